@@ -1,1 +1,1 @@
-"""A scenario becomes a Drake diagram: robots, sources, the world."""
+"""Builds the Drake diagram of a scenario: robots, sources, and the world."""

@@ -1,4 +1,4 @@
-"""Puts robots, sources and obstacles into one world."""
+"""Connects robots, sources and obstacles in one diagram."""
 
 from __future__ import annotations
 
@@ -26,29 +26,30 @@ from systems.framework.input_error import InputError
 
 @dataclass(frozen=True)
 class SoundFollower:
-    """A built scenario: its robots and sources by name.
+    """The diagram of a scenario, with its robots and sources by name.
 
-    ``blocks``, ``port``, ``log`` and ``logged`` are those of the only robot.
+    ``blocks``, ``port``, ``log`` and ``logged`` refer to the only robot.
     """
 
     diagram: Diagram
     scenario: Scenario
     robots: Mapping[str, Parts]
-    """Each robot's blocks: plant, odometry, hearing, tracker, collision, controller,
-    command; with audio also microphones; with ultrasonic sensing also ultrasonic;
-    with a loudspeaker also emitter."""
+    """Blocks of each robot: plant, odometry, hearing, tracker, collision, controller,
+    command; with audio also microphones; with ultrasonic sensing also ultrasonic; with
+    a loudspeaker also emitter."""
     sources: Mapping[str, Parts]
-    """Each source's blocks: source, and with audio emitter."""
+    """Blocks of each source: source, and with audio also emitter."""
     obstacles: Obstacles
     world: Parts | None = None
-    """What all share: wind, plume, radio and sink; none where no robot searches."""
+    """Blocks that all robots share: wind, plume, radio and sink; None if no robot
+    searches."""
 
     @cached_property
     def only(self) -> Parts:
-        """The one robot.
+        """The only robot.
 
         Raises:
-            InputError: There are several.
+            InputError: There are several robots.
         """
         if len(self.robots) > 1:
             raise InputError(
@@ -60,7 +61,7 @@ class SoundFollower:
 
     @cached_property
     def blocks(self) -> dict[str, Any]:
-        """By part: the only robot's, those of its source, and ``obstacles``."""
+        """Blocks by part: of the only robot, of its source, and ``obstacles``."""
         robot = self.only
         target = self.scenario.target(next(iter(self.robots)))
         sources = self.sources[target].blocks if target in self.sources else {}
@@ -69,23 +70,23 @@ class SoundFollower:
 
     @property
     def log(self) -> VectorLogSink | None:
-        """The only robot's log; none unless asked for."""
+        """The log of the only robot; None if the diagram has no log."""
         return self.only.log
 
     @property
     def logged(self) -> Mapping[tuple[str, str], tuple[str, ...]]:
-        """What the only robot's log holds, see ``Parts``."""
+        """Columns in the log of the only robot, see ``Parts``."""
         return self.only.logged
 
     def port(self, part: str, name: str) -> Any:
-        """Output port of a block of the only robot, its source or the obstacles.
+        """Returns an output port of the only robot, its source or the obstacles.
 
         Args:
             part: A key of ``blocks``.
-            name: Of the port.
+            name: Name of the port.
 
         Returns:
-            The port; its value is read in the block's own context.
+            The port; evaluate it in the context of its block.
         """
         return self.blocks[part].GetOutputPort(name)
 
@@ -93,13 +94,13 @@ class SoundFollower:
 def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollower:
     """Builds the diagram of a scenario.
 
-    Every robot and every source is a diagram of its own (``make_robot``,
-    ``make_source``); the world is shared: each robot sees and can hit the
-    obstacles, the other robots and the sources, and hears all that sounds.
+    Each robot and each source is a separate diagram (``make_robot``, ``make_source``)
+    in a common world. Each robot can see and hit the obstacles, the other robots and
+    the sources, and hears all sounds.
 
     Args:
-        scenario: What to build.
-        log: Whether each robot logs what its blocks name columns for.
+        scenario: The scenario to build.
+        log: Whether each robot logs the columns of its blocks.
 
     Returns:
         The diagram, and its blocks by robot, source and part.
@@ -151,14 +152,14 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
 
 
 def _own(scenario: Scenario, name: str, *, audible: bool) -> Scenario:
-    """A robot's own scenario; a loudspeaker that nobody hears is left out."""
+    """A robot's own scenario, without a loudspeaker that no robot hears."""
     own = scenario.of_robot(name)
     return own if audible else own.model_copy(update={"loudspeaker": None})
 
 
 @dataclass(frozen=True)
 class _World:
-    """Joins what robots take from the world to those that give it."""
+    """Connects the inputs of robots to the outputs of sources, obstacles and robots."""
 
     builder: DiagramBuilder
     scenario: Scenario
@@ -168,7 +169,12 @@ class _World:
     shared: Any
 
     def surround(self, name: str) -> None:
-        """Gives a robot all that it takes."""
+        """Connects all inputs of a robot.
+
+        A robot has only those inputs that its blocks need. The poses and sizes of
+        bodies are those of the obstacles, followed by those of other robots and
+        sources.
+        """
         around, target = self.scenario.surroundings(name), self.scenario.target(name)
         if self.shared is not None:
             for port in ("wind", "plume", "air"):
@@ -216,12 +222,12 @@ class _World:
 
     def _constant_port(self, name: str, values: list[float]) -> Any:
         if not self.builder.HasSubsystemNamed(name):
-            array: Any = np.array(values)  # untyped: Drake's stubs take ndarray amiss
+            array: Any = np.array(values)  # untyped: Drake's type stubs reject ndarray
             self.builder.AddNamedSystem(name, ConstantVectorSource(array))
         return self.builder.GetSubsystemByName(name).get_output_port()
 
     def _joined(self, name: str, port: str, more: list[Any]) -> Any:
-        """The obstacles' port, or it and others one after the other."""
+        """Returns the obstacles' port, joined with further ports if there are any."""
         first = self.obstacles.GetOutputPort(port)
         ports = [each for each in (first, *more) if each.size()]
         if len(ports) < 2:

@@ -1,4 +1,4 @@
-"""From the name of a law to its controller block, and to what drives the wheels."""
+"""Makes the controller block of a law, and the block that drives the wheels."""
 
 from __future__ import annotations
 
@@ -20,31 +20,34 @@ from systems.framework.signals import TICK_S
 from systems.laws.catalogue import LAWS
 from systems.ranging.collision_vector import SLOTS
 
-#: What it may tell the log besides, with sizes.
+#: Optional output ports of a law for the log, with sizes.
 _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
 
 
 def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> Any:
     """Builds the controller that ``scenario.law`` names.
 
-    ``package.module:Name`` or ``path/to/file.py:Name`` is a function
-    ``law(c, s, repulsion)`` that returns the force away from an obstacle in N, or
-    a LeafSystem class that may ask for ``robot``, ``attraction``, ``repulsion``,
-    ``sensors``, ``tick_s``, ``following``, ``known``, ``bodies`` and ``seed``. Its
-    inputs are output ports of the diagram, by name; it has one of the outputs that
-    ``make_command`` knows. Either is looked up in the working directory, too. A
-    function is tried at a few distances and speeds.
+    A user's own law is ``package.module:Name`` or ``path/to/file.py:Name``; Python also
+    searches the working directory. It is either a function or a class:
+
+    A function ``law(c, s, repulsion)`` returns the force away from an obstacle, N. It
+    is called at a few distances and speeds as a test.
+
+    A class derives from LeafSystem. Its arguments may be ``robot``, ``attraction``,
+    ``repulsion``, ``sensors``, ``tick_s``, ``following``, ``known``, ``bodies`` and
+    ``seed``. Its inputs have the names of output ports in the diagram. It has exactly
+    one of the outputs that ``make_command`` accepts.
 
     Args:
-        scenario: Its law, and the parameters of the law's block.
+        scenario: Scenario with the law and the parameters of its block.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        seed: Of a law that draws random numbers.
+        seed: Seed of a law that uses random numbers.
 
     Returns:
         The block.
 
     Raises:
-        InputError: There is no such law, or it does not do what a law does.
+        InputError: The law does not exist, or does not have the form of a law.
     """
     sensors = scenario.ultrasonic
     if scenario.obstacle_sensing == "ideal":
@@ -77,7 +80,8 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         return controller(**parts)
     law = import_own(name, "law")
     if inspect.isclass(law):
-        # One that takes any keyword may hand it on to a law of ours, which does not.
+        # Pass only those of ``more`` that the signature names: a law that takes any
+        # keyword may pass all of them on to a law of the package, which rejects some.
         named = inspect.signature(getattr(law, "_construct", law)).parameters
         wanted = {key: value for key, value in more.items() if key in named}
         return _own_block(name, law, {**parts, **wanted})
@@ -110,36 +114,36 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
 def make_command(
     controller: Any, robot: RobotParameters, tick_s: float = TICK_S
 ) -> Any:
-    """Builds the block that drives the wheels as a controller commands.
+    """Builds the block that drives the wheels by the commands of a controller.
 
     Args:
-        controller: A block with one output of size 2 out of ``acceleration_W`` (of
-            P, m/s^2), ``velocity_W`` (of P, m/s) and ``twist_B`` (forward speed and
+        controller: A block with exactly one output of size 2 among ``acceleration_W``
+            (of P, m/s^2), ``velocity_W`` (of P, m/s) and ``twist_B`` (forward speed and
             yaw rate, m/s and rad/s).
         robot: Dimensions and limits.
         tick_s: Period of the command, s.
 
     Returns:
-        The block, with an input of that name.
+        The block, with an input of the same name.
 
     Raises:
-        InputError: The controller has none of them, or several.
+        InputError: The controller has none of these outputs, or several.
     """
     return WheelCommand(command=commanded(controller), robot=robot, tick_s=tick_s)
 
 
 def commanded(controller: Any, name: str = "") -> str:
-    """Output port by which a controller commands.
+    """Returns the name of the output port that carries the commands of a controller.
 
     Args:
-        controller: As of ``make_command``.
-        name: Of its law, for the error.
+        controller: A controller, see ``make_command``.
+        name: Name of its law, for errors.
 
     Returns:
         Name of the port.
 
     Raises:
-        InputError: It has none that is known, or several.
+        InputError: The controller has no such port, or several.
     """
     name = name or controller.get_name()
     sizes = _output_sizes(controller)

@@ -1,4 +1,4 @@
-"""A user's own blocks in a robot."""
+"""Adds a user's own blocks to a robot."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from systems.framework.input_error import InputError
 def with_own_blocks(
     blocks: Mapping[str, Any], names: tuple[str, ...], parts: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """A robot's blocks by part, a user's own among them.
+    """Returns the blocks of a robot by part, including a user's own blocks.
 
     Args:
-        blocks: Ours by part.
-        names: Of the user's own, ``package.module:Name`` or ``path/to/file.py:Name``;
-            one stands in the place of ours of its part.
-        parts: What its ``__init__`` may ask for, by the names of its arguments.
+        blocks: Blocks of the package by part.
+        names: Names of the user's blocks, ``package.module:Name`` or
+            ``path/to/file.py:Name``. A block of the user replaces the block with the
+            same part.
+        parts: Available arguments for their ``__init__``, by name.
 
     Returns:
-        Blocks by part: a copy with the user's own in their places.
+        A new mapping of blocks by part.
 
     Raises:
-        InputError: Two of them have one part, or there is no such block, it does not
-            say what it is, or it cannot be made.
+        InputError: Two of the user's blocks have the same part, or a block does not
+            exist, does not state its part, or cannot be made.
     """
     joined, own = dict(blocks), set()
     for name in names:

@@ -1,4 +1,4 @@
-"""A user's own law: tried, and watched while it runs."""
+"""Tests a user's own law, and checks its results during a run."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from systems.laws.repulsion import RepulsionParameters
 
 
 def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
-    """The law, with an error that names it where it does not return a force.
+    """Wraps a law so that an invalid result raises an error that names the law.
 
     Args:
-        name: Of the law, for messages.
+        name: Name of the law, for messages.
         law: ``law(c, s, repulsion)``; returns a force, N.
 
     Returns:
-        A function of the same arguments. It returns a finite float or AutoDiffXd, N, or
-        raises InputError.
+        A function with the same arguments. It returns a finite float or AutoDiffXd, N,
+        or raises InputError.
     """
 
     @functools.wraps(law)
     def checked(c: Any, s: Any, repulsion: RepulsionParameters) -> Any:
         try:
             force = law(c, s, repulsion)
-        except BaseException as error:  # a user's law raises what it likes
+        except BaseException as error:  # a user's law may raise any exception
             if is_interrupt(error):
                 raise
             raise _failed(name, c, s, f"raises {why(error)}") from error
@@ -57,16 +57,16 @@ def try_law(
     range_m: float,
     top_speed_m_s: float,
 ) -> None:
-    """Calls a law near and far, at rest and fast, as a run will.
+    """Calls a law at several distances and speeds, as a test before the run.
 
     Args:
-        law: From ``checked_law``.
+        law: A function from ``checked_law``.
         repulsion: Gains of all laws.
-        range_m: Largest distance that is tried, m.
-        top_speed_m_s: Largest speed that is tried, m/s.
+        range_m: Largest tested distance, m.
+        top_speed_m_s: Largest tested speed, m/s.
 
     Raises:
-        InputError: It does not return a force everywhere.
+        InputError: The law does not always return a force.
     """
     for share in (1e-3, 0.1, 0.5, 1.0):
         for s in (0.0, 0.5 * top_speed_m_s, top_speed_m_s):
@@ -88,7 +88,7 @@ def _number(value: Any) -> float:
 
 
 def _brief(value: Any) -> str:
-    """As a reader sees it, whatever its own words would be."""
+    """Returns a short text of any value, even if its ``__repr__`` fails."""
     try:
         text = repr(value)
     except Exception:  # noqa: BLE001  # a user's __repr__

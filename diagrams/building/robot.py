@@ -1,4 +1,4 @@
-"""One robot, and one source, as a diagram of its own."""
+"""Builds the diagrams of one robot, of one source, and of the world."""
 
 from __future__ import annotations
 
@@ -36,37 +36,37 @@ from systems.laws.impedance_controller import LAW_COLUMNS
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import SoundParameters
 
-#: What a robot takes from the world around it; of emissions, all.
+#: Inputs of a robot that come from the world; ``emission`` includes all emissions.
 OUTSIDE = "pose_WS", "poses_WO", "sizes", "emission", "wind", "plume", "air"
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a robot's or a source's diagram is made of."""
+    """The parts of a robot's or a source's diagram."""
 
     diagram: Diagram
     blocks: Mapping[str, Any]
-    """Blocks by part, as ``plant``."""
+    """Blocks by part, for example ``plant``."""
     log: VectorLogSink | None = None
-    """Rows of the logged ports, one after the other; none unless asked for."""
+    """Log of the logged ports, one after the other; None if the diagram has no log."""
     logged: Mapping[tuple[str, str], tuple[str, ...]] = field(default_factory=dict)
-    """What the log holds, in order: the columns of each (part, port)."""
+    """Columns of the log by (part, port), in order."""
 
     def port(self, part: str, name: str) -> Any:
-        """Output port of a block.
+        """Returns an output port of a block.
 
         Args:
             part: A key of ``blocks``.
-            name: Of the port.
+            name: Name of the port.
 
         Returns:
-            The port; its value is read in the block's own context.
+            The port; evaluate it in the context of its block.
         """
         return self.blocks[part].GetOutputPort(name)
 
 
 def parts_of(diagram: Diagram) -> Parts:
-    """The parts of what ``make_robot`` or ``make_source`` has made."""
+    """Returns the parts of a diagram of a robot, a source or the world."""
     log, blocks, logged = None, {}, {}
     for system in diagram.GetSystems():
         if isinstance(system, VectorLogSink):
@@ -79,10 +79,10 @@ def parts_of(diagram: Diagram) -> Parts:
 
 
 def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ...]]:
-    """What a log of a robot holds, in order.
+    """Returns the columns in the log of a robot, in order.
 
     Args:
-        blocks: Of the robot, by part.
+        blocks: Blocks of the robot, by part.
 
     Returns:
         The columns of each (part, port).
@@ -95,14 +95,14 @@ def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ..
 
 
 def publishes_state(block: Any, port: str) -> bool:
-    """Whether an output of a block is part of its state: what its last update made.
+    """Whether an output of a block is part of the state, computed by the last update.
 
     Args:
-        block: Of a robot or the world.
+        block: A block of a robot or of the world.
         port: Name of its output.
 
     Returns:
-        False where it is made of the present inputs, or moves between ticks.
+        False if the output depends on the present inputs, or changes between ticks.
     """
     if block.num_continuous_states():
         return False
@@ -114,11 +114,11 @@ def publishes_state(block: Any, port: str) -> bool:
 
 
 def block_seed(seed: int, name: str) -> int:
-    """A block's own seed: depends on the scenario's seed and its name alone.
+    """Computes the seed of a block from the scenario's seed and the block's name.
 
     Args:
-        seed: Of the scenario.
-        name: Of the block.
+        seed: Seed of the scenario.
+        name: Name of the block.
 
     Returns:
         A whole number from 0 to 2^64 - 1.
@@ -128,25 +128,27 @@ def block_seed(seed: int, name: str) -> int:
 
 
 def seed_of(scenario: Scenario, block: str, owner: str) -> int:
-    """The seed of a block; of the only robot or source it is that of the block.
+    """Returns the seed of a block of a robot or source.
+
+    The names of the only robot and of the only source do not affect the seed.
 
     Args:
-        scenario: The run.
+        scenario: The scenario that is run.
         block: Name of the block.
         owner: Name of the robot or source that has it.
 
     Returns:
-        As ``block_seed``.
+        A seed, see ``block_seed``.
     """
     name = block if owner in (ROBOT, SOURCE) else f"{block}_{owner}"
     return block_seed(scenario.seed, name)
 
 
 def world_seeds(scenario: Scenario) -> dict[str, int]:
-    """Seeds of the blocks that all robots share, by name.
+    """Returns the seeds of the blocks that all robots share, by name.
 
     Args:
-        scenario: The run.
+        scenario: The scenario that is run.
     """
     names = "wind_field", "odor_plume", "radio_channel"
     return {name: block_seed(scenario.seed, name) for name in names}
@@ -160,20 +162,20 @@ def robot_blocks(
     robots: Sequence[int] = (),
     others: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """The blocks of a robot by part, a user's own among them.
+    """Makes the blocks of a robot, including a user's own blocks.
 
     Args:
-        scenario: Of this robot alone, see ``Scenario.of_robot``.
-        name: Of the robot; its random numbers depend on it.
+        scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
+        name: Name of the robot; its random numbers depend on the name.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Numbers of those that are robots.
-        others: Names of the sources that are not followed.
+        robots: Numbers of those bodies that are robots.
+        others: Names of the sources that the robot does not follow.
 
     Returns:
-        As a diagram needs them, not yet in one.
+        Blocks by part, not yet in a diagram.
 
     Raises:
-        InputError: As ``make_robot``.
+        InputError: See ``make_robot``.
     """
     own_seed = partial(seed_of, scenario, owner=name)
     seed = own_seed("controller")
@@ -235,30 +237,31 @@ def make_robot(
     listeners_frame_s: float = TICK_S,
     log: bool = False,
 ) -> Diagram:
-    """A robot that follows a sound, as a diagram with ports of its own.
+    """Builds the diagram of a robot.
 
-    The same function builds every fidelity: ``hearing`` and
-    ``obstacle_sensing`` choose blocks with the same ports. Inside, every input is
-    joined to the one output of its name (see docs/model.md). With both ideal and
-    ``odometry.rounding`` off the diagram converts to AutoDiffXd.
+    The same function builds all levels of detail: ``hearing`` and ``obstacle_sensing``
+    select blocks with the same ports. Each input connects to the only output with the
+    same name (see docs/model.md). With both ideal and ``odometry.rounding`` off, the
+    diagram converts to AutoDiffXd.
 
-    Input ports, as far as its blocks need them: ``pose_WS`` of what it follows,
-    ``poses_WO`` and ``sizes`` of the other bodies, ``emission`` of what it follows,
-    ``emission_<name>`` of each other source, and ``wind``, ``plume`` and ``air`` of
-    the world. Output ports: ``pose_WB``, ``velocity_WB``, with a loudspeaker
-    ``own_emission``, and of one that searches ``frames``.
+    The diagram has those of the following inputs that its blocks need: ``pose_WS`` and
+    ``emission`` of the target, ``poses_WO`` and ``sizes`` of the other bodies,
+    ``emission_<name>`` of each other source, and ``wind``, ``plume`` and ``air`` of the
+    world. Its outputs are ``pose_WB`` and ``velocity_WB``, with a loudspeaker
+    ``own_emission``, and for a searching robot ``frames``.
 
     Args:
-        scenario: Of this robot alone, see ``Scenario.of_robot``.
-        name: Of the robot; its random numbers depend on it.
+        scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
+        name: Name of the robot; its random numbers depend on the name.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Numbers of those that are robots.
-        others: Names of the sources that are not followed.
-        listeners_frame_s: Longest frame of those that hear its loudspeaker, s.
-        log: Whether to log what its blocks name columns for, at every tick.
+        robots: Numbers of those bodies that are robots.
+        others: Names of the sources that the robot does not follow.
+        listeners_frame_s: Longest audio frame of the robots that hear its loudspeaker,
+            s.
+        log: Whether to log the columns of its blocks at every tick.
 
     Returns:
-        The diagram; ``parts_of`` gives its blocks by what they are for.
+        The diagram; ``parts_of`` returns its blocks by part.
 
     Raises:
         InputError: The law is not known, or a sound file cannot be played.
@@ -290,17 +293,17 @@ def make_robot(
 
 
 def make_world(scenario: Scenario, *, log: bool = False) -> Diagram | None:
-    """What all robots share, as a diagram with ports of its own.
+    """Builds the diagram of the blocks that all robots share.
 
-    Input ports: ``frames_<name>`` of each robot that searches. Output ports: what its
-    blocks put out, ``air`` among it.
+    Its inputs are ``frames_<name>`` of each searching robot. Its outputs are those of
+    its blocks that robots need, for example ``air``.
 
     Args:
-        scenario: The run.
-        log: Whether to log what its blocks name columns for, at every tick.
+        scenario: The scenario that is run.
+        log: Whether to log the columns of its blocks at every tick.
 
     Returns:
-        The diagram; none where no robot searches.
+        The diagram; None if no robot searches.
     """
     blocks = [*world_blocks(scenario, world_seeds(scenario)).values()]
     if not blocks:
@@ -324,18 +327,18 @@ def make_world(scenario: Scenario, *, log: bool = False) -> Diagram | None:
 def make_source(
     scenario: Scenario, name: str, source: SourceParameters, *, audible: bool
 ) -> Diagram:
-    """A source, driven along its waypoints, as a diagram with ports of its own.
+    """Builds the diagram of a source, which moves along its waypoints.
 
-    Output ports: ``pose_WS``, ``v_WS``, and ``emission`` where it is audible.
+    Its outputs are ``pose_WS``, ``v_WS``, and ``emission`` if it is audible.
 
     Args:
-        scenario: For the seed, the air and the room.
-        name: Of the source; its random numbers depend on it.
+        scenario: Scenario with the seed, the air and the room.
+        name: Name of the source; its random numbers depend on the name.
         source: Its path, drive and sound.
-        audible: Whether anybody hears its sound as waves.
+        audible: Whether a robot hears its sound as waves.
 
     Returns:
-        The diagram; its name is that of the source.
+        The diagram, named after the source.
 
     Raises:
         InputError: Its sound file cannot be played.
@@ -379,7 +382,7 @@ def _emitter(
 
 @contextmanager
 def _fields_of_robot(name: str) -> Iterator[None]:
-    """Errors of a route name the robot's field in the scenario."""
+    """Makes errors of a route name the field of the robot in the scenario."""
     try:
         yield
     except InputError as error:
@@ -392,12 +395,12 @@ def _fields_of_robot(name: str) -> Iterator[None]:
 def naming_sounds(
     scenario: Scenario, name: str, sound: SoundParameters
 ) -> Iterator[None]:
-    """Errors of a sound name its field in the scenario.
+    """Makes errors of a sound name the field of the sound in the scenario.
 
     Args:
-        scenario: Has the sound.
-        name: Of the source or robot that plays it.
-        sound: What is played.
+        scenario: Scenario with the sound.
+        name: Name of the source or robot that plays it.
+        sound: The sound.
 
     Yields:
         Nothing.
@@ -421,7 +424,7 @@ def naming_sounds(
 
 
 def _carry_loudspeaker(builder: DiagramBuilder, emitter: Any, plant: Any) -> None:
-    """The robot's own loudspeaker stands where the robot is: W's S is its B."""
+    """Attaches the loudspeaker to the robot: frame S is the robot's frame B."""
     builder.AddNamedSystem(emitter.get_name(), emitter)
     for output, entry in (("pose_WB", "pose_WS"), ("velocity_WB", "v_WS")):
         builder.Connect(plant.GetOutputPort(output), emitter.GetInputPort(entry))
@@ -429,7 +432,7 @@ def _carry_loudspeaker(builder: DiagramBuilder, emitter: Any, plant: Any) -> Non
 
 
 def _driving(scenario: Scenario, controller: Any) -> Any:
-    """What drives the wheels as the law commands, as far as a guard lets it."""
+    """Makes the block that drives the wheels, with a guard or safety filter if set."""
     if scenario.searches is not None:
         return search_command(scenario)
     if scenario.route is not None:
@@ -451,20 +454,20 @@ def _driving(scenario: Scenario, controller: Any) -> Any:
 def connect_by_name(
     builder: DiagramBuilder, blocks: Sequence[Any], outside: Sequence[str] = ()
 ) -> None:
-    """Joins every input port to the one output port of the same name.
+    """Connects each input port to the only output port with the same name.
 
-    A quantity has one name on every port (see docs/model.md), so the wiring
-    needs no list.
+    A quantity has the same name on every port (see docs/model.md), so there is no list
+    of connections.
 
     Args:
-        builder: That of the robot or source, which has the blocks.
-        blocks: Its blocks.
-        outside: Quantities that come from elsewhere: they become its own inputs; a
-            name that goes on after one of these and an underscore, too.
+        builder: Builder of the robot or source, which contains the blocks.
+        blocks: Blocks to connect.
+        outside: Quantities from outside, which become inputs of the diagram. Names that
+            begin with one of these and an underscore also count.
 
     Raises:
-        InputError: More than one block publishes a quantity, or none, and it does
-            not come from elsewhere.
+        InputError: Several blocks publish a needed quantity, or none does and it does
+            not come from outside.
     """
     outputs = require_published(blocks, outside)
     entries: dict[str, Any] = {}
@@ -481,17 +484,17 @@ def connect_by_name(
 
 
 def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str, Any]:
-    """Refuses blocks whose inputs are not published, or more than once.
+    """Refuses blocks whose inputs are not published exactly once.
 
     Args:
-        blocks: Of a robot or a source.
-        outside: As of ``connect_by_name``.
+        blocks: Blocks of a robot or a source.
+        outside: Quantities from outside, see ``connect_by_name``.
 
     Returns:
         Their output ports by name.
 
     Raises:
-        InputError: Names the block and what it needs.
+        InputError: Names the block and the input that it needs.
     """
     blocks, outputs, counts = list(blocks), {}, Counter[str]()
     for block in blocks:
@@ -513,7 +516,11 @@ def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str
 
 
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:
-    """Output ports of a block that have columns, of a user's own as far as it has."""
+    """Columns of a block's output ports, by port.
+
+    A user's own block without columns has those of ``LAW_COLUMNS`` for which it has a
+    port of the right size.
+    """
     columns = getattr(block, "columns", None) or LAW_COLUMNS
     ports = {
         port.get_name(): port.size()
@@ -525,22 +532,22 @@ def _columns(block: Any) -> dict[str, tuple[str, ...]]:
 
 
 def _add_log(builder: DiagramBuilder, blocks: Sequence[Any], tick_s: float) -> None:
-    """One sink behind a multiplexer: a third cheaper than a sink a port."""
+    """Adds one log behind a multiplexer: a third cheaper than a log per port."""
     ports = [block.GetOutputPort(name) for block in blocks for name in _columns(block)]
     joined = multiplexed(builder, "log_multiplexer", ports)
     LogVectorOutput(joined, builder, publish_period=tick_s).set_name("log")
 
 
 def multiplexed(builder: DiagramBuilder, name: str, ports: Sequence[Any]) -> Any:
-    """One output port with the values of several, one after the other.
+    """Joins several output ports into one, in order.
 
     Args:
-        builder: That of the diagram.
-        name: Of the block that joins them.
-        ports: Output ports of vectors.
+        builder: Builder of the diagram.
+        name: Name of the multiplexer.
+        ports: Output ports that carry vectors.
 
     Returns:
-        The port.
+        The joined port.
     """
     block = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
     for index, port in enumerate(ports):

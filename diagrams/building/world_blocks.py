@@ -1,4 +1,4 @@
-"""What all robots share and no robot has: wind, plume, and what is on the air."""
+"""The blocks that all robots share: wind, plume, radio and sink."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from systems import OdorPlume, RadioChannel, SinkMonitor, WindField
 
 
 def radio_nodes(scenario: Scenario) -> dict[str, int]:
-    """Robots with a radio, and their addresses.
+    """Returns the robots with a radio, and their addresses.
 
     Args:
-        scenario: The run.
+        scenario: The scenario that is run.
 
     Returns:
         Addresses by name.
@@ -27,14 +27,14 @@ def radio_nodes(scenario: Scenario) -> dict[str, int]:
 
 
 def world_blocks(scenario: Scenario, seeds: Mapping[str, int]) -> dict[str, Any]:
-    """The blocks, by part; none where no robot needs them.
+    """Makes the shared blocks; there are none if no robot needs them.
 
     Args:
-        scenario: The run.
-        seeds: Of the blocks, by name.
+        scenario: The scenario that is run.
+        seeds: Seeds of the blocks, by name.
 
     Returns:
-        As a diagram needs them, not yet in one.
+        Blocks by part, not yet in a diagram.
     """
     blocks: dict[str, Any] = {}
     nodes, tick_s = radio_nodes(scenario), scenario.tick_s

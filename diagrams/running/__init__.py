@@ -1,1 +1,1 @@
-"""A diagram runs: Drake's simulator, the compiled loop, the end, the result."""
+"""Running a diagram: Drake's simulator, the compiled loop, stop rules, and results."""

@@ -1,4 +1,4 @@
-"""What a run did."""
+"""The result of a run."""
 
 from __future__ import annotations
 
@@ -25,41 +25,42 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a robot did, at every tick, and why its run ended.
+    """What a robot did at every tick, and why its run ended.
 
-    Of several robots, what all did: ``robots`` has one of each, the names of
-    columns begin with that of the robot and a dot, and the cause is that of the
-    first robot which did not do what it should, the ones that touched something
-    before the others.
+    For a run of several robots, ``robots`` has one result per robot. Column names then
+    begin with the name of the robot and a dot. ``cause`` is that of the decisive robot,
+    see ``decisive_robot``.
     """
 
     scenario: Scenario
-    """Of one robot among several, that of it alone (``Scenario.of_robot``)."""
+    """The scenario that was run. For one of several robots: the scenario of that robot
+    alone (``Scenario.of_robot``)."""
     cause: str
     """One of reached, completed, found, unsettled, timeout, astray, collision, stuck,
-    no way found, false find, lost, diverged, interrupted; docs/model.md says when."""
+    no way found, false find, lost, diverged, interrupted; docs/model.md defines
+    them."""
     collision: Collision | None
-    """Set where the cause is collision."""
+    """The collision, if the cause is collision."""
     columns: dict[str, NDArray[np.float64]]
     """Columns of ``trajectory``."""
     wall_s: float
-    """Time that the simulation took, without building the diagram and compiling or
-    loading what numba compiles, s."""
+    """Duration of the simulation, s. It excludes building the diagram, and compiling or
+    loading code with numba."""
     name: str = ROBOT
-    """Of the robot."""
+    """Name of the robot."""
     engine: Engine = "drake"
-    """What carried the run out."""
+    """The engine that simulated the run."""
     several: dict[str, Self] = field(default_factory=dict)
-    """What each robot did, where there are several."""
+    """Results of the individual robots, if there are several."""
     others: Surroundings | None = None
-    """What this robot had about it, other robots on their ways included."""
+    """Surroundings of this robot, including the recorded paths of the other robots."""
     whole: Scenario | None = None
-    """What was run, where that is more than ``scenario``."""
+    """The whole scenario, if it has more than ``scenario``."""
     ended: float = 0.0
     """Number of the ending of a search, see ``systems.search.search_ending``."""
     world: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """What the sink of a search has heard of each robot, which is in its columns, too:
-    ``robot.frames`` here is ``sink_frames`` there."""
+    """What the sink of a search heard from each robot. The columns of each robot have
+    it, too: ``robot.frames`` here is ``sink_frames`` there."""
 
     @property
     def full_scenario(self) -> Scenario:
@@ -68,53 +69,53 @@ class RunResult:
 
     @cached_property
     def warnings(self) -> tuple[ScenarioWarning, ...]:
-        """What a user must know of the whole scenario, although it could be run."""
+        """Warnings about the whole scenario."""
         return warnings_of(self.full_scenario)
 
     @property
     def robots(self) -> dict[str, Self]:
-        """What each robot did, by name."""
+        """The result of each robot, by name."""
         return self.several or {self.name: self}
 
     @cached_property
     def surroundings(self) -> Surroundings:
-        """What the robot could hit, and what it followed."""
+        """The bodies that the robot could hit, and the one that it followed."""
         return self.others or self.scenario.surroundings()
 
     @property
     def ending(self) -> str:
-        """Cause, and what was touched, or why a search was given up."""
+        """The cause, with the touched object or the reason why the search ended."""
         if self.collision:
             return f"{self.cause} with {self.collision.object}"
         return f"{self.cause}: {self.reason}" if self.reason else self.cause
 
     @property
     def reason(self) -> str:
-        """Why a search was given up; else empty."""
+        """The reason why a search was given up; otherwise empty."""
         return SEARCH_REASONS.get(round(self.ended), "")
 
     @property
     def target_moves(self) -> bool:
-        """Whether what is followed ever moves."""
+        """Whether the target of the robot ever moves."""
         return self.surroundings.followed.path.moves
 
     @property
     def goal_radius_m(self) -> float:
-        """P is in the goal within this distance of what it follows, m."""
+        """P is in the goal within this distance of the target, m."""
         return self.scenario.goal_radius(moves=self.target_moves)
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """(n,) s."""
+        """(n,) times of the ticks, s."""
         return self.columns["t"]
 
     def poses(self, body: str) -> NDArray[np.float64]:
-        """(n, 3) x, y, theta in W at the ticks, m and rad; body ``WB`` or ``WS``."""
+        """(n, 3) x, y, theta in W at the ticks, m and rad; body is ``WB`` or ``WS``."""
         names = (f"p_{body}_x", f"p_{body}_y", f"theta_{body}")
         return np.stack([self.columns[name] for name in names], axis=1)
 
     def vector(self, name: str) -> NDArray[np.float64]:
-        """(2, n) x and y of a column's quantity at the ticks, as of ``p_WP``."""
+        """(2, n) x and y of a quantity at the ticks, for example ``p_WP``."""
         return np.array([self.columns[f"{name}_x"], self.columns[f"{name}_y"]])
 
     @property
@@ -124,7 +125,7 @@ class RunResult:
 
     @cached_property
     def trajectory(self) -> pd.DataFrame:
-        """A row a tick: SI units, frames as in docs/model.md."""
+        """Table with one row per tick, in SI units and the frames of docs/model.md."""
         import pandas as pd
 
         return pd.DataFrame(self.columns)
@@ -138,18 +139,19 @@ def gather_result(
     engine: Engine = "drake",
     world: dict[str, NDArray[np.float64]] | None = None,
 ) -> RunResult:
-    """The result of a run that has ended.
+    """Collects the result of a run that has ended.
 
     Args:
-        scenario: That was run.
-        rules: Each robot's stop rules, with their causes.
-        logs: Each robot's columns, with the time t.
-        wall_s: Time that the simulation took, s.
-        engine: What carried the run out.
-        world: Columns of what all robots share.
+        scenario: The scenario that was run.
+        rules: The stop rules of each robot, with their causes.
+        logs: The columns of each robot, with the time t.
+        wall_s: Duration of the simulation, s.
+        engine: The engine that simulated the run.
+        world: Columns of the blocks that all robots share.
 
     Returns:
-        Of the only robot, or of all with each in ``several``.
+        The result of the only robot; or one result for all robots, with those of the
+        robots in ``several``.
     """
     paths = {
         name: RecordedPath(log["t"], np.column_stack([log[key] for key in _POSE]))
@@ -198,7 +200,7 @@ def gather_result(
 def _heard_by_sink(
     world: Mapping[str, NDArray[np.float64]], robot: str
 ) -> dict[str, NDArray[np.float64]]:
-    """What the sink of a search knows of one robot, as columns of that robot."""
+    """What the sink of a search knows about one robot, as columns of that robot."""
     begin = f"{robot}."
     return {
         f"sink_{key.removeprefix(begin)}": values
@@ -213,15 +215,15 @@ _POSE = ("p_WB_x", "p_WB_y", "theta_WB")
 def logged_columns(
     parts: Parts, times: NDArray[np.float64], rows: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """The columns of a robot's log, and the time.
+    """Returns the columns of a robot's log, and the time.
 
     Args:
-        parts: Of the robot.
-        times: (n,) s.
-        rows: (columns, n) what was logged.
+        parts: Parts of the robot.
+        times: (n,) times of the rows, s.
+        rows: (columns, n) logged values.
 
     Returns:
-        (n,) each, by name.
+        (n,) arrays, by name.
     """
     names = [name for columns in parts.logged.values() for name in columns]
     return {"t": times, **dict(zip(names, rows, strict=True))}
@@ -230,7 +232,7 @@ def logged_columns(
 def _completed(
     columns: dict[str, NDArray[np.float64]], scenario: Scenario, around: Surroundings
 ) -> dict[str, NDArray[np.float64]]:
-    """With what follows from the log: P, and the true and heard place of the source."""
+    """Adds columns that the log implies: P, true and measured source position."""
     offset, theta = scenario.robot.control_point_m, columns["theta_WB"]
     c, s = np.cos(theta), np.sin(theta)
     x_P = columns["p_WB_x"] + offset * c
@@ -242,7 +244,7 @@ def _completed(
     columns["p_WP_x"], columns["p_WP_y"] = x_P, y_P
     columns["source_range_true"] = np.sqrt(dx * dx + dy * dy)
     columns["source_bearing_true"] = np.arctan2(left, ahead)
-    if "detected" not in columns:  # it drives to a goal, or smells
+    if "detected" not in columns:  # the robot drives to a goal or searches for an odor
         return columns
     x, y = columns["p_PS_B_x"], columns["p_PS_B_y"]
     heard, ranged = columns["detected"] > 0.5, columns["range_valid"] > 0.5

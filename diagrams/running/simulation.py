@@ -1,4 +1,4 @@
-"""Runs a scenario and returns what happened."""
+"""Runs a scenario and returns its result."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import WORLD, Scenario
 from systems.framework.input_error import InputError
 
-# Until then a source that sounds from the first instant has been heard and followed.
+# Within this time a robot has heard a source that sounds from the start, and follows.
 _FIRST_TICKS_S = 0.15
-# Kinds of builds that were run in this process.
+# Kinds of scenarios whose compiled code this process has loaded.
 _LOADED: set[tuple[object, ...]] = set()
 
 
 def make_simulator(follower: SoundFollower) -> Simulator:
-    """A simulator of the diagram with the scenario's integrator."""
+    """Makes a simulator of the diagram, with the integrator of the scenario."""
     simulator = Simulator(follower.diagram)
     ApplySimulatorConfig(simulator_config(follower.scenario), simulator)
     return simulator
 
 
 def simulator_config(scenario: Scenario) -> SimulatorConfig:
-    """The scenario's integrator, as Drake takes it."""
+    """The integrator of the scenario, as a Drake configuration."""
     return SimulatorConfig(
         integration_scheme=scenario.integrator.scheme,
         max_step_size=scenario.integrator.step_s,
@@ -57,18 +57,18 @@ def simulate(
     """Runs a scenario to its end.
 
     Args:
-        scenario: What to run.
-        follower: A logged build of the same scenario to use again: Drake
-            never frees blocks written in Python, so many runs in one process
-            should share a build. Compiled runs do by themselves.
-        progress: Called with the simulated time, s, once a simulated second.
-        engine: ``drake``, or ``compiled``: the same blocks in one compiled loop; they
-            are compiled for up to 15 s when they are first used, and kept on the disk.
-            None: that of the scenario, Drake's if that is ``auto``.
-        audio: Opened files for what is heard and played; none: nothing is saved.
+        scenario: The scenario to run.
+        follower: A diagram of the same scenario, built with ``log=True``, to use again.
+            Drake never frees blocks written in Python, so many runs in one process
+            should share one diagram. Compiled runs share blocks automatically.
+        progress: Called with the simulated time, s, once per simulated second.
+        engine: ``drake``, or ``compiled``, which runs the same blocks in one compiled
+            loop. Their first use compiles the blocks for up to 15 s; the code stays on
+            the disk. None: the engine of the scenario; ``auto`` means Drake.
+        audio: Open files for the sound of the run; None: no sound is saved.
 
     Returns:
-        ``RunResult``.
+        The result of the run.
 
     Raises:
         InputError: The law is not known.
@@ -109,11 +109,13 @@ def simulate(
 def _logged(
     follower: SoundFollower, simulator: Simulator
 ) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """Columns of each robot, and of the world if it has any, when a run has ended.
+    """Returns the columns of each robot, and of the world if there is one, after a run.
 
-    Drake logs at an instant before the updates at that instant. What a block publishes
-    of its state is in the row of the next tick, for it changes at ticks alone; so it is
-    moved to the row before, that of the tick at which the block made it.
+    Drake logs before it performs the updates of the same instant. An output that is
+    part of the state of a block therefore appears one row too late. Such outputs change
+    only at ticks. This function moves their columns up by one row, to the tick at which
+    the block computed them. It evaluates the last row after the updates of the last
+    tick.
     """
     context = simulator.get_context()
     every = {**follower.robots}
@@ -140,7 +142,10 @@ def _logged(
 def _monitor(
     follower: SoundFollower, rules: StopRules, audio: RunAudio | None
 ) -> Callable[[Any], Any]:
-    """What the simulator calls after every step: saves the sound, and judges."""
+    """Returns the function that the simulator calls after every step.
+
+    It saves the sound, if any, and applies the stop rules.
+    """
     if audio is None:
         return rules
     save = DiagramAudio(follower, audio)
@@ -153,24 +158,25 @@ def _monitor(
 
 
 def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
-    """The compiled loop of a scenario, compiled or loaded, before its first tick.
+    """Compiles or loads the compiled loop of a scenario, without running a tick.
 
     Args:
-        scenario: What to run.
-        audio: Where its sound goes, if it is saved.
+        scenario: The scenario to run.
+        audio: Open files for the sound, if it is saved.
 
     Returns:
-        The loop.
+        The loop before its first tick.
 
     Raises:
-        InputError: As ``simulate``.
+        InputError: See ``simulate``.
     """
     loop = _new_loop(scenario, audio)
     loop.prepare()
     listens = any(robot.listens for robot in scenario.all_robots.values())
     kind = "compiled", *_kind(scenario)
     if listens and kind not in _LOADED:
-        # What it calls in Python is compiled, too; errors are the run's to raise.
+        # A short separate run compiles the functions that the loop calls in Python.
+        # It ignores errors, which the run itself raises again.
         aside = _new_loop(scenario)
         with suppress(ValueError):
             aside.advance(math.ceil(_FIRST_TICKS_S / scenario.tick_s))
@@ -188,7 +194,7 @@ def _run_compiled(
     progress: Callable[[float], None] | None,
     audio: RunAudio | None,
 ) -> RunResult:
-    """``simulate`` by a compiled loop."""
+    """Runs ``simulate`` with a compiled loop."""
     loop = prepared_loop(scenario, audio)
     start = perf_counter()
     ticks_a_second = max(1, round(1.0 / scenario.tick_s))
@@ -204,10 +210,10 @@ def _run_compiled(
 
 
 def _python_views(follower: SoundFollower, context: Any) -> list[Any]:
-    """Objects by which Python sees contexts, states and outputs of the blocks.
+    """Returns Python objects for the contexts, states and outputs of the blocks.
 
-    As long as they are held, they are not made anew for each call of a block: 5 %
-    of a run.
+    While the caller holds them, they are not created again for each call of a block.
+    This saves 5 % of the time of a run.
     """
     views: list[Any] = []
     for parts in (*follower.sources.values(), *follower.robots.values()):
@@ -223,14 +229,15 @@ def _python_views(follower: SoundFollower, context: Any) -> list[Any]:
 
 
 def load_compiled_code(follower: SoundFollower) -> None:
-    """Runs some ticks aside where a process runs a kind of build for the first time.
+    """Compiles or loads the numba code that a diagram needs, by running a few ticks.
 
-    numba compiles then, or loads what it compiled in an earlier process: a tenth of
-    a run of 40 s, or many times a run, which is none of the simulation's own time.
-    ``simulate`` does it by itself; a process that forks does it beforehand.
+    A process does so once for each kind of diagram. numba compiles the code, or loads
+    the code that an earlier process compiled. Loading takes a tenth of the time of a
+    run of 40 s; compiling takes many times that. Neither counts as simulation time.
+    ``simulate`` calls this function; a process that forks calls it before it forks.
 
     Raises:
-        InputError: As ``simulate``.
+        InputError: See ``simulate``.
     """
     kind = _kind(follower.scenario)
     if kind not in _LOADED:
@@ -241,7 +248,7 @@ def load_compiled_code(follower: SoundFollower) -> None:
 
 
 def _kind(scenario: Scenario) -> tuple[object, ...]:
-    """What decides which compiled functions a run needs."""
+    """The properties of a scenario that determine which compiled functions it needs."""
     return tuple(
         (
             robot.hearing,

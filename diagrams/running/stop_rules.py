@@ -23,24 +23,24 @@ from systems.world.geometry import (
     rectangle_clearance,
 )
 
-#: Causes of runs that did what they should.
+#: Causes of successful runs.
 SUCCESSFUL = ("reached", "completed", "found")
 #: Causes that end the run of all robots.
 ENDING = ("collision", "diverged")
-#: Cause of a robot whose run another's end has cut short.
+#: Cause of a robot whose run ends early because the run of all robots ends.
 INTERRUPTED = "interrupted"
 
-#: A rest of exactly ``stop.rest_time_s`` counts: instants of ticks are rounded, s.
+#: Tolerance for rounded tick times, s: a rest of exactly ``stop.rest_time_s`` counts.
 ROUNDING_S = 1e-9
-#: Parts into which a tick is cut for contacts, and how far a body on a path of its own
-#: may go in one, m: a body that goes farther has its tick cut into more.
+#: Least number of parts per tick for contacts, and the greatest distance that a body
+#: on its own path may move in one part, m. Faster bodies cut the ticks into more parts.
 BETWEEN_TICKS, _PART_M = 5, 0.02
 
-#: Port of a law that says when it has found that there is no way, 0 or 1.
+#: Port by which a law reports that no route leads to the target, 0 or 1.
 GIVES_UP = "gives_up"
-#: Port of a search that says how it ended.
+#: Port by which a search reports how it ended.
 SEARCH_REPORT = "search_report"
-#: Ports of what the bumper of a searching robot feels, and of what there is to feel.
+#: Ports of the contact switches of a searching robot, and of the body they touch.
 CONTACT, TOUCHED = "contact", "touched"
 
 _Places = Mapping[str, tuple[float, float, float]]
@@ -49,15 +49,17 @@ _GO_ON = EventStatus.DidNothing()
 
 @dataclass(frozen=True)
 class Collision:
-    """Who touched whom."""
+    """A contact between a robot and a body."""
 
     object: str
-    """Name of the obstacle, or ``source``."""
+    """Name of the body that the robot touched."""
     fault: str
-    """``robot`` or ``obstacle``: who alone, the other standing still, would have
-    come nearer since the last tick; turning counts, a body at rest never is."""
+    """``robot`` or ``obstacle``: the one that came nearer since the last tick, if the
+    other one had stood still. Turning counts as motion. A body at rest is never at
+    fault."""
     time: float
-    """First contact, s, to a fifth of a tick."""
+    """Time of the first contact, s, with a resolution of a fifth of a tick or
+    better."""
 
 
 class NearBody(NamedTuple):
@@ -66,19 +68,21 @@ class NearBody(NamedTuple):
     name: str
     body: Body
     reach_m: float
-    """With centres farther apart than this they do not touch, m."""
+    """The robot and the body cannot touch if their centers are farther apart than this,
+    m."""
     step_m: float
-    """The most that it moves in a tick on a path of its own, m; a robot: 0."""
+    """Upper bound of the distance that the body moves in a tick on its own path, m; 0
+    for another robot."""
 
 
 def decisive_robot(robots: Mapping[str, RobotRules]) -> str:
-    """Name of the robot whose cause is that of the whole run.
+    """Returns the name of the robot whose cause is the cause of the whole run.
 
-    The first that touched something, else the first that did not do what it
-    should, else the first.
+    It is the first robot that collided or diverged. Without one, it is the first robot
+    that did not do what it should; otherwise the first robot.
 
     Args:
-        robots: By name.
+        robots: Stop rules of the robots, by name.
     """
     causes = {name: rules.final_cause() for name, rules in robots.items()}
 
@@ -92,27 +96,27 @@ def decisive_robot(robots: Mapping[str, RobotRules]) -> str:
 
 
 class Seen(NamedTuple):
-    """What a robot's run is judged by, at a tick."""
+    """What the stop rules need to know about a robot at a tick."""
 
     pose: list[float]
     """x, y, theta in W, m and rad."""
     velocity: list[float]
-    """vx, vy, omega of it in W, m/s and rad/s."""
+    """vx, vy, omega of the robot in W, m/s and rad/s."""
     valid: bool
-    """Whether there is a target."""
+    """Whether the robot has a target."""
     gives_up: bool = False
-    """Whether the law says that there is no way to it."""
+    """Whether the law reports that no route leads to the target."""
     ended: float = 0.0
-    """Number of the ending of a search, 0 while it goes on."""
+    """Number of the ending of a search; 0 while the search continues."""
     feels: bool = False
-    """Whether a contact switch is closed, and by a body."""
+    """Whether a contact switch is closed because it touches a body."""
 
 
 class RunRules:
     """When a run of one or several robots ends.
 
-    It ends when each robot has a cause of its own, or one has touched something
-    or is lost from sight; what has ended otherwise goes on beside the others.
+    The run ends when every robot has a cause, or when a robot collides or diverges. A
+    robot that has ended for another reason keeps moving with the others.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -127,7 +131,7 @@ class RunRules:
 
     @property
     def cause(self) -> str:
-        """Cause of the whole run; empty while it goes on."""
+        """Cause of the whole run; empty while the run continues."""
         if not self.over:
             return ""
         return self.robots[decisive_robot(self.robots)].final_cause()
@@ -139,11 +143,11 @@ class RunRules:
         return all(causes) or any(cause in ENDING for cause in causes)
 
     def judge(self, time: float, seen: Mapping[str, Seen]) -> None:
-        """Decides at a tick.
+        """Applies the stop rules at a tick.
 
         Args:
-            time: s.
-            seen: What each robot does.
+            time: Time of the tick, s.
+            seen: State of each robot, by name.
         """
         self._move(time, {name: each.pose for name, each in seen.items()})
         for name, rules in self.robots.items():
@@ -151,10 +155,10 @@ class RunRules:
         self._interrupt()
 
     def take_over(self, ticks: Mapping[str, JudgedTick]) -> None:
-        """Ends as a compiled loop has ended, which judges by the same functions.
+        """Takes over the end of a compiled loop, which uses the same stop rules.
 
         Args:
-            ticks: The last one of each robot.
+            ticks: The last tick of each robot, by name.
         """
         last = next(iter(ticks.values()))
         before = {name: tick.pose_before for name, tick in ticks.items()}
@@ -175,7 +179,7 @@ class RunRules:
 
 
 class StopRules(RunRules):
-    """A monitor for Drake's simulator; remembers why it stopped the run."""
+    """A monitor for Drake's simulator that remembers why it stopped the run."""
 
     def __init__(self, follower: SoundFollower) -> None:
         super().__init__(follower.scenario)
@@ -184,7 +188,10 @@ class StopRules(RunRules):
         self._tick = -1
 
     def __call__(self, context: Any) -> EventStatus:
-        """Called after every step of the simulator, which may be finer than ticks."""
+        """Judges the run. The simulator calls this after every step.
+
+        Steps may be shorter than ticks; this method ignores the instants between ticks.
+        """
         time = context.get_time()
         tick = round(time / self._tick_s)
         if tick == self._tick or abs(time - tick * self._tick_s) > ROUNDING_S:
@@ -197,7 +204,7 @@ class StopRules(RunRules):
 
 
 class _View:
-    """Reads a robot in the diagram's context."""
+    """Reads the state of a robot from the context of the diagram."""
 
     def __init__(self, parts: Parts) -> None:
         plant = parts.blocks["plant"]
@@ -229,14 +236,14 @@ class _View:
 
 
 def instants_of(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
-    """Instants at which bodies are looked at.
+    """Returns the instants at which contacts are checked.
 
     Args:
-        times: (n + 1,) of ticks, s.
-        parts: Into which each tick is cut.
+        times: (n + 1,) times of the ticks, s.
+        parts: Number of parts per tick.
 
     Returns:
-        (n parts + 1,) s, the ticks among them.
+        (n parts + 1,) instants, s; the ticks are among them.
     """
     shares = np.arange(1, parts + 1) / parts
     between = times[:-1, None] + shares * np.diff(times)[:, None]
@@ -244,7 +251,7 @@ def instants_of(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
 
 
 class RuleNumbers(NamedTuple):
-    """What ends a robot's run, but for contacts."""
+    """Numbers that the stop rules use, except those for contacts."""
 
     stop: StopParameters
     control_point_m: float
@@ -253,10 +260,10 @@ class RuleNumbers(NamedTuple):
     goal_radius_m: float
     source_rests: bool
     searches: int = 0
-    """1 for an odour, 2 for a sound; 0: it does not search."""
+    """1: the robot searches for an odor; 2: for a sound; 0: it does not search."""
 
 
-#: Causes that ``judge_tick`` finds, by their numbers.
+#: Causes that ``judge_tick`` and ``judge_search`` return, by index.
 FOUND = (
     "",
     "diverged",
@@ -269,9 +276,11 @@ FOUND = (
 )
 DIVERGED = FOUND.index("diverged")
 
-#: State of ``judge_tick`` before the first tick: time and place of P from which it has
-#: stayed, time of the last valid target, since when P rests in the goal, whether it was
-#: there, ticks since the first detection, and those of them in which P followed.
+#: State of ``judge_tick`` before the first tick. Its entries are:
+#: 0 to 2: start time, s, and position of P, m, of the present stay in one place;
+#: 3: time of the last valid target, s; 4: time since which P rests in the goal, s;
+#: 5: whether P has been in the goal; 6: number of ticks since the first detection;
+#: 7: number of those ticks in which P followed the target.
 UNJUDGED = (0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
 
 
@@ -285,28 +294,34 @@ def judge_tick(
     gives_up: bool,  # noqa: FBT001
     numbers: RuleNumbers,
 ) -> int:
-    """Why a run ends at a tick, contacts apart.
+    """Decides whether a run ends at a tick, and why, apart from contacts.
+
+    The rules apply in this order: diverged, reached, lost, stuck or no way found.
+    ``state`` holds the start of each condition that must last for some time. It also
+    counts the ticks since the first detection, and those of them in which P follows the
+    target. ``RobotRules.final_cause`` evaluates these counts when the time is over.
 
     Args:
-        time: s.
-        state: As ``UNJUDGED``, changed.
-        pose: (x, y, theta) of the robot, m and rad.
-        velocity: (vx, vy, omega) of it in W, m/s and rad/s.
-        p_WS: What it follows, m.
-        valid: Whether it has a target.
-        gives_up: Whether its law says that there is no way to it.
-        numbers: ``RuleNumbers``.
+        time: Time of the tick, s.
+        state: State of the rules, as ``UNJUDGED``; changed in place.
+        pose: (x, y, theta) of the robot in W, m and rad.
+        velocity: (vx, vy, omega) of the robot in W, m/s and rad/s.
+        p_WS: Position of the target in W, m.
+        valid: Whether the robot has a target.
+        gives_up: Whether the law reports that no route leads to the target.
+        numbers: Numbers that the rules use.
 
     Returns:
-        Place of the cause in ``FOUND``; 0 where the run goes on.
+        Index of the cause in ``FOUND``; 0 if the run continues.
     """
     stop = numbers.stop
+    # Diverged: P is too far from the target, or its position is NaN.
     x_P, y_P = control_point(pose, numbers.control_point_m)
     distance = math.hypot(p_WS[0] - x_P, p_WS[1] - y_P)
     if not distance <= stop.diverged_range_m:
         return 1
     in_goal = distance <= numbers.goal_radius_m
-    # What the end of the time is judged by.
+    # Data for the cause at the end of the time.
     if in_goal:
         state[5] = 1.0
     if valid or state[6] > 0.0:
@@ -314,6 +329,7 @@ def judge_tick(
         state[6] += 1.0
         if error <= stop.following_band_m:
             state[7] += 1.0
+    # Reached: P has rested in the goal of a target at rest for long enough.
     there = numbers.source_rests and in_goal and valid
     if there:
         vx, vy = control_point_velocity(pose[2], velocity, numbers.control_point_m)
@@ -321,11 +337,12 @@ def judge_tick(
     state[4] = min(state[4], time) if there else math.inf
     if time - state[4] >= stop.rest_time_s - ROUNDING_S:
         return 2
+    # Lost: there has been no target for too long.
     if valid:
         state[3] = time
     elif time - state[3] > stop.lost_after_s:
         return 3
-    # Stuck: P goes nowhere though there is a target, and the goal is elsewhere.
+    # Stuck: P stays in one place outside of the goal although there is a target.
     moved = math.hypot(x_P - state[1], y_P - state[2]) > stop.stuck_radius_m
     if not valid or in_goal or moved:
         state[0], state[1], state[2] = time, x_P, y_P
@@ -336,19 +353,24 @@ def judge_tick(
 
 
 def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> int:
-    """Why a run of a search ends at a tick, contacts apart.
+    """Decides whether the run of a search ends at a tick, and why, apart from contacts.
+
+    A search that ended successfully counts as found only near the source; otherwise it
+    is a false find. A search for an odor must also end with the source ahead. A search
+    that was given up counts as lost.
 
     Args:
-        ended: Number of the search's ending, see ``systems.search.search_ending``.
-        pose: (x, y, theta) of the robot, m and rad.
-        p_WS: What it searches for, m.
-        numbers: ``RuleNumbers``.
+        ended: Number of the ending, see ``systems.search.search_ending``.
+        pose: (x, y, theta) of the robot in W, m and rad.
+        p_WS: Position of the source in W, m.
+        numbers: Numbers that the rules use.
 
     Returns:
-        Place of the cause in ``FOUND``; 0 where the run goes on.
+        Index of the cause in ``FOUND``; 0 if the run continues.
     """
     dx, dy = p_WS[0] - pose[0], p_WS[1] - pose[1]
     distance = math.hypot(dx, dy)
+    # Diverged: the robot is too far from the source, or its position is NaN.
     if not distance <= numbers.stop.diverged_range_m:
         return 1
     if ended < 0.5:
@@ -364,41 +386,41 @@ def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> in
 
 
 class JudgedTick(NamedTuple):
-    """A robot's last tick in a compiled loop."""
+    """The last tick of a robot in a compiled loop."""
 
     time: float
     time_before: float
-    """Of the tick before, s; 0 at the first one."""
+    """Time of the previous tick, s; 0 at the first tick."""
     pose: list[float]
     pose_before: list[float]
-    """The same as ``pose`` at the first tick."""
+    """Pose at the previous tick; at the first tick the same as ``pose``."""
     valid: bool
-    """Whether there is a target."""
+    """Whether the robot has a target."""
     state: list[float]
-    """Of ``judge_tick``."""
+    """State of ``judge_tick``."""
     found: int
-    """What that has returned, at this tick or before."""
+    """Index of the cause in ``FOUND`` that was found at this tick or before."""
     touched: tuple[int, float] | None
-    """Number of the first body that was touched since the tick before, and the part of
-    the tick that had passed."""
+    """Number of the first body that was touched since the previous tick, and the
+    elapsed part of the tick at that time (0 to 1)."""
     ended: float = 0.0
     """Number of the ending of a search."""
 
 
 @dataclass
 class RobotRules:
-    """Why one robot's run ends."""
+    """Stop rules of one robot."""
 
     scenario: Scenario
-    """Of this robot alone."""
+    """The scenario of this robot alone."""
     surroundings: Surroundings
-    """What it can hit, and what it follows."""
+    """The bodies that the robot can hit, and its target."""
     cause: str = ""
     collision: Collision | None = None
     ended: float = 0.0
     """Number of the ending of a search."""
     _pose: Sequence[float] | None = None
-    """At the last tick."""
+    """Pose at the last tick."""
     _valid: bool = False
     _state: list[float] = field(default_factory=lambda: [*UNJUDGED])
     _time: float = 0.0
@@ -417,7 +439,11 @@ class RobotRules:
         self.parts, self.near = self._near_bodies()
 
     def _near_bodies(self) -> tuple[int, list[NearBody]]:
-        """Parts into which ticks are cut, and what the robot can touch."""
+        """Returns the number of parts per tick, and the bodies that can be touched.
+
+        A fast body cuts the ticks into more parts, so that it moves at most ``_PART_M``
+        per part.
+        """
         size, tick_s = self.scenario.size, self.scenario.tick_s
         times = tick_s * np.arange(int(self.scenario.duration_s / tick_s + 1e-9) + 1.0)
         instants, farthest, near = instants_of(times, BETWEEN_TICKS), 0.0, []
@@ -433,18 +459,19 @@ class RobotRules:
         return BETWEEN_TICKS * max(1, math.ceil(farthest / _PART_M)), near
 
     def judge(self, time: float, seen: Seen) -> None:
-        """Decides at a tick; what has ended stays as it ended.
+        """Applies the stop rules at a tick.
 
-        Of several robots, one that has reached its goal can still be hit.
+        An earlier cause remains. However, a robot that has reached its goal beside
+        other robots can still collide.
 
         Args:
-            time: s.
-            seen: What the robot does.
+            time: Time of the tick, s.
+            seen: State of the robot.
         """
         places = {name: body.path.pose(time) for name, body, *_ in self.near}
         ended, self._valid = self.cause, seen.valid
         self.collision = None
-        if not seen.feels:  # what the bumper feels is no accident
+        if not seen.feels:  # a contact that the bumper feels is intended
             self.collision = self._find_collision(time, seen.pose, places)
         if self.collision is not None:
             self.cause = "collision"
@@ -468,10 +495,10 @@ class RobotRules:
         self._pose, self._time = seen.pose, time
 
     def take_over(self, tick: JudgedTick) -> None:
-        """Ends as a compiled loop has ended, which judges by the same functions.
+        """Takes over the end of a compiled loop, which uses the same stop rules.
 
         Args:
-            tick: The last one.
+            tick: The last tick.
         """
         self._state, self._valid = tick.state, tick.valid
         self._pose, self._time = tick.pose_before, tick.time_before
@@ -484,7 +511,7 @@ class RobotRules:
             self.cause = "collision"
 
     def final_cause(self) -> str:
-        """Cause of the run, once the simulator has returned."""
+        """Cause of the run after the simulator has returned."""
         if self.cause:
             return self.cause
         if self.numbers.searches:
@@ -505,7 +532,12 @@ class RobotRules:
     def _find_collision(
         self, time: float, pose: Sequence[float], places: _Places
     ) -> Collision | None:
-        """First contact since the last tick."""
+        """Returns the first contact since the last tick, if there is one.
+
+        A body is skipped if it cannot have touched the robot: the distance of the
+        centers exceeds their reach plus both motions. ``first_overlap`` checks the
+        other bodies at the parts of the tick.
+        """
         first = math.inf
         touched: NearBody | None = None
         before = pose if self._pose is None else self._pose
@@ -530,7 +562,7 @@ class RobotRules:
     def _collide(
         self, near: NearBody, part: float, time: float, pose: Sequence[float]
     ) -> Collision:
-        """The contact with a body when a part of the tick had passed."""
+        """Returns the collision with a body after a part of the tick (0 to 1)."""
         instant = self._time + part * (time - self._time)
         fault = self._fault(instant, time, pose, near.body)
         return Collision(near.name, fault, instant)
@@ -538,7 +570,12 @@ class RobotRules:
     def _fault(
         self, instant: float, time: float, pose: Sequence[float], body: Body
     ) -> str:
-        """Who alone would have come nearer since the last tick, the other standing."""
+        """Returns who is at fault for a contact, ``robot`` or ``obstacle``.
+
+        It compares two clearances: of the moved robot from the body at the last tick,
+        and of the moved body from the robot at the last tick. The smaller clearance
+        decides.
+        """
         robot_then = self._footprint(self._time, time, pose)
         robot_now = self._footprint(instant, time, pose)
         body_then, body_now = body.rectangle(self._time), body.rectangle(instant)
@@ -549,7 +586,7 @@ class RobotRules:
     def _footprint(
         self, instant: float, time: float, pose: Sequence[float]
     ) -> NDArray[np.float64]:
-        """The robot's rectangle between the last tick and this one."""
+        """The robot's rectangle at an instant between the last tick and this one."""
         now = np.array(pose)
         before = now if self._pose is None else np.array(self._pose)
         part = (instant - self._time) / max(time - self._time, self.scenario.tick_s)

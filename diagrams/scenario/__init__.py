@@ -1,1 +1,1 @@
-"""The scenario: its fields, its files, its checks and its warnings."""
+"""The scenario: its fields, files, checks and warnings."""

@@ -1,4 +1,4 @@
-"""Whether there is sound of a run to save."""
+"""Checks whether a run has sound that can be saved."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.wav_writer import LARGEST_WAV_BYTES
 
-#: Of a sample in a file.
+#: Bytes per sample in the files of microphones and loudspeakers.
 HEARD_BYTES, PLAYED_BYTES = 2, 4
 
 
 def check_audible(scenario: Scenario) -> None:
-    """Refuses a scenario of which there is no sound to save.
+    """Refuses a scenario without sound that can be saved.
 
     Args:
-        scenario: To be run.
+        scenario: The scenario to run.
 
     Raises:
-        InputError: No robot hears sound waves, a rate is no whole number of Hz, or a
-            file would be longer than WAV files can be.
+        InputError: No robot hears sound waves, a sample rate is not a whole number of
+            Hz, or a file would exceed the maximum size of WAV files.
     """
     robots = scenario.all_robots
     listening = [name for name, own in robots.items() if own.listens]

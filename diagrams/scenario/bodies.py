@@ -1,4 +1,4 @@
-"""Rectangles that move, and what one robot has about it."""
+"""Moving rectangles, and the surroundings of one robot."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ class Path(Protocol):
         """Whether the pose ever changes."""
 
     def pose(self, time: float) -> tuple[float, float, float]:
-        """(x, y, theta) in W at a time in s, m and rad."""
+        """(x, y, theta) in W, m and rad, at a time in s."""
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) at many times at once."""
+        """(n, 3) poses at several times."""
 
 
 @dataclass(frozen=True)
 class RecordedPath:
-    """Poses of a robot at the ticks of a run, joined by straight lines."""
+    """Poses of a robot at the ticks of a run, with linear interpolation."""
 
     times: NDArray[np.float64]
-    """(n,) ascending, s."""
+    """(n,) ascending times, s."""
     recorded: NDArray[np.float64]
-    """(n, 3) x, y, theta in W, m and rad, not wrapped."""
+    """(n, 3) x, y, theta in W, m and rad; angles are not wrapped."""
 
     moves = True
 
     def pose(self, time: float) -> tuple[float, float, float]:
-        """(x, y, theta) at a time in s."""
+        """(x, y, theta) in W, m and rad, at a time in s."""
         x, y, theta = self.poses([time])[0].tolist()
         return x, y, theta
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) at many times at once; before and after the run as at its ends."""
+        """(n, 3) poses at several times; constant before and after the run."""
         at = np.asarray(times, dtype=float)
         return np.column_stack(
             [np.interp(at, self.times, column) for column in self.recorded.T]
@@ -54,7 +54,7 @@ class RecordedPath:
 
 
 class LivePath:
-    """Where a robot was at the last tick and is at this one, during a run."""
+    """Poses of a robot at the last two ticks, during a run."""
 
     moves = True
 
@@ -62,10 +62,10 @@ class LivePath:
         self._then = self._now = 0.0, pose
 
     def move(self, time: float, pose: Sequence[float]) -> None:
-        """The next tick, at a time in s.
+        """Sets the pose at the next tick.
 
         Args:
-            time: Of the tick, s.
+            time: Time of the tick, s.
             pose: x, y, theta in W, m and rad.
         """
         x, y, theta = pose
@@ -73,11 +73,11 @@ class LivePath:
 
     @property
     def step_m(self) -> float:
-        """How far it went from the last tick to this one, m."""
+        """Distance between the positions at the last two ticks, m."""
         return math.dist(self._then[1][:2], self._now[1][:2])
 
     def pose(self, time: float) -> tuple[float, float, float]:
-        """(x, y, theta) at a time in s since the last tick, by a straight line."""
+        """(x, y, theta) at a time in s, interpolated since the previous tick."""
         (begin, then), (end, now) = self._then, self._now
         if time >= end or end <= begin:
             return now
@@ -86,7 +86,7 @@ class LivePath:
         return x, y, theta
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) at many times at once."""
+        """(n, 3) poses at several times."""
         return np.array([self.pose(time) for time in np.asarray(times).tolist()])
 
 
@@ -94,7 +94,7 @@ class Body(NamedTuple):
     """A rectangle that moves along a path."""
 
     path: Path
-    """Pose of its centre over time."""
+    """Pose of its center over time."""
     size: tuple[float, float]
     """Length and width, m."""
 
@@ -103,42 +103,42 @@ class Body(NamedTuple):
         return np.array([*self.path.pose(time), *self.size])
 
     def rectangles(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 5) rectangles at many times at once."""
+        """(n, 5) rectangles at several times."""
         return rectangles_at(self.path.poses(times), self.size)
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What one robot can hit, and which of it is followed."""
+    """The bodies that one robot can hit, and its target."""
 
     bodies: Mapping[str, Body]
-    """By name: obstacles, other robots, other sources, and last what it follows."""
+    """Bodies by name: obstacles, other robots, other sources, and finally the
+    target."""
     target: str
-    """Name of the source, or of the robot with a loudspeaker, that it follows; or of
-    its goal."""
+    """Name of the target: the source, the leader, or the goal."""
     goal: Path | None = None
-    """A place that it drives to in the place of following a body."""
+    """A goal to drive to, instead of a body to follow."""
 
     @property
     def followed(self) -> Body:
-        """What is followed; a goal has no extent, and cannot be hit."""
+        """The target; a goal has no extent and cannot be hit."""
         if self.goal is not None:
             return Body(self.goal, (0.0, 0.0))
         return self.bodies[self.target]
 
     @cached_property
     def obstacles(self) -> dict[str, Body]:
-        """All but what is followed."""
+        """All bodies except the target."""
         return {k: body for k, body in self.bodies.items() if k != self.target}
 
 
 def rectangles_at(
     poses: NDArray[np.float64], size: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """Rectangles of one size.
+    """Returns rectangles of the same size at several poses.
 
     Args:
-        poses: (n, 3) x, y, theta of their centres, m and rad.
+        poses: (n, 3) x, y, theta of the centers, m and rad.
         size: Length and width, m.
 
     Returns:
@@ -150,25 +150,25 @@ def rectangles_at(
 
 
 def microphones_W(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
-    """The robot's microphones.
+    """Returns the positions of a robot's microphones.
 
     Args:
         pose_WB: (x, y, theta), m and rad.
-        robot: Their places in B.
+        robot: Parameters with the positions in B.
 
     Returns:
-        (n, 2) in W, m.
+        (n, 2) positions in W, m.
     """
     x, y, theta = np.asarray(pose_WB)
     return np.array([x, y]) + np.stack(rotate(theta, *microphones_B(robot).T), axis=1)
 
 
 def robot_rectangle(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
-    """The robot's footprint: a rectangle centred on the origin of B.
+    """Returns the footprint of a robot, a rectangle centered on the origin of B.
 
     Args:
         pose_WB: (x, y, theta), m and rad.
-        robot: Its size.
+        robot: Parameters with the size.
 
     Returns:
         (5,) x, y, theta, length, width in W.

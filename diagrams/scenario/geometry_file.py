@@ -10,22 +10,23 @@ from systems.base.robot import microphones_B
 from systems.framework.input_error import shortened
 from systems.sound.parameters import MicArrayParameters
 
-#: Places are written to a nanometre: sums of floats have longer tails.
+#: Least standard deviations in the file: of the positions, and of the speed of sound.
 _LEAST_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
+#: Positions are rounded to a nanometer, which removes the rounding errors of sums.
 _DECIMALS = 9
 
 
 def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
-    """The YAML that goes with a recording of a robot's microphones.
+    """Returns the YAML text that describes the microphones of a recording.
 
     Args:
-        scenario: The run.
-        robot: Its name.
+        scenario: The scenario that is run.
+        robot: Name of the robot.
         file: Name of the recording.
 
     Returns:
-        Stated places of the microphones in B, m, the speed of sound, and comments on
-        what they belong to and how far the array may be off.
+        Nominal positions of the microphones in B, m, and the speed of sound. Comments
+        describe the recording and the errors of the array.
     """
     own = scenario.all_robots[robot]
     places = np.round(microphones_B(own.robot), _DECIMALS).tolist()
@@ -41,7 +42,8 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
     if scenario.room is not None and scenario.room.rise_m:
         rise = scenario.room.rise_m
         comments.append(f"The microphones are {rise:g} m above the loudspeakers.")
-    # Uniform within its tolerance, and no better than the rounding of a drawing.
+    # Positions are uniformly distributed within the tolerance. The least standard
+    # deviation is the rounding of a drawing.
     drawn = own.microphones.position_tolerance_m / 3.0**0.5
     document = dump_yaml(
         {
@@ -55,7 +57,7 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
 
 
 def _faults(array: MicArrayParameters) -> list[str]:
-    """What the file cannot say of the array, a line each."""
+    """Returns errors of the array that the fields cannot express, one line each."""
     lines = []
     if any(array.channel_skew_s):
         times = ", ".join(f"{1e6 * skew:g}" for skew in array.channel_skew_s)

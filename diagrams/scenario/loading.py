@@ -1,4 +1,4 @@
-"""Scenarios from the library, from YAML files and from the command line."""
+"""Loads scenarios from the library, from YAML files and from the command line."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LIBRARY = Path(__file__).parents[1] / "scenarios"
 
 
 def library_scenarios() -> dict[str, Path]:
-    """Names and files of the scenarios that come with the package."""
+    """Names and files of the scenarios in the package."""
     return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
 
 
@@ -35,18 +35,20 @@ def load_scenario(
     """Loads a scenario.
 
     Args:
-        source: A name of the library (``phonotaxis scenarios``) or a path.
-        overrides: ``key=value`` with a dotted key, as ``source.speed_m_s=0.2``,
-            ``obstacles.cart.size_m=[0.2, 0.1]`` for the obstacle of that name, or
-            ``obstacles.0.size_m=[0.2, 0.1]``; values are YAML. Or a mapping of
-            dotted keys to values, as ``{"source.speed_m_s": 0.2}``.
+        source: A name from the library (``phonotaxis scenarios``), or the path of a
+            file.
+        overrides: ``key=value`` with a dotted key, for example
+            ``source.speed_m_s=0.2``, ``obstacles.cart.size_m=[0.2, 0.1]`` for the
+            obstacle of that name, or ``obstacles.0.size_m=[0.2, 0.1]``; values are
+            YAML. A mapping of dotted keys to values also works, for example
+            ``{"source.speed_m_s": 0.2}``.
 
     Returns:
-        ``Scenario``.
+        The validated scenario.
 
     Raises:
-        InputError: Unknown name, unreadable file, or fields that are
-            unknown, of the wrong type or out of range; names each by its whole
+        InputError: The name is unknown, the file is unreadable, or fields are unknown,
+            of the wrong type or out of range. The error names each field by its full
             path.
     """
     path = _find(source)
@@ -71,7 +73,7 @@ def _settings(
 
 
 def _plain(key: str, value: Any) -> Any:
-    """The value as a file would hold it, which nobody else changes."""
+    """Returns a copy of the value as plain data, in the form of a file."""
     try:
         return json.loads(json.dumps(value))
     except (TypeError, ValueError):
@@ -93,18 +95,18 @@ def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
 
 
 def dump_scenario(scenario: Scenario) -> str:
-    """The whole scenario as YAML, loadable by ``load_scenario``."""
+    """Returns the whole scenario as YAML, which ``load_scenario`` can load."""
     return dump_yaml(scenario.model_dump(mode="json"))
 
 
 def write_scenario(scenario: Scenario, directory: Path) -> None:
-    """Writes a whole scenario and its schema, so that editors know its fields.
+    """Writes the whole scenario and a copy of its schema, which helps editors.
 
-    The schema is a copy: a result can be moved, and looks the same on every machine.
+    The copy makes the directory independent of the machine and of its place.
 
     Args:
-        scenario: Goes to ``scenario.yaml``.
-        directory: Exists; gets ``scenario.schema.json``, too.
+        scenario: The scenario, for ``scenario.yaml``.
+        directory: An existing directory; it also gets ``scenario.schema.json``.
     """
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
     (directory / "scenario.yaml").write_text(first + dump_scenario(scenario), "utf-8")
@@ -131,10 +133,10 @@ def _find(source: str | Path) -> Path:
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
-    """The mapping of fields that a YAML file holds; empty where it is empty.
+    """Reads the mapping of fields in a YAML file; an empty file has no fields.
 
     Raises:
-        InputError: It cannot be read, or holds something else.
+        InputError: The file cannot be read, or contains something else.
     """
     try:
         with path.open("rb") as file:
@@ -152,11 +154,11 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 
 def resolve_sound(data: dict[str, Any], folder: Path) -> None:
-    """A relative sound file lies beside the scenario, or where one works.
+    """Makes relative paths of sound files absolute.
 
     Args:
         data: Fields of a scenario, changed in place.
-        folder: That of the file that the fields are from, or the working directory.
+        folder: Folder of the file with the fields, or the working directory.
     """
     for place in [
         data,
@@ -180,10 +182,10 @@ def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]
 
 
 def parse_setting(text: str) -> tuple[str, Any]:
-    """Key and value of ``key=value``; the value is YAML.
+    """Splits ``key=value`` into the key and the value, which is YAML.
 
     Raises:
-        InputError: It is not of that form.
+        InputError: The text does not have this form.
     """
     key, equals, value_text = text.partition("=")
     if not equals or not all(key.split(".")):
@@ -194,10 +196,10 @@ def parse_setting(text: str) -> tuple[str, Any]:
 
 
 def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
-    """Sets fields of a mapping, presets first: what is set beside one wins.
+    """Sets fields of a mapping, presets first, so that other fields override them.
 
-    A group that has a preset begins anew with another one. Groups on the way to a
-    field are made.
+    If a group already has a preset, a new preset clears the group. Missing groups on
+    the path to a field are created.
 
     Args:
         data: Fields of a scenario, changed in place.
@@ -236,7 +238,7 @@ def _descend(node: Any, part: str, key: str) -> Any:
     if isinstance(node, list):
         return node[_index(node, part, key)]
     if isinstance(node, dict):
-        if node.get(part) is None:  # also where a whole group is unset, as room
+        if node.get(part) is None:  # also if a whole group is null, for example room
             node[part] = {}
         return node[part]
     raise InputError(key, "leads into a plain value; shorten the key")

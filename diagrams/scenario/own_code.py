@@ -1,8 +1,8 @@
-"""A user's own functions and classes, named in a scenario.
+"""A user's own functions and classes that a scenario names.
 
-Python reads a module once in a process. A user edits a law in a notebook and runs it
-again: ``import_own`` compares the files with what was loaded, and loads them anew where
-they differ.
+Python loads a module only once per process. However, a user may edit a law in a
+notebook and run it again. ``import_own`` therefore compares the files with the loaded
+modules, and loads changed modules again.
 """
 
 from __future__ import annotations
@@ -29,28 +29,29 @@ if TYPE_CHECKING:
 #: Packages of the project.
 OURS = ("analysis", "diagrams", "phonotaxis", "systems")
 
-#: Modules of a user's that are loaded, by name, and the SHA-256 of each one's file.
+#: Loaded modules of users and the SHA-256 of their files, by name of the module.
 _LOADED: dict[str, tuple[ModuleType, str]] = {}
-#: Whether modules stay as they were loaded, see ``code_of_sweep``.
+#: Whether changed modules are not loaded again, see ``code_of_sweep``.
 _KEEPS = False
 
 
 def import_own(name: str, field: str) -> Any:
-    """The function or class that a name stands for.
+    """Imports the function or class that a name denotes.
 
-    It is that of the present file: where the file of its module, or of a module of the
-    user's that this one uses, has changed since it was loaded, they are loaded anew.
+    The result always corresponds to the present files. If the file of the module has
+    changed since it was loaded, the module is loaded again. The same applies to the
+    user's other modules that it uses.
 
     Args:
-        name: ``package.module:Name`` or ``path/to/file.py:Name``; both are looked
-            up in the working directory, too.
-        field: Of the scenario, which names it.
+        name: ``package.module:Name`` or ``path/to/file.py:Name``; Python also searches
+            the working directory.
+        field: Field of the scenario that contains the name.
 
     Returns:
-        What has that name; it can be called.
+        The function or class.
 
     Raises:
-        InputError: There is none, or its module cannot be imported.
+        InputError: It does not exist, or its module cannot be imported.
     """
     module_name, _, attribute = name.rpartition(":")
     if not module_name or not attribute:
@@ -60,7 +61,7 @@ def import_own(name: str, field: str) -> Any:
     try:
         module = _import(module_name)
         found = getattr(module, attribute, None)
-    except BaseException as error:  # a user's module raises what it likes
+    except BaseException as error:  # a user's module may raise any exception
         if is_interrupt(error):
             raise
         raise InputError(field, f"{name!r} cannot be imported: {why(error)}") from None
@@ -82,7 +83,7 @@ def _import(name: str) -> ModuleType:
 
 
 def _module_of(name: str) -> ModuleType:
-    """A module, that of an earlier call if there was one."""
+    """Returns a module, which is imported unless it is loaded already."""
     if not name.endswith(".py"):
         here = str(Path.cwd())
         if here not in sys.path:
@@ -98,8 +99,8 @@ def _module_of(name: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[known] = module
     try:
-        # From the text: bytecode that Python keeps is taken for that of a text of the
-        # same size and second.
+        # Compile the source text. The bytecode cache cannot distinguish versions of a
+        # file that have the same size and were saved in the same second.
         exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
     except BaseException:
         del sys.modules[known]
@@ -108,7 +109,7 @@ def _module_of(name: str) -> ModuleType:
 
 
 def _has_changed(module: ModuleType) -> bool:
-    """Whether a module's file is not what was loaded; a new module is noted."""
+    """Whether a module's file differs from the loaded one; records a new module."""
     digest = _digest(Path(_file_of(module)))
     known, loaded = _LOADED.get(module.__name__, (None, ""))
     if known is not module:
@@ -118,7 +119,7 @@ def _has_changed(module: ModuleType) -> bool:
 
 
 def _digest(file: Path) -> str:
-    """SHA-256 of a file; empty where it is gone."""
+    """SHA-256 of a file; empty if the file is gone."""
     try:
         return hashlib.sha256(file.read_bytes()).hexdigest()
     except OSError:
@@ -126,7 +127,7 @@ def _digest(file: Path) -> str:
 
 
 def _forget(changed: Sequence[ModuleType]) -> None:
-    """Has Python load modules of a user's anew, and those that use them."""
+    """Unloads changed modules of a user, and the modules that use them."""
     gone = {
         name: module
         for name, (module, _) in _LOADED.items()
@@ -143,17 +144,17 @@ def _forget(changed: Sequence[ModuleType]) -> None:
 
 
 def loaded_digests(scenario: Scenario) -> dict[str, str]:
-    """What a user's laws and blocks stand for, to tell versions of them apart.
+    """Returns digests of a user's laws and blocks, which identify their versions.
 
     Args:
-        scenario: Any; laws and blocks of the package have no files.
+        scenario: Any scenario; laws and blocks of the package have no files here.
 
     Returns:
-        SHA-256, as it was loaded, of each file of a user's that its robots use, by its
-        absolute path.
+        SHA-256 of each file of the user that the robots use, by absolute path. The
+        digests are those of the loaded code.
 
     Raises:
-        InputError: As ``import_own``.
+        InputError: See ``import_own``.
     """
     digests: dict[str, str] = {}
     for robot in scenario.all_robots.values():
@@ -167,20 +168,21 @@ def loaded_digests(scenario: Scenario) -> dict[str, str]:
 
 @contextmanager
 def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[None]:
-    """Within it a process runs a scenario with the code with which its sweep began.
+    """Within this context, a scenario runs with the code of the start of its sweep.
 
-    What is loaded stays, whatever becomes of its file, as long as it is that code.
+    Loaded code remains in use, even if its file changes, provided it is the wanted
+    code.
 
     Args:
-        scenario: Any.
-        wanted: SHA-256 of files by their absolute paths.
+        scenario: The scenario to run.
+        wanted: SHA-256 of files by absolute path.
 
     Yields:
         Nothing.
 
     Raises:
-        InputError: A file of a user's has changed, and this process has not loaded what
-            it was.
+        InputError: A user's file has changed, and this process has not loaded its
+            earlier version.
     """
     global _KEEPS  # noqa: PLW0603
     loaded = {_file_of(module): digest for module, digest in _LOADED.values()}
@@ -201,14 +203,14 @@ def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[Non
 
 
 def own_files(name: str, field: str) -> tuple[Path, ...]:
-    """Source files of a module of the user's, and of those of theirs that it uses.
+    """Returns the source files of a user's module, and of the user's modules it uses.
 
     Args:
-        name: Of a law or a block; those of the package have none.
-        field: Of the scenario, which names it.
+        name: Name of a law or a block.
+        field: Field of the scenario that contains the name.
 
     Returns:
-        Absolute paths in ascending order; none for a name of the package.
+        Absolute paths in ascending order; none for a name from the package.
     """
     if ":" not in name:
         return ()
@@ -218,23 +220,28 @@ def own_files(name: str, field: str) -> tuple[Path, ...]:
 
 
 def digests_of(module: ModuleType) -> dict[str, str]:
-    """A module of the user's, and those of theirs that it uses, as they were loaded.
+    """Returns digests of a user's module and of the user's modules that it uses.
 
     Args:
-        module: Imported.
+        module: An imported module.
 
     Returns:
-        SHA-256 of each file by its absolute path; none of a module that has no file.
+        SHA-256 of each file, as loaded, by absolute path; empty for a module without a
+        file.
     """
     digests: dict[str, str] = {}
     for each in _users_modules(module):
-        _has_changed(each)  # notes one that was not known
+        _has_changed(each)  # records a new module
         digests[_file_of(each)] = _LOADED[each.__name__][1]
     return digests
 
 
 def _imports(file: Path, package: str) -> list[str]:
-    """Names of the modules that a file imports: of a number none tells whence it is."""
+    """Names of the modules that a file imports.
+
+    Only the source shows the origin of an imported number, because numbers have no
+    ``__module__``.
+    """
     try:
         tree = ast.parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError):
@@ -251,12 +258,12 @@ def _imports(file: Path, package: str) -> list[str]:
 
 
 def _file_of(module: ModuleType) -> str:
-    """Absolute path."""
+    """Absolute path of the file of a module."""
     return str(Path(module.__file__ or "").resolve())
 
 
 def _users_modules(module: ModuleType) -> list[ModuleType]:
-    """It, and those that it uses, as far as they are files of the user's."""
+    """A module and the modules that it uses, as far as they are files of the user."""
     found: dict[str, ModuleType] = {}
     waiting = [module]
     while waiting:
@@ -265,6 +272,7 @@ def _users_modules(module: ModuleType) -> list[ModuleType]:
         if module.__name__ in found or file is None or not _is_users(module, file):
             continue
         found[module.__name__] = module
+        # Modules that it uses: those that it imports, and the origins of its objects.
         names = _imports(Path(file), module.__package__ or "")
         for value in list(vars(module).values()):
             of = "__name__" if isinstance(value, ModuleType) else "__module__"
@@ -277,24 +285,24 @@ def _users_modules(module: ModuleType) -> list[ModuleType]:
 def made(
     name: str, field: str, maker: Callable[..., Any], parts: Mapping[str, Any]
 ) -> Any:
-    """What a user's class makes of what its arguments ask for.
+    """Makes an object from a user's class, with the arguments that it accepts.
 
     Args:
-        name: Of the class, for messages.
-        field: Of the scenario, which names it.
-        maker: The class; of a scalar-templated one its ``_construct`` tells what it
-            asks for.
-        parts: What it may ask for, by name; it gets all, where it takes any keyword.
+        name: Name of the class, for messages.
+        field: Field of the scenario that contains the name.
+        maker: The class. For a scalar-templated class, the signature of its
+            ``_construct`` counts.
+        parts: Available arguments by name.
 
     Returns:
         The object.
 
     Raises:
-        InputError: It cannot be made.
+        InputError: The object cannot be made.
     """
     try:
         return maker(**asked_for(maker, parts))
-    except BaseException as error:  # a user's class raises what it likes
+    except BaseException as error:  # a user's class may raise any exception
         if is_interrupt(error):
             raise
         raise InputError(
@@ -304,14 +312,14 @@ def made(
 
 
 def asked_for(maker: Callable[..., Any], parts: Mapping[str, Any]) -> dict[str, Any]:
-    """Those of some parts that a class asks for.
+    """Selects the arguments that a class accepts.
 
     Args:
-        maker: The class, as of ``made``.
-        parts: By name.
+        maker: The class, see ``made``.
+        parts: Available arguments by name.
 
     Returns:
-        Those that its arguments name; all, where it takes any keyword.
+        The arguments in the signature; all of them if the class accepts any keyword.
     """
     asked = inspect.signature(getattr(maker, "_construct", maker)).parameters
     if any(each.kind is each.VAR_KEYWORD for each in asked.values()):
@@ -320,25 +328,25 @@ def asked_for(maker: Callable[..., Any], parts: Mapping[str, Any]) -> dict[str, 
 
 
 def _is_users(module: ModuleType, file: str) -> bool:
-    """Whether versions of packages do not tell what the module holds."""
-    # A script that runs cannot be loaded anew.
+    """Whether a module is the user's, so that package versions do not determine it."""
+    # The running script cannot be loaded again.
     if module.__name__.partition(".")[0] in (*OURS, "__main__"):
         return False
-    # The standard library, and what pip has installed.
+    # The standard library and installed packages are not the user's.
     return (
         "site-packages" not in file and Path(sys.base_prefix) not in Path(file).parents
     )
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Whether Ctrl-C may have raised an exception, and not a user's own code.
+    """Whether Ctrl-C may have raised an exception, rather than a user's own code.
 
-    The command line has a handler for Ctrl-C that raises a class of its own, so that a
+    The handler of the command line raises its own class on Ctrl-C. With this handler, a
     plain KeyboardInterrupt comes from the user's code. Python's default handler raises
-    that same plain KeyboardInterrupt: there it counts as Ctrl-C.
+    a plain KeyboardInterrupt on Ctrl-C; with that handler, it counts as Ctrl-C.
 
     Args:
-        error: Raised while a user's code ran.
+        error: An exception raised while a user's code ran.
     """
     if type(error) is not KeyboardInterrupt:
         return isinstance(error, KeyboardInterrupt)
@@ -346,7 +354,7 @@ def is_interrupt(error: BaseException) -> bool:
 
 
 def why(error: BaseException) -> str:
-    """Kind and text of an error in a user's code, with its line."""
+    """Kind, text and line of an error in a user's code."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = Path(__file__).resolve().parents[1]
     own = [f for f in frames if ours not in Path(f.filename).resolve().parents]

@@ -1,4 +1,4 @@
-"""What a scenario says of each robot and of each source."""
+"""The fields of each robot and of each source in a scenario."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from systems.sound.parameters import MicArrayParameters, SoundParameters, channe
 
 
 class StartParameters(Parameters):
-    """Where the robot starts, at rest."""
+    """Pose of the robot at the start, where it is at rest."""
 
     position_m: Point = (0.0, 0.0)
     """Origin of B in W, m."""
@@ -56,23 +56,23 @@ class StartParameters(Parameters):
 
 
 class FollowerParameters(Parameters):
-    """One robot that follows a sound: its law, hearing, sensors and body."""
+    """One robot: its law, hearing, sensors and body."""
 
     law: str = Field(default="active", min_length=1)
     """A name that ``phonotaxis laws`` lists, ``package.module:Name``, or
     ``path/to/file.py:Name``."""
     hearing: Literal["audio", "ideal"] = "audio"
-    """Sound waves and microphones, or exact positions."""
+    """``audio``: sound waves and microphones; ``ideal``: exact positions."""
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
-    """Cones, or exact nearest points."""
+    """``ultrasonic``: sensors with cones; ``ideal``: exact nearest points."""
     blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
-    """A user's own blocks, ``package.module:Name`` or ``path/to/file.py:Name``, that
-    the robot has in addition to its blocks, or instead of the block with the same
-    part."""
+    """A user's own blocks, ``package.module:Name`` or ``path/to/file.py:Name``. A block
+    replaces the robot's block with the same part; otherwise it is added."""
     follows: str = ""
-    """Name of the source, or of a robot with a loudspeaker; empty: the first source."""
+    """Name of the source or the leader to follow; empty: the first source."""
     loudspeaker: SoundParameters | None = None
-    """What the robot itself plays, at the origin of B, for others to follow."""
+    """Sound that the robot itself plays at the origin of B, so that others can follow
+    it."""
     start: StartParameters = StartParameters()
     microphones: MicArrayParameters = MicArrayParameters()
     tdoa: TDOAParameters = TDOAParameters()
@@ -91,8 +91,8 @@ class FollowerParameters(Parameters):
     objects: ObjectSensorParameters = ObjectSensorParameters()
     detector: ObjectDetectorParameters = ObjectDetectorParameters()
     guard: GuardParameters | None = None
-    """Keeps the robot in space that its sensors have seen as free, with any law; null:
-    no guard, unless the law is ``guarded``."""
+    """The guard keeps the robot in space that its sensors have seen as free, with any
+    law; null: no guard, unless the law is ``guarded``."""
     free_space: FreeSpaceParameters = FreeSpaceParameters()
     search: PlumeSearchParameters = PlumeSearchParameters()
     gas_sensors: GasSensorParameters = GasSensorParameters()
@@ -118,29 +118,29 @@ class FollowerParameters(Parameters):
 
     @property
     def own_guard(self) -> GuardParameters | None:
-        """``guard``, which a guarded law always has; none: nothing guards it."""
+        """The guard of the robot; guarded laws always have one. None: no guard."""
         if self.guard is None and self.law in LAWS and LAWS[self.law].guarded:
             return GuardParameters(obstacle_speed_m_s=0.6)
         return self.guard
 
     @property
     def listens(self) -> bool:
-        """Whether it hears sound waves."""
+        """Whether the robot hears sound waves."""
         return self.hearing == "audio" and not self.has_goal
 
     @property
     def searches(self) -> Literal["odor", "sound"] | None:
-        """What it searches for step by step; none: it follows, or has a route."""
+        """What the robot searches for; None: it follows a source or a route."""
         return LAWS[self.law].searches if self.law in LAWS else None
 
     @property
     def has_goal(self) -> bool:
-        """Whether it goes to what makes no sound: a goal, or a source of odour."""
+        """Whether the target is silent: the goal of a route, or an odor source."""
         return self.route is not None or self.searches == "odor"
 
     @property
     def follow_distance_m(self) -> float:
-        """Of P from what it follows, m; a goal is driven to."""
+        """Distance between P and the target, m; 0 with a route."""
         return self.attraction.follow_distance_m if self.route is None else 0.0
 
     @property
@@ -150,10 +150,10 @@ class FollowerParameters(Parameters):
 
 
 class SourceParameters(SourceRobotParameters):
-    """One source: the robot that carries it, and what it plays."""
+    """One source: the leader that carries it, and its sound."""
 
     sound: SoundParameters = SoundParameters()
-    """What it plays."""
+    """The sound of the source."""
     body: bool = True
-    """Whether it has a body that robots can hit and see; off: a loudspeaker in the
-    air."""
+    """Whether the source has a body that robots can hit and see; off: a loudspeaker in
+    the air."""

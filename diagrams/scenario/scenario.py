@@ -1,7 +1,7 @@
-"""The scenario: everything that a run depends on, in one tree.
+"""The scenario: all that a run depends on, in one tree of fields.
 
-The tree is made of the blocks' own parameter models, so that a quantity has
-one name, one default and one legal range. See ``load_scenario`` for YAML.
+The tree consists of the parameter models of the blocks. Each quantity therefore has one
+name, one default and one legal range. ``load_scenario`` reads a scenario from YAML.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ from systems.sound.parameters import SoundParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
 
-#: Names of the robot and of the source where there is one of each.
+#: Names of the only robot and of the only source.
 ROBOT, SOURCE = "robot", "source"
-#: Name of what a robot with a route drives to.
+#: Name of the target of a robot with a route.
 GOAL = "goal"
-#: Name of what all robots share in the diagram.
+#: Name of the diagram that all robots share.
 WORLD = "world"
-#: Name of what smells.
+#: Name of the source of odor.
 ODOR = "odor"
 
 _P = TypeVar("_P", bound=Parameters)
@@ -60,13 +60,13 @@ _P = TypeVar("_P", bound=Parameters)
 class Scenario(FollowerParameters, RunParameters):
     """One run. Every field has a default: the default scenario is complete.
 
-    Its fields of a robot apply to all robots, except where ``robots`` sets them for one
-    robot; the same rule applies to sources.
+    The fields of a robot apply to all robots, unless ``robots`` sets them for one
+    robot. The same rule applies to sources.
     """
 
     @cached_property
     def all_robots(self) -> dict[str, FollowerParameters]:
-        """Each robot with all that it has, by name."""
+        """Complete fields of each robot, by name."""
         fields = FollowerParameters.model_fields
         if not self.robots:
             values = {key: getattr(self, key) for key in fields}
@@ -81,7 +81,7 @@ class Scenario(FollowerParameters, RunParameters):
 
     @cached_property
     def all_sources(self) -> dict[str, SourceParameters]:
-        """Each source with all that it has, by name."""
+        """Complete fields of each source, by name."""
         robots = self.all_robots.values()
         if not self.sources and all(
             r.has_goal or r.follows in self.robots for r in robots
@@ -94,7 +94,7 @@ class Scenario(FollowerParameters, RunParameters):
         }
 
     def sounds(self) -> dict[str, SoundParameters]:
-        """What is played, by the name of the source or robot that plays it."""
+        """The sound of each source and loudspeaker, by name of the source or robot."""
         played = {name: source.sound for name, source in self.all_sources.items()}
         for name, robot in self.all_robots.items():
             if robot.loudspeaker is not None:
@@ -102,13 +102,13 @@ class Scenario(FollowerParameters, RunParameters):
         return played
 
     def sound_field(self, name: str) -> str:
-        """Where the scenario says what somebody plays, for a message.
+        """Returns the field of a sound, for messages.
 
         Args:
-            name: One of ``sounds``.
+            name: A name from ``sounds``.
 
         Returns:
-            Dotted path.
+            Dotted path of the field.
         """
         if name in self.all_robots:
             return f"robots.{name}.loudspeaker" if self.robots else "loudspeaker"
@@ -119,26 +119,26 @@ class Scenario(FollowerParameters, RunParameters):
         )
 
     def robot_fields(self) -> Iterator[tuple[str, FollowerParameters]]:
-        """Each robot, with what its fields begin with in a message."""
+        """Yields each robot, with the prefix of its fields in messages."""
         for name, robot in self.all_robots.items():
             yield (f"robots.{name}." if self.robots else ""), robot
 
     @property
     def longest_frame_s(self) -> float:
-        """Of all robots' microphones, s."""
+        """Longest audio frame of all robots, s."""
         return max(robot.microphones.frame_s for robot in self.all_robots.values())
 
     def target(self, robot: str) -> str:
-        """Name of what a robot follows, or of its goal."""
+        """Name of the source or leader that a robot follows, or of its goal."""
         own = self.all_robots[robot]
         if own.has_goal:
             return GOAL if own.route is not None else ODOR
         return own.follows or next(iter(self.all_sources))
 
     def of_robot(self, name: str) -> Scenario:
-        """The scenario as if a robot were alone with the source that it follows.
+        """Returns the scenario of one robot, alone with the source that it follows.
 
-        Where it follows a robot, ``source`` rests where that one starts.
+        If it follows a robot, ``source`` is at rest at the start of that leader.
         """
         if not self.robots and not self.sources:
             return self
@@ -163,13 +163,13 @@ class Scenario(FollowerParameters, RunParameters):
         return self.model_copy(update=own | {"robots": {}, "sources": {}})
 
     def require_one_robot(self, purpose: str) -> None:
-        """Refuses named robots and sources for what is of the plain ones alone.
+        """Refuses named robots and sources.
 
         Args:
-            purpose: What is, as 'a linear model'.
+            purpose: What needs one robot, for example 'a linear model'.
 
         Raises:
-            InputError: Some are named.
+            InputError: The scenario names robots or sources.
         """
         for field, named in (("robots", self.robots), ("sources", self.sources)):
             if named:
@@ -183,10 +183,10 @@ class Scenario(FollowerParameters, RunParameters):
         """Refuses hearing and range sensors that are slower than the tick.
 
         Args:
-            purpose: What is of one rate, as 'a linear model'.
+            purpose: What needs one rate, for example 'a linear model'.
 
         Raises:
-            InputError: One is.
+            InputError: A period differs from the tick.
         """
         for field, period in (
             ("microphones.frame_s", self.microphones.frame_s),
@@ -202,14 +202,15 @@ class Scenario(FollowerParameters, RunParameters):
     def surroundings(
         self, robot: str = "", paths: Mapping[str, Path] | None = None
     ) -> Surroundings:
-        """All that a robot can hit and see, and what it follows.
+        """Returns all bodies that a robot can hit and see, and its target.
 
         Args:
-            robot: Its name; empty: the first one.
-            paths: Of the other robots; without them they rest at their starts.
+            robot: Name of the robot; empty: the first one.
+            paths: Paths of the other robots; a robot without a path is at rest at its
+                start.
 
         Returns:
-            Bodies by name, what it follows last.
+            Bodies by name, the target last.
         """
         robot = robot or next(iter(self.all_robots))
         target, paths = self.target(robot), paths or {}
@@ -231,16 +232,16 @@ class Scenario(FollowerParameters, RunParameters):
         return Surroundings(bodies, target)
 
     def bodies(self) -> dict[str, Body]:
-        """All that the first robot can hit, by name; what it follows is last."""
+        """The bodies that the first robot can hit, by name; its target is last."""
         return dict(self.surroundings().bodies)
 
     def robots_seen(self, robot: str) -> tuple[int, ...]:
-        """Which of the bodies that a robot can see are robots, by their numbers."""
+        """Numbers of those bodies that are robots, among all that a robot can see."""
         names = enumerate(self.surroundings(robot).obstacles)
         return tuple(number for number, name in names if name in self.all_robots)
 
     def mapped(self) -> NDArray[np.float64]:
-        """(n, 5) rectangles of what rests and is on the map, m and rad."""
+        """(n, 5) rectangles of the known obstacles at rest, m and rad."""
         still = [
             Body(obstacle.path(), obstacle.size_m).rectangle(0.0)
             for obstacle in self.obstacles
@@ -250,7 +251,7 @@ class Scenario(FollowerParameters, RunParameters):
 
     @property
     def source_size(self) -> tuple[float, float]:
-        """Length and width of the master robot, m."""
+        """Length and width of ``source``, m."""
         return self.source.length_m, self.source.width_m
 
     @property
@@ -259,10 +260,11 @@ class Scenario(FollowerParameters, RunParameters):
         return self.goal_radius(moves=self.source.path().moves)
 
     def goal_radius(self, *, moves: bool) -> NonNegative:
-        """P is in the goal within this distance of what it follows, m.
+        """P is in the goal within this distance of the target, m.
 
         Args:
-            moves: Whether that moves: the goal is as wide as the following band then.
+            moves: Whether the target moves. The goal is then as wide as the following
+                band.
         """
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
         return self.follow_distance_m + margin
@@ -285,7 +287,7 @@ class Scenario(FollowerParameters, RunParameters):
 
     @model_validator(mode="after")
     def _check(self) -> Scenario:
-        # The others rest on these.
+        # The other checks assume that these pass.
         self._check_names()
         self._check_targets()
         self._check_searches()
@@ -357,7 +359,7 @@ class Scenario(FollowerParameters, RunParameters):
         if any(robot.listens for robot in robots.values()):
             return
         followed = {self.target(name) for name in robots}
-        # The one source that is always there may be a body alone.
+        # The default source need not be heard: it may serve as a body only.
         named = [each for each in played if each in robots or each in self.sources]
         for name in named:
             if name not in followed:
@@ -420,7 +422,7 @@ class Scenario(FollowerParameters, RunParameters):
                 )
 
     def _check_step(self) -> None:
-        # Where explicit Runge-Kutta steps of these orders amplify a decay.
+        # Limits of step over lag: longer steps of these schemes amplify a decay.
         limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
         step = self.integrator.step_s
         for prefix, robot in self.robot_fields():
@@ -495,7 +497,7 @@ class Scenario(FollowerParameters, RunParameters):
 def _check_schedule(
     field: str, target: str, played: Mapping[str, SoundParameters]
 ) -> None:
-    """A known schedule tells sources apart only if their bursts are apart."""
+    """Refuses ``schedule_known`` for a target that sounds without a pause."""
     sound = played[target]
     if sound.on_s >= sound.period_s:
         raise InputError(

@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 
 def check_files(scenario: Scenario) -> None:
-    """Refuses files that a run could not use, before what simulates is loaded.
+    """Refuses files that a run cannot use, before the simulation is loaded.
 
     Args:
-        scenario: Any.
+        scenario: The scenario to check.
 
     Raises:
-        InputError: One is missing or no good; has all of them.
+        InputError: Files are missing or unusable; the error lists all of them.
     """
     faults: list[InputError] = []
 

@@ -1,4 +1,4 @@
-"""YAML of whatever origin: read within limits, or refused in a line."""
+"""Reads YAML from any origin within limits, and writes YAML."""
 
 from __future__ import annotations
 
@@ -18,26 +18,27 @@ from ruamel.yaml.parser import Parser
 
 from systems.framework.input_error import InputError
 
-#: The parser takes some seconds for so much.
+#: Largest text, bytes; the parser takes some seconds for a text of this size.
 LARGEST_BYTES = 100_000
+#: Largest number of levels.
 DEEPEST = 20
-#: With every alias written out: a few lines of aliases can stand for gigabytes.
+#: Largest size with all aliases expanded; a few lines of aliases can mean gigabytes.
 LARGEST_MEANING = 1_000_000
 
 
 def parse_yaml(text: str | bytes, field: str) -> Any:
-    """The plain value that a YAML text stands for.
+    """Parses a YAML text into plain values.
 
     Args:
         text: One document.
-        field: Begins the message of an error.
+        field: Start of error messages.
 
     Returns:
-        Mappings, lists and scalars; None of an empty text.
+        Mappings, lists and scalars; None for an empty text.
 
     Raises:
-        InputError: It is not YAML, has more than 100 kB, is nested more than 20
-            deep, or its aliases stand for more than a million characters.
+        InputError: The text is not YAML, is longer than 100 kB, has more than 20
+            levels, or expands to more than a million characters through aliases.
     """
     if len(text) > LARGEST_BYTES:
         raise InputError(
@@ -57,15 +58,15 @@ def parse_yaml(text: str | bytes, field: str) -> Any:
         raise InputError(
             field, f"is not valid YAML{where}: {what}; correct it"
         ) from None
-    # What the parser's constructors raise for values that are none of their tag,
-    # as !!int x, 2024-13-45, !!bool x.
+    # The constructors raise these for values that do not fit their tag, for example
+    # !!int x, 2024-13-45, !!bool x.
     except (YAMLError, ValueError, ArithmeticError, LookupError, TypeError) as error:
         text = f"is not valid YAML: {type(error).__name__}: {error}; correct it"
         raise InputError(field, text) from None
 
 
 def dump_yaml(document: dict[str, Any]) -> str:
-    """Plain values as YAML, what is innermost on one line."""
+    """Returns plain values as YAML, with the innermost groups on one line."""
     yaml = YAML()
     yaml.default_flow_style = None
     stream = StringIO()
@@ -74,12 +75,12 @@ def dump_yaml(document: dict[str, Any]) -> str:
 
 
 class _BoundedParser(Parser):
-    """Refuses nesting and aliases that nobody means, as they come."""
+    """Refuses excessive nesting and aliases during parsing."""
 
     def __init__(self, loader: Any) -> None:
         super().__init__(loader)
         self._anchors: dict[str, int] = {}
-        # One for each collection that is open: its anchor, and its size so far.
+        # Anchor and size so far of each open collection.
         self._open: list[tuple[str | None, int]] = [(None, 0)]
 
     def get_event(self) -> Event:
@@ -99,7 +100,7 @@ class _BoundedParser(Parser):
         return event
 
     def _add(self, anchor: str | None, size: int) -> None:
-        """A node is complete: part of what is open, and of what names it."""
+        """Adds the size of a complete node to its collection; records its anchor."""
         if anchor is not None:
             self._anchors[anchor] = size
         around, total = self._open[-1]

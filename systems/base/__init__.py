@@ -1,1 +1,1 @@
-"""Bodies with wheels: the robot's drive and odometry, and the source's carrier."""
+"""Bodies with wheels: drive and odometry of the robot, and carrier of the source."""

@@ -1,8 +1,9 @@
-"""The robot that carries a loudspeaker, driven along its waypoints.
+"""The motion of a robot that carries a loudspeaker along its waypoints.
 
-It is a differential drive of the plant's kind (``plant_derivatives``), whose
-controller knows its pose. Nothing acts back on it, so that its motion is a function
-of time: it is integrated once, tick by tick and as far as asked.
+The carrier is a differential drive with the same equations as the plant
+(``plant_derivatives``). Its controller knows its pose. No other body acts on it, so
+its motion is a function of time. The motion is integrated once, tick by tick, up to
+the latest time that is needed.
 """
 
 from __future__ import annotations
@@ -24,18 +25,19 @@ from systems.world.paths import WaypointPath
 
 register_jitable(value_weights)
 
-#: How the wheels' speeds follow their commands: as the slave robot's.
+#: Motors of the carrier. They have the same lag as those of the follower.
 _PLANT = PlantParameters()
 
-#: Commands are meant for when they have taken effect: half a tick is held, and the
-#: motors lag.
+#: Time from a command to its mean effect: the motor lag, and half a tick because the
+#: command is held. The feed-forward looks ahead by this time.
 LEAD_S = _PLANT.motor_lag_s + 0.5 * TICK_S
 
-# Feedback: of the way ahead, 1/s, of the way aside, 1/m^2, and of the heading, 1/s.
-# The first decays within half a second, ten lags; with the other two, lateral errors
-# decay over 0.3 m of the way at 0.3 m/s.
+# Feedback gains of the error ahead, 1/s, the error aside, 1/m^2, and the heading error,
+# 1/s. Errors ahead decay within half a second (ten motor lags). Errors aside decay over
+# 0.3 m of the path at 0.3 m/s.
 _AHEAD, _ASIDE, _TURN = 2.0, 50.0, 5.0
 
+# Integration steps per tick.
 _STEPS_A_TICK = 5
 
 
@@ -46,17 +48,18 @@ def drive_along(
     ticks: tuple[int, int],
     knot: Sequence[float],
 ) -> NDArray[np.float64]:
-    """Drives a carrier on, from one tick to another.
+    """Continues the motion of a carrier from one tick to another.
 
     Args:
-        robot: Its wheels, mass and top speed.
-        wheel_acceleration_m_s2: Limit of that of each wheel's rim, m/s^2.
-        plan: Where it is to be.
-        ticks: The first one, and the one before the last row.
-        knot: (8,) at the first tick: pose, velocity in W and speeds of both wheels.
+        robot: Wheels, mass, and top speed of the carrier.
+        wheel_acceleration_m_s2: Limit of the acceleration of each wheel's rim, m/s^2.
+        plan: Path that the carrier follows.
+        ticks: First and last tick of the interval.
+        knot: (8,) state at the first tick: pose in W (m, m, rad), velocity in W (m/s,
+            m/s, rad/s), and left and right wheel speed, rad/s.
 
     Returns:
-        (n, 8) the same at the ticks after the first.
+        (n, 8) states at the n ticks after the first, up to the last.
     """
     times = np.arange(*ticks) * TICK_S
     states = drive(
@@ -86,29 +89,34 @@ def drive(
     lag: float,
     *numbers: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Follows a plan with feed-forward and feedback, tick by tick.
+    """Follows planned poses with feed-forward and feedback, tick by tick.
+
+    In each tick the function computes the errors ahead, aside, and of the heading. The
+    planned twist plus the feedback gives speed and yaw rate. The wheel commands follow,
+    within the limit of acceleration. Then the function integrates the plant over the
+    tick by the classical Runge-Kutta method of fourth order.
 
     Args:
-        state: (7,) of the plant at the first tick, see ``plant_derivatives``.
-        poses: (n, 3) where to be at each tick, m and rad.
-        twists: (n, 2) speed, m/s, and yaw rate, rad/s, to have when commands have
-            taken effect, ``LEAD_S`` later.
-        wheel_acceleration: Limit, rad/s^2.
-        radius: Of the wheels, m.
-        separation: Of the wheels, m.
-        lag: Of the motors, s.
+        state: (7,) state of the plant at the first tick, see ``plant_derivatives``.
+        poses: (n, 3) planned pose at each tick in W, m and rad.
+        twists: (n, 2) planned speed, m/s, and yaw rate, rad/s, at the time ``LEAD_S``
+            after each tick, when the commands take effect.
+        wheel_acceleration: Limit of the acceleration of each wheel, rad/s^2.
+        radius: Radius of the wheels, m.
+        separation: Distance between the wheels, m.
+        lag: Time constant of the motors, s.
         *numbers: ``PlantNumbers``.
 
     Returns:
         (n + 1, 7) states at the ticks.
 
     Reference: the feedback is that of Kanayama, Kimura, Miyazaki and Noguchi, "A stable
-    tracking control method for an autonomous mobile robot", ICRA 1990, with a gain
-    of the heading that does not vanish at rest.
+    tracking control method for an autonomous mobile robot", ICRA 1990. Here the gain of
+    the heading does not vanish at rest.
     """
     states = np.empty((len(poses) + 1, 7))
     command = np.empty(2)
-    for k in range(7):  # a slice compiles words about its shape
+    for k in range(7):  # a slice would also compile the error message for its shape
         states[0, k] = state[k]
     step = TICK_S / _STEPS_A_TICK
     for k in range(len(poses)):
@@ -119,7 +127,7 @@ def drive(
         speed = twists[k, 0] * math.cos(turn) + _AHEAD * (c * dx + s * dy)
         aside = twists[k, 0] * (c * dy - s * dx)
         yaw_rate = twists[k, 1] + _ASIDE * aside + _TURN * math.sin(turn)
-        # A wheel accelerates by what its command is ahead of it, over the lag.
+        # The acceleration of a wheel is the command minus its speed, over the lag.
         most = wheel_acceleration * lag
         for wheel, side in enumerate((-0.5, 0.5)):
             ahead = (speed + side * yaw_rate * separation) / radius - now[5 + wheel]
@@ -140,14 +148,15 @@ def drive(
 def poses_between(
     knots: NDArray[np.float64], ticks: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Poses between knots.
+    """Interpolates poses between knots by cubic Hermite polynomials.
 
     Args:
-        knots: (m, 8) as of ``drive_along``, a tick apart.
-        ticks: (n,) times since the first one, in ticks; after the last one, its.
+        knots: (m, 8) states as in ``drive_along``, one tick apart.
+        ticks: (n,) times since the first knot, ticks. Times after the last knot give
+            the last pose.
 
     Returns:
-        (n, 3) m and rad.
+        (n, 3) poses in W, m and rad.
     """
     poses = np.empty((ticks.size, 3))
     for i in range(ticks.size):

@@ -1,4 +1,4 @@
-"""Path, drive and size of a robot that carries a loudspeaker."""
+"""Path, drive, and size of a robot that carries a loudspeaker."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from systems.framework.parameters import (
 )
 from systems.world.paths import ACCELERATION_M_S2, AtEnd, WaypointPath
 
-#: The wheels' acceleration is this many times the path's at least: as much as a
-#: command that is held for half a lag needs, and some to correct.
+#: Least ratio of the wheels' acceleration to the acceleration along the path. The
+#: commands are held for half a motor lag, and the feedback needs a reserve.
 _HEADROOM = 1.5
 
-#: See ``CarrierParameters.top_yaw_rate``.
+#: Turn during which the yaw rate rises in a corner, rad.
 _TURN_IN_RAD = 0.08
 
 
@@ -36,7 +36,7 @@ class CarrierParameters(Parameters):
     """Path and drive of a robot that carries a loudspeaker (Han 2019, table 5)."""
 
     waypoints_m: Waypoints = ((2.0, 0.0),)
-    """Waypoints in W, m; one point is a source at rest."""
+    """Waypoints in W, m. With one waypoint the source is at rest."""
     speed_m_s: NonNegativeSpeed = 0.3
     """Speed along the path, m/s (Han 2019, 5.3)."""
     acceleration_m_s2: Acceleration = ACCELERATION_M_S2
@@ -44,9 +44,10 @@ class CarrierParameters(Parameters):
     corner_radius_m: Length = 0.3
     """Largest radius of the rounded corners, m."""
     start_time_s: Time = 0.0
-    """The source rests at its first waypoint until then, s."""
+    """Time until which the source rests at its first waypoint, s."""
     at_end: AtEnd = "stop"
-    """At the last waypoint: rest, or go back and forth."""
+    """Behavior at the last waypoint: ``stop`` rests there, ``shuttle`` goes back and
+    forth."""
     wheel_radius_m: Length = 0.06
     """Radius of the driven wheels, m."""
     wheel_separation_m: Length = 0.29
@@ -54,8 +55,8 @@ class CarrierParameters(Parameters):
     mass_kg: Mass = 5.3
     """Mass, kg."""
     wheel_force_n: Positive = 5.3
-    """Largest force of each motor at its wheel's rim, N: with the mass it limits the
-    wheels' acceleration, to 2 m/s^2 by default."""
+    """Largest force of each motor at its wheel's rim, N. Force and mass limit the
+    acceleration of the wheels (2 m/s^2 by default)."""
     top_speed_m_s: Speed = 1.0
     """Limit of each wheel's rim speed, m/s."""
 
@@ -83,28 +84,32 @@ class CarrierParameters(Parameters):
     def wheel_acceleration_m_s2(self) -> float:
         """Limit of the acceleration of each wheel's rim, m/s^2.
 
-        Of both wheels ahead, 2 F/m; one ahead and one back turn the body, whose
-        inertia about its centre is about that of half its mass at each wheel.
+        Straight ahead both wheels accelerate by 2 F/m. The limit of a turn is about the
+        same, because the inertia of the body is about that of half its mass at each
+        wheel.
         """
         return 2.0 * self.wheel_force_n / self.mass_kg
 
     @property
     def top_yaw_rate(self) -> float:
-        """In corners, rad/s: the wheels reach it while the robot turns by 0.08 rad."""
+        """Top yaw rate in corners, rad/s.
+
+        The wheels reach this yaw rate while the robot turns by 0.08 rad.
+        """
         yaw_acceleration = 2.0 * self.wheel_acceleration_m_s2 / self.wheel_separation_m
         return math.sqrt(2.0 * _TURN_IN_RAD * yaw_acceleration)
 
     @property
     def rest_heading(self) -> float:
-        """Heading where there is one waypoint, rad."""
+        """Heading of a carrier with one waypoint, rad."""
         return 0.0
 
     def path(self) -> DrivenPath:
-        """The motion as a function of time."""
+        """Returns the driven motion as a function of time."""
         return driven_path(self)
 
     def plan(self) -> WaypointPath:
-        """The motion that is asked for, from time 0 on."""
+        """Returns the planned motion, which starts at time 0."""
         return WaypointPath(
             self.waypoints_m,
             speed=self.speed_m_s,
@@ -117,7 +122,7 @@ class CarrierParameters(Parameters):
 
 
 class SourceRobotParameters(CarrierParameters):
-    """Path, drive and size of the leader robot (Han 2019, 5.3 and table 5)."""
+    """Path, drive, and size of the leader robot (Han 2019, 5.3 and table 5)."""
 
     heading_deg: Angle = 0.0
     """Heading of a source at rest, deg CCW from the x axis of W."""
@@ -128,21 +133,22 @@ class SourceRobotParameters(CarrierParameters):
 
     @property
     def rest_heading(self) -> float:
-        """Heading where there is one waypoint, rad."""
+        """Heading of a carrier with one waypoint, rad."""
         return math.radians(self.heading_deg)
 
 
 @lru_cache(maxsize=16)
 def driven_path(carrier: CarrierParameters) -> DrivenPath:
-    """The motion of a carrier.
+    """Returns the driven motion of a carrier.
 
-    A run asks for the same one many times, and the runs of a sweep in turn.
+    The cache keeps the motions of the last 16 carriers. A run and the runs of a sweep
+    use the same carrier many times.
 
     Args:
-        carrier: Any.
+        carrier: Parameters of the carrier.
 
     Returns:
-        Of the last 16 carriers the same object.
+        The motion, the same object for equal parameters.
     """
     robot = RobotParameters(
         wheel_radius_m=carrier.wheel_radius_m,

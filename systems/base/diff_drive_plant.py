@@ -1,4 +1,4 @@
-"""The differential-drive base: motors, wheels, motion, with or without slip."""
+"""The differential-drive base: motors, wheels, and motion with or without slip."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from systems.framework.signals import TICK_S
 def body_twist(
     wheel_speeds: Any, robot: RobotParameters, slip: Any = (0.0, 0.0)
 ) -> Any:
-    """Motion of the body from the speeds of its wheels.
+    """Computes the motion of the body from the speeds of its wheels.
 
     Args:
-        wheel_speeds: Left and right wheel, rad/s; floats or AutoDiffXd.
+        wheel_speeds: Left and right wheel speed, rad/s; floats or AutoDiffXd.
         robot: Radius and separation of the wheels.
-        slip: Part of the left and right rim speed that is lost, below 1.
+        slip: Share of the left and right rim speed that is lost, below 1.
 
     Returns:
         Forward speed, m/s, and yaw rate, rad/s, counterclockwise.
@@ -44,29 +44,29 @@ def _rim_twist(left, right, separation):
 
 
 class PlantNumbers(NamedTuple):
-    """What the motion of the plant depends on: last arguments of compiled code."""
+    """Constants of the motion of the plant, the last arguments of compiled code."""
 
     left_rim_m: float
     """Path of the left end of the axle per angle of its wheel, m/rad."""
     right_rim_m: float
-    """The same of the right end, m/rad."""
+    """Path of the right end of the axle per angle of its wheel, m/rad."""
     wheel_separation_m: float
     """Distance between the wheels, m."""
     top_wheel_speed: float
-    """Commands saturate here, rad/s."""
+    """Wheel speed at which commands saturate, rad/s."""
     motor_lag_s: float
-    """Time constant of the wheels' speeds, s."""
+    """Time constant of the wheel speeds, s."""
 
     @classmethod
     def of(cls, robot: RobotParameters, plant: PlantParameters) -> PlantNumbers:
-        """From the parameters.
+        """Computes the constants from the parameters.
 
         Args:
             robot: Wheels and top speed.
-            plant: Lag of the motors, and the part of the rim speeds that slip takes.
+            plant: Lag of the motors, and share of the rim speeds that is lost by slip.
 
         Returns:
-            The numbers; the radii are those that slip leaves of the wheels.
+            The constants. Slip reduces the two radii.
         """
         left, right = plant.slip
         return cls(
@@ -88,17 +88,17 @@ def plant_derivatives(
     top_wheel_speed: Any,
     motor_lag_s: Any,
 ) -> Any:
-    """Time derivatives of the plant; ``.py_func`` takes AutoDiffXd.
+    """Computes the time derivatives of the plant. ``.py_func`` takes AutoDiffXd.
 
     Args:
         state: (7,) x, y, theta, left and right wheel angle, left and right wheel
             speed; m, rad, rad/s.
-        commanded: (2,) left and right wheel speed, rad/s.
-        left_rim_m: See ``PlantNumbers``, also for the others.
-        right_rim_m: The same of the right end, m/rad.
-        wheel_separation_m: m.
-        top_wheel_speed: rad/s.
-        motor_lag_s: s.
+        commanded: (2,) commanded left and right wheel speed, rad/s.
+        left_rim_m: See ``PlantNumbers``.
+        right_rim_m: See ``PlantNumbers``.
+        wheel_separation_m: See ``PlantNumbers``.
+        top_wheel_speed: See ``PlantNumbers``.
+        motor_lag_s: See ``PlantNumbers``.
 
     Returns:
         (7,) derivatives in the order of the state.
@@ -122,17 +122,17 @@ def slipping_derivatives(
     motor_lag_s: Any,
     grip: Any,
 ) -> Any:
-    """``plant_derivatives`` with friction: the body moves by the tyres' forces.
+    """Computes the time derivatives of the plant with tires that may slip.
 
     Args:
-        state: (10,) that of ``plant_derivatives``, then the body's forward and
-            leftward speed, m/s, and yaw rate, rad/s.
-        commanded: (2,) left and right wheel speed, rad/s.
-        left_rim_m: See ``PlantNumbers``, also for the others.
-        right_rim_m: The same of the right end, m/rad.
-        wheel_separation_m: m.
-        top_wheel_speed: rad/s.
-        motor_lag_s: s.
+        state: (10,) state of ``plant_derivatives``, then forward and leftward speed of
+            the body, m/s, and its yaw rate, rad/s.
+        commanded: (2,) commanded left and right wheel speed, rad/s.
+        left_rim_m: See ``PlantNumbers``.
+        right_rim_m: See ``PlantNumbers``.
+        wheel_separation_m: See ``PlantNumbers``.
+        top_wheel_speed: See ``PlantNumbers``.
+        motor_lag_s: See ``PlantNumbers``.
         grip: ``GripNumbers``.
 
     Returns:
@@ -164,28 +164,29 @@ def _set_wheel_rates(rates, state, commanded, top_wheel_speed, motor_lag_s):
 
 @njit(cache=True)
 def _checked_derivatives(state, commanded, *numbers):  # pragma: no cover  (compiled)
-    """``plant_derivatives``, and whether all that they rest on is finite."""
+    """Returns ``plant_derivatives``, and whether state and command are finite."""
     rates = plant_derivatives(state, commanded, *numbers)
     return rates, np.isfinite(state.sum() + commanded.sum())
 
 
 @njit(cache=True)
 def _checked_slipping(state, commanded, *numbers):  # pragma: no cover  (compiled)
-    """The same of ``slipping_derivatives``."""
+    """Returns ``slipping_derivatives``, and whether state and command are finite."""
     rates = slipping_derivatives(state, commanded, *numbers)
     return rates, np.isfinite(state.sum() + commanded.sum())
 
 
 @register_jitable
 def saturated(value: Any, limit: Any) -> Any:
-    """A value, its magnitude limited.
+    """Limits the magnitude of a value.
 
     Args:
         value: Float or AutoDiffXd.
-        limit: Not negative.
+        limit: Largest magnitude, not negative.
 
     Returns:
-        The value, or the limit with its sign, of which no derivative is left.
+        The value, or the limit with the sign of the value. The limit has derivatives of
+        zero.
     """
     if value > limit:
         return value * 0.0 + limit
@@ -196,7 +197,10 @@ def saturated(value: Any, limit: Any) -> Any:
 
 @register_jitable
 def _velocities(state, numbers):
-    """Velocity in W, m/s and rad/s, and slip of both rims and sideways, m/s."""
+    """Returns the velocity in W, m/s and rad/s, and the slip velocities, m/s.
+
+    The slip velocities are those of the left rim, the right rim, and sideways.
+    """
     left, right = numbers.left_rim_m * state[5], numbers.right_rim_m * state[6]
     v, omega = _rim_twist(left, right, numbers.wheel_separation_m)
     sideways = 0.0 * v
@@ -210,18 +214,18 @@ def _velocities(state, numbers):
     return velocity, slip
 
 
-#: Columns of the port ``slip_velocities`` with friction.
+#: Table columns of the port ``slip_velocities`` with friction.
 _SLIP_COLUMNS = "slip_left", "slip_right", "slip_sideways"
 
-#: Drake's integrators stretch a last step by this factor at most.
+#: Largest factor by which Drake's integrators stretch a last step.
 _STRETCH = 1.01
 
 
 class PlantStepNumbers(NamedTuple):
-    """What the step of ``DiffDrivePlant`` depends on."""
+    """Constants of the step of ``DiffDrivePlant``."""
 
     derivatives: Any
-    """``derivatives(state, commanded, *of_plant)``."""
+    """Function ``derivatives(state, commanded, *of_plant)``."""
     of_plant: tuple[Any, ...]
     """``PlantNumbers``, and ``GripNumbers`` with friction."""
     advance: Any
@@ -236,14 +240,14 @@ class PlantStepNumbers(NamedTuple):
 
 
 def plant_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Moves the robot on by one tick, by Drake's explicit Runge-Kutta steps.
+    """Advances the robot by one tick with the explicit Runge-Kutta steps of Drake.
 
     The state is that of ``plant_derivatives`` or ``slipping_derivatives``.
     """
     (commanded,) = inputs
     derivatives, of_plant = numbers.derivatives, numbers.of_plant
     time, end = tick * numbers.tick_s, (tick + 1) * numbers.tick_s
-    # Times, steps and sums are rounded as Drake does.
+    # Times, steps, and sums are computed in Drake's order, so they round equally.
     while time < end:
         h = end - time
         if h > _STRETCH * numbers.step_s:
@@ -271,7 +275,8 @@ def _third_order(state, h, commanded, derivatives, of_plant):
         state[k] += change[k]
 
 
-#: Weights of earlier slopes in each stage of Dormand and Prince (1980), and at the end.
+#: Weights of the earlier slopes in the stages of Dormand and Prince (1980). The last
+#: row has the weights of the result.
 _STAGES = (
     (1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0),
     (3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0),
@@ -297,8 +302,8 @@ def _fifth_order(state, h, commanded, derivatives, of_plant):
         state[k] = reached[k]
 
 
-#: Drake's explicit Runge-Kutta steps, by the names of ``integrator.scheme``:
-#: ``advance(state, h, commanded, derivatives, numbers)`` changes the state.
+#: Drake's explicit Runge-Kutta steps by the names of ``integrator.scheme``. The
+#: functions ``advance(state, h, commanded, derivatives, of_plant)`` change the state.
 SCHEMES = {
     "runge_kutta2": _second_order,
     "runge_kutta3": _third_order,
@@ -307,7 +312,7 @@ SCHEMES = {
 
 
 def _publish_plant(state, outputs, numbers):
-    """The outputs of ``plant_step``'s state."""
+    """Computes the outputs from the state of ``plant_step``."""
     pose, velocity, angles, slip = outputs
     found = _velocities(state, numbers)
     for k in range(3):
@@ -318,21 +323,22 @@ def _publish_plant(state, outputs, numbers):
 @define_for_scalars("DiffDrivePlant_", __name__)
 def DiffDrivePlant_(T):
     class Impl(Block_[T]):
-        """Moves the robot: motor lag, saturation, wheels that roll or slip.
+        """Moves the robot, with motor lag, saturation, and wheels that roll or slip.
 
-        Continuous state: x, y, theta, two wheel angles, two wheel speeds; with
-        ``plant.friction`` also forward and leftward speed and yaw rate of the
-        body. Without friction these follow from the wheel speeds. The outputs are
-        functions of the state; no feedthrough. The heading is not wrapped.
+        Continuous state: x, y, theta, two wheel angles, and two wheel speeds. With
+        ``plant.friction`` the forward speed, leftward speed, and yaw rate of the body
+        follow. Without friction these result from the wheel speeds. The outputs are
+        functions of the state, without feedthrough. The heading is not wrapped.
 
         Args:
             robot: Dimensions and top speed.
             plant: ``PlantParameters``.
-            initial_pose: (x, y, theta) at time zero, at rest.
+            initial_pose: (x, y, theta) in W at time zero, m and rad. The robot starts
+                at rest.
 
         Raises:
-            ValueError: The initial pose, a state or a command is not finite, which
-                an error-controlled integrator would meet with endless steps.
+            ValueError: The initial pose, a state, or a command is not finite. An
+                error-controlled integrator would then take steps without end.
 
         Reference: Han 2019, table 6; the motor lag and the grip are ours.
         """
@@ -409,7 +415,7 @@ def DiffDrivePlant_(T):
             derivatives.SetFromVector(rates)
 
         def step_for(self, run: RunFacts) -> Step:
-            """The step, with the initial pose and the integrator of the run."""
+            """Returns the step with the initial pose and the integrator of the run."""
             numbers = self._numbers._replace(
                 advance=SCHEMES[run.scheme], step_s=run.step_s, tick_s=run.tick_s
             )

@@ -1,7 +1,7 @@
 """Motion of a robot that carries a loudspeaker, as a function of time.
 
-``systems/base/carrier.py`` drives it; that is compiled code, which is loaded when the
-robot is first asked where it drives.
+``systems/base/carrier.py`` computes the motion. That module has compiled code, so it
+is imported only when a pose or velocity of a moving robot is needed.
 """
 
 from __future__ import annotations
@@ -16,28 +16,29 @@ from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath
 
-#: After the end of the planned motion the robot is held: by then the feedback moves
-#: it by less than 1 nm/s.
+#: Time after the end of the plan when the robot is stopped, s. By then the feedback
+#: moves it by less than 1 nm/s.
 _SETTLING_S = 10.0
 
+#: Least number of ticks that are computed at once.
 _CHUNK_TICKS = 400
 
 
 class DrivenPath:
     """Pose and velocity of a robot that drives through waypoints.
 
-    Commands go out every 25 ms, whatever the tick of those that follow it, from the
-    start on; between them the pose follows the cubic Hermite polynomial, within 1 um
-    and 10 urad of the plant. The robot is
-    within 2 mm of its plan in the library's scenarios, and at 0.7 m/s within 4 cm
-    beside the arcs of corners; it rests within 5 mm of the last waypoint.
+    The wheel commands change every 25 ms from the start time on. This tick does not
+    depend on the ticks of the followers. Between ticks the pose is a cubic Hermite
+    polynomial, which differs from the plant by at most 1 um and 10 urad. In the
+    scenarios of the library the robot stays within 2 mm of its plan. At 0.7 m/s it
+    stays within 4 cm of the arcs of corners. It stops within 5 mm of the last waypoint.
 
     Args:
-        plan: Where it is to be.
-        robot: Its wheels, mass and top speed.
-        wheel_acceleration_m_s2: Limit of that of each wheel's rim, m/s^2.
-        start_time_s: It rests at the first waypoint until then, s.
-        stops: Whether it rests at the end of its plan.
+        plan: Planned path.
+        robot: Wheels, mass, and top speed.
+        wheel_acceleration_m_s2: Limit of the acceleration of each wheel's rim, m/s^2.
+        start_time_s: Time until which the robot rests at the first waypoint, s.
+        stops: Whether the robot rests at the end of its plan.
     """
 
     def __init__(
@@ -52,20 +53,20 @@ class DrivenPath:
         self._start, self._plan, self._robot = start_time_s, plan, robot
         self._wheel_acceleration = wheel_acceleration_m_s2
         self.moves = plan.moves
-        """Whether it ever leaves its first waypoint."""
+        """Whether the robot ever leaves its first waypoint."""
         self.length = plan.length
         """Length of the planned path, m."""
         self._rest = plan.pose(0.0)
         self._end = math.inf
         if stops:
             self._end = math.ceil((plan.duration + _SETTLING_S) / TICK_S)
-        # Pose, velocity and wheel speeds at the ticks so far; rows of floats are
-        # read one by one faster than those of an array.
+        # Pose, velocity, and wheel speeds at the ticks so far, as lists and as an
+        # array. Single rows of floats are faster to read from lists.
         self._knots = [[*self._rest, 0.0, 0.0, 0.0, 0.0, 0.0]]
         self._table = np.array(self._knots)
 
     def _drive_on(self, tick: int) -> None:
-        """Has the knots up to the one after a tick, or to the end."""
+        """Computes the knots up to the one after a tick, or up to the end."""
         from systems.base.carrier import drive_along
 
         knots = self._knots
@@ -86,14 +87,14 @@ class DrivenPath:
         self._table = np.vstack([self._table, rows])
 
     def _since(self, ticks: float) -> tuple[float, list[float], list[float]]:
-        """Part of the tick that has passed, and the knots at its ends."""
+        """Returns the elapsed share of a tick, and the knots at both ends of it."""
         if ticks >= len(self._knots) - 1:
             self._drive_on(int(min(ticks, self._end)))
         k = min(int(ticks), len(self._knots) - 2)
         return min(ticks - k, 1.0), self._knots[k], self._knots[k + 1]
 
     def pose(self, time: float) -> tuple[float, float, float]:
-        """(x, y, theta) in W at a time in s; m and rad."""
+        """Returns (x, y, theta) in W at a time in s, m and rad."""
         if not self.moves or time <= self._start:
             return self._rest
         s, a, b = self._since((time - self._start) / TICK_S)
@@ -105,7 +106,7 @@ class DrivenPath:
         )
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
+        """Returns the (n, 3) poses in W at n times in s, m and rad; see ``pose``."""
         times = np.asarray(times, dtype=float)
         if not self.moves or not len(times):
             return np.full((len(times), 3), self._rest)
@@ -116,7 +117,7 @@ class DrivenPath:
         return poses_between(self._table, ticks)
 
     def velocity(self, time: float) -> tuple[float, float, float]:
-        """(vx, vy, omega) in W at a time in s; m/s and rad/s."""
+        """Returns (vx, vy, omega) in W at a time in s, m/s and rad/s."""
         if not self.moves or time <= self._start:
             return (0.0, 0.0, 0.0)
         s, a, b = self._since((time - self._start) / TICK_S)
@@ -129,16 +130,16 @@ class DrivenPath:
         )
 
     def extreme_twists(self, until: float) -> NDArray[np.float64]:
-        """Speeds and yaw rates at the ticks of the path.
+        """Returns the speeds and yaw rates at the ticks of the path.
 
-        Within a tick the speed of each wheel nears that which is commanded, so that
-        every point of the body is fastest at one of the ends.
+        Within a tick the speed of each wheel approaches its command. Therefore every
+        point of the body is fastest at the start or at the end of the tick.
 
         Args:
-            until: Ticks count up to this time, s.
+            until: Time up to which ticks count, s.
 
         Returns:
-            (n, 2) m/s and rad/s.
+            (n, 2) speeds, m/s, and yaw rates, rad/s.
         """
         ticks = max(until - self._start, 0.0) / TICK_S
         if not self.moves:

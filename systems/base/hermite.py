@@ -1,4 +1,4 @@
-"""The cubic polynomial between two instants of which values and slopes are known."""
+"""The cubic polynomial between two instants with known values and slopes."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from systems.framework.signals import TICK_S
 
 
 def value_weights(s: Any) -> tuple[Any, Any, Any]:
-    """Weights of the cubic Hermite polynomial over a tick.
+    """Computes the weights of the cubic Hermite polynomial over a tick.
 
     Args:
-        s: Share of the tick that has passed, from 0 to 1.
+        s: Elapsed share of the tick, from 0 to 1.
 
     Returns:
-        Of the difference of both values, and of the slopes at begin and end, s.
+        Weight of the difference of both values, 1; weights of the slopes at the start
+        and at the end, s.
     """
     rest = TICK_S * s * (1.0 - s)
     return s * s * (3.0 - 2.0 * s), rest * (1.0 - s), -rest * s

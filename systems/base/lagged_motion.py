@@ -1,4 +1,4 @@
-"""Motion of the base while its wheels approach a held command with the motors' lag."""
+"""Motion of the base while the wheels approach a held command with motor lag."""
 
 from __future__ import annotations
 
@@ -10,45 +10,49 @@ from numba.extending import register_jitable
 
 from systems.framework.scalar_math import cos, sin
 
-#: Nodes of Gauss and Legendre's quadrature on each panel.
+#: Number of Gauss-Legendre nodes in each panel of the quadrature.
 _NODES = 4
-#: No panel is longer, s: it bounds the turn within a panel.
+#: Longest panel, s. It limits the turn within a panel.
 _LONGEST_PANEL_S = 0.1
 
 
 class LaggedMotion(NamedTuple):
-    """How wheels turn in a period during which their command is held.
+    """Constants of the wheel motion in a period with a held command.
 
-    With the lag tau each wheel's speed is c + (w - c) exp(-t/tau): c its command, w its
-    speed at the start. Its angle is then the sum of a *steady* part that grows in
-    proportion to time, c t, and of a *lagged* part that grows as 1 - exp(-t/tau).
+    Each wheel has the speed c + (w - c) exp(-t/tau). Here tau is the lag, c is the
+    command, and w is the speed at the start. The wheel angle is the sum of two parts.
+    The *steady* part c t grows in proportion to time. The *lagged* part grows as
+    1 - exp(-t/tau).
     """
 
     duration_s: float
+    """Duration of the period, s."""
     lag_s: float
-    """tau, s."""
+    """Lag tau, s."""
     kept: float
-    """exp(-duration/tau): share of w - c that is left at the end."""
+    """Share exp(-duration/tau) of w - c that is left at the end."""
     lagged_s: float
-    """tau (1 - kept): angle of the lagged part for each rad/s of w - c, s."""
+    """Angle tau (1 - kept) of the lagged part per rad/s of w - c, s."""
     least_share: float
-    """Where pulses are counted, a tick's steady part counts with this share at least,
-    whatever the net way: see docs/guard.md, "Encoders"."""
+    """Least share with which the steady part of a tick counts in the error bound of
+    the encoders, at any net path. See docs/results_guard.md, "Encoders"."""
     nodes: tuple[tuple[float, float, float, float], ...]
-    """Of the quadrature: shares of the steady and of the lagged part that are behind
-    the robot at the node, and the weights of the node for both."""
+    """Nodes of the quadrature: shares of the steady part and of the lagged part that
+    the robot has covered at the node, and weights of the node for both parts."""
 
 
 def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
-    """The numbers of ``LaggedMotion``.
+    """Computes the constants of ``LaggedMotion``.
+
+    No panel of the quadrature is longer than the lag. This keeps the error below 1e-10
+    of the path length.
 
     Args:
-        duration_s: Of the period, s.
-        lag_s: Time constant of the wheels' speeds, s.
+        duration_s: Duration of the period, s.
+        lag_s: Time constant of the wheel speeds, s.
 
     Returns:
-        The numbers. Panels of the quadrature are no longer than the lag, so that its
-        error is below 1e-10 of the way.
+        The constants.
     """
     panels = math.ceil(max(duration_s / lag_s, duration_s / _LONGEST_PANEL_S) - 1e-9)
     at, weight = np.polynomial.legendre.leggauss(_NODES)
@@ -57,7 +61,7 @@ def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
     steady = np.tile(0.5 * weight, panels) / panels
     decay = np.exp(-share * duration_s / lag_s)
     kept = math.exp(-duration_s / lag_s)
-    # Weights add up to 1, so that a straight way is exact.
+    # The weights add up to 1, so a straight path is exact.
     lagged = steady * decay / (steady @ decay)
     nodes = zip(
         share.tolist(),
@@ -73,17 +77,20 @@ def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
 
 @register_jitable
 def advance_pose(pose: Any, travelled: Any, steady: Any, motion: LaggedMotion) -> Any:
-    """Pose after a period in which the command was held.
+    """Computes the pose after a period in which the command was held.
+
+    Path and turn have a steady part and a lagged part. The function integrates
+    (cos theta, sin theta) along the path by a quadrature over the nodes of ``motion``.
 
     Args:
-        pose: (x, y, theta) at the start, m and rad; floats or AutoDiffXd.
-        travelled: Way, m, and turn, rad, of the body in the period.
-        steady: What they would have been, had the wheels run at their commanded speeds
-            from the start.
+        pose: (x, y, theta) at the start in W, m and rad; floats or AutoDiffXd.
+        travelled: Path, m, and turn, rad, of the body in the period.
+        steady: Path and turn if the wheels had run at their commanded speeds from the
+            start.
         motion: ``LaggedMotion`` of the period.
 
     Returns:
-        (x, y, theta): the integral of (cos theta, sin theta) along the way.
+        (x, y, theta) at the end in W, m and rad.
     """
     lagged_way, lagged_turn = travelled[0] - steady[0], travelled[1] - steady[1]
     x, y, theta = pose[0], pose[1], pose[2]

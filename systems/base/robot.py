@@ -1,4 +1,4 @@
-"""Dimensions of the sound-following robot, shared by several blocks."""
+"""Dimensions of the follower, which several blocks share."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from systems.framework.parameters import (
     with_preset,
 )
 
-#: Microphones nearer to one another than this are one, m.
+#: Least distance between two microphones, m.
 LEAST_SPACING_M = 1e-3
 
 
 class RobotParameters(Parameters):
     """The follower robot of Han 2019, table 6.
 
-    The table prints "350 (W) x 820 (L)" next to a wheel distance of 410 mm and
-    a microphone row of 800 mm, so that 820 mm can only be the lateral size.
+    The table prints "350 (W) x 820 (L)", a wheel distance of 410 mm, and a microphone
+    row of 800 mm. Therefore 820 mm can only be the lateral size.
     """
 
     preset: RobotPreset = "han2019"
-    """A named robot: defaults of the other fields; fields that are set take
-    precedence."""
+    """Named robot that gives the defaults of the other fields. Fields that are set
+    take precedence."""
     length_m: Length = 0.35
     """Extent of the body along its x axis, m."""
     width_m: Length = 0.82
-    """Extent of the body along its y axis, the microphone bar included, m."""
+    """Extent of the body along its y axis, including the microphone bar, m."""
     control_point_m: Length = 0.175
     """Distance epsilon of the control point P ahead of the axle, m."""
     microphones_m: Annotated[tuple[Point, ...], Strict(False), Field(min_length=3)] = (
@@ -47,16 +47,18 @@ class RobotParameters(Parameters):
         (0.0, 0.0),
         (0.0, -0.4),
     )
-    """Microphones from P in B axes, m, at least three; no two within 1 mm.
+    """Positions of the microphones relative to P in the axes of B, m. There must be at
+    least three, and no two within 1 mm.
 
-    A row with 0.4 m between neighbors, from left to right (Han 2019, 2.3).
+    The default is a row from left to right with 0.4 m between neighbors (Han 2019,
+    2.3).
     """
     wheel_radius_m: Length = 0.06
     """Radius of the driven wheels, m."""
     wheel_separation_m: Length = 0.41
     """Distance L between the driven wheels, m."""
     mass_kg: Mass = 3.94
-    """Virtual mass M at P, kg: the mass of the robot."""
+    """Virtual mass M at P, kg. It equals the mass of the robot."""
     top_speed_m_s: Speed = 0.72
     """Limit of |v_P| and of each wheel's rim speed, m/s (Han 2019, 5.3)."""
 
@@ -83,10 +85,10 @@ class RobotParameters(Parameters):
 
 
 def body_radius(robot: RobotParameters) -> float:
-    """Radius of the disc about the axle that holds the body at any heading, m."""
+    """Returns the radius of the disc around the axle that contains the body, m."""
     return 0.5 * math.hypot(robot.length_m, robot.width_m)
 
 
 def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
-    """(n, 2) microphones in B, m, in the order of the channels."""
+    """Returns the (n, 2) microphone positions in B, m, in the order of the channels."""
     return np.add(robot.microphones_m, [robot.control_point_m, 0.0])

@@ -1,4 +1,4 @@
-"""Named robots: what a user would else write field by field."""
+"""Named robots: sets of values for the fields of ``RobotParameters``."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _SONG: Mapping[str, Any] = {
     "top_speed_m_s": 0.2,
 }
 
-#: Fields of ``RobotParameters`` that differ from the slave robot of Han 2019.
+#: Fields of ``RobotParameters`` that differ from the follower of Han 2019.
 ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
     "han2019": {},
-    # ROBOTIS e-Manual, TurtleBot3 Burger: 138 x 178 mm, 1 kg, wheels of 66 mm,
-    # 160 mm apart, 0.22 m/s; mass, wheels and track are also in tables 1 and 2 of
+    # ROBOTIS e-Manual, TurtleBot3 Burger: 138 x 178 mm, 1 kg, wheels of 66 mm diameter,
+    # 160 mm apart, 0.22 m/s. Mass, wheels, and track are also in tables 1 and 2 of
     # Engelbrecht, Steyn and Djouani (2021). P is half a wheel separation ahead of the
-    # axle, so that its speeds along and across have one limit. It has no microphones of
-    # its own: these are ours.
+    # axle, so its speeds along and across the heading have the same limit. The real
+    # robot has no microphones. These positions are ours.
     "turtlebot3_burger": {
         "length_m": 0.138,
         "width_m": 0.178,
@@ -37,11 +37,11 @@ ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
         "mass_kg": 1.0,
         "top_speed_m_s": 0.22,
     },
-    # Song 2011: neither sizes nor track are printed; these are ours. P is over the axle
-    # but for a centimetre: nothing is steered by it. The smelling robot has no use for
-    # microphones.
+    # Song 2011 prints neither size nor track. These values are ours. P is only 1 cm
+    # ahead of the axle, because no law steers by it. The olfactory robot does not use
+    # its microphones.
     "song2011_olfactory": _SONG,
-    # A microphone in the middle and three on arms of 15 cm (3.1), one of them ahead.
+    # One microphone in the middle, three on arms of 15 cm (3.1), one of these ahead.
     "song2011_hearing": {
         **_SONG,
         "microphones_m": (

@@ -15,9 +15,9 @@ def SourceRobot_(T):
     class Impl(Block_[T]):
         """Drives the source along its waypoints.
 
-        The wheels drive the motion (``DrivenPath``), and nothing acts back on them:
-        the outputs are functions of time alone; no state, no latency. No gradient
-        passes through the source, because its motion depends on no input.
+        The motion is that of a robot with wheels (``DrivenPath``). No other body acts
+        on it. The outputs are functions of time, without state and without latency. No
+        gradient passes through the source, because its motion depends on no input.
 
         Args:
             source: ``SourceRobotParameters``.

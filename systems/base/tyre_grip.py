@@ -1,4 +1,4 @@
-"""Grip of the two driven wheels: friction that holds them, up to a limit."""
+"""Grip of the two driven wheels: friction forces up to a limit."""
 
 from __future__ import annotations
 
@@ -10,29 +10,30 @@ from numba.extending import register_jitable
 from systems.base.robot import RobotParameters
 
 GRAVITY_M_S2 = 9.81
-#: Slip that is left when a wheel grips again decays in this time, s: a third-order
-#: step of 25 ms takes 98 % of it, and any scheme of the integrator is stable.
+#: Time constant with which the remaining slip decays when a wheel grips again, s. A
+#: third-order step of 25 ms removes 98 % of the slip. All integrators are stable.
 _REGRIP_S = 0.016
-#: Of the search for forces. What is wanting falls to 0.4 in each with the printed
-#: dimensions, to two thirds with a body no wider than its wheels are apart.
+#: Iterations of the search for forces. With the printed dimensions each iteration
+#: reduces the error to 0.4 of its value. It reduces the error to two thirds if the body
+#: is no wider than the distance between its wheels.
 _SWEEPS = 60
 
 
 class GripNumbers(NamedTuple):
-    """What the grip hangs on; the robot's mass cancels."""
+    """Constants of the grip. The mass of the robot cancels."""
 
     traction_m_s2: float
-    """Largest force of one wheel over the mass of the robot, m/s^2."""
+    """Largest force of one wheel, divided by the mass of the robot, m/s^2."""
     gyration_m2: float
-    """Moment of inertia about the vertical axis over the mass, m^2."""
+    """Moment of inertia about the vertical axis, divided by the mass, m^2."""
 
     @classmethod
     def of(cls, robot: RobotParameters, friction: float) -> GripNumbers:
-        """A uniform rectangle whose weight the two driven wheels share.
+        """Computes the grip of a uniform rectangle whose weight the two wheels share.
 
         Args:
             robot: Length and width of the rectangle.
-            friction: Coefficient between tyres and floor.
+            friction: Coefficient of friction between tires and floor.
 
         Returns:
             Half of friction times gravity, m/s^2, and (length^2 + width^2) / 12, m^2.
@@ -51,18 +52,22 @@ def grip_accelerations(
     wheel_separation_m: float,
     grip: GripNumbers,
 ) -> tuple[Any, Any, Any]:
-    """How the body's velocity changes by the forces of its tyres.
+    """Computes the acceleration of the body by the forces of its tires.
 
-    Where the floor can give them, the forces are those with which no wheel slips.
-    Where it cannot, they are those of at most ``traction_m_s2``, in any direction,
-    that come nearest to it (Gauss' principle of least constraint): a sliding wheel
-    pushes with the limit along its slip, and has none left for the side.
+    If the friction suffices, the forces are those with which no wheel slips. If it does
+    not suffice, the force of each wheel is at most ``traction_m_s2`` in any direction.
+    Under this limit the forces come nearest to motion without slip (Gauss' principle of
+    least constraint). A sliding wheel pushes along its slip with the limit. It has no
+    force left for the side.
+
+    The function computes the forces without slip first. If a force exceeds the limit,
+    projected gradient descent finds the limited forces.
 
     Args:
-        motion: Forward and leftward speed of the axle's middle, m/s, and yaw rate,
+        motion: Forward and leftward speed of the middle of the axle, m/s, and yaw rate,
             rad/s; floats or AutoDiffXd.
         rims: Left and right rim speed, m/s.
-        rim_accelerations: Their rates of change, m/s^2.
+        rim_accelerations: Left and right rim acceleration, m/s^2.
         wheel_separation_m: Distance between the wheels, m.
         grip: ``GripNumbers``.
 
@@ -72,12 +77,12 @@ def grip_accelerations(
     forward, sideways, yaw = motion
     traction_m_s2, gyration_m2 = grip
     half = wheel_separation_m / 2.0
-    # What each contact should do so that its slip is or becomes nothing.
+    # Accelerations of the contact points that keep or make the slip zero.
     left_slip = rims[0] - (forward - yaw * half)
     right_slip = rims[1] - (forward + yaw * half)
     left_wanted = rim_accelerations[0] + left_slip / _REGRIP_S
     right_wanted = rim_accelerations[1] + right_slip / _REGRIP_S
-    # Forces over the mass with which no wheel slips, halved between the wheels.
+    # Forces without slip, divided by the mass. Both wheels share them equally.
     lever = half * half / gyration_m2
     push = (left_wanted + right_wanted) / 2.0 - yaw * sideways
     twist = (right_wanted - left_wanted) / (2.0 * lever)
@@ -86,7 +91,7 @@ def grip_accelerations(
     left_y, right_y = side / 2.0, side / 2.0
     largest = max(left_x * left_x, right_x * right_x) + left_y * left_y
     if largest > traction_m_s2 * traction_m_s2:
-        # Projected gradient descent on what is wanting.
+        # Projected gradient descent on the missing acceleration.
         gain = 0.5 * min(1.0, 1.0 / lever)
         for _ in range(_SWEEPS):
             along = left_x + right_x - push
@@ -107,7 +112,7 @@ def grip_accelerations(
 
 @register_jitable
 def _limited(x: Any, y: Any, limit: float) -> tuple[Any, Any]:
-    """A force of at most this size in the same direction."""
+    """Scales a force down to the limit, in the same direction."""
     square = x * x + y * y
     if square > limit * limit:
         scale = limit / np.sqrt(square)

@@ -20,35 +20,40 @@ from systems.framework.signals import TICK_S
 
 @register_jitable
 def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
-    """Wheel angle in whole pulses, rad.
+    """Rounds a wheel angle down to whole pulses.
 
     Args:
-        angle: Of the wheel since the start, rad, of either sign.
-        pulses_per_revolution: Of the encoder.
+        angle: Angle of the wheel since the start, rad, positive or negative.
+        pulses_per_revolution: Pulses of the encoder per revolution.
 
     Returns:
-        The greatest whole number of pulses that is not above the angle, rad.
+        Largest multiple of a pulse that is not above the angle, rad.
     """
     pulse = math.tau / pulses_per_revolution
     return math.floor(angle / pulse) * pulse
 
 
 class OdometryNumbers(NamedTuple):
-    """What the step of ``WheelOdometry`` depends on."""
+    """Constants of the step of ``WheelOdometry``."""
 
     robot: RobotParameters
     pulses: int
-    """Per revolution; 0: angles are not rounded."""
+    """Pulses per revolution; 0: angles are not rounded."""
     motion: LaggedMotion
-    """Of the wheels in a tick."""
+    """Motion of the wheels in a tick."""
     lost_tick: int = -1
-    """Tick at which the pose is lost; -1: never."""
+    """Tick at which the pose restarts at zero; -1: never."""
 
 
 def odometry_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Continues pose and encoder angles, the state, to the present angles."""
+    """Continues the pose to the present wheel angles.
+
+    The state is the pose and both encoder angles of the last tick. The step computes
+    the path and turn from the new angles. It also computes the path and turn that the
+    held command would give without lag. ``advance_pose`` integrates the motion.
+    """
     left, right = inputs[0][0], inputs[0][1]
     if numbers.pulses > 0:
         left = encoder_angle(left, numbers.pulses)
@@ -60,7 +65,7 @@ def odometry_step(
     turned = left - state[3], right - state[4]
     travelled = body_twist(turned, robot)
     steady = travelled
-    # Right after an update nothing of the present command has been driven.
+    # Directly after an update the wheels have not moved yet, so the motion is zero.
     if turned[0] != 0.0 or turned[1] != 0.0:
         top = robot.top_wheel_speed
         steady_left = motion.duration_s * saturated(inputs[1][0], top)
@@ -78,29 +83,28 @@ def odometry_step(
 @define_for_scalars("WheelOdometry_", __name__)
 def WheelOdometry_(T):
     class Impl(Block_[T]):
-        """Estimates pose and velocity from the wheels' encoders.
+        """Estimates pose and velocity from the encoders of the wheels.
 
-        The block assumes that between two ticks the wheels approach their command
-        with the motors' nominal lag: the encoders give the angles of both ends,
-        command and lag the motion in between. With rolling wheels of that lag and
-        exact angles the pose at a tick is exact. The mean heading over a tick is not
-        enough: forward speed in phase with the yaw acceleration gives errors that
-        add up.
+        The block assumes that the wheels approach their command with the nominal motor
+        lag between two ticks. The encoders give the angles at both ticks. Command and
+        lag give the motion in between. If the wheels roll with that lag and the angles
+        are exact, the pose at a tick is exact. The mean heading over a tick would not
+        be enough. If the forward speed varied in phase with the yaw acceleration, its
+        errors would add up.
 
-        With angles in whole pulses the position error is (q/L) s + q at most: q is the
-        path of the rim per pulse, L the wheel separation, s the mean path of both rims
-        (docs/guard.md has the proof).
+        With angles in whole pulses the position error is at most (q/L) s + q. Here q is
+        the path of the rim per pulse, L is the wheel separation, and s is the mean path
+        of both rims (docs/results_guard.md has the proof).
 
         Discrete state, every tick: pose and encoder angles at the last tick. The
-        outputs continue it to the present angles: no latency. The velocity
-        is the mean over the tick in progress (at a tick: over the last one).
-        Slip goes unseen.
+        outputs continue this state to the present angles, without latency. The velocity
+        at a tick is the mean over the last tick. The block does not measure slip.
 
         Args:
             robot: Wheel radius and separation.
             odometry: ``OdometryParameters``.
             plant: Lag of the motors.
-            initial_pose: (x, y, theta) at time zero, known.
+            initial_pose: Known pose (x, y, theta) in W at time zero, m and rad.
             tick_s: Period of the update, s.
 
         Raises:
@@ -155,7 +159,7 @@ def WheelOdometry_(T):
             )
 
         def step_for(self, run: RunFacts) -> Step:
-            """The step, with the initial pose of the run."""
+            """Returns the step with the initial pose of the run."""
             return self.step._replace(state=[*run.initial_pose, 0.0, 0.0])
 
     return Impl

@@ -1,4 +1,4 @@
-"""From what a law commands to wheel speeds: an acceleration, a velocity or a twist."""
+"""Wheel speeds from the command of a law: an acceleration, a velocity, or a twist."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.world.geometry import rotate, safe_norm
 
-#: ``turned_off_back`` turns by no more than this.
+#: Tangent of the largest angle by which ``turned_off_back`` turns.
 _ASIDE = math.tan(math.radians(5.0))
 
 
 @register_jitable
 def clamped_velocity(vx: Any, vy: Any, top_speed: Any) -> Any:
-    """A velocity in its direction, its magnitude top_speed at most.
+    """Limits the magnitude of a velocity and keeps its direction.
 
     Args:
-        vx: m/s; float or AutoDiffXd.
-        vy: m/s, in the same axes.
-        top_speed: m/s.
+        vx: First component, m/s; float or AutoDiffXd.
+        vy: Second component in the same axes, m/s.
+        top_speed: Largest magnitude, m/s.
 
     Returns:
         (vx, vy), m/s.
@@ -40,19 +40,19 @@ def clamped_velocity(vx: Any, vy: Any, top_speed: Any) -> Any:
 def integrate_velocity(
     v_WP: Any, acceleration_W: Any, period: Any, top_speed: Any
 ) -> Any:
-    """Velocity of the virtual mass after one period, its magnitude clamped.
+    """Computes the velocity of the virtual mass after one period.
 
-    The clamp acts on the state: without it v_P would wind up to F_m/D_r,
-    2 m/s for each metre to go.
+    The function limits the velocity, which is a state. Without the limit v_P would
+    wind up to F_m/D_r, which is 2 m/s per meter of distance to the target.
 
     Args:
-        v_WP: (vx, vy), m/s; floats or AutoDiffXd.
-        acceleration_W: (ax, ay), m/s^2.
-        period: s.
-        top_speed: m/s.
+        v_WP: Velocity (vx, vy) in W, m/s; floats or AutoDiffXd.
+        acceleration_W: Acceleration (ax, ay) in W, m/s^2.
+        period: Period, s.
+        top_speed: Largest magnitude of the velocity, m/s.
 
     Returns:
-        (vx, vy), m/s.
+        (vx, vy) in W, m/s.
     """
     vx = v_WP[0] + period * acceleration_W[0]
     vy = v_WP[1] + period * acceleration_W[1]
@@ -61,15 +61,15 @@ def integrate_velocity(
 
 @register_jitable
 def hand_position_twist(v_WP: Any, theta: Any, control_point_m: Any) -> Any:
-    """Forward speed and yaw rate that give P the velocity v_WP.
+    """Computes the forward speed and yaw rate that give P the velocity v_WP.
 
-    v = v_P . x_B and omega = v_P . y_B / epsilon: exact, and smooth at
-    standstill.
+    The result is v = v_P . x_B and omega = v_P . y_B / epsilon. It is exact, and it is
+    smooth at standstill.
 
     Args:
-        v_WP: (vx, vy), m/s; floats or AutoDiffXd.
+        v_WP: Velocity (vx, vy) of P in W, m/s; floats or AutoDiffXd.
         theta: Heading of B in W, rad.
-        control_point_m: epsilon, m.
+        control_point_m: Distance epsilon of P ahead of the axle, m.
 
     Returns:
         (v, omega), m/s and rad/s.
@@ -80,38 +80,40 @@ def hand_position_twist(v_WP: Any, theta: Any, control_point_m: Any) -> Any:
 
 @register_jitable
 def hand_position_velocity(twist_B: Any, theta: Any, control_point_m: Any) -> Any:
-    """Velocity of P in W that a twist gives it: undoes ``hand_position_twist``.
+    """Computes the velocity of P from a twist, the inverse of ``hand_position_twist``.
 
     Args:
         twist_B: (v, omega), m/s and rad/s; floats or AutoDiffXd.
         theta: Heading of B in W, rad.
-        control_point_m: epsilon, m.
+        control_point_m: Distance epsilon of P ahead of the axle, m.
 
     Returns:
-        (vx, vy), m/s.
+        (vx, vy) of P in W, m/s.
     """
     return rotate(theta, twist_B[0], control_point_m * twist_B[1])
 
 
 @register_jitable
 def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
-    """A vector along which P is to move, turned aside where it points straight back.
+    """Turns a vector for P aside if it points straight back.
 
-    The heading follows theta' = |v_P| sin(psi - theta)/epsilon, psi the direction of
-    v_P: stable where P moves ahead, and an equilibrium, though not a stable one, where
-    it moves straight back. There the robot would back for metres, into what it follows,
-    until rounding errors have grown. Aim P aside instead, and the body turns round.
-    Ours: the papers do not say how an acceleration becomes wheel speeds.
+    The heading follows theta' = |v_P| sin(psi - theta)/epsilon, where psi is the
+    direction of v_P. A heading along v_P is a stable equilibrium. A heading opposite to
+    v_P is an unstable equilibrium. There the robot would drive backward for meters,
+    even into its target, until rounding errors grow. This function points the vector
+    aside, so the body turns around. The method is ours, because the papers do not say
+    how an acceleration becomes wheel speeds.
 
     Args:
-        x: Component in W, any unit; float or AutoDiffXd.
-        y: See x.
+        x: First component in W, any unit; float or AutoDiffXd.
+        y: Second component in W, in the same unit.
         theta: Heading of B in W, rad.
-        least: A shorter vector stays as it is, in that unit.
+        least: Backward component up to which a vector does not change, in that unit.
 
     Returns:
-        (x, y): up to 5 deg off straight back, to the side to which it tends already,
-        and to the left if to none. All other vectors stay as they are.
+        (x, y) in W, at most 5 deg from straight back. The vector turns to its own
+        side, or to the left if it has no side. Vectors that point elsewhere do not
+        change.
     """
     along, across = rotate(-theta, x, y)
     aside = _ASIDE * (-along - least)
@@ -122,15 +124,17 @@ def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
 
 @register_jitable
 def limited_wheel_speeds(v: Any, omega: Any, robot: RobotParameters) -> Any:
-    """Left and right wheel speed, scaled together to the limit.
+    """Computes the wheel speeds, scaled together to the limit.
+
+    The scaling keeps the curvature omega/v of the path.
 
     Args:
         v: Forward speed, m/s; float or AutoDiffXd.
         omega: Yaw rate, rad/s.
-        robot: Its dimensions and top speed.
+        robot: Dimensions and top speed.
 
     Returns:
-        (left, right), rad/s. The curvature omega/v is kept.
+        (left, right) wheel speed, rad/s.
     """
     half = omega * robot.wheel_separation_m / 2.0
     left = (v - half) / robot.wheel_radius_m
@@ -142,16 +146,16 @@ def limited_wheel_speeds(v: Any, omega: Any, robot: RobotParameters) -> Any:
     return left, right
 
 
-#: Columns of the port ``wheel_speeds`` of every block that commands the wheels.
+#: Table columns of the port ``wheel_speeds`` of every block that commands the wheels.
 WHEEL_SPEED_COLUMNS = "wheel_speed_left", "wheel_speed_right"
 
 
 class CommandNumbers(NamedTuple):
-    """What the step of a wheel command depends on."""
+    """Constants of the step of a wheel command."""
 
     velocity: Callable[..., Any]
-    """``velocity(v_WP, command, theta, robot, tick_s)``: the velocity of P from the
-    last one, the command of the law, and the heading."""
+    """Function ``velocity(v_WP, command, theta, robot, tick_s)``. It returns the new
+    velocity of P from the last velocity, the command of the law, and the heading."""
     robot: RobotParameters
     tick_s: float
 
@@ -159,7 +163,7 @@ class CommandNumbers(NamedTuple):
 def command_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Velocity of P, m/s, and wheel speeds, rad/s, of the next tick: the state."""
+    """Computes the state: velocity of P, m/s, and wheel speeds, rad/s."""
     command, pose = inputs
     robot, theta = numbers.robot, pose[2]
     before = state[0], state[1]
@@ -170,7 +174,7 @@ def command_step(
 
 
 def _publish_command(state, outputs, numbers):
-    """The outputs of ``command_step``'s state."""
+    """Copies the outputs from the state of ``command_step``."""
     wheel_speeds, v_WP = outputs
     wheel_speeds[0], wheel_speeds[1] = state[2], state[3]
     v_WP[0], v_WP[1] = state[0], state[1]
@@ -189,8 +193,8 @@ def _at_twist(v_WP, twist_B, theta, robot, tick_s):
     return clamped_velocity(vx, vy, robot.top_speed_m_s)
 
 
-#: Output ports by which a law commands, each of size 2, and for each port how the
-#: velocity of P follows, as ``CommandNumbers.velocity``.
+#: Names of the command ports of laws, each of size 2, and for each port the function
+#: ``CommandNumbers.velocity``.
 COMMANDS: Mapping[str, Callable[..., Any]] = {
     "acceleration_W": _accelerated,
     "velocity_W": _at_velocity,
@@ -201,17 +205,17 @@ COMMANDS: Mapping[str, Callable[..., Any]] = {
 @define_for_scalars("WheelCommand_", __name__)
 def WheelCommand_(T):
     class Impl(Block_[T]):
-        """Commands the wheels so that P moves as a law commands.
+        """Computes wheel speeds so that P moves according to the command of a law.
 
-        An acceleration is integrated: it moves the virtual mass at P. A velocity of P
-        and a twist of the body are obeyed at once. Beyond top speed the velocity of P
-        keeps its direction, which for a twist is the curvature of the path; beyond a
-        wheel's limit the path keeps its curvature.
+        The block integrates an acceleration, which moves the virtual mass at P. It
+        obeys a velocity of P or a twist of the body at once. Above the top speed, the
+        velocity of P keeps its direction. For a twist, this keeps the curvature of the
+        path. Above the limit of a wheel, the path keeps its curvature.
 
-        Discrete state, every tick: velocity of P and wheel speeds, the outputs. An
-        update at t uses the inputs at t and acts from t on: from echo to wheels 0 ms,
-        from the end of an audio frame to the wheels one tick (the estimator's). No
-        feedthrough.
+        Discrete state, every tick: velocity of P and wheel speeds, which are the
+        outputs. An update at the time t uses the inputs at t and acts from t on. The
+        latency from an echo to the wheels is 0 ms. The latency from the end of an audio
+        frame to the wheels is the one tick of the estimator. There is no feedthrough.
 
         Args:
             command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or
@@ -219,8 +223,7 @@ def WheelCommand_(T):
             robot: Dimensions and top speed.
             tick_s: Period of the command, s.
 
-        Reference: ours; the papers do not say how an acceleration becomes
-        wheel speeds.
+        Reference: ours. The papers do not say how an acceleration becomes wheel speeds.
         """
 
         part = "command"
@@ -254,5 +257,5 @@ def WheelCommand_(T):
 
 
 WheelCommand = WheelCommand_[None]
-#: The command of a law that accelerates P.
+#: Name of the block for laws that command an acceleration of P.
 WheelSpeedCommand = WheelCommand

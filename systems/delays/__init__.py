@@ -1,1 +1,1 @@
-"""Delays between channels: spectra, correlations, peaks, fits, their errors."""
+"""Delays between channels: spectra, correlations, peaks, and errors."""

@@ -1,8 +1,8 @@
-"""Delays of all channels that belong together, of the many peaks of each pair.
+"""Finds sets of lags that belong together among the many peaks of each pair.
 
-In a room the correlation of two channels has a peak for every pair of paths, and an
-echo's may be the highest. Those of the direct sound add up: the lag from channel i
-to k is that from i to j and from j to k.
+In a room, the correlation of two channels has a peak for every pair of paths. The peak
+of an echo may be the highest. The lags of the direct sound are consistent: the lag from
+channel i to k is the sum of those from i to j and from j to k.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-# Peaks of a pair, and sets of lags, that are followed up.
+# Number of peaks per pair, and number of sets of lags, that are followed.
 _PEAKS, _SETS = 12, 48
 
-# Sets differ by more than this in some lag, and lags may be off by this, columns.
+# Two sets differ if some lag differs by more than the first value, columns. Lags count
+# as consistent up to the second value, columns.
 _APART, _OFF = 8, 2
 
 
@@ -24,18 +25,19 @@ def consistent_lags(
     reach: NDArray[np.int64],
     count: int,
 ) -> list[NDArray[np.int64]]:
-    """Sets of lags with the greatest sums of all pairs' correlations.
+    """Finds the sets of lags with the greatest sums of the correlations of all pairs.
 
-    Channels join one after another, and the best sets are kept.
+    The channels are added one after another. Each set is combined with each peak of the
+    next channel, and the best combinations are kept.
 
     Args:
-        correlations: (p, 2 m + 1) of each pair; no lag stands in the middle.
+        correlations: (p, 2 m + 1) correlation of each pair; lag 0 is in the middle.
         pairs: (p, 2) channels i < j of n.
-        reach: (p,) longest lag of each pair either way, columns, at most m.
+        reach: (p,) longest lag of each pair in either direction, columns, at most m.
         count: Number of sets.
 
     Returns:
-        Sets (n,) of lags after channel 0, columns; the best one first.
+        Sets (n,) of lags relative to channel 0, columns; the best one first.
     """
     wide = maximum_filter1d(correlations, 2 * _OFF + 1, axis=1)
     middle = correlations.shape[1] // 2
@@ -47,17 +49,20 @@ def consistent_lags(
         lags = _peaks(correlations[p], int(reach[p]))
         if not lags.size:
             return []
+        # (sets, lags) scores of all combinations.
         score = scores[:, np.newaxis] + correlations[p, middle + lags]
         for j in range(1, k):
             between = lags - sets[:, j, np.newaxis]
             p = row[j, k]
             value = wide[p, middle + np.clip(between, -reach[p], reach[p])]
             score += np.where(np.abs(between) <= reach[p], value, -np.inf)
+        # The best combinations with lags within reach.
         order = np.argsort(-score, axis=None)[:_SETS]
         order = order[np.isfinite(score.flat[order])]
         rows, columns = np.unravel_index(order, score.shape)
         sets = np.column_stack((sets[rows], lags[columns]))
         scores = score.flat[order]
+    # The best sets that differ from all better ones.
     found: list[NDArray[np.int64]] = []
     for lags in sets:
         if len(found) < count and all(np.abs(lags - f).max() > _APART for f in found):
@@ -66,7 +71,7 @@ def consistent_lags(
 
 
 def _peaks(correlation: NDArray[np.float32], reach: int) -> NDArray[np.int64]:
-    """Lags of the highest peaks within reach, its ends included."""
+    """Returns the lags of the highest peaks within reach, including its ends."""
     from scipy.signal import find_peaks
 
     middle = correlation.size // 2

@@ -1,8 +1,8 @@
-"""Channels that repeat another one: no two microphones hear alike.
+"""Finds channels that repeat another one.
 
-Two microphones may hear the same sound at the same time. Their own noise, and that
-of their converters, is not the same: what one channel holds beyond the other, but
-for a gain and a delay of whole samples, is then no less than that noise.
+Two microphones may record the same sound at the same time. However, their own noise and
+that of their converters differ. The difference between two real channels, after the
+best gain and delay in whole samples, is therefore at least this noise.
 """
 
 from __future__ import annotations
@@ -17,24 +17,26 @@ from scipy import fft
 
 from systems.framework.compiling import njit
 
-# A copy is off by its rounding alone, a twelfth of a squared step; or by less than
-# this share of its power.
+# Limits of the mean square difference of a copy. The first is a share of a squared
+# step, of which rounding causes a twelfth. The second is a share of the power of the
+# copy. The larger limit counts.
 _ROUNDING = 0.1
 _EXACT_SHARE = 1e-6
 
-# And by less than this share, so that a channel of next to nothing copies none.
+# It must in any case be below this share, so that an almost silent channel is no copy.
 _LIKE_SHARE = 0.01
 
-# Two inputs of one microphone differ by their converters' noise: by less than the
-# first share of the sound, and than the second one of what is left in the pauses,
-# which are quieter by the third.
+# Two inputs of one microphone differ by the noise of their converters. Their difference
+# is below the first share of the power of the sound. In a pause, it is below the second
+# share of the power there. A pause has less than the third share of the power of the
+# sound.
 _SHARED_SOUND, _SHARED_PAUSE, _PAUSE = 1e-3, 0.02, 0.01
 
-# Samples of a frame by which most pairs are told to be no copies, and how much
-# larger the difference may be in them than in the frame.
+# Number of samples from the middle of a frame that exclude most pairs. The difference
+# in these samples may be larger than in the frame by the second value.
 _PROBE, _PROBE_MARGIN = 128, 4.0
 
-# The loudest stretch and the quietest one that are looked at, s.
+# Lengths of the loudest section and of the quietest one that are examined, s.
 _LOUD_S, _PAUSE_S = 0.25, 0.05
 
 
@@ -44,16 +46,16 @@ def repeats(
     lag: int,
     step: float,
 ) -> bool:
-    """Whether one channel is the other one but for a gain and its rounding.
+    """Returns whether one channel equals another one except for a gain and rounding.
 
     Args:
         first: (n,) samples.
         second: (n,) samples.
-        lag: By how many samples the second is later.
-        step: Between two values that samples can have, in their unit.
+        lag: Delay of the second channel, samples.
+        step: Difference between two possible values of a sample, in its unit.
 
     Returns:
-        True where the residue after the best gain is no more than rounding leaves.
+        True if the difference after the best gain is no more than that of rounding.
     """
     left, power, other = _difference(first, second, lag)
     return bool(_is_copy(left, power, other, _ROUNDING * step**2))
@@ -67,19 +69,20 @@ def frame_repeats(
     *,
     noisy: bool,
 ) -> bool:
-    """Whether a channel of a frame repeats another one, at a lag or at none.
+    """Returns whether a channel of a frame repeats another one, with or without a lag.
 
     Args:
-        frame: (n, samples) channels; counts, where they are integers.
+        frame: (n, samples) channels; integers are counts.
         pairs: (p, 2) channels to compare.
-        later: (n - 1,) by how many samples the channels are later than channel 0.
-        at_once: (p,) whether equal channels repeat each other; False where
-            microphones may hear the same at the same time.
-        noisy: Whether there is noise to tell a later sound from a copy. Without any,
-            what is later by whole samples is no copy yet.
+        later: (n - 1,) delays of the channels relative to channel 0, samples.
+        at_once: (p,) whether to compare the pair at lag 0. False if both microphones
+            may record the same at the same time.
+        noisy: Whether the frames contain noise. Without noise, a sound that arrives
+            later by whole samples looks like a copy, so pairs are compared only at lag
+            0.
 
     Returns:
-        True where one of the pairs does.
+        True if at least one of the pairs repeats.
     """
     step = 1.0 if frame.dtype == np.int16 else 0.0
     rounding = _ROUNDING * step**2
@@ -107,9 +110,9 @@ def _frame_repeats(
                 continue
             a = frame[i, first : first + _PROBE]
             b, none = frame[j, middle : middle + _PROBE], lag - lag
-            # A literal 0 would be compiled anew.
+            # numba would compile a literal 0 anew.
             left, power, _ = _difference(a, b, none)
-            # The middle of the frame speaks for a copy, or against it.
+            # Most pairs that are no copies already differ in the middle of the frame.
             if left < _PROBE_MARGIN * max(_EXACT_SHARE * power, rounding):
                 left, power, other = _difference(frame[i], frame[j], lag)
                 if _is_copy(left, power, other, rounding):
@@ -121,7 +124,7 @@ def _frame_repeats(
 def _is_copy(
     left: float, power: float, other: float, rounding: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """From what ``_difference`` returns."""
+    """Returns whether the results of ``_difference`` are those of a copy."""
     least = max(_EXACT_SHARE * power, rounding)
     return power > 0.0 and other > 0.0 and left < min(least, _LIKE_SHARE * power)
 
@@ -129,10 +132,14 @@ def _is_copy(
 def copied_pairs(
     samples: NDArray[np.float64], sample_rate_hz: float
 ) -> list[tuple[int, int]]:
-    """Pairs of channels of which one repeats the other.
+    """Finds the pairs of channels that repeat each other.
+
+    Each pair is compared at the lag of its highest correlation. A pair repeats if the
+    channels differ by rounding alone in the loudest section. If the recording has a
+    pause, two inputs of one microphone are found, too.
 
     Args:
-        samples: (n, samples) channels that hold something, without NaN.
+        samples: (n, samples) channels that are not silent, without NaN.
         sample_rate_hz: Rate of the samples, Hz.
 
     Returns:
@@ -141,7 +148,7 @@ def copied_pairs(
     loud, most = _block(samples, _LOUD_S, sample_rate_hz, np.argmax)
     pause, least = _block(samples, _PAUSE_S, sample_rate_hz, np.argmin)
     steps = [_step(channel) for channel in loud]
-    # A pause that holds more than rounding, in every channel.
+    # Whether there is a pause that contains more than rounding in every channel.
     paused = np.all(least > 4.0 * np.square(steps)) and np.all(least < _PAUSE * most)
     size = loud.shape[1]
     spectra = fft.rfft(loud - loud.mean(axis=1, keepdims=True), 2 * size)
@@ -167,9 +174,12 @@ def _block(
     sample_rate_hz: float,
     choose: Callable[[NDArray[np.float64]], np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n, size) of a stretch chosen by its power, and (n,) that power.
+    """Returns a section chosen by its power, and its power in each channel.
 
-    Digital silence, of one value, is not chosen.
+    Sections in which a channel is constant (digital silence) are not chosen.
+
+    Returns:
+        (n, size) samples and (n,) power.
     """
     size = min(round(seconds * sample_rate_hz), samples.shape[1])
     count = samples.shape[1] // size
@@ -184,7 +194,7 @@ def _block(
 
 
 def _step(channel: NDArray[np.float64]) -> float:
-    """Least difference of two values that occur."""
+    """Returns the least difference between two values of a channel."""
     values = np.unique(channel)
     return float(np.diff(values).min()) if values.size > 1 else 0.0
 
@@ -198,7 +208,12 @@ def _shares(block: NDArray[np.float64], i: int, j: int, lag: int) -> float:
 def _difference(
     first: NDArray[Any], second: NDArray[Any], lag: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Variances of what the second channel holds beyond the first, and of both."""
+    """Computes how much a channel contains in addition to another one.
+
+    Returns:
+        Variances of the difference after the best gain, of the second channel, and of
+        the first channel.
+    """
     begin, end = max(0, lag), min(second.size, second.size + lag)
     count = end - begin
     a, b, aa, bb, ab = 0.0, 0.0, 0.0, 0.0, 0.0

@@ -1,7 +1,7 @@
-"""Peaks of weighted cross-correlations and their errors, from their spectra.
+"""Computes the peaks of weighted cross-correlations and their errors from spectra.
 
-Compiled functions that call each other stand in one file: numba's cache does not
-see that a function in another one has changed.
+All compiled functions that call each other are in this file. The cache of numba does
+not notice changes of functions in other files.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-# Largest number of steps, and the step at which it ends, samples.
+# Largest number of steps, and the step at which the search ends, samples.
 _ITERATIONS = 10
 _TOLERANCE = 1e-6
 
-# Variance of an arrival that is rounded to whole samples: 1/12 a pair.
+# Variance of an arrival that is rounded to whole samples: 1/12 per pair.
 _ROUNDING = 1.0 / 24.0
 
 
@@ -31,9 +31,10 @@ def _turned(
     real: NDArray[np.float64],
     imaginary: NDArray[np.float64],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills in the parts of a cross-spectrum (n,) times exp(j w t).
+    """Computes real and imaginary part of a cross-spectrum (n,) times exp(j w t).
 
-    The turns come from a few cosines by doubling: the rest is sums and products.
+    Sines and cosines are evaluated only for bins whose number is a power of two. The
+    others follow from sums and products.
     """
     bins = cross.size
     cosine, sine = np.empty(bins), np.empty(bins)
@@ -59,7 +60,11 @@ def _slope_and_curve(
     first: float,
     step: float,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Derivatives of a correlation: sums of -w W Im(z) and of w^2 W Re(z)."""
+    """Computes the derivatives of a correlation.
+
+    Returns:
+        Sums of -w W Im(z) and of w^2 W Re(z).
+    """
     slope, curve = 0.0, 0.0
     for k in range(real.size):
         w = first + k * step
@@ -76,7 +81,7 @@ def _sums(
     first: float,
     step: float,
 ) -> tuple[float, float, float, float, float]:  # pragma: no cover  (compiled)
-    """Sums of Re(z), W Re(z), W |z|, w^2 W^2 Re(z) and w^2 W^2."""
+    """Computes the sums of Re(z), W Re(z), W |z|, w^2 W^2 Re(z) and w^2 W^2."""
     plain, aligned, total, squares, noise = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(real.size):
         w, weight = first + k * step, np.float64(weights[k])
@@ -99,20 +104,22 @@ def _refine(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Peaks of weighted cross-correlations, and sums for their errors.
+    """Refines the peaks of weighted cross-correlations by Newton's method.
+
+    It also computes sums for the errors of the peaks.
 
     Args:
         cross: (p, n) cross-spectra of the pairs.
-        weights: (p, n) W.
-        first: Angular frequency of the first bin, rad a sample.
-        step: From bin to bin, rad a sample.
-        start: (p,) where the search begins, samples.
-        newton: Whether to search, or to stay there.
+        weights: (p, n) weights W.
+        first: Angular frequency w of the first bin, rad per sample.
+        step: Step of w from bin to bin, rad per sample.
+        start: (p,) delays where the search begins, samples.
+        newton: Whether to search; otherwise the delays stay at ``start``.
 
     Returns:
-        tau (p,) in samples. With z the cross-spectrum turned back by tau:
-        the sum of Re(z) (p,); the share of sum W |z| that is in phase (p,);
-        and sums (p, 3) of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
+        (p,) delays tau, samples. Let z be the cross-spectrum after removal of tau. Then
+        (p,) sums of Re(z); (p,) shares of the sum W |z| that is in phase; and (p, 3)
+        sums of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
     """
     pairs, bins = cross.shape
     tau, plain, agreement = np.empty(pairs), np.empty(pairs), np.empty(pairs)
@@ -148,14 +155,15 @@ def _arrival_variances(
     bins: int,
     padding: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(n,) of each channel's time of arrival, samples^2.
+    """Computes the (n,) variance of each channel's time of arrival, samples^2.
 
-    With noise of power n a bin and signal of power s, a correlation's peak moves
-    by the noise over its curvature,
-    sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2: for equal
-    weights and much signal that is the bound of Knapp and Carter (1976).
+    Let n be the power of the noise per bin and s that of the signal. The variance of a
+    correlation's peak is sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W
+    s)^2. For equal weights and much signal, this is the bound of Knapp and Carter
+    (1976). The powers of each channel follow from the coherences of its pairs.
     """
     channels = energy.size
+    # Share q of signal in the energy of each channel, from the coherences r.
     n, s = np.empty(channels), np.empty(channels)
     for m in range(channels):
         exponent = 0.0
@@ -169,7 +177,7 @@ def _arrival_variances(
         curve, squares, noise = sums[p]
         scale = padding / (2.0 * curve * curve * (channels - 1))
         cross = 0.5 * n[i] * n[j] * noise
-        # Each channel's part: noise of one against the signal of the other.
+        # Part of each channel: its noise with the signal of the other channel.
         parts[i] += scale * (n[i] * squares * math.sqrt(s[j] / s[i]) + cross)
         parts[j] += scale * (n[j] * squares * math.sqrt(s[i] / s[j]) + cross)
     return parts
@@ -183,10 +191,10 @@ def _reconcile(
     to_delays: NDArray[np.float64],
     reconciled: NDArray[np.float64],
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Fills in the arrivals that fit all delays best.
+    """Computes the arrivals that fit all delays best by least squares.
 
     Returns:
-        How far they are from the given ones at most, and each delay from them.
+        Largest change of an arrival, and largest disagreement of a delay with them.
     """
     moved, closure = 0.0, 0.0
     reconciled[0] = 0.0
@@ -213,26 +221,27 @@ def measure_peaks(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], float, float, float, float, float
 ]:  # pragma: no cover  (compiled)
-    """Fields of ``Peaks``; a correlation of 0 where there is no peak.
+    """Computes the fields of ``Peaks``; without a peak, the correlation is 0.
 
     Args:
-        cross: (p, bins) of the pairs, units of the frame squared.
-        weights: (p, bins).
-        energy: (n,) of the channels, units of the frame squared.
-        arrivals: (n,) see ``find_peaks``, samples.
+        cross: (p, bins) cross-spectra of the pairs, units of the frame squared.
+        weights: (p, bins) weights.
+        energy: (n,) energies of the channels, units of the frame squared.
+        arrivals: (n,) arrivals to start from, see ``find_peaks``, samples.
         tables: ``PairTables``.
-        sizes: First bin, length of the transform, and of the cut channels
-            less what their edges cost, samples.
+        sizes: First bin; length of the transform, samples; and effective length of the
+            cut channels, without the loss at their edges, samples.
         newton: See ``find_peaks``.
 
     Returns:
-        Arrivals (n,), samples, their covariance (n - 1, n - 1), samples^2, and the
+        (n,) arrivals, samples; their (n - 1, n - 1) covariance, samples^2; and the
         floats ``correlation`` to ``closure``, in the order of ``Peaks``.
     """
     pairs, to_delays, to_shares = tables
     first, length, cut_samples = sizes
     others = len(energy) - 1
     step = 2.0 * math.pi / length
+    # The channels are cut at whole samples: only the rest of each delay is left.
     whole = np.rint(arrivals)
     start = np.empty(len(pairs))
     for p in range(len(pairs)):
@@ -247,6 +256,7 @@ def measure_peaks(
         i, j = pairs[p]
         tau[p] += whole[j] - whole[i]
         r[p] = plain[p] / max(math.sqrt(energy[i] * energy[j]), 1e-300)
+    # Errors, if every pair has a peak.
     correlation, angular_frequency, noise_energy = 0.0, 0.0, 0.0
     moved, closure = _reconcile(tau, arrivals, pairs, to_delays, reconciled)
     if r.min() > 0.0 and sums[:, 0].min() > 0.0:

@@ -1,4 +1,4 @@
-"""Sub-sample peaks of the channels' cross-correlations, and their errors."""
+"""Sub-sample peaks of the cross-correlations of channels, and their errors."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from systems.delays.overlap import EDGE_SAMPLES, cut_rows
 from systems.delays.transforms import filled_rows, transform_filled_rows
 from systems.framework.compiling import njit
 
-# Weights of PHAT fall to zero where the cross-spectrum is below this share of
-# its mean: bins of noise would otherwise weigh as much as bins of sound.
+# The whitened spectrum decreases to zero where the cross-spectrum is below this share
+# of its mean. Otherwise bins of noise would count as much as bins of sound.
 _PHAT_FLOOR = 0.1
 
 
 def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Weights of the phase transform, for (pairs, bins) cross-spectra."""
+    """Computes the weights of the phase transform for (pairs, bins) cross-spectra."""
     size = np.abs(cross)
     floor = _PHAT_FLOOR * size.mean(axis=-1, keepdims=True)
     return 1.0 / (size + floor + np.finfo(np.float32).tiny)
@@ -30,7 +30,12 @@ def _pair_spectra(
 ) -> tuple[
     NDArray[np.complex64], NDArray[np.float32], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Cross-spectra (p, bins) of pairs of channels, weights 1, and energies (n,)."""
+    """Computes the cross-spectra of pairs of channels.
+
+    Returns:
+        (p, bins) cross-spectra, (p, bins) weights of 1, and (n,) energies of the
+        channels.
+    """
     channels, bins = spectra.shape
     energy = np.zeros(channels)
     for m in range(channels):
@@ -46,20 +51,20 @@ def _pair_spectra(
 
 
 class PairTables(NamedTuple):
-    """Matrices that join pairs of channels to channels."""
+    """Matrices that convert values of pairs to values of channels."""
 
     pairs: NDArray[np.int64]
     """(p, 2) all pairs of n channels."""
     to_delays: NDArray[np.float64]
-    """(n - 1, p) least squares from their delays to t_k - t_0."""
+    """(n - 1, p) least-squares conversion of the delays of pairs to t_k - t_0."""
     to_shares: NDArray[np.float64]
-    """(n, p) least squares from the logarithms of their coherences to those of
-    the channels' shares of signal: a coherence is the geometric mean of two
-    shares. Exact for three channels."""
+    """(n, p) least-squares conversion of the logarithms of the coherences of pairs to
+    the logarithms of the channels' shares of signal. A coherence is the geometric mean
+    of two shares. The conversion is exact for three channels."""
 
     @classmethod
     def of(cls, pairs: NDArray[np.int64]) -> PairTables:
-        """The tables of all pairs i < j of some channels."""
+        """Makes the tables of all pairs i < j of channels."""
         rows = np.arange(len(pairs))
         count = int(pairs.max()) + 1
         first, second = np.zeros((2, len(pairs), count), dtype=np.float64)
@@ -72,23 +77,24 @@ class PairTables(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """Peaks of all pairs' correlations."""
+    """Peaks of the correlations of all pairs."""
 
     arrivals: NDArray[np.float64]
-    """(n,) arrival at each channel after channel 0 that fits all delays, samples."""
+    """(n,) arrivals relative to channel 0 that fit all delays, samples."""
     covariance: NDArray[np.float64]
-    """(n - 1, n - 1) of the arrivals after the first one, samples^2."""
+    """(n - 1, n - 1) covariance of the arrivals at channels 1 ... n - 1, samples^2."""
     correlation: float
     """Least correlation coefficient of the pairs, 0 to 1."""
     angular_frequency: float
-    """Root mean square of what the channels share, rad a sample; least of the pairs."""
+    """Root mean square angular frequency of the shared sound, rad per sample; the least
+    value of the pairs."""
     noise_energy: float
-    """Of what the mean channel does not share with the others, within the band,
+    """Energy within the band that the mean channel does not share with the others,
     units of the frame squared."""
     moved: float
     """Largest change of an arrival, samples."""
     closure: float
-    """Largest disagreement of a pair's own delay with ``arrivals``, samples."""
+    """Largest disagreement between the delay of a pair and ``arrivals``, samples."""
 
 
 def find_peaks(
@@ -101,19 +107,19 @@ def find_peaks(
     phat: bool = False,
     newton: bool = True,
 ) -> Peaks | None:
-    """Peaks of the cross-correlations near given delays.
+    """Finds the peaks of the cross-correlations near given delays.
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrival at each channel after channel 0, samples.
+        arrivals: (n,) arrivals relative to channel 0, samples.
         tables: The pairs of channels.
-        length: Of the Fourier transform, at least that of the frame.
-        band: Its bins to use.
+        length: Length of the Fourier transform, at least that of the frame.
+        band: Bins to use.
         phat: Whether to whiten.
-        newton: Whether to search between the samples.
+        newton: Whether to search between samples.
 
     Returns:
-        The peaks, or None where there is none.
+        The peaks, or None if there is no peak.
     """
     rows = filled_rows(len(frame))
     cut, cut_samples = cut_rows(frame, np.rint(arrivals), rows, length)
@@ -121,7 +127,7 @@ def find_peaks(
     cross, weights, energy = _pair_spectra(spectra, tables.pairs)
     if phat:
         weights = whitening(cross)
-    # The soft edges cost energy: the mean square of a raised cosine is 3/8.
+    # The soft edges reduce the energy: the mean square of a raised cosine is 3/8.
     peaks = Peaks(
         *measure_peaks(
             cross,

@@ -1,4 +1,4 @@
-"""Sizes of the transforms that measure delays, and the pairs to measure."""
+"""Sizes of the transforms and pairs of channels for the measurement of delays."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from systems.delays.delay_peaks import PairTables
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 
-# Samples a period of the highest frequency on the grid of the first search.
+# Samples per period of the highest frequency in the first search.
 _GRID_DENSITY = 5.0
 
-# Divides the length of the transform.
+# The length of the transform is a multiple of this.
 _TWOS = 256
 
-# Left of a frame after the cut, as a share; a longer delay cannot be measured.
+# Least share of a frame that must remain after the cut. Longer delays cannot be
+# measured.
 _LEAST_OVERLAP = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class DelayPlan:
-    """What can be worked out before the first frame.
+    """Quantities that can be computed before the first frame.
 
     Raises:
         InputError: Band, frame and array do not fit the sample rate.
@@ -68,10 +69,10 @@ class DelayPlan:
 
     @cached_property
     def edges(self) -> NDArray[np.int64]:
-        """(n - 1, 2) pairs of near channels that join all, as a tree from channel 0.
+        """(n - 1, 2) pairs of close channels that join all, as a tree from channel 0.
 
-        Near pairs have few lags to search. The first channel of an edge is 0 or
-        the second one of an earlier edge.
+        Pairs of close channels have few lags to search. The first channel of an edge is
+        0 or the second one of an earlier edge.
         """
         places = self.shape.p_AM
         gaps = np.linalg.norm(places[:, np.newaxis] - places, axis=2)
@@ -92,14 +93,14 @@ class DelayPlan:
 
     @cached_property
     def tables(self) -> PairTables:
-        """Joins the delays of all pairs."""
+        """Tables that combine the delays of all pairs."""
         return PairTables.of(self.shape.pairs)
 
     @cached_property
     def length(self) -> int:
         """Samples of the Fourier transform, padded so that lags do not wrap."""
         least = self.frame_samples + int(self.edge_lags.max()) + 2
-        # Many factors of two make the fastest transforms.
+        # Transforms with many factors of two are the fastest.
         return _TWOS * int(fft.next_fast_len(-(-least // _TWOS)))
 
     @cached_property
@@ -111,12 +112,12 @@ class DelayPlan:
 
     @cached_property
     def grid(self) -> int:
-        """Samples of the correlation in the first search."""
+        """Samples of a correlation in the first search."""
         least = math.ceil(_GRID_DENSITY * self.band.stop)
         return int(fft.next_fast_len(least, real=True))
 
     @cached_property
     def gates(self) -> NDArray[np.int64]:
-        """(n - 1,) largest lag on that grid, one more than sound can take."""
+        """(n - 1,) largest lag of each edge in the first search, plus one."""
         exact = self.edge_lags * (self.grid / self.length)
         return np.ceil(exact).astype(np.int64) + 1

@@ -1,9 +1,8 @@
-"""First search for the delays of a frame, and whether it holds a sound at all.
+"""First search for the delays of a frame; detects whether it contains a sound.
 
-Channels of noise alone are independent, whatever its colour. The correlation
-of two such channels at a given lag is then Gaussian with a variance that the
-channels' own spectra give, so the height of its highest peak says how likely
-noise alone would reach it.
+Noise in different channels is independent, whatever its color. The correlation of such
+channels at a lag is Gaussian, and the spectra of the channels give its variance. The
+height of the highest peak therefore gives the probability that noise alone reaches it.
 """
 
 from __future__ import annotations
@@ -22,35 +21,35 @@ from systems.framework.compiling import njit
 # Largest coherence: there is always some noise.
 _WHOLE = 0.99
 
-# Nothing is as high above noise as so many standard deviations.
+# Largest height above noise that is computed, standard deviations.
 _HIGHEST = 38.0
 
 
 class DelaySearch(NamedTuple):
-    """What the first look at a frame tells."""
+    """Result of the first search in a frame."""
 
     arrivals: NDArray[np.float64]
-    """(n,) arrival at each channel after channel 0, samples."""
+    """(n,) arrivals relative to channel 0, samples."""
     ambiguity: float
-    """Second peak over first within the gate, 0 to 1; worst edge."""
+    """Ratio of the second to the first peak within the gate, 0 to 1; worst edge."""
     chance: float
-    """Probability that noise alone has peaks as high as these."""
+    """Probability that noise alone has peaks as high as all of these."""
     weakest: float
-    """Probability that noise alone has a peak as high as the lowest of these: near
-    one where the sound has not reached all channels yet."""
+    """Probability that noise alone has a peak as high as the lowest of these. It is
+    near 1 if the sound has not reached all channels yet."""
     energy: float
-    """Of the mean channel within the band, units of the frame squared."""
+    """Energy of the mean channel within the band, units of the frame squared."""
 
 
 def amdf(
     x_i: NDArray[np.float32], x_j: NDArray[np.float32], max_lag: int
 ) -> NDArray[np.float64]:
-    """Average magnitude difference of two channels (Han 2019, eq. 4-6).
+    """Computes the average magnitude difference of two channels (Han 2019, eq. 4-6).
 
-    The papers maximise 1 / sum_k |x_i(k) - x_j(k + lag)| over lag = 0 ... n-1.
-    Here the sum itself is minimised, so that equal signals do no harm; both
-    signs of the lag are searched; and the sum is divided by the number of its
-    terms, for the printed one favours large lags.
+    The papers maximize 1 / sum_k |x_i(k) - x_j(k + lag)| over lag = 0 ... n-1. This
+    function differs in three ways. It returns the sum itself, so that equal signals
+    cause no division by zero. It includes both signs of the lag. It divides the sum by
+    the number of its terms, because the printed sum favors large lags.
 
     Args:
         x_i: (n,) samples.
@@ -58,7 +57,7 @@ def amdf(
         max_lag: Largest lag, below n.
 
     Returns:
-        (2 max_lag + 1,) for the lags -max_lag ... max_lag. The minimum stands
+        (2 max_lag + 1,) differences for the lags -max_lag ... max_lag. The minimum is
         at the delay t_j - t_i.
     """
     return _amdf(np.ascontiguousarray(x_i), np.ascontiguousarray(x_j), max_lag)
@@ -83,10 +82,10 @@ def _amdf(
 def _peak(
     values: NDArray[Any],
 ) -> tuple[np.intp, float]:  # pragma: no cover  (compiled)
-    """Place of the highest value, and the next peak's height over it.
+    """Finds the highest value, and the ratio of the next peak to it.
 
-    The main lobe ends on either side where the values have fallen below half
-    the peak. A peak on the border is no peak: its ambiguity is 1.
+    The main lobe ends on each side where the values are at most half the peak. A
+    highest value at a border is no peak: its ratio is 1.
     """
     best = np.argmax(values)
     top = values[best]
@@ -110,11 +109,11 @@ def _cross_spectra(
 ) -> tuple[
     NDArray[np.complex64], NDArray[np.float64], float
 ]:  # pragma: no cover  (compiled)
-    """Cross-spectra (e, size) of the edges, from the bin ``first`` on.
+    """Computes the cross-spectra of the edges, from the bin ``first`` on.
 
     Returns:
-        They, (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins k, and the
-        energy of the mean channel; 0 where one is silent.
+        (e, size) cross-spectra C; (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins
+        k; and the energy of the mean channel, 0 if a channel is silent.
     """
     channels, bins = spectra.shape
     cross = np.zeros((len(edges), size), dtype=spectra.dtype)
@@ -138,7 +137,11 @@ def _cross_spectra(
 def _gated_peak(
     correlation: NDArray[np.float32], gate: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Lag of the highest peak within the gate, second peak over it, its height."""
+    """Finds the highest peak within the gate.
+
+    Returns:
+        Lag of the peak, ratio of the second peak to it, and its height.
+    """
     gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
     for k in range(gate):
         gated[k] = correlation[correlation.size - gate + k]
@@ -146,7 +149,7 @@ def _gated_peak(
         gated[gate + k] = correlation[k]
     best, ratio = _peak(gated)
     lag = float(best - gate)
-    if 0 < best < 2 * gate:  # vertex of the parabola
+    if 0 < best < 2 * gate:  # vertex of a parabola
         rise, fall = gated[best] - gated[best - 1], gated[best] - gated[best + 1]
         lag += 0.5 * (rise - fall) / max(rise + fall, np.float32(1e-30))
     return lag, ratio, gated[best]
@@ -156,12 +159,12 @@ def _gated_peak(
 def _chance_of_noise(
     heights: NDArray[np.float64], counts: NDArray[np.float64]
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Probability that noise reaches all peaks together, and the lowest of them.
+    """Computes the probability that noise reaches all peaks, and the lowest one.
 
     Args:
         heights: (e,) peaks over their standard deviation.
-        counts: (e,) how often noise crosses zero upwards within the gate; it
-            crosses a height z exp(-z^2 / 2) times as often (Rice 1944).
+        counts: (e,) expected number of upward zero crossings of noise within the gate.
+            Noise crosses a height z exp(-z^2 / 2) times as often (Rice 1944).
     """
     log_product, weakest = 0.0, 0.0
     for e in range(heights.size):
@@ -170,7 +173,7 @@ def _chance_of_noise(
         below = (1.0 - 0.5 * math.erfc(z / math.sqrt(2.0))) * math.exp(-crossings)
         log_product += math.log(max(1.0 - below, 1e-300))
         weakest = max(weakest, 1.0 - below)
-    # Fisher: the product of m independent probabilities.
+    # Probability of the product of m independent probabilities (Fisher).
     term, total = 1.0, 0.0
     for k in range(heights.size):
         total += term
@@ -188,16 +191,20 @@ def _judge(
     padding: float,
     stretch: float,
 ) -> tuple[NDArray[np.float64], float, float, float]:  # pragma: no cover  (compiled)
-    """Arrivals, ambiguity, chance and weakest of ``DelaySearch``.
+    """Computes arrivals, ambiguity, chance and weakest of ``DelaySearch``.
+
+    The correlation of each edge gives the lag of its highest peak. The lags add up to
+    arrivals along the tree. The height of the peak relative to that of noise gives the
+    chance.
 
     Args:
         cross: (e, grid // 2 + 1) cross-spectra of the edges.
         grid: Samples of their correlations.
-        moments: From ``_cross_spectra``.
+        moments: (e, 2) sums of ``_cross_spectra``.
         edges: (e, 2) channels, a tree.
-        gates: (e,) largest lags.
+        gates: (e,) largest lags, samples of the correlation.
         padding: Length of the transform over that of the frame.
-        stretch: Samples of the frame a sample of the correlation.
+        stretch: Samples of the frame per sample of the correlation.
     """
     count = len(cross)
     correlation = np.empty((count, grid), dtype=np.float32)
@@ -210,7 +217,7 @@ def _judge(
         i, j = edges[e]
         arrivals[j] = arrivals[i] + lag * stretch
         ambiguity = max(ambiguity, ratio)
-        # Padding makes the bins dependent: fewer count than are summed.
+        # Padding makes the bins dependent, so that fewer count than are summed.
         heights[e] = height / (math.sqrt(2.0 * padding * moments[e, 0]) + 1e-300)
         rms_bin = math.sqrt(moments[e, 1] / (moments[e, 0] + 1e-300))
         counts[e] = 2.0 * gates[e] / grid * rms_bin
@@ -219,10 +226,11 @@ def _judge(
 
 
 def weakest_sound(plan: DelayPlan, rate: float) -> float:
-    """Level of the weakest sound that is not taken for noise.
+    """Computes the level of the weakest sound that is distinguished from noise.
 
-    For a given energy, no sound correlates higher above the noise than one with
-    the noise's own spectrum (Cauchy-Schwarz), so that this holds for every sound.
+    For a given energy, the sound with the spectrum of the noise has the highest
+    correlation relative to noise (Cauchy-Schwarz). The level is therefore valid for
+    every sound.
 
     Args:
         plan: Rates, band and array.
@@ -260,7 +268,7 @@ def _correlation_search(
 
 
 def _arrivals(lags: NDArray[np.float64], plan: DelayPlan) -> NDArray[np.float64]:
-    """(n,) arrivals from the lags along the edges."""
+    """Converts the lags along the edges to (n,) arrivals."""
     arrivals = np.zeros(len(lags) + 1)
     for (i, j), lag in zip(plan.edges.tolist(), lags.tolist(), strict=True):
         arrivals[j] = arrivals[i] + lag
@@ -270,12 +278,12 @@ def _arrivals(lags: NDArray[np.float64], plan: DelayPlan) -> NDArray[np.float64]
 def _amdf_search(
     frame: NDArray[np.float32], plan: DelayPlan
 ) -> tuple[NDArray[np.float64], float]:
-    """Arrivals by the papers' function, and their ambiguity."""
+    """Computes arrivals by the function of the papers, and their ambiguity."""
     lags, ambiguity = np.empty(len(plan.edges)), 0.0
     for e, (i, j) in enumerate(plan.edges.tolist()):
         reach = int(plan.edge_lags[e]) + 1
         difference = amdf(frame[i], frame[j], reach)
-        # Its depth below the mean is what a correlation has as height.
+        # Its depth below the mean corresponds to the height of a correlation.
         best, ratio = _peak(difference.mean() - difference)
         lags[e] = best - reach
         ambiguity = max(ambiguity, ratio)
@@ -291,19 +299,20 @@ def search_delays(
     phat: bool = False,
     by_amdf: bool = False,
 ) -> DelaySearch | None:
-    """Looks for a sound in a frame; None where a channel is silent.
+    """Searches for a sound in a frame.
 
     Args:
-        frame: (n, frame_samples), any unit.
-        spectra: (n, bins) its transform of ``plan.length`` within the band.
+        frame: (n, frame_samples) channels, any unit.
+        spectra: (n, bins) transform of length ``plan.length`` within the band.
         plan: Rates and array.
         band: Bins of the transform.
         phat: Whether to whiten.
-        by_amdf: Whether the delays are those of the papers' function.
-            Detection rests on the correlation all the same.
+        by_amdf: Whether the delays are those of the function of the papers. Detection
+            uses the correlation in any case.
 
     Returns:
-        First arrivals, samples, and how far they are to be believed.
+        First arrivals, samples, and measures of their reliability; None if a channel is
+        silent.
     """
     size = plan.grid // 2 + 1
     cross, moments, energy = _cross_spectra(spectra, plan.edges, band.start, size)
@@ -312,8 +321,9 @@ def search_delays(
     white = cross.copy() if phat else None
     found = _correlation_search(cross, moments, energy, plan)
     if white is not None:
-        # Whitening breaks the tie of a tone's peaks by noise: the ambiguity of
-        # the plain correlation counts as well, and noise is judged by it.
+        # The peaks of a tone are equal. After whitening, noise decides between them.
+        # The ambiguity is therefore the larger of both, and the plain correlation
+        # decides about noise.
         white[:, band] *= whitening(white[:, band])
         seen = _correlation_search(white, moments, energy, plan)
         arrivals, ambiguity = seen.arrivals, max(found.ambiguity, seen.ambiguity)

@@ -1,8 +1,8 @@
-"""Several sets of delays in one frame: one for each of the sounds that overlap.
+"""Measures a set of delays for each of several overlapping sounds.
 
-Sounds that do not depend on each other add up in the correlations: each has its peaks,
-as high as its share of the power, in all pairs of channels, and the lags of one sound
-close around every triangle of channels.
+Independent sounds add up in the correlations. Each sound has a peak in the correlation
+of every pair of channels. The height of the peak is the sound's share of the power. The
+lags of one sound add up to zero around every triangle of channels.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from systems.delays.delay_search import DelaySearch
 from systems.delays.delays import DelayEstimate, settled_delays
 from systems.delays.transforms import transform_rows
 
-# A pair's peak may be off the lag that closes the triangle by so much, columns.
+# Largest distance between the peak of a pair and the lag that closes the triangle,
+# columns.
 _OFF = 2
 
 
@@ -31,18 +32,21 @@ def estimate_delay_sets(
     seen: tuple[DelaySearch, slice],
     count: int,
 ) -> list[DelayEstimate]:
-    """Delays of the sounds of a frame.
+    """Measures the delays of the sounds of a frame.
+
+    The set with the greatest sum of correlations is found and refined. Its peaks are
+    then removed, and the search is repeated.
 
     Args:
-        frame: (n, frame_samples), any unit.
+        frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
         method: A key of ``METHODS``.
-        seen: What ``look`` returned for this frame.
-        count: Of sets that are followed up.
+        seen: Result of ``look`` for this frame.
+        count: Number of sets to search for.
 
     Returns:
-        At most ``count`` estimates, that of the greatest sum of correlations first.
-        What other sounds hold counts as noise in the errors of each.
+        At most ``count`` estimates, the one with the greatest sum of correlations
+        first. The other sounds count as noise in the errors of each estimate.
     """
     search, band = seen
     correlations, middle = _correlations(frame, plan, band)
@@ -65,7 +69,7 @@ def estimate_delay_sets(
 
 
 def _remove_peak(correlation: NDArray[np.float32], column: int) -> None:
-    """Takes the peak near a column out, down to the valleys beside it."""
+    """Removes the peak near a column, down to the valleys on both sides."""
     first, last = max(column - _OFF, 0), correlation.size - 1
     low = high = first + int(correlation[first : column + _OFF + 1].argmax())
     while low > 0 and correlation[low - 1] <= correlation[low]:
@@ -78,7 +82,11 @@ def _remove_peak(correlation: NDArray[np.float32], column: int) -> None:
 def _correlations(
     frame: NDArray[np.float32], plan: DelayPlan, band: slice
 ) -> tuple[NDArray[np.float32], int]:
-    """(p, 2 m + 1) whitened correlations of all pairs on the plan's grid, and m."""
+    """Computes the whitened correlations of all pairs on the grid of the plan.
+
+    Returns:
+        (p, 2 m + 1) correlations, and m.
+    """
     spectra = transform_rows(frame, plan.length)[:, band]
     i, j = plan.shape.pairs.T
     cross = np.zeros((len(i), plan.grid // 2 + 1), dtype=np.complex64)

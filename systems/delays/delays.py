@@ -1,10 +1,9 @@
-"""Delays between the channels of a frame.
+"""Measures the delays between the channels of a frame.
 
-The delays of neighbouring channels are first found on a grid. Then the
-channels are cut to the stretch that they share, so that the edges of the frame
-do not bend the result, and the peak of each pair's cross-correlation is found
-by Newton's method on the cross-spectrum. The coherence of the cut channels
-gives the errors of the delays.
+First, the delays of close channels are searched on a grid. The channels are then cut
+to the section that they share, so that the edges of the frame do not shift the result.
+Newton's method on the cross-spectrum finds the peak of the correlation of each pair.
+The coherence of the cut channels gives the errors of the delays.
 """
 
 from __future__ import annotations
@@ -20,7 +19,8 @@ from systems.delays.delay_search import DelaySearch, search_delays
 from systems.delays.occupied_band import occupied_band
 from systems.delays.transforms import transform_rows
 
-# The channels are cut again when a delay has moved by more than this, samples.
+# The channels are cut again if a delay changes by more than the first value, samples.
+# The second value limits the number of cuts.
 _SETTLED = 0.75
 _CUTS = 4
 
@@ -29,38 +29,38 @@ class _Method(NamedTuple):
     phat: bool = False
     """Whether the cross-spectra are whitened."""
     by_amdf: bool = False
-    """Whether delays are whole samples by the papers' function."""
+    """Whether delays are whole samples by the function of the papers."""
 
 
-#: Ways to measure delays, by name.
+#: Methods to measure delays, by name.
 METHODS = {
     "gcc": _Method(),
     "gcc_phat": _Method(phat=True),
     "amdf": _Method(by_amdf=True),
-    "ml": _Method(),  # starts from the correlation; see systems.hearing.coherent
+    "ml": _Method(),  # starts from gcc; see systems.hearing.coherent
 }
 
 
 class DelayEstimate(NamedTuple):
-    """Delays of one frame and what speaks for them."""
+    """Delays of one frame, and measures of their reliability."""
 
     tau: NDArray[np.float64]
-    """(n - 1,) t_k - t_0 of the channels 1 ... n - 1, s; positive where the
-    sound reaches channel 0 earlier."""
+    """(n - 1,) t_k - t_0 of the channels 1 ... n - 1, s. Positive if the sound reaches
+    channel 0 earlier."""
     covariance: NDArray[np.float64]
-    """(n - 1, n - 1) of the delays, s^2."""
+    """(n - 1, n - 1) covariance of the delays, s^2."""
     correlation: float
     """Least correlation coefficient of the pairs, 0 to 1."""
     closure: float
-    """Largest disagreement of a pair's own delay with ``tau``, s."""
+    """Largest disagreement between the delay of a pair and ``tau``, s."""
     ambiguity: float
-    """Second peak over first within the gate, 0 to 1; worst edge."""
+    """Ratio of the second to the first peak within the gate, 0 to 1; worst edge."""
     chance: float
-    """Probability that noise alone has peaks as high as these."""
+    """Probability that noise alone has peaks as high as all of these."""
     angular_frequency: float
-    """Root mean square over the sound that the channels share, rad/s."""
+    """Root mean square angular frequency of the shared sound, rad/s."""
     noise_energy: float
-    """Of what the mean channel does not share with the others, within the band,
+    """Energy within the band that the mean channel does not share with the others,
     units of the frame squared."""
     band: slice
     """Bins of the plan's transform that were used."""
@@ -73,16 +73,16 @@ def look(
     *,
     find_band: bool = False,
 ) -> tuple[DelaySearch, slice] | None:
-    """First look at a frame; see ``estimate_delays``.
+    """Searches a frame for a sound.
 
     Args:
-        frame: (n, frame_samples), any unit.
+        frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
         method: A key of METHODS.
-        find_band: Whether to use the occupied part of the band alone.
+        find_band: Whether to use only the occupied part of the band.
 
     Returns:
-        The search and the bins that it used, or None where a channel is silent.
+        The search and the bins that it used, or None if a channel is silent.
     """
     chosen = METHODS[method]
     spectra = transform_rows(frame, plan.length)[:, plan.band]
@@ -105,17 +105,17 @@ def estimate_delays(
     find_band: bool = False,
     seen: tuple[DelaySearch, slice] | None = None,
 ) -> DelayEstimate | None:
-    """Delays of a frame.
+    """Measures the delays of a frame.
 
     Args:
-        frame: (n, frame_samples), any unit.
+        frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
         method: A key of METHODS.
-        find_band: Whether to use the occupied part of the band alone.
-        seen: What ``look`` returned for this frame, if it was called already.
+        find_band: Whether to use only the occupied part of the band.
+        seen: Result of ``look`` for this frame, if there is one.
 
     Returns:
-        The estimate, however poor, or None where a channel is silent or the
+        The estimate, whatever its reliability. None if a channel is silent or the
         correlation has no peak within the gate.
     """
     seen = seen or look(frame, plan, method, find_band=find_band)
@@ -128,13 +128,13 @@ def settled_delays(
     method: str,
     seen: tuple[DelaySearch, slice],
 ) -> DelayEstimate | None:
-    """Delays of a frame near those of a search.
+    """Measures the delays of a frame near those of a search.
 
     Args:
-        frame: (n, frame_samples), any unit.
+        frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
         method: A key of METHODS.
-        seen: What ``look`` returned, or other arrivals to start from.
+        seen: Result of ``look``, or other arrivals to start from.
 
     Returns:
         As ``estimate_delays``.

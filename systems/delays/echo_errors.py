@@ -1,4 +1,4 @@
-"""What echoes that slip through the precedence effect do to delays."""
+"""Errors of delays due to echoes that remain after their suppression."""
 
 from __future__ import annotations
 
@@ -9,36 +9,39 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-# Such echoes, those off the floor above all, shift each arrival by itself
-# (standard deviation, s) and the whole direction (rad). The less of a frame is
-# news, the more: from this share on they count fully. All from the trials in
-# rooms, docs/results_hearing.md.
+# Echoes that remain, mainly those off the floor, shift each arrival independently
+# (standard deviation, s) and the whole direction (rad). These values apply if at least
+# the share ``_NEWS`` of a frame's energy is no echo. The errors are larger for smaller
+# shares. All values are from the trials in rooms, docs/results_hearing.md.
 _ARRIVAL_S = 1.2e-6
 _DIRECTION_RAD = 2e-3
 _NEWS = 0.12
 
-# An echo d later shifts the peak of a correlation in proportion to 1 / (w^2 d), for
-# over the band w its phase turns and the rest cancels: the errors above are those
-# of this root mean square frequency, rad/s.
+# An echo with the delay d shifts the peak of a correlation in proportion to 1 / (w^2
+# d). Its phase varies over the band w, so that most of its effect cancels. The errors
+# above are those at this root mean square frequency, rad/s.
 _BAND = 2.0 * math.pi * 4.5e3
 
-# Fewer parts see a sound begin less well, more are fooled by noise of a narrow band.
+# Number of parts of a frame. Fewer parts detect the start of a sound less well. With
+# more parts, noise in a narrow band causes more false detections.
 _PARTS = 5
 
 
 def echo_errors(
     shape: ArrayShape, c: float, news: float, angular_frequency: float
 ) -> NDArray[np.float64]:
-    """Covariance of the delays of a frame whose echoes were suppressed.
+    """Computes the covariance of the delays of a frame after the suppression of echoes.
 
     Args:
         shape: The microphones.
         c: Speed of sound, m/s.
         news: Share of the frame's energy that is no echo, above 0.
-        angular_frequency: Root mean square of the sound that is left, rad/s.
+        angular_frequency: Root mean square angular frequency of the remaining sound,
+            rad/s.
 
     Returns:
-        (n - 1, n - 1) of the channels 1 ... n - 1 against channel 0, s^2.
+        (n - 1, n - 1) covariance of the delays of channels 1 ... n - 1 to channel 0,
+        s^2.
     """
     turns = (shape.p_AM[1:] - shape.p_AM[0]) * (_DIRECTION_RAD / c)
     single = _ARRIVAL_S**2 * (np.eye(len(turns)) + 1.0)
@@ -47,16 +50,16 @@ def echo_errors(
 
 
 def energy_spread(frame: NDArray[np.float32]) -> float:
-    """Share of a frame that its energy is spread over.
+    """Computes the share of a frame over which its energy is spread.
 
-    The square of the energy's mean over its mean square, between fifths of the
-    frame: p for a steady sound in a share p of silence.
+    It is the squared mean of the energies of the fifths of the frame over their mean
+    square. For a steady sound in a share p of a silent frame, it is p.
 
     Args:
         frame: (n, samples) channels, not all silent.
 
     Returns:
-        0.2 to 1.
+        Share, 0.2 to 1.
     """
     parts = np.array_split(frame, _PARTS, axis=1)
     energy = np.array([float(np.vdot(part, part)) for part in parts])

@@ -1,8 +1,9 @@
-"""Frames at half their rate: what lies above would be transformed for nothing.
+"""Halves the sample rate of frames, if the band allows it.
 
-A half-band filter of 19 taps, every other one zero: flat to 0.02 dB up to
-``PASSED`` times the rate, and 55 dB down from where the rest would fold onto that.
-It is symmetrical and the same for all channels, so that delays stay what they are.
+Transforms are then faster. The half-band filter has 19 taps, every other one of them
+zero. It is flat to 0.02 dB up to ``PASSED`` times the sample rate. It suppresses the
+frequencies that alias to this range by 55 dB. The filter is symmetrical and the same
+for all channels, so that it does not change delays.
 """
 
 from __future__ import annotations
@@ -14,17 +15,17 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-#: Highest frequency that passes, as a share of the rate.
+#: Highest frequency that passes, as a share of the sample rate.
 PASSED = 0.15
 
-# Taps beside the middle one, on each side; the rest are zero.
+# Number of nonzero taps on each side of the middle one.
 _PAIRS = 5
-# Of the Kaiser window: more would leak less and pass less.
+# Parameter of the Kaiser window. A larger one leaks less and has a narrower band.
 _BETA = 5.0
 
 
 def _taps() -> tuple[np.float32, ...]:
-    """The taps at 1, 3, 5 ... samples from the middle one, which is 1/2."""
+    """Returns the taps at 1, 3, 5 ... samples from the middle one, which is 1/2."""
     away = 2.0 * np.arange(_PAIRS) + 1.0
     window = np.i0(_BETA * np.sqrt(1.0 - (away / (2.0 * _PAIRS)) ** 2))
     taps = np.sinc(away / 2.0) * window
@@ -38,14 +39,14 @@ _TAPS = _taps()
 def halve_rate(
     frame: NDArray[Any],
 ) -> NDArray[np.float32]:  # pragma: no cover  (compiled)
-    """Every other sample of what passes.
+    """Filters a frame and keeps every other sample.
 
     Args:
         frame: (n, samples) channels, floats or counts.
 
     Returns:
-        (n, samples // 2) float32, at the second, fourth ... sample. Beyond the
-        frame there is silence: four or five at each end miss a part.
+        (n, samples // 2) float32, at the second, fourth ... sample. The frame is
+        continued by silence, so four or five samples at each end are incomplete.
     """
     channels, samples = frame.shape
     half = samples // 2
@@ -64,7 +65,11 @@ def _halve_row(
     odd: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills in one channel; odd (half,) is scratch, and even between its ends."""
+    """Filters one channel.
+
+    ``odd`` (half,) is scratch memory, and so is ``even`` except for its ends, which are
+    zero.
+    """
     inside = even[_PAIRS - 1 : _PAIRS - 1 + odd.size]
     for k in range(odd.size):
         inside[k], odd[k] = samples[2 * k], samples[2 * k + 1]

@@ -5,29 +5,29 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Spectra are smoothed over this width: bins of one frame scatter by 100 %.
+# Width over which spectra are smoothed. The bins of one frame scatter by 100 %.
 _SMOOTHING_HZ = 400.0
 
-# A sound stands this far above the floor, 6 dB.
+# Least ratio of the power of a sound to the floor: 6 dB.
 _ABOVE_FLOOR = 4.0
 
-# The floor is what a quarter of the band lies below.
+# The floor is this quantile of the smoothed power in the band.
 _FLOOR_QUANTILE = 0.25
 
-# Where less than this is occupied, a tone say, the whole band is used.
+# If less than this is occupied, for example by a tone, the whole band is used.
 _LEAST_WIDTH_HZ = 500.0
 
 
 def occupied_band(spectra: NDArray[np.complex64], bin_hz: float) -> tuple[int, int]:
-    """Bins from the first to the last that stand above the floor.
+    """Finds the bins from the first to the last that are above the floor.
 
     Args:
-        spectra: (channels, bins).
-        bin_hz: Distance of the bins, Hz.
+        spectra: (channels, bins) spectra within the band.
+        bin_hz: Width of a bin, Hz.
 
     Returns:
-        First bin and the one after the last; all where the sound fills the band,
-        or nothing stands out.
+        First bin and the one after the last. All bins if the sound fills the band, or
+        if too few bins are above the floor.
     """
     bins = spectra.shape[1]
     width = max(1, round(_SMOOTHING_HZ / bin_hz))

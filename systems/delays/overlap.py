@@ -1,4 +1,4 @@
-"""The stretch of a frame that all channels share."""
+"""Cuts channels to the section of a frame that they share."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-#: Raised-cosine edges of the cut channels, samples. Sharp edges pull a peak to
-#: whole samples by one over the length and the squared bandwidth: 2e-3 samples of
-#: a 25 ms frame at 50 kHz, as much as the noise at 30 dB. These leave a twentieth
-#: of it, and nothing where they follow the delays below the sample.
+#: Length of the raised-cosine edges of the cut channels, samples. Sharp edges pull a
+#: peak to whole samples by the inverse of length and squared bandwidth. For a 25 ms
+#: frame at 50 kHz, this is 2e-3 samples, as much as noise at 30 dB. Soft edges reduce
+#: it to a twentieth, and to zero if they follow the delays below one sample.
 EDGE_SAMPLES = 16
 
 
 def cut_to_overlap(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """The stretch that all channels share, with soft edges.
+    """Cuts the section that all channels share, with soft edges.
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrival at each channel after channel 0, samples. Channels
-            are cut at whole samples; their edges follow what is left of it.
+        arrivals: (n,) arrivals relative to channel 0, samples. Channels are cut at
+            whole samples, and their edges follow the rest of the delay.
 
     Returns:
-        (n, m) in the frame's unit; m is the frame's length less the largest difference
-        of the arrivals, in whole samples.
+        (n, m) in the unit of the frame; m is the length of the frame less the largest
+        difference of the arrivals, in whole samples.
     """
     cut, length = cut_rows(frame, arrivals, *frame.shape)
     return np.ascontiguousarray(cut[:, :length])
@@ -38,16 +38,16 @@ def cut_to_overlap(
 def cut_rows(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64], rows: int, columns: int
 ) -> tuple[NDArray[np.float32], int]:  # pragma: no cover  (compiled)
-    """``cut_to_overlap``, with zeros after and below.
+    """Cuts as ``cut_to_overlap``, with zeros after the section and in further rows.
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrival at each channel after channel 0, samples.
-        rows: Of the output, at least n.
-        columns: Of the output, at least m.
+        arrivals: (n,) arrivals relative to channel 0, samples.
+        rows: Rows of the output, at least n.
+        columns: Columns of the output, at least m.
 
     Returns:
-        (rows, columns), of which the first m columns hold the stretch, and m.
+        (rows, columns), of which the first m columns contain the section, and m.
     """
     channels, samples = frame.shape
     whole = np.rint(arrivals)
@@ -67,6 +67,6 @@ def cut_rows(
 
 @njit(cache=True)
 def _ramp(k: float) -> np.float32:  # pragma: no cover  (compiled)
-    """A raised cosine's sample of number k, which need not be whole."""
+    """Returns the sample k of a raised cosine; k need not be whole."""
     share = min(max((k + 0.5) / EDGE_SAMPLES, 0.0), 1.0)
     return np.float32(0.5 - 0.5 * math.cos(math.pi * share))

@@ -1,11 +1,11 @@
 """Keeps the first wave front of every sound and suppresses its echoes.
 
-In a room the direct sound comes first; what follows in the same band is, for
-some tens of milliseconds, more likely an echo of it than news. Short-time
-spectra of each channel are therefore weighted by how far they rise above a
-decaying memory of their past, and whitened: the precedence effect, as in the
-echo-free onsets of Huang, Ohnishi and Sugie (1995). All weights are real, so
-that delays between the channels stay what they are.
+In a room, the direct sound arrives first. For some tens of milliseconds, further sound
+in the same band is more likely an echo than new sound. The short-time spectra of each
+channel are therefore weighted and whitened. The weight is the rise above a decaying
+memory of the past spectra. This is the precedence effect, as in the echo-free onsets of
+Huang, Ohnishi and Sugie (1995). All weights are real, so that the delays between the
+channels do not change.
 """
 
 from __future__ import annotations
@@ -18,24 +18,26 @@ from scipy import fft
 
 from systems.framework.compiling import njit
 
-# Short against the first echoes, long against a period of the lowest band, s.
+# Length of a spectrum, s: short compared with the delay of the first echoes, long
+# compared with a period of the lowest band.
 _WINDOW_S = 2.56e-3
 _HOPS_PER_WINDOW = 4
 
-# Memory of a room that decays by 60 dB in 0.69 s; the trials in
-# docs/results_hearing.md change little from 20 to 100 ms.
+# Time constant of the memory, s. It is that of a room with a reverberation time (60 dB)
+# of 0.69 s. In the trials in docs/results_hearing.md, results change little from 20 to
+# 100 ms.
 _DECAY_S = 0.05
 
-# Only what rises this many times above the noise is news: one bin of noise in
-# exp(4) does. Others would be whitened to the size of the sound.
+# Power counts as new only above this many times the noise. One in exp(4) bins of noise
+# exceeds it. Without this limit, whitening would raise noise to the level of the sound.
 _NOISE_MARGIN = 4.0
 
-# Whitening stops at this share of a channel's strongest instant.
+# Whitening is limited below this share of the strongest power of a channel.
 _WHITENING_FLOOR = 0.01
 
 
 class EchoMemory:
-    """Sizes of the memory for frames of a rate."""
+    """Sizes and decay of the memory for frames at a sample rate."""
 
     def __init__(self, channels: int, sample_rate_hz: float) -> None:
         self.window = _HOPS_PER_WINDOW * max(
@@ -45,24 +47,24 @@ class EchoMemory:
         self.shape = (channels, self.window // 2 + 1)
         self.decay_a_hop = math.exp(-self.hop / sample_rate_hz / _DECAY_S)
         phase = (np.arange(self.window) + 0.5) / self.window
-        # Its square adds up to a constant over four hops.
+        # The squares of the taper add up to a constant over four hops.
         self.taper = (np.sin(np.pi * phase) * math.sqrt(0.5)).astype(np.float32)
 
     def faded(self, memory: NDArray[np.float32], samples: int) -> NDArray[np.float32]:
-        """The memory after so many samples of silence.
+        """Returns the memory after a silence.
 
         Args:
             memory: (n, bins) power that echoes may still have, units of the frame
                 squared.
-            samples: Length of the silence.
+            samples: Length of the silence, samples.
 
         Returns:
-            (n, bins), smaller by the decay of so many samples.
+            (n, bins) memory, reduced by the decay in this time.
         """
         return memory * np.float32(self.decay_a_hop ** (samples / self.hop))
 
     def least(self, noise_density: float) -> float:
-        """What is remembered at least of noise of so much energy a sample."""
+        """Returns the least power in the memory for noise of this energy per sample."""
         return _NOISE_MARGIN * noise_density * float(np.vdot(self.taper, self.taper))
 
 
@@ -74,14 +76,19 @@ def _weigh(
     floor: np.float32,
     noise: np.float32,
 ) -> float:  # pragma: no cover  (compiled)
-    """Weights spectra (n, instants, bins) in place; memory becomes the last one.
+    """Weights spectra (n, instants, bins) in place and updates the memory.
+
+    New power is the excess over the memory. Its ratio to the power gives the weight,
+    and the root of the power whitens. The memory is the largest of the decayed memory,
+    the present power and the noise.
 
     Returns:
-        Share of the energy that is news.
+        Share of the energy that is new.
     """
     channels, instants, bins = spectra.shape
     kept, all_of_it = 0.0, 1e-30
     for m in range(channels):
+        # Strongest instant of the channel, which limits the whitening.
         strongest = np.float32(0.0)
         for t in range(instants):
             total = np.float32(0.0)
@@ -124,18 +131,18 @@ def keep_first_wave_front(
     sizes: EchoMemory,
     noise_density: float = 0.0,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
-    """A frame without what may be echoes.
+    """Suppresses possible echoes in a frame.
 
     Args:
         frame: (n, samples) channels, any unit.
-        memory: (n, bins) what the last frame left; None after silence.
-        sizes: Of window and memory.
-        noise_density: Mean square of the noise a sample, were it white, units of the
-            frame squared; 0 where it is not known.
+        memory: (n, bins) memory of the last frame; None after silence.
+        sizes: Sizes of window and memory.
+        noise_density: Mean square per sample of white noise as loud as the noise, units
+            of the frame squared; 0 if it is unknown.
 
     Returns:
-        (n, samples) weighted and whitened channels, the new memory, and the share
-        of the frame's energy that is news, 0 to 1.
+        (n, samples) weighted and whitened channels, the new memory, and the share of
+        the frame's energy that is new, 0 to 1.
     """
     windows = np.lib.stride_tricks.sliding_window_view(frame, sizes.window, axis=1)
     spectra = fft.rfft(windows[:, :: sizes.hop] * sizes.taper)
@@ -146,6 +153,6 @@ def keep_first_wave_front(
     pieces = fft.irfft(spectra, sizes.window, overwrite_x=True)
     out = np.zeros(frame.shape, dtype=np.float32)
     _overlap_add(pieces, sizes.taper, sizes.hop, out)
-    # The last window ends before the frame does.
+    # The last window ends before the end of the frame.
     rest = frame.shape[1] - sizes.hop * (spectra.shape[1] - 1)
     return out, sizes.faded(memory, rest - sizes.hop), news

@@ -1,7 +1,7 @@
 """Fourier transforms of the channels of a frame, in compiled code.
 
-They are SciPy's to the last bit, without the microseconds that SciPy takes to find out
-who is to do a transform: as long again as a frame's transforms themselves.
+The results are equal to those of SciPy to the last bit. SciPy takes additional
+time to select the function for a transform, as much as for the transforms of a frame.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from systems.framework.compiling import njit
 
 @njit(cache=True)
 def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
-    """Rows to transform for so many channels.
+    """Returns the number of rows to transform for a number of channels.
 
-    Single precision is transformed four rows at a time, and a rest of three one
-    by one: with a fourth row of zeros it takes two thirds of the time.
+    Rows of single precision are transformed four at a time, and a remainder of three
+    one by one. A fourth row of zeros then saves a third of the time.
 
     Args:
-        channels: Their number.
+        channels: Number of channels.
 
     Returns:
-        Their number, or one more.
+        Number of rows: that of the channels, or one more.
     """
     return channels + (1 if channels % 4 == 3 else 0)
 
@@ -35,13 +35,13 @@ def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
 def transform_filled_rows(
     rows: NDArray[Any],
 ) -> NDArray[Any]:  # pragma: no cover  (compiled)
-    """Spectra of rows.
+    """Computes the spectra of rows.
 
     Args:
-        rows: (n, length) of single or double precision.
+        rows: (n, length) rows of single or double precision.
 
     Returns:
-        (n, length // 2 + 1) of the same.
+        (n, length // 2 + 1) spectra of the same precision.
     """
     precision = rows[:1, :1] * np.complex64(1.0)
     shape = rows.shape[0], rows.shape[1] // 2 + 1
@@ -55,14 +55,14 @@ def transform_filled_rows(
 def transform_rows(
     frame: NDArray[np.float32], length: int
 ) -> NDArray[np.complex64]:  # pragma: no cover  (compiled)
-    """Spectra of channels that are padded with zeros.
+    """Computes the spectra of channels that are padded with zeros.
 
     Args:
         frame: (n, samples) channels, any unit.
-        length: Of the transform, samples; at least that of the channels.
+        length: Length of the transform, samples; at least that of the channels.
 
     Returns:
-        (n, length // 2 + 1), in the unit of the frame.
+        (n, length // 2 + 1) spectra in the unit of the frame.
     """
     channels, samples = frame.shape
     rows = np.zeros((filled_rows(channels), length), dtype=np.float32)

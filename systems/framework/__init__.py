@@ -1,1 +1,1 @@
-"""What every block rests on: parameters, checks, noise, scalars, compiled code."""
+"""The basis of all blocks: parameters, checks, noise, scalars and compiled code."""

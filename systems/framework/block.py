@@ -1,8 +1,13 @@
-"""The base of all blocks: a block declares its ports, state and columns once.
+"""The base class of all blocks.
 
-From this declaration ``Block`` makes the Drake ports, the state and its update, the
-check that all inputs are finite, the port table of the docstring, the columns in the
-table of a run, and the step of the compiled loop.
+A block declares its ports, its state and its columns once. From this declaration,
+``Block`` creates:
+
+- the Drake ports, the state and its update;
+- the check that all inputs are finite;
+- the table of ports in the docstring;
+- the columns in the table of a run;
+- the step of the compiled loop.
 """
 
 from __future__ import annotations
@@ -42,22 +47,22 @@ class Port(NamedTuple):
 
     name: str
     size: int | str
-    """Number of elements; or a multiple of a size that the block knows when it is made,
-    as ``sensors`` or ``3 bodies``; or ``OBJECT``."""
+    """Number of elements, or ``OBJECT``. A string such as ``sensors`` or ``3 bodies``
+    is a multiple of a size that the block receives when it is constructed."""
     unit: str
-    """Units of the elements, as ``m, m, rad``, or the type of the object."""
+    """Units of the elements, for example ``m, m, rad``, or the type of the object."""
     columns: str | tuple[str, ...] = ()
-    """Names of the elements in the table of a run; ``range_{}`` stands for ``range_1``,
-    ``range_2`` and so on. Without columns the port is not in the table."""
+    """Names of the elements in the table of a run. ``range_{}`` means ``range_1``,
+    ``range_2`` and so on. A port without columns is not in the table."""
 
     def elements(self, sizes: Mapping[str, int]) -> int:
-        """Number of elements.
+        """Number of elements of a port that carries numbers.
 
         Args:
-            sizes: The sizes that the block knows, by name.
+            sizes: The sizes of the block, by name.
 
         Returns:
-            The number; that of a port that carries an object is not known.
+            The number of elements.
         """
         if isinstance(self.size, int):
             return self.size
@@ -68,7 +73,7 @@ class Port(NamedTuple):
         """Names of the elements in the table of a run.
 
         Args:
-            sizes: The sizes that the block knows, by name.
+            sizes: The sizes of the block, by name.
 
         Returns:
             One name per element; empty if the port is not in the table.
@@ -80,71 +85,76 @@ class Port(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What a block computes in a tick, for Drake and for compiled loops.
+    """The computation of a block in one tick, for Drake and for compiled loops.
 
     ``step(tick, state, inputs, outputs, numbers)`` reads the inputs, fills the outputs
-    element by element, and replaces the state by that of the next tick. ``inputs`` and
-    ``outputs`` have one entry per port, in the order of the declaration: a sequence of
-    numbers, or the object that the port carries. The sequences are lists of float or
-    AutoDiffXd in Drake and arrays in compiled code.
+    element by element, and replaces the state by the state of the next tick.
+
+    ``inputs`` and ``outputs`` have one entry per port, in the order of the declaration.
+    An entry is a sequence of numbers or the object that the port carries. In compiled
+    code, the sequences are arrays. In Drake, they are lists of float or AutoDiffXd, or
+    arrays if the block declares this.
     """
 
     step: Callable[..., None]
     numbers: Any
-    """What the step depends on and never changes: a named tuple of numbers, arrays,
-    functions and parameters, or of tuples of these. A field ``noise`` is a
-    ``TickNoise``; each run gives it the seed of the run."""
+    """Constants of the step: a named tuple of numbers, arrays, functions and
+    parameters, or of tuples of these. If it has a field ``noise`` of the type
+    ``TickNoise``, each run replaces this field according to its seed."""
     state: Any = ()
-    """At the first tick: a sequence of numbers, or a named tuple of arrays (or of named
-    tuples of arrays), which the step changes in place."""
+    """State at the first tick: a sequence of numbers or a named tuple. The fields of
+    the named tuple are arrays or named tuples of arrays. The step changes the arrays in
+    place."""
     publish: Callable[..., None] | None = None
-    """``publish(state, outputs, numbers)`` fills the outputs of a block whose outputs
-    depend on its state alone. The step then does not fill them."""
+    """``publish(state, outputs, numbers)`` fills the outputs of a block if they depend
+    only on its state. The step of such a block does not fill them."""
     host: Any = None
-    """``HostCall`` of a step that calls Python; the loop keeps it alive."""
+    """``HostCall`` of a step that calls Python. The loop keeps a reference to it."""
     carries: Mapping[str, Callable[[int], Any]] = {}
-    """What each output port that carries an object has at a tick."""
+    """For each output port that carries an object: a function that returns the object
+    at a tick."""
 
 
 class RunFacts(NamedTuple):
-    """What a step needs to know of the run in a compiled loop.
+    """Facts about a run that a step needs in a compiled loop.
 
-    Blocks are shared by runs that differ in start, seed and layout. Therefore these
-    values come from the run, whatever the block was made with.
+    Several runs share the same blocks, but differ in start, seed and layout. Therefore
+    these values replace the values with which a block was constructed.
     """
 
     ticks: int
     tick_s: float
     initial_pose: tuple[float, float, float]
-    """Of the robot in W, m and rad."""
+    """x, y and heading of the robot in W at the start, m, m and rad."""
     scheme: str
-    """Of the integrator, as ``runge_kutta3``."""
+    """Name of the integrator, for example ``runge_kutta3``."""
     step_s: float
     """Largest step of the integrator, s."""
     seed_of: Callable[[str], int]
-    """Seed of a block, by the name of the block."""
+    """Function that returns the seed of a block, given the name of the block."""
     carried: Mapping[str, Callable[[int], Any]]
-    """What the input ports that carry objects have at a tick, by name."""
+    """For each input port that carries an object, by name: a function that returns the
+    object at a tick."""
     mapped: Any = ()
-    """(n, 5) x, y, theta, length, width of the obstacles in the robot's map, m and
+    """(n, 5) x, y, theta, length and width of the obstacles in the robot's map, m and
     rad."""
     goal: tuple[float, float] | None = None
-    """Position of the goal of the robot, m, if it has one."""
+    """Position of the goal of the robot in W, m, if the robot has a goal."""
 
 
 def has_arrays(state: Any) -> bool:
-    """Whether a state is a named tuple of arrays, which a step changes in place."""
+    """Returns whether a state is a named tuple of arrays."""
     return hasattr(state, "_fields")
 
 
 def copied(state: Any) -> Any:
-    """A deep copy of a named tuple of arrays, or of named tuples of arrays.
+    """Copies a named tuple of arrays, including nested named tuples.
 
     Args:
-        state: Its fields may also be numbers, which a step cannot change.
+        state: The named tuple. Its fields may also be numbers.
 
     Returns:
-        A state that shares no array with the first one.
+        A named tuple with the same values that shares no array with ``state``.
     """
     if has_arrays(state):
         return type(state)(*map(copied, state))
@@ -152,25 +162,25 @@ def copied(state: Any) -> Any:
 
 
 class _Declared:
-    """The declaration of a block, and what is made of it.
+    """The declaration of a block, and the methods that evaluate it.
 
     Its private names are mangled, so that blocks can use any name of their own.
     """
 
     part: ClassVar[str] = ""
-    """The role of the block in its robot, as ``plant`` or ``tracker``. A block replaces
-    another one by having the same part."""
+    """The role of the block in its robot, for example ``plant`` or ``tracker``. A block
+    replaces another block that has the same part."""
     stage: ClassVar[Stage] = "control"
     """The place of the block in the signal chain."""
     inputs: Sequence[Port] = ()
     """Input ports, in the order of the step."""
     outputs: Sequence[Port] = ()
-    """Output ports, in the order of the step. One that carries an object publishes the
-    field of that name of a state of arrays; the step does not fill it."""
+    """Output ports, in the order of the step. A port that carries an object publishes
+    the field of the state with the name of the port. The step does not fill it."""
     states: Sequence[str] = ()
     """Names of the elements of the state, continuous elements first."""
     columns: Mapping[str, tuple[str, ...]] = {}
-    """The columns of each output port that is in the table of a run."""
+    """Names of the columns in the table of a run, by output port."""
     step: Step
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -184,12 +194,12 @@ class _Declared:
         sizes: Mapping[str, int] | None = None,
         omit: Collection[str] = (),
     ) -> list[Any]:
-        """Declares the input ports and the columns of a block that computes by itself.
+        """Declares the input ports and the columns of a block without a ``Step``.
 
-        Such a block adds its output ports by ``declare_output``.
+        Such a block declares its output ports with ``declare_output``.
 
         Args:
-            sizes: The sizes that the ports refer to.
+            sizes: Sizes to which the ports refer, by name.
             omit: Names of ports that this block does not have.
 
         Returns:
@@ -218,12 +228,12 @@ class _Declared:
         """Declares one of the output ports.
 
         Args:
-            name: As in ``outputs``.
+            name: Name of the port in ``outputs``.
             calc: ``calc(context, output)`` sets the output.
-            prerequisites: Tickets of what ``calc`` reads.
+            prerequisites: Dependency tickets of all values that ``calc`` reads.
 
         Returns:
-            The port.
+            The Drake port.
         """
         (port,) = (port for port in self.__outputs if port.name == name)
         if port.size == OBJECT:
@@ -250,17 +260,26 @@ class _Declared:
         unread: Collection[str] = (),
         arrays: bool = False,
     ) -> None:
-        """Declares ports, state, update and outputs of a block that does a ``Step``.
+        """Declares the ports, the state, the update and the outputs of a block.
+
+        A cache entry stores the result of the step, so that Drake computes it only once
+        for all output ports. If the step has ``publish``, a second cache entry stores
+        the outputs. It depends only on the state, so that these outputs have no direct
+        feedthrough. The form of the state of the step determines the Drake state:
+
+        - a sequence of numbers: a discrete state;
+        - a named tuple of arrays: an abstract state;
+        - an empty sequence: no Drake state.
 
         Args:
-            step: What the block computes in a tick.
+            step: The computation of the block in one tick.
             tick_s: Period of the update, s.
-            sizes: The sizes that the ports refer to.
+            sizes: Sizes to which the ports refer, by name.
             omit: Names of ports that this block does not have.
-            unread: Names of input ports, the last ones, that the step does not read.
-                They may stay unconnected.
-            arrays: Whether the step wants arrays instead of lists in Drake, too,
-                because it calls compiled functions.
+            unread: Names of input ports that the step does not read. They must be the
+                last input ports, and may stay unconnected.
+            arrays: Whether Drake passes arrays instead of lists to the step. A step
+                that calls compiled functions needs arrays.
         """
         self.declare_ports(sizes=sizes, omit=omit)
         self.step, self.__tick_s = step, tick_s
@@ -276,8 +295,9 @@ class _Declared:
         sources = {port.ticket() for port in self.__read_ports}
         sources.add(self.time_ticket())
         if has_arrays(step.state):
-            # The tick that the state belongs to, the state, and the outputs of the tick
-            # before, which hold until the next one begins.
+            # The abstract value holds the tick of the last update, the state after
+            # this update, and the outputs of this tick. The outputs remain valid until
+            # the next tick begins.
             self.DeclareAbstractState(Value((-1, copied(step.state), None)))
             self.DeclarePeriodicUnrestrictedUpdateEvent(
                 period_sec=tick_s, offset_sec=0.0, update=self.__replace_arrays
@@ -323,13 +343,13 @@ class _Declared:
         self.declare_output(name, calc, {self.__computed.ticket()})
 
     def step_for(self: Any, run: RunFacts) -> Step:
-        """What the block computes in each tick of a compiled loop.
+        """Returns the step of the block for one run of a compiled loop.
 
         Args:
-            run: The run.
+            run: The facts about the run.
 
         Returns:
-            The step, with a state of its own and the noise of the run.
+            The step, with its own copy of the state and the noise of the run.
 
         Raises:
             InputError: The block has no step.
@@ -390,7 +410,7 @@ class _Declared:
         state: Any = []
         if has_arrays(step.state):
             done, state, known = context.get_abstract_state(0).get_value()
-            # The update of this tick has been done: its outputs hold.
+            # The update of this tick is complete, so its outputs are still valid.
             if done == tick:
                 return known, state
             state = copied(state)
@@ -430,7 +450,7 @@ class _Declared:
 
 
 class Block(LeafSystem, _Declared):
-    """The base of a block. ``Block_[T]`` is that of a template."""
+    """The base class of a block. ``Block_[T]`` is the base class for a scalar type."""
 
     _scalar = float
 
@@ -439,7 +459,7 @@ class _DifferentiableBlock(LeafSystem_[AutoDiffXd], _Declared):
     _scalar = AutoDiffXd
 
 
-#: The base of a block's template, by scalar type.
+#: Base class of a block that is a template, by scalar type.
 Block_: dict[Any, Any] = {float: Block, AutoDiffXd: _DifferentiableBlock}
 
 
@@ -448,14 +468,14 @@ def _field_at(state: Any, name: str, _tick: int) -> Any:
 
 
 def part_of(system: Any) -> str:
-    """The part of a system; that of a system that states none is ``controller``."""
+    """Returns the part of a system. The default is ``controller``."""
     return getattr(system, "part", "") or "controller"
 
 
 def _with_port_table(cls: Any) -> str:
-    """The docstring, with a table of the ports after the summary."""
+    """Returns the docstring with a table of the ports after the summary."""
     summary, _, rest = inspect.cleandoc(cls.__doc__ or "").partition("\n\n")
-    # The class of a template is local to the function of that name.
+    # The class of a template is local to a function that has the name of the class.
     name = cls.__qualname__.partition("_.<locals>")[0].rpartition(".")[2]
     lines = [".. pydrake_system::", "", f"    name: {name}"]
     for heading, ports in (("input_ports", cls.inputs), ("output_ports", cls.outputs)):

@@ -1,4 +1,4 @@
-"""One computation behind several output ports."""
+"""A cache entry that several output ports share."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ def declare_cache(
     compute: Callable[[Any], Any],
     prerequisites: set[DependencyTicket],
 ) -> CacheEntry:
-    """Declares a cache entry that holds what ``compute(context)`` returns.
+    """Declares a cache entry for the result of ``compute(context)``.
 
-    Ports that share it take ``{entry.ticket()}`` as their prerequisite and
-    read ``entry.Eval(context)``; they must not change the object.
+    Ports that share the entry declare ``{entry.ticket()}`` as their prerequisite. They
+    read the result with ``entry.Eval(context)`` and must not change it.
 
     Args:
-        system: The block.
+        system: The block that owns the entry.
         description: Name of the entry.
-        compute: Takes a context; returns any object.
-        prerequisites: Tickets of what ``compute`` reads: ports, states, time.
+        compute: Function of a context that returns any object.
+        prerequisites: Dependency tickets of all ports, states and times that
+            ``compute`` reads.
 
     Returns:
-        The entry, to be evaluated in a context.
+        The cache entry.
     """
 
     def calc(context: Any, value: Any) -> None:

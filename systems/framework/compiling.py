@@ -1,15 +1,17 @@
-"""Where compiled functions are kept, and for how long they hold.
+"""The cache of compiled functions.
 
-numba keeps the code of a function until the file of that function changes. Most of our
-compiled functions call functions of other files, whose code becomes part of theirs.
-``njit`` below has numba keep code by the content of every file of ours that the
-function's own file imports, directly or not. An edit in one of them is a new key; code
-of other versions and of other clones stays beside it, until it was unused for 30 days.
+By default, numba reuses the cached code of a function until the file of this function
+changes. However, most of our compiled functions contain the code of functions from
+other files. Therefore ``njit`` below uses another key. The key is a hash of the file
+and of all our files that it imports, directly or indirectly. A change in one of these
+files gives a new key. Code of other versions and other clones stays in the cache until
+it has not been used for 30 days.
 
-None takes numba's ``fastmath``: sums that the compiler may reorder come out as the
-machine, the caller and the order of compiling have it, and runs of 40 s make
-centimetres of their last bit (``tests/evals/test_compiled_code.py``). Without it the
-compiled loop by ear takes 10 to 15 % longer, Drake's 5 %.
+No function uses the option ``fastmath`` of numba. With this option, the compiler may
+reorder sums. The last bit of a sum would then depend on the machine, on the caller and
+on the order of compilation. In a run of 40 s, such a difference grows to centimeters
+(``tests/evals/test_compiled_code.py``). Without ``fastmath``, the compiled loop of a
+robot that listens takes 10 to 15 % longer, and the loop of Drake 5 %.
 """
 
 from __future__ import annotations
@@ -28,20 +30,21 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-#: Packages that code of ours is in.
+#: The packages of this repository.
 _PACKAGES = ("systems", "diagrams", "analysis", "studies", "benchmarks")
 _ROOT = Path(__file__).resolve().parents[2]
-#: They tell numba how to compile functions of other files, which need not import them.
+#: These files define how numba compiles functions of other files. The other files need
+#: not import them, so that every digest includes these files.
 OVERLOADS = (
     _ROOT / "systems" / "framework" / "scalar_math.py",
     _ROOT / "systems" / "world" / "geometry.py",
 )
 
-#: The default folder. ``NUMBA_CACHE_DIR`` names another one.
+#: The default folder of the cache. ``NUMBA_CACHE_DIR`` overrides it.
 _FOLDER = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "phonotaxis")
-#: Code that was not used for so long is removed, s, ...
+#: Time without use after which code is removed, s.
 _KEPT_S = 30 * 86_400.0
-#: ... and its last use is known to within a day, s.
+#: Resolution of the recorded time of the last use, s.
 _USE_S = 86_400.0
 
 _IMPORT = re.compile(
@@ -51,15 +54,17 @@ _IMPORT = re.compile(
 
 
 def provide_cache(folder: Path = _FOLDER) -> Path | None:
-    """Gives compiled code a folder where its usual one cannot be written.
+    """Creates a temporary cache folder if the usual folder is not writable.
 
-    It lasts as long as the process, and serves the processes that this one starts.
+    The temporary folder exists until the process ends. Processes that this process
+    starts use it, too.
 
     Args:
-        folder: The usual one.
+        folder: The usual folder of the cache.
 
     Returns:
-        A new folder; none where the usual one, or the user's choice, serves.
+        The temporary folder, or None if the usual folder is writable or the user has
+        chosen a folder.
     """
     if os.environ.get("NUMBA_CACHE_DIR") or _can_be_written(folder):
         return None
@@ -72,21 +77,21 @@ def provide_cache(folder: Path = _FOLDER) -> Path | None:
 
 
 def cache_folder() -> Path:
-    """The folder of compiled code."""
+    """Returns the folder of the compiled code."""
     return Path(os.environ.get("NUMBA_CACHE_DIR") or _FOLDER)
 
 
 def njit(*arguments: Any, **options: Any) -> Any:
-    """``numba.njit``; code that it keeps holds for the present sources alone.
+    """Calls ``numba.njit`` with a cache whose key is the content of the sources.
 
     Args:
-        *arguments: Of ``numba.njit``.
-        **options: Of ``numba.njit``.
+        *arguments: Positional arguments of ``numba.njit``.
+        **options: Options of ``numba.njit``.
 
     Returns:
-        What ``numba.njit`` returns.
+        The result of ``numba.njit``.
     """
-    import numba  # only here: lists and refusals load this module, and no numba
+    import numba  # imported late, because lists and error messages need no numba
 
     _keep_by_source()
     return numba.njit(*arguments, **options)
@@ -94,7 +99,7 @@ def njit(*arguments: Any, **options: Any) -> Any:
 
 @cache
 def _keep_by_source() -> None:
-    """Has numba ask ``SourceLocator`` first, then those that it asks otherwise."""
+    """Makes ``SourceLocator`` the first of the cache locators of numba."""
     from numba import config
     from numba.core.caching import CacheImpl
 
@@ -106,9 +111,9 @@ def _keep_by_source() -> None:
 
 
 class SourceLocator:
-    """Tells numba where the code of one of our functions is kept.
+    """Determines where numba caches the code of one of our functions.
 
-    It has the methods of ``numba.core.caching._CacheLocator``.
+    The class has the methods of ``numba.core.caching._CacheLocator``.
     """
 
     def __init__(self, function: Any, file: str) -> None:
@@ -118,23 +123,23 @@ class SourceLocator:
 
     @classmethod
     def from_function(cls, function: Any, file: str) -> SourceLocator | None:
-        """One for a function of ours, none for any other."""
+        """Returns a locator for one of our functions, and None for other functions."""
         return cls(function, file) if _is_ours(Path(file)) else None
 
     def get_cache_path(self) -> str:
-        """The folder of all functions of one file, by what they are made of."""
+        """Returns the folder for the functions of the file and its present digest."""
         name = f"{Path(self._py_file).stem}_{self._digest[:24]}"
         return str(cache_folder() / "functions" / name)
 
     def ensure_cache_path(self) -> None:
-        """Makes the folder, and removes what was not used for long."""
+        """Creates the folder if necessary, and removes folders that are long unused."""
         folder = Path(self.get_cache_path())
         if not folder.exists():
             _remove_unused(folder.parent)
             folder.mkdir(parents=True, exist_ok=True)
 
     def get_source_stamp(self) -> str:
-        """What the code was compiled from."""
+        """Returns the digest of the sources, and records the use of the folder."""
         folder = Path(self.get_cache_path())
         with suppress(OSError):
             if folder.stat().st_mtime < time.time() - _USE_S:
@@ -142,31 +147,31 @@ class SourceLocator:
         return self._digest
 
     def get_disambiguator(self) -> str:
-        """Line of the function: a file may have two of one name."""
+        """Returns the line, because a file may have two functions of the same name."""
         return str(self._line)
 
 
 @cache
 def _remove_unused(folder: Path) -> None:
-    """Once per process."""
+    """Removes folders without recent use, at most once per process."""
     oldest = time.time() - _KEPT_S
-    with suppress(OSError):  # another process may remove them, too
+    with suppress(OSError):  # another process may remove the same folders
         for each in folder.iterdir():
             if each.stat().st_mtime < oldest:
                 shutil.rmtree(each, ignore_errors=True)
 
 
 def source_digest(*files: Path) -> str:
-    """Hash of Python files and of all sources of ours that they import.
+    """Computes a hash of Python files and of all our files that they import.
 
-    Those of ours are read once in a process: the code that it has loaded is that of its
-    start.
+    A process reads each of our files only once, because later changes do not affect the
+    code that it has loaded.
 
     Args:
-        *files: Of ours or a user's.
+        *files: Our files or files of a user.
 
     Returns:
-        Hexadecimal digits, the same for the same content in any clone.
+        Hexadecimal digits. They depend on the content of the files, not on the clone.
     """
     import numpy as np
 
@@ -182,19 +187,19 @@ def source_digest(*files: Path) -> str:
 
 
 def _place(file: Path) -> str:
-    """Where it is in a clone; of a user's the name alone."""
+    """Returns the path of our file within a clone, or the name of a user's file."""
     return str(file.relative_to(_ROOT)) if _is_ours(file) else file.name
 
 
 def _read(file: Path) -> tuple[str, tuple[Path, ...]]:
-    """Hash of a file, and the files of ours that it imports.
+    """Returns the hash of a file, and our files that it imports.
 
-    Imports are taken from the text, in functions and comments as well: one too many
-    costs a compilation, one too few a wrong result.
+    A search of the text finds the imports, also in functions and in comments. A
+    superfluous file costs only a compilation. A missing file would give wrong results.
     """
     try:
         text = file.read_bytes()
-    except OSError:  # a user's file that is gone, and still loaded
+    except OSError:  # a deleted file of a user whose code is still loaded
         text = b""
     names: set[str] = set()
     for base, listed, plain in _IMPORT.findall(text):
@@ -224,11 +229,11 @@ def _is_ours(file: Path) -> bool:
 
 
 def _can_be_written(folder: Path) -> bool:
-    """Whether files can be made there, or the folder itself."""
+    """Returns whether the folder is writable or can be created."""
     while not folder.exists():
         folder = folder.parent
     return os.access(folder, os.W_OK | os.X_OK)
 
 
-# Every import of a block comes by here, before numba compiles anything.
+# Every block imports this module before numba compiles anything.
 provide_cache()

@@ -1,8 +1,9 @@
-"""Elementary functions of floats, of arrays, and of AutoDiffXd.
+"""Elementary functions of floats, arrays and AutoDiffXd.
 
-They are those of ``pydrake.math``, and sine and cosine of arrays those of numpy; for
-floats ``math`` has the same ones in a third of the time, but raises where they are
-infinite or not a number.
+For floats, the functions of ``math`` give the same results as those of ``pydrake.math``
+in a third of the time. However, they raise errors where a result is infinite or not a
+number. In these cases, and for AutoDiffXd, this module uses ``pydrake.math``. It uses
+numpy for the sine and cosine of arrays.
 """
 
 from __future__ import annotations
@@ -12,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-# From some way above this exponent on a float is infinite.
+# Slightly above this exponent, the result is infinite.
 _LARGEST_EXPONENT = 709.0
 
 
 def float_of(x: Any) -> float:
-    """Value of a float or an AutoDiffXd."""
+    """Returns the value of a float or an AutoDiffXd."""
     return x if isinstance(x, float) else x.value()
 
 
 def cos(x: Any) -> Any:
-    """Cosine of x in rad."""
+    """Computes the cosine of x, with x in rad."""
     if isinstance(x, float) and math.isfinite(x):
         return math.cos(x)
     if isinstance(x, np.ndarray):
@@ -31,7 +32,7 @@ def cos(x: Any) -> Any:
 
 
 def sin(x: Any) -> Any:
-    """Sine of x in rad."""
+    """Computes the sine of x, with x in rad."""
     if isinstance(x, float) and math.isfinite(x):
         return math.sin(x)
     if isinstance(x, np.ndarray):
@@ -40,21 +41,21 @@ def sin(x: Any) -> Any:
 
 
 def exp(x: Any) -> Any:
-    """e to the power of x."""
+    """Computes e to the power of x."""
     if isinstance(x, float) and x < _LARGEST_EXPONENT:
         return math.exp(x)
     return _of_drake().exp(x)
 
 
 def sqrt(x: Any) -> Any:
-    """Square root of x."""
+    """Computes the square root of x."""
     if isinstance(x, float) and x >= 0.0:
         return math.sqrt(x)
     return _of_drake().sqrt(x)
 
 
 def _of_drake() -> Any:
-    """Its functions; parameters are checked without Drake."""
+    """Imports ``pydrake.math`` late, so that parameter checks do not load Drake."""
     import pydrake.math
 
     return pydrake.math

@@ -1,8 +1,8 @@
-"""Blocks refuse what is not finite, where they read a port and where they are made.
+"""Checks that all inputs and arguments of blocks are finite.
 
-Comparisons swallow NaN: an echo flag of NaN is no echo, an obstacle at NaN is out of
-reach. A sum swallows nothing and costs little, so that each block adds up all that it
-reads.
+A comparison with NaN is false and hides the error: an echo flag of NaN looks like no
+echo, and an obstacle at NaN looks out of reach. A sum is finite only if all its terms
+are, and it takes little time. Therefore each block sums all values that it reads.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.framework.scalar_math import float_of
 
-# Between a template's name and its scalar in the names of pydrake's classes.
+# Separates the template and the scalar type in the names of pydrake's classes.
 _SCALAR = "_\N{MATHEMATICAL BOLD SCRIPT CAPITAL T}"
 
 
 def read_list(context: Any, port: Any) -> list[Any]:
-    """Values of a vector input port, floats or AutoDiffXd.
+    """Reads a vector input port.
 
     Args:
-        context: Of the block.
-        port: Vector input port of n elements, connected.
+        context: Context of the block.
+        port: Connected vector input port with n elements.
 
     Returns:
-        The n elements, in the port's unit.
+        The n elements, floats or AutoDiffXd, in the unit of the port.
 
     Raises:
-        ValueError: An element is not finite; names block, port, element and time.
+        ValueError: An element is not finite. The message contains block, port, element
+            and time.
     """
     values = port.Eval(context).tolist()
     added = sum(values)
@@ -43,17 +44,17 @@ def read_list(context: Any, port: Any) -> list[Any]:
 
 
 def read_lists(context: Any, ports: Sequence[Any]) -> list[list[Any]]:
-    """``read_list`` of several ports, in half the time.
+    """Reads several vector input ports in half the time of ``read_list``.
 
     Args:
-        context: Of the block.
-        ports: Vector input ports, connected.
+        context: Context of the block.
+        ports: Connected vector input ports.
 
     Returns:
-        A list of elements for each port.
+        One list of elements per port.
 
     Raises:
-        ValueError: As ``read_list``.
+        ValueError: An element is not finite.
     """
     values = [port.Eval(context).tolist() for port in ports]
     added = sum(chain.from_iterable(values))
@@ -63,17 +64,17 @@ def read_lists(context: Any, ports: Sequence[Any]) -> list[list[Any]]:
 
 
 def read_arrays(context: Any, ports: Sequence[Any]) -> list[Any]:
-    """``read_lists`` where arrays are wanted.
+    """Reads several vector input ports as arrays.
 
     Args:
-        context: Of the block.
-        ports: Vector input ports, connected.
+        context: Context of the block.
+        ports: Connected vector input ports.
 
     Returns:
-        (n,) array of each port: of floats, or of AutoDiffXd as objects.
+        One (n,) array per port, of floats or of AutoDiffXd objects.
 
     Raises:
-        ValueError: As ``read_list``.
+        ValueError: An element is not finite.
     """
     arrays = [port.Eval(context) for port in ports]
     added = sum(chain.from_iterable(map(np.ndarray.tolist, arrays)))
@@ -88,15 +89,15 @@ def _check_ports(context: Any, ports: Sequence[Any], values: Sequence[Any]) -> N
 
 
 def check_record(context: Any, port: Any, record: Any) -> None:
-    """Refuses a named tuple on an abstract port that holds what is not finite.
+    """Checks that all fields of a named tuple from an abstract port are finite.
 
     Args:
-        context: Of the block, for the time in the message.
-        port: Abstract input port that carries the record.
-        record: Named tuple of numbers and arrays; integers are finite.
+        context: Context of the block, for the time in the message.
+        port: Abstract input port that carries the named tuple.
+        record: Named tuple of numbers and arrays. Arrays of integers are not checked.
 
     Raises:
-        ValueError: As ``read_list``.
+        ValueError: A field is not finite.
     """
     for name, field in zip(record._fields, record, strict=True):
         if isinstance(field, np.ndarray):
@@ -109,7 +110,7 @@ def check_record(context: Any, port: Any, record: Any) -> None:
 
 @njit(cache=True)
 def total(values: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
-    """Sum of (n,) numbers in any order: not finite where one of them is not."""
+    """Sums (n,) numbers. The sum is not finite if one of the numbers is not."""
     out = values.dtype.type(0.0)
     for k in range(values.size):
         out += values[k]
@@ -117,16 +118,17 @@ def total(values: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
 
 
 def check_port(context: Any, port: Any, values: Any, field: str = "") -> None:
-    """Says which element of what a port carries is not finite, if one is.
+    """Raises an error if a value from a port is not finite.
 
     Args:
-        context: Of the block, for the time in the message.
+        context: Context of the block, for the time in the message.
         port: Input port.
-        values: What it carries, or one field of that: a number or an array.
-        field: Name of the field, with a dot before it; empty: the whole.
+        values: Value of the port or of one of its fields: a number or an array.
+        field: Name of the field after a dot. Empty: ``values`` is the whole value.
 
     Raises:
-        ValueError: An element is not finite; names block, port, element and time.
+        ValueError: An element is not finite. The message contains block, port, element
+            and time.
     """
     block = type(port.get_system()).__name__.partition(_SCALAR)[0]
     time = float_of(context.get_time())
@@ -139,15 +141,15 @@ def check_port(context: Any, port: Any, values: Any, field: str = "") -> None:
 
 
 def check_finite(name: str, values: Any, end: str = "; give a finite number") -> None:
-    """Refuses numbers that are not finite.
+    """Checks that numbers are finite.
 
     Args:
-        name: What they are, and of which block.
-        values: A number or an array of them, floats or AutoDiffXd.
-        end: How the message goes on: when, and the remedy.
+        name: Name of the block and of the quantity, for the message.
+        values: A number or an array of numbers, floats or AutoDiffXd.
+        end: End of the message: the time and the remedy.
 
     Raises:
-        ValueError: Names the first one that is not finite.
+        ValueError: A number is not finite. The message contains the first such number.
     """
     array = np.asarray(values)
     for place, value in enumerate(array.ravel().tolist()):

@@ -1,7 +1,8 @@
-"""Steps in Python for blocks that work on whole arrays: compiled loops call back.
+"""Steps in Python that a compiled loop calls.
 
-A frame of sound is read and written by libraries (transforms, room responses), which
-compiled code cannot call; a call back costs a microsecond or two.
+Blocks that process frames of sound use libraries (transforms, room responses). Compiled
+code cannot call these libraries. Therefore the compiled loop calls a Python function
+for such a block. A call takes one or two microseconds.
 """
 
 from __future__ import annotations
@@ -18,24 +19,24 @@ from numpy.typing import NDArray
 
 from systems.framework.block import Step
 
-#: Reads the inputs of a tick and fills the outputs of the next, each one after the
-#: other as the ports are.
+#: ``function(tick, inputs, outputs)`` reads the inputs of a tick and fills the outputs
+#: of the next tick. Each array contains the elements of all ports, in their order.
 HostFunction = Callable[[int, NDArray[np.float64], NDArray[np.float64]], None]
 
 
 class HostError(Exception):
-    """Ends a compiled loop: a ``HostCall`` keeps what was raised."""
+    """Ends a compiled loop. The ``HostCall`` has the original exception."""
 
 
 class HostCall:
-    """A Python function as compiled code calls it: by its address.
+    """A Python function that compiled code calls by its address.
 
-    What it raises cannot pass through compiled code: it is kept in ``error``, and the
-    loop ends with ``HostError``. The address is good as long as this object lives.
+    An exception cannot pass through compiled code. Therefore ``error`` stores it, and
+    the loop ends with ``HostError``. The address is valid while this object exists.
 
     Args:
-        function: Takes the tick, the inputs and the outputs to be filled.
-        inputs: How many numbers its inputs are; the rest are outputs.
+        function: The function, see ``HostFunction``.
+        inputs: Number of inputs. All further numbers are outputs.
     """
 
     def __init__(self, function: HostFunction, inputs: int) -> None:
@@ -62,18 +63,18 @@ class HostCall:
 
 
 class HostNumbers(NamedTuple):
-    """What ``_host_step`` depends on."""
+    """Constants of ``_host_step``."""
 
     address: int
-    """Of the function."""
+    """Address of the function."""
     period_ticks: int
-    """From one call to the next, ticks."""
+    """Period of the calls, ticks."""
     inputs: int
-    """Numbers on the input ports."""
+    """Number of elements of all input ports."""
 
 
 def _define_called(_, function, tick, address, size):  # type: ignore[no-untyped-def]
-    """What the function of three whole numbers returns that stands at an address."""
+    """Calls the function of three integers at an address, and returns its result."""
 
     def codegen(_: Any, builder: Any, _signature: Any, values: Any) -> Any:
         word = ir.IntType(64)
@@ -88,7 +89,7 @@ _called: Any = intrinsic(_define_called)
 
 
 def _host_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untyped-def]
-    """Hands the inputs over; the state is they and the outputs of the next tick."""
+    """Calls the function. State: the inputs, then the outputs of the next tick."""
     if tick % numbers.period_ticks != 0:
         return
     k = 0
@@ -102,7 +103,7 @@ def _host_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untype
 
 
 def _publish_host_step(state, outputs, numbers):  # type: ignore[no-untyped-def]
-    """The outputs of ``_host_step``'s state."""
+    """Copies the outputs from the state of ``_host_step``."""
     k = numbers.inputs
     for values in outputs:
         for j in range(len(values)):
@@ -113,14 +114,17 @@ def _publish_host_step(state, outputs, numbers):  # type: ignore[no-untyped-def]
 def host_step(
     function: HostFunction, inputs: int, outputs: int, period_ticks: int
 ) -> Step:
-    """A step in Python, whose outputs are zero until it was done for the first time.
+    """Makes a step that calls a Python function.
+
+    The outputs are zero until the first call is complete.
 
     Args:
-        function: What is done, see ``HostFunction``.
-        inputs: Numbers on the input ports.
-        outputs: Numbers on the output ports; they are published for the next tick.
-            0: it is done before the blocks that publish for the next tick.
-        period_ticks: From one time to the next, ticks.
+        function: The function, see ``HostFunction``.
+        inputs: Number of elements of all input ports.
+        outputs: Number of elements of all output ports. The step publishes them for the
+            next tick. If this is 0, the loop calls the function before the steps that
+            publish outputs.
+        period_ticks: Period of the calls, ticks.
 
     Returns:
         The step.

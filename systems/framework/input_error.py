@@ -1,25 +1,24 @@
-"""The one error of bad input."""
+"""The error that all invalid input raises."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-#: A whole message, with its field, has at most so many characters.
+#: Largest number of characters of a message, including its field.
 LONGEST_MESSAGE = 280
 _LONGEST_FIELD = 100
 
 
 class InputError(ValueError):
-    """Bad input: which field, what is wrong with it, and how to mend it.
+    """Invalid input, with the field, the fault and the remedy.
 
-    Whatever was in a file, the text is one line of printable characters, and at
-    most 280 of them: of longer ones the middle is left out, so that field and
-    remedy stay.
+    The text is one line of at most 280 printable characters, whatever the input
+    contains. If the field or the message is longer, its middle is omitted.
 
     Args:
         field: Dotted path of the field, name of the option, or name of the block.
-        message: The value, what is wrong, and the remedy.
-        others: What else is wrong with the same input.
+        message: The value, the fault and the remedy.
+        others: Further errors in the same input.
     """
 
     def __init__(
@@ -33,19 +32,19 @@ class InputError(ValueError):
 
     @property
     def all(self) -> tuple[InputError, ...]:
-        """This error and the others."""
+        """This error and the further errors."""
         return (self, *self._others)
 
     @classmethod
     def joined(cls, errors: Iterable[InputError], below: str = "") -> InputError:
-        """One error that has all of some, each once.
+        """Combines several errors into one error, without duplicates.
 
         Args:
-            errors: One or more.
-            below: Begins the path of each.
+            errors: One error or more.
+            below: Path that precedes the field of each error.
 
         Returns:
-            The first, with the others.
+            The first error, with all others as its further errors.
         """
         texts = {
             (".".join(filter(None, (below, each.field))), each.message): None
@@ -60,17 +59,18 @@ class InputError(ValueError):
 
 
 def shortened(text: str, length: int) -> str:
-    """A text on one line without its middle, so that it has at most ``length``.
+    """Converts a text into one line, and omits its middle if it is too long.
 
     Args:
-        text: Any text; white space becomes single blanks, what cannot be printed an
-            escape.
-        length: Most characters, more than 10.
+        text: Any text. White space becomes single blanks. Characters that are not
+            printable become escape sequences.
+        length: Largest number of characters of the result, more than 10.
 
     Returns:
-        The text itself where it is short enough, else its ends about `` ... ``.
+        The whole line if it is short enough, else its two ends with `` ... `` between
+        them.
     """
-    # What is far too long is cut first: escaping all of it would take memory.
+    # A text that is far too long is cut first, because escape sequences need memory.
     if len(text) > 8 * length:
         text = f"{text[: 4 * length]}{text[-4 * length :]}"
     text = " ".join(text.split())

@@ -1,4 +1,4 @@
-"""Files that a user names."""
+"""Checks of the paths of input files."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from systems.framework.input_error import InputError
 
 
 def require_file(path: str | Path, field: str, kind: str) -> Path:
-    """Refuses what is no file before anything is loaded that could read it.
+    """Checks that a path is a file, before libraries that could read it are loaded.
 
     Args:
-        path: Of the file.
-        field: Name of the parameter that holds the path, for the message.
-        kind: Of file, as 'WAV or FLAC'.
+        path: Path of the file.
+        field: Name of the parameter with the path, for the message.
+        kind: Kind of file for the message, for example 'WAV or FLAC'.
 
     Returns:
         The path.
 
     Raises:
-        InputError: It is no file.
+        InputError: The path is not a file.
     """
     path = Path(path)
     if not path.is_file():

@@ -1,7 +1,7 @@
-"""What the fields of a parameter model mean: their docstrings.
+"""The meanings of the fields of a parameter model, read from their docstrings.
 
-They are read when they are asked for. Pydantic can read them, too, but does so for
-every model as it is loaded, which takes a quarter of the time of loading a scenario.
+This module reads the docstrings of a model only on request. Pydantic would read them
+whenever a model is imported. This takes a quarter of the time for loading a scenario.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from systems.framework.parameters import Parameters
 
 
 def meanings(model: type[Parameters]) -> dict[str, str]:
-    """Docstrings of a model's fields, those of its bases included.
+    """Reads the docstrings of the fields of a model and of its base classes.
 
     Args:
         model: The model.
 
     Returns:
-        By field, without indentation; a field that has none is left out.
+        The docstrings without indentation, by field. Fields without docstring are
+        omitted.
     """
     found: dict[str, str] = {}
     for base in reversed(model.__mro__):
@@ -36,7 +37,7 @@ def meanings(model: type[Parameters]) -> dict[str, str]:
 def _of_class(model: type[Parameters]) -> dict[str, str]:
     try:
         source = textwrap.dedent(inspect.getsource(model))
-    except (OSError, TypeError):  # made by ``create_model``
+    except (OSError, TypeError):  # a model that ``create_model`` made
         return {}
     node = ast.parse(source).body[0]
     assert isinstance(node, ast.ClassDef | ast.If)

@@ -1,4 +1,4 @@
-"""Random numbers that depend on a seed and a tick alone."""
+"""Random numbers that depend only on a seed and a tick."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from scipy.special import ndtri
 
 from systems.framework.compiling import njit
 
-#: Tick of what is drawn once, when a block is built; no run gets there.
+#: Tick for numbers that a block draws once, before the run. No run reaches this tick.
 BEFORE_THE_RUN = 2**62
 
 _WORD = (1 << 64) - 1
 
-# By which the state of splitmix64 grows from word to word.
+# Increment of the state of splitmix64 per word.
 _STEP = np.uint64(0x9E3779B97F4A7C15)
 
 
 @njit(cache=True)
 def _scrambled(word: int | np.uint64) -> np.uint64:  # pragma: no cover  (compiled)
-    """The finaliser of splitmix64: every bit of the result hangs on every bit."""
+    """The finalizer of splitmix64. Each output bit depends on all input bits."""
     word = np.uint64(word) + _STEP
     word = (word ^ (word >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     word = (word ^ (word >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -34,12 +34,12 @@ def _scrambled(word: int | np.uint64) -> np.uint64:  # pragma: no cover  (compil
 def _tick_word(
     seed: int | np.uint64, tick: int | np.uint64
 ) -> np.uint64:  # pragma: no cover  (compiled)
-    """A word for a seed and a tick."""
+    """Hashes a seed and a tick to a word."""
     return _scrambled(_scrambled(seed) ^ tick)
 
 
 class _TickSeed(ISeedSequence):
-    """Three words from seed and tick; numpy's own sequence takes 15 us more."""
+    """Three words from seed and tick. numpy's own sequence takes 15 us longer."""
 
     def __init__(self, seed: int, tick: int) -> None:
         words = [_tick_word(np.uint64(seed & _WORD), np.uint64(tick & _WORD))]
@@ -48,32 +48,32 @@ class _TickSeed(ISeedSequence):
         self._words = np.array(words, dtype=np.uint64)
 
     def generate_state(self, n_words: int, dtype: Any = np.uint32) -> Any:
-        """What SFC64 asks for: three 64-bit words."""
+        """Returns the three 64-bit words for SFC64."""
         if n_words != 3 or np.dtype(dtype) != np.uint64:
             raise ValueError("a tick's seed serves SFC64 only")
         return self._words
 
 
 def tick_generator(seed: int, tick: int) -> Generator:
-    """A fresh generator for one tick of one block.
+    """Makes a new generator for one tick of one block.
 
-    Blocks keep no generator: a context that is run again, or a block that is
-    read twice, must see the same noise. SFC64 is numpy's fastest; its start
-    from hashed words makes the streams of different ticks independent.
+    Blocks store no generator. Therefore the noise is the same if Drake evaluates a
+    block twice or runs a context again. SFC64 is the fastest generator of numpy. It
+    starts from hashed words, so that the numbers of different ticks are independent.
 
     Args:
-        seed: Of the block.
-        tick: Number of the tick; 0 is at 0 s.
+        seed: Seed of the block.
+        tick: Number of the tick. Tick 0 is at 0 s.
 
     Returns:
-        A generator whose numbers only these two decide.
+        A generator whose numbers depend only on ``seed`` and ``tick``.
     """
-    # numpy's stub forgets ISeedSequence, which its documentation names.
+    # The type stub of numpy lacks ISeedSequence, but the documentation allows it.
     return Generator(SFC64(_TickSeed(seed, tick)))  # type: ignore[arg-type]
 
 
 def _quantiles() -> NDArray[np.float32]:
-    """(65536,) of the normal distribution, of variance 1/2."""
+    """Returns (65536,) quantiles of a normal distribution with variance 1/2."""
     quantiles = ndtri((np.arange(65_536) + 0.5) / 65_536)
     return (quantiles / np.std(quantiles) * np.sqrt(0.5)).astype(np.float32)
 
@@ -88,7 +88,10 @@ def _add_quantiles(
     quantiles: NDArray[np.float32],
     out: NDArray[np.float64],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out from the words of splitmix64 after theirs, two numbers a word."""
+    """Fills out with normal numbers, two from each word of splitmix64.
+
+    Each number is the sum of two quantiles, and 16 bits of the word select a quantile.
+    """
     state, low = _tick_word(seed, tick), np.uint64(0xFFFF)
     for k in range(0, out.size, 2):
         word = _scrambled(state)
@@ -103,19 +106,20 @@ def _add_quantiles(
 def standard_normals(
     shape: tuple[int, int], seed: int, tick: int
 ) -> NDArray[np.float64]:
-    """A few normal numbers for one tick of one block; for many see ``frame_noise``.
+    """Draws a few normal numbers for one tick of one block.
 
-    Sums of two numbers from a table of 65 536 quantiles, normal up to 5.9 standard
-    deviations, where they end. Their words are those of splitmix64 from a place
-    hashed from seed and tick.
+    Each number is the sum of two entries of a table with 65 536 quantiles. The numbers
+    are normally distributed up to 5.9 standard deviations, and none is larger. The
+    generator splitmix64 selects the entries. Its initial state is a hash of seed and
+    tick. For many numbers, use ``frame_noise``.
 
     Args:
-        shape: Rows and columns.
-        seed: Of the block.
+        shape: Numbers of rows and columns.
+        seed: Seed of the block.
         tick: Number of the tick.
 
     Returns:
-        (rows, columns) of unit variance.
+        (rows, columns) numbers of unit variance.
     """
     out = np.empty(shape)
     words = np.uint64(seed & _WORD), np.uint64(tick & _WORD)
@@ -124,20 +128,20 @@ def standard_normals(
 
 
 class TickNoise(NamedTuple):
-    """What ``standard_normals`` of a block are made from, in compiled code."""
+    """Seed and table of ``standard_normals`` for compiled code."""
 
     seed: np.uint64
     quantiles: NDArray[np.float32]
 
 
 def tick_noise(seed: int) -> TickNoise:
-    """That of a block.
+    """Makes the ``TickNoise`` of a block.
 
     Args:
-        seed: Of the block.
+        seed: Seed of the block.
 
     Returns:
-        For ``tick_normals``.
+        The argument ``noise`` of ``tick_normals``.
     """
     return TickNoise(np.uint64(seed & _WORD), _QUANTILES)
 
@@ -146,20 +150,20 @@ def tick_noise(seed: int) -> TickNoise:
 def tick_normals(
     noise: TickNoise, tick: int, rows: int, columns: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """``standard_normals`` of a tick.
+    """Draws the ``standard_normals`` of a tick in compiled code.
 
-    They are double precision: the product of a Python float and a number of single
-    precision is single precision in numpy and double precision in compiled code, so
-    that the two engines would differ.
+    The numbers have double precision. With single precision, the two engines would
+    differ: the product with a Python float has single precision in numpy, but double
+    precision in compiled code.
 
     Args:
-        noise: Of the block.
+        noise: Seed and table of the block.
         tick: Number of the tick.
-        rows: How many.
-        columns: How many.
+        rows: Number of rows.
+        columns: Number of columns.
 
     Returns:
-        (rows, columns) of unit variance.
+        (rows, columns) numbers of unit variance.
     """
     out = np.empty((rows, columns))
     _add_quantiles(noise.seed, np.uint64(tick), noise.quantiles, out.reshape(-1))
@@ -167,14 +171,15 @@ def tick_normals(
 
 
 def _polynomial(function: Any, low: float, high: float, degree: int) -> tuple[Any, ...]:
-    """Coefficients in single precision, lowest first, of a fit at Chebyshev points."""
+    """Fits a polynomial at Chebyshev points. The lowest coefficient is first."""
     fit = np.polynomial.Chebyshev.interpolate(function, degree, [low, high])
     coefficients = fit.convert(kind=np.polynomial.Polynomial).coef
     return tuple(coefficients.astype(np.float32))
 
 
-# ln(1 + f) / f for 1 + f between the roots of 1/2 and of 2; sin(a) / a and cos(a) over
-# a^2 up to 45 degrees. All are right to single precision.
+# Three polynomials, accurate to single precision: ln(1 + f) / f as a function of f, for
+# 1 + f between sqrt(1/2) and sqrt(2); sin(a) / a and cos(a) as functions of a^2, for a
+# up to 45 degrees.
 _LN = _polynomial(lambda f: np.log1p(f) / f, 2.0**-0.5 - 1.0, 2.0**0.5 - 1.0, 8)
 _SINC = _polynomial(lambda y: np.sinc(np.sqrt(y) / np.pi), 0.0, (np.pi / 4.0) ** 2, 3)
 _COS = _polynomial(lambda y: np.cos(np.sqrt(y)), 0.0, (np.pi / 4.0) ** 2, 4)
@@ -182,7 +187,7 @@ _LN_2 = np.float32(np.log(2.0))
 _ANGLE_UNIT = np.float32(np.pi / 4.0 / 2.0**23)
 _ROOT_HALF_BITS = np.float32(np.sqrt(0.5)).view(np.int32)
 
-# Pairs of numbers that are made at once: their scratch fits the fastest cache.
+# Number of pairs computed at once. The scratch arrays then fit into the fastest cache.
 _PAIRS = 625
 
 
@@ -194,20 +199,23 @@ def _normal_pairs(
     turn: NDArray[np.int32],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out (2 n,) from n words: the method of Box and Muller (1958).
+    """Fills out (2 n,) with normal numbers (Box and Muller, 1958).
 
-    Of each word 23 bits decide on the radius, 24 on the angle within an eighth of
-    the circle to either side of an axis, and 3 on the axis and the signs. Every
-    step vectorises, which the functions of ``math`` would not.
+    One word of splitmix64 gives one pair: radius times cosine and radius times sine of
+    an angle. The radius is sqrt(-2 ln u), where 23 bits of the word give u. Further 24
+    bits give an angle between -45 and 45 deg. The last three bits swap the two numbers
+    and choose their signs, so that the angles cover the whole circle. Polynomials
+    replace the functions of ``math``, because the compiler can vectorize them.
 
     Args:
-        state: Of splitmix64, before these words.
+        state: State of splitmix64 before these words.
         uniform: (n,) float32, scratch.
-        angle: (n,) float32, scratch.
+        angle: (n,) float32, scratch, rad.
         turn: (n,) int32, scratch.
-        out: First the n first numbers of the pairs, then their partners.
+        out: The first numbers of the n pairs, then the second numbers.
     """
     n, half = uniform.size, np.float32(0.5)
+    # Splits each word into u, the angle and three bits.
     for k in range(n):
         word = _scrambled(state + np.uint64(k) * _STEP)
         share = np.int32(word >> np.uint64(41))
@@ -217,16 +225,19 @@ def _normal_pairs(
         turn[k] = np.int32(word & np.uint64(7))
     bits = uniform.view(np.int32)
     for k in range(n):
+        # Writes u as (1 + f) 2^exponent, with 1 + f from sqrt(1/2) to sqrt(2).
         exponent = (bits[k] - _ROOT_HALF_BITS) >> np.int32(23)
         bits[k] -= exponent << np.int32(23)
-        f = uniform[k] - np.float32(1.0)  # the number was 1 + f times 2^exponent
+        f = uniform[k] - np.float32(1.0)
         p = (_LN[8] * f + _LN[7]) * f + _LN[6]
         p = ((p * f + _LN[5]) * f + _LN[4]) * f + _LN[3]
         p = ((p * f + _LN[2]) * f + _LN[1]) * f + _LN[0]
         radius = np.sqrt(np.float32(-2.0) * (np.float32(exponent) * _LN_2 + f * p))
+        # Sine and cosine of the angle.
         a, y = angle[k], angle[k] * angle[k]
         sine = a * (((_SINC[3] * y + _SINC[2]) * y + _SINC[1]) * y + _SINC[0])
         cosine = (((_COS[4] * y + _COS[3]) * y + _COS[2]) * y + _COS[1]) * y + _COS[0]
+        # The three bits: swap, sign of the first number, sign of the second number.
         upright = turn[k] & np.int32(1)
         first = radius * (sine if upright else cosine)
         second = radius * (cosine if upright else sine)
@@ -239,7 +250,7 @@ def _normal_pairs(
 def _fill_with_normals(
     seed: np.uint64, tick: np.uint64, out: NDArray[np.float32]
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out (n,) from the words of splitmix64, block after block."""
+    """Fills out (n,) with normal numbers, one block of ``_PAIRS`` pairs at a time."""
     state, block = _tick_word(seed, tick), 2 * _PAIRS
     uniform = np.empty(_PAIRS, dtype=np.float32)
     angle = np.empty(_PAIRS, dtype=np.float32)
@@ -251,24 +262,25 @@ def _fill_with_normals(
     if whole < out.size:
         last = np.empty(block, dtype=np.float32)
         _normal_pairs(state, uniform, angle, turn, last)
-        # An assignment to a slice compiles words about shapes too: seconds of it.
+        # A slice assignment would add seconds to the compilation.
         for k in range(whole, out.size):
             out[k] = last[k - whole]
 
 
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
-    """White Gaussian noise of unit variance that only the seed and the tick decide.
+    """Draws white Gaussian noise for one tick of one block.
 
-    Nine times as fast as numpy's numbers; they end at 5.8 standard deviations. Their
-    words are those of splitmix64 from a place hashed from seed and tick.
+    This function is nine times as fast as numpy's generator. No number is larger than
+    5.8 standard deviations. The words come from splitmix64. Its initial state is a hash
+    of seed and tick.
 
     Args:
-        shape: Rows and columns: channels and samples.
-        seed: Of the block.
+        shape: Numbers of rows (channels) and columns (samples).
+        seed: Seed of the block.
         tick: Number of the tick.
 
     Returns:
-        (rows, columns) of unit variance.
+        (rows, columns) numbers of unit variance.
     """
     out = np.empty(shape, dtype=np.float32)
     words = np.uint64(seed & _WORD), np.uint64(tick & _WORD)

@@ -1,9 +1,10 @@
-"""What every block's parameter set has in common.
+"""The base class of all parameter models, and the types of their fields.
 
-A block's parameters are one frozen pydantic model, in ``parameters.py`` of its room:
-scenarios are checked without Drake and compiled code. A scenario is a tree of these
-models, so each quantity has one name, one default and one legal range, and an error
-names the field by its whole path.
+The parameters of a block are one frozen pydantic model in the file ``parameters.py`` of
+its folder. These files import neither Drake nor compiled code, so that a scenario can
+be checked without them. A scenario is a tree of such models. Therefore each quantity
+has one name, one default and one range, and an error message contains the full path of
+the field.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Strict
 
-# Every quantity has a range that a robot on a floor can have, with decades to spare:
-# what lies outside is a slip of the pen, and would overflow or never end. Where a
-# field needs a narrower range, it says so itself.
+# The ranges are decades wider than any robot on a floor needs. A value outside its
+# range is a typing error. It would cause an overflow or an endless run. A field that
+# needs a narrower range defines its own range.
 _LARGEST_M = 1_000.0
 _DAY_S = 86_400.0
 _LARGEST = 1e6
@@ -42,16 +43,16 @@ NonNegativeStiffness = Annotated[float, Field(ge=0.0, le=_LARGEST)]
 Damping = Annotated[float, Field(ge=1e-9, le=_LARGEST)]
 NonNegativeDamping = Annotated[float, Field(ge=0.0, le=_LARGEST)]
 
-# YAML knows lists only, hence the one exception to strict types.
+# YAML has lists, but no tuples. Therefore these types are not strict.
 Point = Annotated[tuple[Coordinate, Coordinate], Strict(False)]
 Waypoints = Annotated[tuple[Point, ...], Strict(False), Field(max_length=1_000)]
 Size = Annotated[tuple[Length, Length], Strict(False)]
 
 
 class Parameters(BaseModel):
-    """Frozen, strictly typed, no unknown keys, no NaN and no infinity.
+    """A frozen model with strict types, without unknown keys, NaN or infinity.
 
-    The docstring of a field says what it means, and in which unit; see ``meanings``.
+    The docstring of a field states its meaning and its unit, see ``meanings``.
     """
 
     model_config = ConfigDict(
@@ -64,14 +65,16 @@ class Parameters(BaseModel):
     def model_copy(
         self, *, update: Mapping[str, Any] | None = None, deep: bool = False
     ) -> Self:
-        """A copy with some fields changed; cached properties are worked out anew.
+        """Copies the model and changes some fields.
+
+        The copy computes its cached properties again.
 
         Args:
-            update: New values by field; they are not validated.
-            deep: Whether values are copied as well.
+            update: New values by field. They are not validated.
+            deep: Whether to copy the values, too.
 
         Returns:
-            A parameter set of the same class.
+            A model of the same class.
         """
         copied = super().model_copy(update=update, deep=deep)
         for name in copied.__dict__.keys() - type(self).model_fields.keys():
@@ -80,16 +83,16 @@ class Parameters(BaseModel):
 
 
 def with_preset(data: Any, presets: Mapping[str, Mapping[str, Any]]) -> Any:
-    """Input of a model that has a field ``preset``, filled up from that preset.
+    """Completes the input of a model with the values of its field ``preset``.
 
     Args:
-        data: As pydantic gives it to a validator before all others.
-        presets: Fields by the preset's name.
+        data: Input of a validator with the mode ``before``.
+        presets: Values of fields, by the name of the preset.
 
     Returns:
-        The input, in which what was given wins.
+        The completed input. Given values override the values of the preset.
     """
     name = data.get("preset") if isinstance(data, Mapping) else None
-    if isinstance(name, str):  # of any other type it is refused later
+    if isinstance(name, str):  # a later check rejects any other type
         return {**presets.get(name, {}), **data}
     return data

@@ -1,6 +1,7 @@
-"""``systems.framework.elementary``, which compiled code may call from here.
+"""The functions of ``systems.framework.elementary``, for use in compiled code, too.
 
-So it may call the functions of ``pydrake.math``: of floats all are those of ``math``.
+This module defines numba overloads for these functions and for the same functions of
+``pydrake.math``. For floats, compiled code calls the functions of ``math``.
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ def _as_it_is(x: Any) -> Any:
 
 
 def _compile_as(function: Callable[..., Any], compiled: Callable[..., Any]) -> None:
-    """Compiled code that calls a function of a float calls another one."""
+    """Makes compiled code call ``compiled`` instead of ``function`` for a number."""
 
     @overload(function, strict=False)
     def of_a_float(x: Any) -> Any:
         if isinstance(x, types.Float | types.Integer):
-            return lambda x: compiled(x)  # noqa: PLW0108  # numba wants its own
+            return lambda x: compiled(x)  # noqa: PLW0108  # numba needs a lambda
         return None
 
 
@@ -45,4 +46,4 @@ _compile_as(float_of, _as_it_is)
 
 @overload(pydrake.math.atan2, strict=False)
 def _atan2_of_floats(y: Any, x: Any) -> Any:
-    return lambda y, x: math.atan2(y, x)  # noqa: PLW0108  # numba wants its own
+    return lambda y, x: math.atan2(y, x)  # noqa: PLW0108  # numba needs a lambda

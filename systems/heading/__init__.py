@@ -1,1 +1,1 @@
-"""From a wanted heading to the wheels: compass, heading controller, motors."""
+"""Control of the heading: compass, heading controller and motor driver."""

@@ -1,4 +1,4 @@
-"""The magnetic compass: heading from two components of the field."""
+"""The magnetic compass: heading from two components of the magnetic field."""
 
 from __future__ import annotations
 
@@ -15,24 +15,25 @@ from systems.heading.parameters import CompassParameters
 
 @register_jitable
 def wrapped_deg(angle: float) -> float:
-    """An angle in (-180, 180] deg.
+    """Wraps an angle to (-180, 180] deg.
 
     Args:
-        angle: deg.
+        angle: Angle, deg.
     """
     return 180.0 - (180.0 - angle) % 360.0
 
 
 @register_jitable
 def field_in_body(theta: float, numbers: Any) -> tuple[float, float]:
-    """The level field that the sensor feels.
+    """Computes the horizontal magnetic field at the sensor, with its distortions.
 
     Args:
-        theta: Heading of B in W, rad CCW.
-        numbers: Has ``north_deg``, ``hard_iron`` and ``soft_iron``.
+        theta: Heading of B in W, CCW, rad.
+        numbers: Object with the fields ``north_deg``, ``hard_iron`` and ``soft_iron``.
 
     Returns:
-        (Hx, Hy) along x and y (left) of B, as shares of the earth's.
+        (Hx, Hy) along x (ahead) and y (left) of B, divided by the horizontal field of
+        the earth.
     """
     north = math.radians(numbers.north_deg) - theta
     hx = numbers.soft_iron[0] * math.cos(north) + numbers.hard_iron[0]
@@ -42,22 +43,23 @@ def field_in_body(theta: float, numbers: Any) -> tuple[float, float]:
 
 @register_jitable
 def heading_of_field(hx: float, hy: float) -> float:
-    """Heading from the field (Song 2011, eq. 7).
+    """Computes the heading from the magnetic field (Song 2011, eq. 7).
 
-    The printed ratio alone is wrong in two quadrants.
+    The printed arctangent of a ratio is wrong in two quadrants. This function uses the
+    arctangent of two arguments.
 
     Args:
         hx: Component ahead.
         hy: Component to the left.
 
     Returns:
-        Clockwise from magnetic north, (-180, 180] deg.
+        Heading clockwise from magnetic north, -180 to 180 deg.
     """
     return math.degrees(math.atan2(hy, hx))
 
 
 class CompassNumbers(NamedTuple):
-    """What the step of ``MagneticHeading`` depends on."""
+    """Constants of the step of ``MagneticHeading``."""
 
     own: CompassParameters
     noise: TickNoise
@@ -67,7 +69,7 @@ class CompassNumbers(NamedTuple):
 def magnetic_heading_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: CompassNumbers
 ) -> None:
-    """The heading that the compass measures."""
+    """Computes the heading that the compass measures."""
     hx, hy = field_in_body(inputs[0][2], numbers.own)
     heading = heading_of_field(hx, hy)
     if numbers.own.noise_deg > 0.0:
@@ -77,19 +79,19 @@ def magnetic_heading_step(
 
 
 class MagneticHeading(Block):
-    """Measures the heading by the magnetic field of the earth.
+    """Measures the heading from the magnetic field of the earth.
 
-    Song's headings are clockwise. Only this block and ``HeadingController`` convert
-    between them and the counter-clockwise angles of W.
+    The headings of Song 2011 are clockwise from north. Angles in W are
+    counterclockwise.
 
-    No state; noise is drawn every tick. Latency: none.
+    The block has no state. It draws new noise every tick. Latency: none.
 
     Args:
-        parameters: ``CompassParameters``.
+        parameters: North, distortions of the field, and noise.
         seed: Seed of the noise.
         tick_s: Period of the robot, s.
 
-    Reference: Song 2011, eq. 7, by an arctangent of two arguments.
+    Reference: Song 2011, eq. 7, with an arctangent of two arguments.
     """
 
     part = "compass"

@@ -1,4 +1,4 @@
-"""From a wanted heading to the motors' duties: PID and pulse widths."""
+"""The heading controller: duties of the motors from the expected heading."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from systems.framework.signals import TICK_S
 from systems.heading.compass import wrapped_deg
 from systems.heading.parameters import HeadingControlParameters
 
-#: How an error becomes duties: mended, as printed, and with the missing ``else`` alone.
+#: Methods to compute duties from the output of the PID controller: corrected, as
+#: printed, and as printed with only the missing ``else`` added.
 PULSE_WIDTHS = ("mended", "printed", "else_only")
 _MENDED, _PRINTED, _ELSE_ONLY = range(len(PULSE_WIDTHS))
 
@@ -25,17 +26,17 @@ def _limited(value: float, largest: float) -> float:
 def heading_error(
     deviation: float, change: float, integral: float, tick_s: float, own: Any
 ) -> tuple[float, float]:
-    """Output of the PID (Song 2011, table 1).
+    """Computes the output of the PID controller (Song 2011, table 1).
 
     Args:
-        deviation: gamma, expected less present heading, (-180, 180] deg.
-        change: Of it since the last tick, wrapped, deg.
-        integral: I of the last tick, deg.
-        tick_s: s.
+        deviation: gamma, expected heading minus present heading, (-180, 180] deg.
+        change: Change of the deviation since the last tick, wrapped, deg.
+        integral: I, integral part at the last tick, deg.
+        tick_s: Period of the control, s.
         own: ``HeadingControlParameters``.
 
     Returns:
-        epsilon, deg, and I.
+        The output epsilon, deg, and the new integral part I, deg.
     """
     if abs(deviation) < own.integral_within_deg:
         integral += own.integral * deviation * tick_s
@@ -50,17 +51,18 @@ def heading_error(
 
 @register_jitable
 def motor_duties(error: float, limit: float, kind: int) -> tuple[float, float]:
-    """Duties of the motors (Song 2011, table 2).
+    """Computes the duties of the motors (Song 2011, table 2).
 
-    Mended it is v = max(0, 1 - |e|/L), w = 0.01 e, left and right v + w and v - w.
+    In the corrected form, the left duty is v + w and the right duty is v - w, with
+    v = max(0, 1 - |e|/L) and w = 0.01 e.
 
     Args:
-        error: epsilon, clockwise, deg.
-        limit: L, deg.
-        kind: Place in ``PULSE_WIDTHS``.
+        error: epsilon, output of the PID controller, clockwise, deg.
+        limit: L, output beyond which the robot turns on the spot, deg.
+        kind: Index in ``PULSE_WIDTHS``.
 
     Returns:
-        Left and right; beyond -1 to 1 as printed.
+        The left and the right duty. They are not limited to -1 to 1.
     """
     if kind == _MENDED:
         ahead, turn = max(0.0, 1.0 - abs(error) / limit), 0.01 * error
@@ -78,7 +80,7 @@ def motor_duties(error: float, limit: float, kind: int) -> tuple[float, float]:
 
 
 class HeadingNumbers(NamedTuple):
-    """What the step of ``HeadingController`` depends on."""
+    """Constants of the step of ``HeadingController``."""
 
     own: HeadingControlParameters
     kind: int
@@ -89,9 +91,10 @@ class HeadingNumbers(NamedTuple):
 def heading_controller_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: HeadingNumbers
 ) -> None:
-    """The duties of the motors.
+    """Computes the duties of the motors.
 
-    State: integral, deg; deviation at the last tick, deg; whether the robot moved.
+    State: integral part, deg; deviation at the last tick, deg; whether the robot moved
+    at the last tick, 0 or 1.
     """
     expected, heading, move = inputs
     duty = outputs[0]
@@ -109,22 +112,24 @@ def heading_controller_step(
 
 
 class HeadingController(Block):
-    """Turns the robot to a heading, and drives it on as it comes near to it.
+    """Turns the robot to the expected heading, and drives it in this direction.
 
-    The block has a PID controller of the deviation, and maps its output to the duties
-    of the motors; while ``move`` is 0 the duties are 0. The change of the deviation is
-    wrapped. At the first tick of a move it is 0, so that the differential part has no
-    kick, and the integral starts again at 0.
+    A PID controller computes an output from the deviation of the heading. The block
+    then converts this output to the duties of the motors. The smaller the deviation,
+    the faster the robot drives. While ``move`` is 0, the duties are 0.
 
-    Discrete state, every tick: integral, last deviation, and whether the robot moved.
-    Latency: none. The paper's period is 10 ms; our tick of 25 ms costs a degree of
-    margin (``analysis.linear.heading_loop``).
+    At the first tick of a move, the integral part starts at 0. The differential part is
+    also 0 at this tick, so that it does not jump.
+
+    Discrete state, every tick: integral part, last deviation, and whether the robot
+    moved. Latency: none. The paper uses a period of 10 ms. Our tick of 25 ms reduces
+    the phase margin by one degree (``analysis.linear.heading_loop``).
 
     Args:
-        parameters: ``HeadingControlParameters``.
+        parameters: Gains and limits.
         tick_s: Period of the control, s.
 
-    Reference: Song 2011, 2.3.2, tables 1 to 3, with the errata of docs/errata.md.
+    Reference: Song 2011, 2.3.2, tables 1 to 3, with the errata in docs/errata.md.
     """
 
     part = "heading"

@@ -1,4 +1,4 @@
-"""From duties to wheel speeds."""
+"""The motor driver: wheel speeds from the duties of the motors."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from systems.heading.parameters import MotorDriverParameters
 
 
 class MotorNumbers(NamedTuple):
-    """What the step of ``MotorDriver`` depends on."""
+    """Constants of the step of ``MotorDriver``."""
 
     full_speed: float
-    """rad/s."""
+    """Wheel speed at full duty, rad/s."""
 
 
 @register_jitable
 def motor_driver_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: MotorNumbers
 ) -> None:
-    """The wheel speeds, which are the state: rad/s, left and right."""
+    """Computes the wheel speeds. State: left and right wheel speed, rad/s."""
     duty = inputs[0]
     state[0], state[1] = numbers.full_speed * duty[0], numbers.full_speed * duty[1]
 
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: MotorNumbers) -> None:
-    """The outputs of ``motor_driver_step``'s state."""
+    """Copies the outputs from the state of ``motor_driver_step``."""
     outputs[0][0], outputs[0][1] = state[0], state[1]
 
 
 class MotorDriver(Block):
-    """Commands the wheels by the duties of their motors.
+    """Computes the commanded wheel speeds from the duties of the motors.
 
-    Discrete state, every tick: the output, which acts from the update on. The plant
-    models the lag of the motors.
+    Discrete state, every tick: the output. A new output is valid from the update on.
+    The plant models the lag of the motors.
 
     Args:
-        parameters: ``MotorDriverParameters``.
-        robot: Radius and top speed of the wheels, which limits the command.
+        parameters: Speed at full duty.
+        robot: Radius and top speed of the wheels. The top speed limits the command.
         tick_s: Period of the update, s.
 
     Reference: Song 2011, 2.3.2.

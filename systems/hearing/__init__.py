@@ -1,1 +1,1 @@
-"""From a frame to a place: estimators, sensors of the source, the tracker."""
+"""Hearing: estimators and ideal sensor of the source, and the tracker."""

@@ -12,12 +12,12 @@ from systems.framework.signals import AudioFrame
 
 
 def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
-    """The frame on a port.
+    """Returns the frame on a port.
 
     Args:
-        context: Of the block.
-        port: Its input port ``audio``.
-        block: Its name, for messages.
+        context: Context of the block.
+        port: Input port ``audio`` of the block.
+        block: Name of the block, for messages.
 
     Returns:
         The frame.
@@ -37,7 +37,7 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def audio_of_run(run: RunFacts) -> Callable[[int], AudioFrame]:
-    """The frames of a compiled loop.
+    """Returns the source of frames in a compiled loop.
 
     Args:
         run: The run.
@@ -58,12 +58,12 @@ def audio_of_run(run: RunFacts) -> Callable[[int], AudioFrame]:
 
 
 def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
-    """Refuses a frame of another rate.
+    """Raises an error if a frame has another sample rate.
 
     Args:
         audio: The frame.
-        rate_hz: That the block is for, Hz.
-        block: Its name, for messages.
+        rate_hz: Sample rate that the block expects, Hz.
+        block: Name of the block, for messages.
 
     Raises:
         InputError: The rates differ.
@@ -77,11 +77,11 @@ def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
 
 
 def declare_state_outputs(block: Any) -> None:
-    """Declares the output ports of a block whose first state group holds them.
+    """Declares the output ports of a block whose first state group contains them.
 
     Args:
-        block: Has declared its ports; the group has the values of the output ports, one
-            after the other.
+        block: The block, which has declared its input ports. The state group contains
+            the values of the output ports in order.
     """
     first = 0
     for port in block.outputs:

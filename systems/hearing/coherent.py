@@ -1,16 +1,17 @@
-"""Maximum likelihood: the place at which the channels of a frame add up best.
+"""Maximum likelihood: finds the position at which the channels add up best.
 
-A sound s of unknown waveform reaches microphone m at t_m with the gain a_m,
-among white noise. With its best guess of s put in, the likelihood of a place
-grows with sum_k |Y_k|^2, Y_k = sum_m a_m X_m(w_k) exp(j w_k t_m), over sum
-a_m^2. It is maximised by Newton's method: the slope and the curvature over the
-times of arrival at a place make a set of delays with a covariance, and the
-place that fits them (``systems.hearing.multilateration``) is the next one. With as many
-microphones as are just needed this is the peak of the delays, with more it
-uses only delays that belong to a place.
+A sound s of unknown waveform reaches microphone m at the time t_m with the gain a_m, in
+white noise. If s is replaced by its best estimate, the likelihood of a position grows
+with sum_k |Y_k|^2 / sum_m a_m^2, where Y_k = sum_m a_m X_m(w_k) exp(j w_k t_m).
 
-The gains are those of the channels, the principal component of their
-cross-spectra, for which 1/R_m holds where microphones are alike.
+Newton's method maximizes it. At a position, slope and curvature with respect to the
+times of arrival give a set of delays with a covariance. The position that fits these
+delays (``systems.hearing.multilateration``) is the next one. With the least number of
+microphones, the result is the peak of the delays. With more microphones, the method
+uses only delays that belong to a position.
+
+The gains are those of the channels: the principal component of their cross-spectra.
+They are proportional to 1/R_m if the microphones are alike.
 """
 
 from __future__ import annotations
@@ -27,14 +28,15 @@ from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# Newton steps, and the change of a delay at which they end, samples.
+# Number of Newton steps, and the change of a delay at which they end, samples.
 _STEPS = 8
 _SETTLED = 1e-4
 
-# The channels are cut again when a delay is off the cut by more than this, samples.
+# The channels are cut again if a delay differs from that of the cut by more than this,
+# samples.
 _RECUT = 0.02
 
-# Left of a frame after the cut, as a share.
+# Least share of a frame that must remain after the cut.
 _LEAST_OVERLAP = 0.25
 
 
@@ -42,7 +44,7 @@ _LEAST_OVERLAP = 0.25
 def _ranges(
     p_AM: NDArray[np.float64], p_AS: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(n,) distances of the microphones from a place, m."""
+    """Returns the (n,) distances of the microphones from a position, m."""
     ranges = np.empty(len(p_AM))
     for m in range(len(p_AM)):
         square = 0.0
@@ -53,10 +55,10 @@ def _ranges(
 
 
 def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.float64]:
-    """Delays of the sound from a fix at the microphones.
+    """Returns the delays of the sound from an estimated source.
 
     Args:
-        fix: Place in A; where its range is not known, a direction to a plane wave.
+        fix: Position in A, or the direction to a plane wave if its range is not valid.
         shape: The n microphones.
         c: Speed of sound, m/s.
 
@@ -79,20 +81,20 @@ def refine_source(
     sample_rate_hz: float,
     band_hz: tuple[float, float],
 ) -> SourceFix | None:
-    """The most likely place near a first one.
+    """Finds the most likely position near a first one.
 
     Args:
         frame: (n, samples) channels, any unit.
-        start: A fix whose delays are right to half a period of the highest
-            frequency that is heard.
+        start: Estimate whose delays are right to half a period of the highest frequency
+            of the sound.
         shape: The n microphones.
         c: Speed of sound, m/s.
-        sample_rate_hz: Rate of the frame, Hz.
+        sample_rate_hz: Sample rate of the frame, Hz.
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        The fix, its errors from the signal and noise that the frame shows, or
-        None where the likelihood has no maximum nearby.
+        The estimate, with errors from signal and noise in the frame; None if the
+        likelihood has no maximum nearby.
     """
     fix, cut_at = start, np.full(shape.count - 1, np.inf)
     for _ in range(_STEPS):
@@ -121,27 +123,30 @@ def refine_source(
 def _cut(
     frame: NDArray[np.float32], delays: NDArray[np.float64]
 ) -> NDArray[np.float32] | None:
-    """(n, m) the stretch that all channels share; None where too little is left."""
+    """Returns the (n, m) section that all channels share; None if it is too short."""
     arrivals = np.concatenate((np.zeros(1), delays))
     length = frame.shape[1] - np.ptp(np.rint(arrivals))
     if length < max(_LEAST_OVERLAP * frame.shape[1], 4 * EDGE_SAMPLES):
         return None
-    # An offset would show at the edges, in all channels alike.
+    # An offset would appear at the edges of all channels alike.
     return cut_to_overlap(frame - frame.mean(axis=1, keepdims=True), arrivals)
 
 
 def _spectra(
     cut: NDArray[np.float32], sample_rate_hz: float, band_hz: tuple[float, float]
 ) -> tuple[NDArray[np.complex64], float, float, float]:
-    """Spectra within the band; first and step of w, rad a sample; padding.
+    """Computes the spectra within the band.
 
-    The padding is the number of bins that bear the noise of one.
+    Returns:
+        (n, bins) spectra; w of the first bin and its step, rad per sample; and the
+        padding, which is the number of bins that share the noise of one.
     """
     length = int(fft.next_fast_len(cut.shape[1], real=True))
     first = max(1, math.ceil(band_hz[0] * length / sample_rate_hz))
     last = min(length // 2, math.floor(band_hz[1] * length / sample_rate_hz))
     spectra = fft.rfft(cut, length)[:, first : last + 1]
-    # Sums of the window's squares and fourth powers: 3/8 and 35/128 an edge.
+    # Sums of the squares and fourth powers of the window: each edge has means of 3/8
+    # and 35/128.
     flat = cut.shape[1] - 2 * EDGE_SAMPLES
     squares, fourths = flat + 0.75 * EDGE_SAMPLES, flat + 35.0 / 64.0 * EDGE_SAMPLES
     step = 2.0 * math.pi / length
@@ -154,17 +159,17 @@ def _pair_sums(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float
 ]:  # pragma: no cover  (compiled)
-    """Sums over the bins of the channels' products, turned back by their delays.
+    """Sums the products of the channels over the bins, after removal of their delays.
 
     Args:
-        spectra: (n, bins).
-        first: Angular frequency w of the first bin, rad a sample.
-        step: From bin to bin, rad a sample.
+        spectra: (n, bins) spectra of the channels.
+        first: Angular frequency w of the first bin, rad per sample.
+        step: Step of w from bin to bin, rad per sample.
         rest: (n,) delays, samples.
 
     Returns:
-        (n, n) sums of the products X_m X_n^*: real part, w times imaginary
-        part, w^2 times real part; and the sum of w^2.
+        (n, n) sums of the products X_m X_n^*: real part, w times imaginary part, w^2
+        times real part; and the sum of w^2.
     """
     n, bins = spectra.shape
     aligned = np.empty((bins, n), dtype=np.complex128)
@@ -202,7 +207,16 @@ def _newton_step(
     step: float,
     rest: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Change of the delays to the maximum, samples, and their covariance."""
+    """Computes one Newton step of the delays.
+
+    The gains are the principal eigenvector of the cross powers. Slope and curvature of
+    the likelihood then give the step. The other eigenvalues give the noise, and with it
+    the covariance.
+
+    Returns:
+        (n - 1,) change of the delays to the maximum, samples, and their (n - 1, n - 1)
+        covariance; None if there is no maximum.
+    """
     n, bins = spectra.shape
     power, slope, curve, squares = _pair_sums(
         spectra, first, step, np.concatenate((np.zeros(1), rest))
@@ -224,6 +238,6 @@ def _newton_step(
     noise = float(np.sum(values[:-1])) / (bins * (n - 1))
     off = ~np.eye(n, dtype=bool)
     signal = float(np.sum((weights * curve)[off]) / np.sum(weights[off] ** 2))
-    # Noise in one channel meets the sound of the others, and their noise.
+    # The noise of one channel multiplies the sound of the others, and their noise.
     excess = 1.0 + noise * squares / signal if signal > 0.0 else math.inf
     return inverse @ gradient, inverse * (noise * excess)

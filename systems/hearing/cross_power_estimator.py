@@ -1,4 +1,4 @@
-"""Hears where a source is from spectra gathered while the robot stands and listens."""
+"""Locates a source from spectra gathered while the robot stands still and listens."""
 
 from __future__ import annotations
 
@@ -41,46 +41,50 @@ from systems.hearing.steer_near import near_grid, steer
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.parameters import MicArrayParameters
 
-#: Sound that fills fewer Hz than this repeats within the array: any bearing fits. A
-#: steady tone fills up to 310 Hz by its ends and its echoes, a siren some thousand.
+#: The correlation of sound with less bandwidth than this repeats within the delays of
+#: the array, so that any bearing fits, Hz. A steady tone has up to 310 Hz due to its
+#: ends and echoes. A siren has some thousand.
 _LEAST_BANDWIDTH_HZ = 600.0
-#: Loudest and faintest channel that still hears, as a share of the median power.
+#: A channel with less power than this share of the median channel counts as silent.
 _DEAF = 1e-4
-#: Of what the occupied bins of all pairs would sum up to if they came from one place,
-#: sound reaches more than this,
+#: The response must exceed this share of the sum that the occupied bins of all pairs
+#: would have if they came from one position. Otherwise nothing is heard.
 _COHERENT = 0.15
-#: and more than n bins of chance do: 5.1 over the root of 2 n, at most, in 60 silences.
+#: The response must also exceed this many times the root of 2 n, where n is the number
+#: of occupied bins. In 60 recordings of silence, chance reached at most 5.1 times this
+#: root.
 _CHANCE = 5.5
-#: Fewer frames than this are no estimate.
+#: Fewer frames than this give no estimate.
 _LEAST_FRAMES = 4
 
 
 class Direction(NamedTuple):
-    """What was heard."""
+    """Estimated direction of a sound."""
 
     bearing: float
-    """From the middle microphone, CCW from x of B, rad."""
+    """Bearing from the middle microphone, CCW from x of B, rad."""
     range_status: int
-    """Whether there is a range, or why there is none, see ``range_status``."""
+    """Whether there is a range, or why there is none (``range_status``)."""
     place: NDArray[np.float64] | None = None
-    """(2,) from the middle microphone in B, m; None where only the bearing is known."""
+    """(2,) position from the middle microphone in B axes, m; None if only the bearing
+    is known."""
     ambiguous: bool = False
     """Whether other directions fit as well."""
     other: float = 0.0
-    """The best of them, rad."""
+    """Bearing of the best other direction, rad."""
 
 
 class ArrayListener:
-    """Gathers and estimates, without a context.
+    """Gathers spectra and estimates directions, without a Drake context.
 
     Args:
-        parameters: How.
-        robot: Places of the microphones, the first one in the middle.
+        parameters: Method, band and thresholds.
+        robot: Positions of the microphones, the middle one first.
         c: Speed of sound, m/s.
-        microphones: Rate and length of the frames.
+        microphones: Sample rate and length of the frames.
 
     Raises:
-        InputError: There are fewer than four microphones, or the band is none.
+        InputError: There are fewer than four microphones, or the band is empty.
     """
 
     def __init__(
@@ -107,9 +111,9 @@ class ArrayListener:
         self._own, self._c = parameters, c
         self.band_hz = parameters.low_hz, top
         self.p_PR_B = places[0]
-        """(2,) of the middle microphone from P in B axes, m."""
+        """(2,) middle microphone from P in B axes, m."""
         self.p_RM = places - places[0]
-        """(n, 2) microphones from that one, m."""
+        """(n, 2) microphones from the middle one, m."""
         self.facts = FrameSpectra(
             len(places), microphones.frame_samples, microphones.sample_rate_hz, top
         )
@@ -117,17 +121,17 @@ class ArrayListener:
 
     @cached_property
     def sums_size(self) -> int:
-        """Numbers of one ``CrossPowers``."""
+        """Number of elements of a packed ``CrossPowers``."""
         facts = self.facts
         return 1 + facts.bins * (2 * len(facts.pairs) + facts.channels)
 
     def pack(self, sums: CrossPowers) -> NDArray[np.float64]:
-        """Sums as (sums_size,) numbers."""
+        """Converts sums to a (sums_size,) vector."""
         pairs = np.ascontiguousarray(sums.pairs).view(np.float64).ravel()
         return np.concatenate(([sums.frames], pairs, sums.own.ravel()))
 
     def unpack(self, numbers: NDArray[np.float64]) -> CrossPowers:
-        """Sums from (sums_size,) numbers."""
+        """Converts a (sums_size,) vector to sums."""
         facts = self.facts
         split = 1 + 2 * len(facts.pairs) * facts.bins
         pairs = np.ascontiguousarray(numbers[1:split]).view(np.complex128)
@@ -138,26 +142,32 @@ class ArrayListener:
         )
 
     def lost(self, sound: CrossPowers) -> list[int]:
-        """Channels that hear nothing at all.
+        """Returns the channels that are silent.
 
         Args:
-            sound: Gathered while it sounded.
+            sound: Spectra gathered while the source sounded.
 
         Returns:
-            Their numbers, from 0.
+            Numbers of the channels, from 0.
         """
         power = sound.own.sum(axis=1)
         return np.flatnonzero(power <= _DEAF * np.median(power)).tolist()
 
     def direction(self, sound: CrossPowers, noise: CrossPowers) -> Direction | None:
-        """Where the sound comes from.
+        """Estimates where the sound comes from.
+
+        The cross powers of the noise are subtracted, and the rest is whitened. The
+        correlations of all pairs are then added up for a grid of positions. The
+        strongest position gives the bearing. The peaks of the correlations near its
+        delays give a range.
 
         Args:
-            sound: Gathered while it sounded.
-            noise: Gathered before; it may hold no frame.
+            sound: Spectra gathered while the source sounded.
+            noise: Spectra gathered before; it may contain no frame.
 
         Returns:
-            None where nothing is heard, or too few microphones are left.
+            The direction, or None if nothing is heard or fewer than three microphones
+            work.
         """
         lost, facts = self.lost(sound), self.facts
         if sound.frames < _LEAST_FRAMES or facts.channels - len(lost) < 3:
@@ -169,11 +179,13 @@ class ArrayListener:
         mean, occupied = signal_powers(facts, sound, subtracted, self.band_hz)
         if not occupied[heard].any():
             return None
+        # The phases of the cross powers carry the delays (whitening).
         narrow = self._bandwidth(occupied[heard]) < _LEAST_BANDWIDTH_HZ
         size = np.maximum(np.abs(mean), 1e-300)
         if self._own.method == "gcc_si":
             inside = facts.frequencies_hz >= self.band_hz[0]
             return self._printed(np.where(inside, mean / size, 0.0), lost)
+        # Sum of the correlations of all pairs at each position of the grid.
         weighted = np.where(occupied, mean / size, 0.0)
         correlations = cross_correlations(facts, weighted)[heard]
         pairs = [facts.pairs[k] for k in heard]
@@ -182,10 +194,12 @@ class ArrayListener:
             correlations,
             FINE * facts.rate_hz,
         )
+        # Noise alone must not reach the strongest sum.
         bins = 2.0 * float(occupied[heard].sum())
         chance = 0.0 if narrow else _CHANCE * math.sqrt(bins)
         if found.response < max(_COHERENT * bins, chance):
             return None
+        # Position from the exact delays of the peaks.
         delays = self._refined(correlations, found.delays)
         bearing, place, status = self._interpolated(pairs, delays, lost)
         if self._own.method == "srp_near":
@@ -194,14 +208,14 @@ class ArrayListener:
         return Direction(bearing, status, place, ambiguous, found.other)
 
     def _bandwidth(self, occupied: NDArray[np.bool_]) -> float:
-        """Hz that the sound fills, on the median pair."""
+        """Returns the bandwidth of the sound in the median pair, Hz."""
         width = self.facts.rate_hz / self.facts.length
         return float(np.median(occupied.sum(axis=1))) * width
 
     def _refined(
         self, correlations: NDArray[np.float64], delays: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(pairs,) delays of the peaks next to given ones, s."""
+        """Returns the (pairs,) delays of the correlation peaks near given delays, s."""
         rate, length = FINE * self.facts.rate_hz, correlations.shape[1]
         around = np.arange(-2 * FINE, 2 * FINE + 1)
         refined = np.empty(len(delays))
@@ -220,7 +234,17 @@ class ArrayListener:
         delays: NDArray[np.float64],
         lost: list[int],
     ) -> tuple[float, NDArray[np.float64] | None, int]:
-        """Bearing, place and status of the range from delays of pairs t_j - t_i, s."""
+        """Returns bearing, position and status of the range.
+
+        Args:
+            pairs: Pairs (i, j) of working microphones.
+            delays: (pairs,) delays t_j - t_i, s.
+            lost: Silent channels.
+
+        Returns:
+            Bearing, rad; (2,) position from the middle microphone, m, or None; and the
+            status of the range (``range_status``).
+        """
         others = [k for k in range(self.facts.channels) if k not in lost]
         base, *rest = others
         rows = np.zeros((len(pairs), len(rest)))
@@ -231,7 +255,7 @@ class ArrayListener:
                 row[rest.index(i)] -= 1.0
         d = self._c * (np.linalg.pinv(rows) @ delays)
         p_RM = self.p_RM[rest] - self.p_RM[base]
-        if lost:  # the middle microphone may be among them
+        if lost:  # the middle microphone may be silent
             status = range_status(0.0, enough=False)
             return plane_wave_bearing(p_RM, d), None, status
         return near_or_far(p_RM, d)
@@ -239,7 +263,11 @@ class ArrayListener:
     def _printed(
         self, weighted: NDArray[np.complex128], lost: list[int]
     ) -> Direction | None:
-        """Whole samples, pairs with the middle, spherical interpolation."""
+        """Estimates the direction by the printed method.
+
+        It uses delays in whole samples, pairs with the middle microphone, and spherical
+        interpolation.
+        """
         if lost:
             return None
         facts = self.facts
@@ -280,45 +308,49 @@ _NOTHING, _NOISE, _SOUND = range(3)
 
 
 class _Memory(NamedTuple):
-    """What a frame leaves behind."""
+    """What one frame leaves for the next one."""
 
     asked: int
-    """What was asked for at the last frame."""
+    """Value of ``listening`` at the last frame."""
     before: NDArray[np.float64]
-    """(channels, samples) the last frame, if it was gathered."""
+    """(channels, samples) last frame, if it was gathered."""
     noise: CrossPowers
     sound: CrossPowers
     outputs: NDArray[np.float64]
 
 
 class CrossPowerEstimator(Block):
-    """Hears where the source is while the search listens.
+    """Estimates where the source is while the search listens.
 
-    Frames are gathered as cross-power spectra as long as ``listening`` asks for it,
-    those of noise and of sound apart; when it no longer asks for sound, the estimate of
-    what was gathered is put out, and stands until it asks again. Then, and where
-    nothing was heard, all outputs are zero but ``lost_microphone``, the first channel
-    that hears nothing at all. Bearing and range count from the middle microphone, the
-    first; p_PS_B from P, a unit vector where the range is not known.
-    ``range_status`` says why (``systems.hearing.source_fix``). ``ambiguous`` says
-    that another direction, ``alternative_bearing``, fits as well, or that the sound
-    fills so little of the band that any would.
+    The block gathers cross-power spectra while ``listening`` requests them. The sums
+    for noise and for sound are separate. When ``listening`` no longer requests sound,
+    the estimate appears at the outputs. It stays there until sound is requested again,
+    when all outputs become zero. If nothing was heard, all outputs are zero except
+    ``lost_microphone``. This is the number of the first silent channel, from 1, or 0.
 
-    While it is not asked for, ``audio`` is not evaluated, and nobody has to make it.
+    Bearing and range refer to the middle microphone, which is the first. ``p_PS_B``
+    refers to P. It is a unit vector if the range is unknown, and ``range_status`` gives
+    the reason (``systems.hearing.source_fix``). ``ambiguous`` is 1 if another
+    direction, ``alternative_bearing``, fits as well. It is also 1 if the bandwidth of
+    the sound is so small that any direction fits.
 
-    State: the outputs, the last frame, and sums of spectra. Rate and latency: updated
-    every ``frame_s`` of the microphones, and visible after it.
+    ``audio`` is evaluated only while ``listening`` requests it.
+
+    State: the outputs, the last frame, and the sums of spectra.
+    Rate and latency: the block updates every ``frame_s`` of the microphones. The
+    outputs change one tick later.
 
     Args:
         parameters: ``CrossPowerParameters``.
-        robot: Places of the microphones.
+        robot: Positions of the microphones.
         acoustics: Speed of sound.
-        microphones: Rate and length of the frames.
+        microphones: Sample rate and length of the frames.
 
     Raises:
-        InputError: As ``ArrayListener``.
+        InputError: As for ``ArrayListener``.
 
-    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17; the first two methods are ours.
+    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17. The methods ``srp_near`` and
+    ``gcc_plane`` are not in the paper.
     """
 
     part, stage = "hearing", "hearing"
@@ -358,18 +390,18 @@ class CrossPowerEstimator(Block):
         return _Memory(_NOTHING, frame, none, none, np.zeros(_SIZE))
 
     def hear(self, asked: int, audio: Any, memory: _Memory) -> _Memory:
-        """The memory after a frame.
+        """Returns the memory after a frame.
 
         Args:
-            asked: What ``listening`` says.
-            audio: Gives the frame; called only if it is asked for.
-            memory: What the last frame left.
+            asked: Value of ``listening``.
+            audio: Returns the frame; called only if the frame is required.
+            memory: What the previous frame left.
 
         Returns:
             The new memory.
 
         Raises:
-            InputError: The frame has another rate.
+            InputError: The frame has another sample rate.
         """
         if asked == _NOTHING and memory.asked == _NOTHING:
             return memory
@@ -380,7 +412,7 @@ class CrossPowerEstimator(Block):
         if asked == _NOTHING:
             return memory._replace(asked=asked, outputs=outputs)
         frame = self._counts(audio())
-        if asked != memory.asked:  # the first frame has none before it
+        if asked != memory.asked:  # a spectrum needs two frames
             if asked == _NOISE:
                 return memory._replace(
                     asked=asked, before=frame, noise=blank.noise, outputs=outputs
@@ -416,7 +448,7 @@ class CrossPowerEstimator(Block):
     def _listen(self, context: Any, discrete_state: Any) -> None:
         asked = round(float(read_arrays(context, [self._listening])[0][0]))
         if asked == _NOTHING and not context.get_discrete_state(_FRAME).value()[0]:
-            return  # without reading the sums, which are long
+            return  # unpacking the sums takes time
         memory = self._remembered(context)
 
         def frame() -> AudioFrame:
@@ -445,10 +477,10 @@ class CrossPowerEstimator(Block):
         return _Memory(round(float(head[0])), before, noise, sound, outputs)
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each frame of a compiled loop.
+        """Returns the step of the block for the frames of a compiled loop.
 
         Args:
-            run: Has the frames.
+            run: Provides the frames.
 
         Returns:
             The step, which calls Python.

@@ -1,4 +1,4 @@
-"""Cross-power spectra that are gathered over many frames."""
+"""Cross-power spectra that are summed over many frames."""
 
 from __future__ import annotations
 
@@ -10,45 +10,45 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-#: A bin is occupied where this share of the channels' power is the sound's,
+#: A bin is occupied if its cross power exceeds this share of the channels' power,
 _LEAST_SHARE = 0.25
-#: and more than this share of the noise's: its cross power differs by about as much
-#: from one second to the next.
+#: and this share of the power of the noise. The cross power of noise changes by about
+#: as much from one second to the next.
 _LEAST_OVER_NOISE = 0.3
-#: Or, relative to the strongest bin, this share of its power.
+#: It must also exceed this share of the cross power of the strongest bin.
 _LEAST_POWER = 1e-4
-#: Points of a correlation between two samples.
+#: Number of correlation values per sample.
 FINE = 8
 
 
 class FrameSpectra(NamedTuple):
-    """How frames become spectra: two of them after one another, by a Hann window."""
+    """How frames become spectra: each pair of successive frames with a Hann window."""
 
     channels: int
     samples: int
-    """Of a frame."""
+    """Samples per channel of a frame."""
     rate_hz: float
     top_hz: float
     """Highest frequency that is kept."""
 
     @property
     def length(self) -> int:
-        """Samples of a transform."""
+        """Number of samples of a transform."""
         return 2 * self.samples
 
     @property
     def bins(self) -> int:
-        """Number of frequencies from 0 on that are kept."""
+        """Number of frequencies that are kept, from 0 on."""
         return int(self.top_hz / self.rate_hz * self.length) + 1
 
     @property
     def frequencies_hz(self) -> NDArray[np.float64]:
-        """(bins,) Hz."""
+        """(bins,) frequencies, Hz."""
         return np.arange(self.bins) * self.rate_hz / self.length
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
-        """Of channels, i < j."""
+        """All pairs of channels i < j."""
         return [*combinations(range(self.channels), 2)]
 
 
@@ -56,11 +56,11 @@ class CrossPowers(NamedTuple):
     """Sums over frames."""
 
     pairs: NDArray[np.complex128]
-    """(pairs, bins) of X_i X_j*."""
+    """(pairs, bins) sums of X_i X_j*."""
     own: NDArray[np.float64]
-    """(channels, bins) of each channel's power."""
+    """(channels, bins) sums of the power of each channel."""
     frames: float
-    """How many."""
+    """Number of frames."""
 
 
 @cache
@@ -74,13 +74,13 @@ def gather_frame(
     before: NDArray[np.float64],
     now: NDArray[np.float64],
 ) -> CrossPowers:
-    """Adds the spectra of a frame and the one before it.
+    """Adds the spectra of a frame and the previous one to the sums.
 
     Args:
         facts: How frames become spectra.
-        sums: So far.
-        before: (channels, samples) of the frame before.
-        now: (channels, samples).
+        sums: Sums so far.
+        before: (channels, samples) previous frame.
+        now: (channels, samples) present frame.
 
     Returns:
         The new sums.
@@ -102,18 +102,19 @@ def signal_powers(
     noise: CrossPowers | None,
     band_hz: tuple[float, float],
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
-    """Cross powers of the sound alone, and where they are.
+    """Computes the cross powers of the sound alone, and the bins that it occupies.
 
     Args:
         facts: How frames became spectra.
-        sound: While it sounded; some frames.
-        noise: Before it sounded, which is subtracted; none: nothing is.
-        band_hz: Lowest and highest frequency that count, Hz.
+        sound: Sums of at least one frame while the source sounded.
+        noise: Sums from before, which are subtracted; None: nothing is subtracted.
+        band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        (pairs, bins) means, and (pairs, bins) whether a bin is occupied: by a good
-        share of both channels' power, not far below the strongest, and above what
-        noise leaves when it is subtracted.
+        (pairs, bins) mean cross powers, and (pairs, bins) whether a bin is occupied.
+        The cross power of an occupied bin is a large share of the power of both
+        channels. It is not far below the strongest bin, and it is above the uncertainty
+        of the noise.
     """
     mean, own = sound.pairs / sound.frames, sound.own / sound.frames
     steady = np.zeros_like(own)
@@ -136,16 +137,16 @@ def signal_powers(
 def cross_correlations(
     facts: FrameSpectra, weighted: NDArray[np.complex128], fine: int = FINE
 ) -> NDArray[np.float64]:
-    """Correlations of weighted cross powers.
+    """Computes the correlations of weighted cross powers.
 
     Args:
         facts: How frames became spectra.
-        weighted: (pairs, bins).
-        fine: Points a sample.
+        weighted: (pairs, bins) weighted cross powers.
+        fine: Number of values per sample.
 
     Returns:
-        (pairs, fine length) over the delay t_j - t_i, the delay 0 first, negative ones
-        from the end.
+        (pairs, fine * length) correlations over the delay t_j - t_i. Delay 0 is first,
+        and negative delays are at the end.
     """
     count = fine * facts.length
     return scipy.fft.irfft(np.conj(weighted), count, axis=1) * count

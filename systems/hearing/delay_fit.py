@@ -1,19 +1,24 @@
-"""Fits a place to the delays at microphones of any places: compiled kernels.
+"""Fits a position to the delays at an array of any shape: compiled kernels.
 
-With u the direction of the source seen from the microphones' centroid and w
-the inverse of its range, microphone m is farther from it than the centroid by
+Let u be the direction of the source from the centroid of the microphones, and w its
+inverse range. The distance from the source to microphone m exceeds the distance to the
+centroid by
 
-    g_m = (w |p_m|^2 - 2 p_m . u) / (sqrt(1 - 2 w p_m . u + w^2 |p_m|^2) + 1),
+    g_m = (w |p_m|^2 - 2 p_m . u) / (sqrt(1 - 2 w p_m . u + w^2 |p_m|^2) + 1).
 
-which is smooth where the range is infinite (w = 0), and beyond. The delays are
-c tau_m = g_m - g_0. Squaring the ranges makes them linear in the direction and
-the inverse range as seen from microphone 0 (Smith and Abel, 1987): the start.
-Gauss-Newton steps on the whitened delays in (direction, w) follow. Along a row,
-or in the plane of a plane array in space, the direction has its components
-within the array as coordinates; elsewhere those across itself.
+This function is smooth at infinite range (w = 0) and beyond. The delays are c tau_m =
+g_m - g_0. The fit has two stages.
 
-All is written out in loops: for arrays this small they are the fastest, and
-numba compiles them in a tenth of the time.
+The start is a linear problem. The squared ranges are linear in the direction and the
+inverse range from microphone 0 (Smith and Abel, 1987).
+
+Gauss-Newton steps in (u, w) on the whitened delays follow. Their coordinates depend on
+the array. For a row, and for a plane array in space, the direction has its components
+within the span of the array as coordinates. For other arrays, the coordinates are
+rotations of u perpendicular to itself.
+
+All kernels are written as loops. For arrays of this size loops are fastest, and numba
+compiles them in a tenth of the time.
 """
 
 from __future__ import annotations
@@ -30,10 +35,11 @@ from systems.hearing.source_fix import RANGED, range_status
 _STEPS = 30
 _SETTLED = 1e-9
 
-# Two places explain the delays alike where their chi-squares differ by less.
+# Two positions explain the delays equally well if their chi-squares differ by less than
+# this.
 _SAME_CHI_SQUARE = 9.0
 
-# Keeps slopes finite along a row and in the plane of a plane array.
+# Keeps the slopes finite for directions along a row or in the plane of a plane array.
 _LEAST_COSINE = 0.05
 
 
@@ -41,16 +47,17 @@ class DelayProblem(NamedTuple):
     """Delays and the array that measured them."""
 
     d: NDArray[np.float64]
-    """(n - 1,) differences of range from that of microphone 0, m."""
+    """(n - 1,) range differences to microphone 0, m."""
     root: NDArray[np.float64]
-    """(n - 1, n - 1) lower triangle that makes their errors independent, of
-    variance 1."""
+    """(n - 1, n - 1) lower triangular matrix that whitens d: the errors become
+    independent with variance 1."""
     p: NDArray[np.float64]
     """(n, d) microphones from their centroid, m."""
     span: NDArray[np.float64]
-    """(r, d) orthonormal vectors that they span."""
+    """(r, d) orthonormal basis of the span of the microphones."""
     side: NDArray[np.float64]
-    """(d,) unit vector off the span to the side looked at; zeros: none is."""
+    """(d,) unit vector perpendicular to the span, towards the side where sources are
+    reported. Zeros if the span is the whole space."""
 
 
 @njit(cache=True)
@@ -63,19 +70,24 @@ def _whitened(
     r: NDArray[np.float64],
     J: NDArray[np.float64],
 ) -> float:  # pragma: no cover  (compiled)
-    """Fills in residuals r (m,) and slopes J (m, k + 1); returns the sum of r^2.
+    """Computes the whitened residuals r and their slopes J.
 
     Args:
         problem: Delays and array.
-        basis: (d, k) what the coordinates of the direction do to it.
-        k: Number of these coordinates.
+        basis: (d, k) derivatives of u with respect to its coordinates.
+        k: Number of coordinates of the direction.
         u: (d,) direction.
-        w: Inverse range.
-        r: Output.
-        J: Output, by the direction's coordinates and by w.
+        w: Inverse range, 1/m.
+        r: (n - 1,) output, residuals.
+        J: (n - 1, k + 1) output, slopes of the model with respect to the coordinates of
+            u and to w.
+
+    Returns:
+        The sum of r^2.
     """
     p, root = problem.p, problem.root
     n, dim = p.shape
+    # g of the module's docstring and its slopes G, one row per microphone.
     g = np.empty(n)
     G = np.empty((n, k + 1))
     for m in range(n):
@@ -93,12 +105,13 @@ def _whitened(
             for i in range(dim):
                 turned += p[m, i] * basis[i, j]
             G[m, j] = -turned / ratio
+    # Differences to microphone 0, multiplied by the whitening matrix.
     cost = 0.0
     for a in range(n - 1):
         r[a] = 0.0
         for j in range(k + 1):
             J[a, j] = 0.0
-        for b in range(a + 1):  # root is a lower triangle
+        for b in range(a + 1):  # root is lower triangular
             r[a] += root[a, b] * (problem.d[b] - g[b + 1] + g[0])
             for j in range(k + 1):
                 J[a, j] += root[a, b] * (G[b + 1, j] - G[0, j])
@@ -110,7 +123,10 @@ def _whitened(
 def _factor(
     J: NDArray[np.float64], size: int, damping: float, prior: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Cholesky factor of J^T J, damped (Marquardt), with a prior on the last."""
+    """Computes the Cholesky factor of J^T J.
+
+    The diagonal is damped (Marquardt). ``prior`` is added to the last diagonal element.
+    """
     N = np.zeros((size, size))
     trace = 0.0
     for i in range(size):
@@ -135,7 +151,7 @@ def _factor(
 def _substitute(
     L: NDArray[np.float64], x: NDArray[np.float64]
 ) -> None:  # pragma: no cover  (compiled)
-    """x becomes (L L^T)^-1 x."""
+    """Replaces x by (L L^T)^-1 x."""
     size = L.shape[0]
     for i in range(size):
         for j in range(i):
@@ -151,7 +167,7 @@ def _substitute(
 def _least_squares(
     J: NDArray[np.float64], r: NDArray[np.float64], size: int, damping: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """x of least |J x - r| over the first columns of J."""
+    """Solves J x = r by least squares for the first ``size`` columns of J."""
     x = np.zeros(size)
     for i in range(size):
         for a in range(J.shape[0]):
@@ -174,16 +190,21 @@ def _dot(
 def _coordinates(
     problem: DelayProblem, u: NDArray[np.float64], bound: Any
 ) -> tuple[NDArray[np.float64], int]:  # pragma: no cover  (compiled)
-    """(d, k) what the coordinates of a direction do to it, and k.
+    """Computes the derivatives of a direction with respect to its coordinates.
 
-    Where it is bound to unit length within the span, they are those across it,
-    else its components in the span.
+    If ``bound``, u keeps unit length within the span. Its coordinates are then
+    rotations perpendicular to itself. Otherwise its coordinates are its components in
+    the span.
+
+    Returns:
+        (d, 3) derivatives, of which the first k columns are used, and k.
     """
     span = problem.span
     rank, dim = span.shape
     basis = np.zeros((dim, 3))
     if not bound:
-        # Microphones a little off their plane hear the component off it too.
+        # Microphones slightly off their plane also respond to the component of u
+        # perpendicular to the plane.
         off = 1.0
         for j in range(rank):
             off -= _dot(span[j], u) ** 2
@@ -198,6 +219,7 @@ def _coordinates(
         for i in range(dim):
             basis[i, 0] = a * span[1, i] - b * span[0, i]
     if rank == 3:
+        # Two unit vectors perpendicular to u; the first one from the axis farthest off.
         least = 0
         for i in range(1, 3):
             if abs(u[i]) < abs(u[least]):
@@ -215,7 +237,7 @@ def _coordinates(
 def _lifted(
     problem: DelayProblem, v: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Direction with components v in the span, completed to the side."""
+    """Returns the direction with components v in the span, completed to unit length."""
     off = math.sqrt(max(0.0, 1.0 - _dot(v, v)))
     u = np.empty(problem.side.size)
     for i in range(u.size):
@@ -229,7 +251,7 @@ def _lifted(
 def _within(
     problem: DelayProblem, u: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Components of a direction in the span."""
+    """Returns the components of a direction in the span."""
     v = np.empty(problem.span.shape[0])
     for j in range(v.size):
         v[j] = _dot(problem.span[j], u)
@@ -240,17 +262,21 @@ def _within(
 def _descend(
     problem: DelayProblem, u: NDArray[np.float64], w: float, bound: Any, far: Any
 ) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
-    """Gauss-Newton steps, shortened where they lead uphill.
+    """Runs Gauss-Newton steps with Marquardt damping.
+
+    A step that does not increase the cost is accepted, and the damping decreases.
+    Otherwise the step is discarded, and the damping increases. The steps end when the
+    largest change is below ``_SETTLED``.
 
     Args:
         problem: Delays and array.
         u: (d,) direction to start from.
-        w: Inverse range to start from.
+        w: Inverse range to start from, 1/m.
         bound: Whether u keeps unit length within the span.
         far: Whether w stays as it is.
 
     Returns:
-        u, w and the sum of squares there.
+        u, w and the sum of squared residuals there.
     """
     m = problem.d.size
     basis, k = _coordinates(problem, u, bound)
@@ -296,17 +322,21 @@ def _descend(
 def _descend_within(
     problem: DelayProblem, u: NDArray[np.float64], w: float, far: Any
 ) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
-    """``_descend`` to a place that exists: w >= 0 and |u| = 1."""
+    """Runs ``_descend`` with the constraints w >= 0 and |u| = 1.
+
+    The steps are repeated with a constraint as an equation where a result violates it.
+    """
     bound = _is_bound(problem)
     cost = 0.0
     for _ in range(4):
         u, w, cost = _descend(problem, u, w, bound, far)
         length = math.sqrt(_dot(u, u))
         if w < 0.0:
-            w, far = 0.0, w < 0.0  # a literal True would be compiled anew
+            w, far = 0.0, w < 0.0  # numba would compile a literal True anew
         elif length > 1.0 and not bound:
-            # More than the array is long: in its line or plane.
-            u, bound = u / length, length > 1.0  # likewise
+            # The delays exceed the length of the array: the source is in its line or
+            # plane.
+            u, bound = u / length, length > 1.0  # see above
         else:
             break
     return u, w, cost
@@ -314,7 +344,7 @@ def _descend_within(
 
 @njit(cache=True)
 def _is_bound(problem: DelayProblem) -> bool:  # pragma: no cover  (compiled)
-    """Whether the array has no side: all of a direction lies in its span."""
+    """Returns whether all components of a direction are in the span of the array."""
     return _dot(problem.side, problem.side) == 0.0
 
 
@@ -324,9 +354,16 @@ def _starts(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], int
 ]:  # pragma: no cover  (compiled)
-    """Components (s, r) and inverse ranges (s,) seen from microphone 0.
+    """Computes starts from the linear equations seen from microphone 0.
 
-    The first start is far away. The number of starts is returned too.
+    With v the components of the direction in the span, q = p_b - p_0 and d the range
+    difference, the equation is q . v - w (q^2 - d^2) / 2 = -d. The first start is a
+    plane wave (w = 0). If v must have unit length, v is linear in w, and |v| = 1 gives
+    up to two further starts. Otherwise least squares for v and w give one further start
+    if there are enough delays.
+
+    Returns:
+        (3, r) components v, (3,) inverse ranges, and the number of starts.
     """
     d, root, p, span = problem.d, problem.root, problem.p, problem.span
     m, rank = d.size, span.shape[0]
@@ -347,9 +384,9 @@ def _starts(
         components[0, j] = v_far[j]
     count = 1
     if _is_bound(problem):
-        # Direction as a function of w, of length 1: a quadratic in w.
+        # v = v_far + w v_w with |v| = 1: a quadratic equation in w.
         v_w = _least_squares(A, half, rank, 0.0)
-        # The loops above count with a and b.
+        # a and b are also the indices of the loops above.
         a, b, c = _dot(v_w, v_w), _dot(v_far, v_w), _dot(v_far, v_far) - 1.0
         reach = math.sqrt(max(0.0, b * b - a * c))
         for sign in (1.0, -1.0):
@@ -373,12 +410,12 @@ def _starts(
 def _from_centroid(
     problem: DelayProblem, v: NDArray[np.float64], w: float
 ) -> tuple[NDArray[np.float64], float]:  # pragma: no cover  (compiled)
-    """Direction and inverse range, given from microphone 0, from the centroid."""
+    """Converts direction and inverse range from microphone 0 to the centroid."""
     length = math.sqrt(_dot(v, v))
     if length > 1.0 or (_is_bound(problem) and length > 0.0):
         v = v / length
     if length == 0.0 and _is_bound(problem):
-        v[0] = 1.0  # nothing points to a source amid the microphones
+        v[0] = 1.0  # any direction: the source is amid the microphones
     u = _lifted(problem, v)
     if w <= 0.0:
         return u, 0.0
@@ -394,7 +431,14 @@ def _search(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """The two best places: u (2, d), w (2,) and chi-square (2,)."""
+    """Finds the two positions with the lowest costs.
+
+    Each start is refined by ``_descend_within``, the plane wave last. It is left out if
+    another start already fits.
+
+    Returns:
+        (2, d) directions, (2,) inverse ranges and (2,) chi-squares, the best one first.
+    """
     n, dim = problem.p.shape
     unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
     far = n - 1 < unknowns
@@ -402,7 +446,7 @@ def _search(
     us, ws, costs = np.zeros((2, dim)), np.zeros(2), np.array([np.inf, np.inf])
     for s in range(count - 1, -1, -1):
         if s == 0 and costs[0] < n + 25.0:
-            break  # a start from far away would end there as well
+            break  # the plane wave would end at the same position
         u, w = _from_centroid(problem, components[s].copy(), inverse[s])
         u, w, cost = _descend_within(problem, u, w, far)
         place = 0 if cost < costs[0] else 1
@@ -423,17 +467,17 @@ def _covariance(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], int
 ]:  # pragma: no cover  (compiled)
-    """Errors at a place.
+    """Computes the errors of a position.
 
     Args:
         problem: Delays and array.
         u: (d,) direction.
-        w: Inverse range.
-        prior: What is known of w beforehand: 1 over its variance.
+        w: Inverse range, 1/m.
+        prior: Prior information on w: 1 over its variance, m^2.
 
     Returns:
-        (k + 1, k + 1) covariance of the coordinates of u and of w, (d, k)
-        slopes of u by its coordinates, and k.
+        (k + 1, k + 1) covariance of the coordinates of u and of w; (d, 3) derivatives
+        of u with respect to its coordinates; and k.
     """
     bound = _is_bound(problem)
     basis, k = _coordinates(problem, u, bound)
@@ -446,8 +490,8 @@ def _covariance(
         _substitute(L, C[i])
     if not bound:
         v = _within(problem, u)
-        # Near the line or plane the component off it is the root of a small
-        # difference: its error stays below the root of that difference's.
+        # Near the line or plane, the perpendicular component is the root of a small
+        # difference. The error of this difference bounds it from below.
         size = 0.0
         for i in range(k):
             for j in range(k):
@@ -465,7 +509,7 @@ def _covariance(
 def _carried(
     T: NDArray[np.float64], C: NDArray[np.float64], size: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """T C T^T over the first columns of T."""
+    """Computes T C T^T with the first ``size`` columns of T."""
     dim = T.shape[0]
     out = np.zeros((dim, dim))
     for i in range(dim):
@@ -489,20 +533,27 @@ def fit_delays(
     NDArray[np.float64],
     int,
 ]:  # pragma: no cover  (compiled)
-    """Place, its errors and its twin.
+    """Computes the position, its errors and its twin.
+
+    The search gives up to two positions. If both fit about equally well, the farther
+    one is the result and the nearer one its twin. The range is valid if the inverse
+    range exceeds its standard deviation. Otherwise the direction is fitted again for a
+    plane wave. Its covariance then includes the unknown range, with the standard
+    deviation ``prior_w`` of w.
 
     Args:
         problem: ``DelayProblem``.
-        prior_w: Standard deviation of the inverse range before anything is
-            heard, 1/m; used where the delays tell no range.
+        prior_w: Standard deviation of the inverse range without measurement, 1/m. It is
+            used if the delays give no range.
 
     Returns:
-        u (d,), w and its variance (infinite: no range), covariances (d, d) of
-        u and of the position, chi-square, the twin's place (0: none), and the
-        status of the range (``range_status``).
+        u (d,); w and its variance (infinite: no range); covariances (d, d) of u and of
+        the position, or of u twice without a range; chi-square; position of the twin
+        (zeros: none); and the status of the range (``range_status``).
     """
     us, ws, costs = _search(problem)
     n, dim = problem.p.shape
+    # The farther position of two that fit equally well; the other one is the twin.
     main, twin = 0, np.zeros(dim)
     if costs[1] < costs[0] + _SAME_CHI_SQUARE and min(ws[0], ws[1]) > 0.0:
         apart = abs(ws[0] - ws[1]) / ws[0]
@@ -512,6 +563,7 @@ def fit_delays(
             main = 0 if ws[0] < ws[1] else 1
             for i in range(dim):
                 twin[i] = us[1 - main, i] / ws[1 - main]
+    # A position, if its range is valid.
     u, w, cost = us[main].copy(), ws[main], costs[main]
     unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
     status = range_status(w, 0.0, 1.0, n - 1 >= unknowns)
@@ -527,7 +579,8 @@ def fit_delays(
                 to_p[i, k] = -u[i] / (w * w)
             of_p = _carried(to_p, C, k + 1)
             return u, w, C[k, k], of_u, of_p, cost, twin, status
-    far = n > 0  # a literal True would be compiled anew
+    # Otherwise a direction alone.
+    far = n > 0  # numba would compile a literal True anew
     u, _, cost_far = _descend_within(problem, u, 0.0, far)
     C, by, k = _covariance(problem, u, 0.0, 1.0 / (prior_w * prior_w))
     of_u = _carried(by, C, k)

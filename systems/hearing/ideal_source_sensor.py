@@ -1,4 +1,4 @@
-"""Exact hearing in place of loudspeaker, microphones and estimator."""
+"""Ideal hearing, which replaces loudspeaker, microphones and estimator."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from systems.world.geometry import control_point, rotate, safe_norm
 
 @register_jitable
 def relative_position(pose_WB: Any, pose_WS: Any, control_point_m: Any) -> Any:
-    """The source as seen from the robot; floats or AutoDiffXd.
+    """Computes the position of the source relative to the robot.
 
     Args:
-        pose_WB: x, y, theta of the robot, m and rad.
-        pose_WS: x, y, theta of the source; its heading does not count.
+        pose_WB: x, y, theta of the robot in W, m and rad; floats or AutoDiffXd.
+        pose_WS: x, y, theta of the source in W; theta has no effect.
         control_point_m: Distance of P ahead of the origin of B, m.
 
     Returns:
@@ -40,11 +40,11 @@ def relative_position(pose_WB: Any, pose_WS: Any, control_point_m: Any) -> Any:
 
 @register_jitable
 def disturbed(x: Any, y: Any, numbers: Any, hearing: Any) -> Any:
-    """A position with the noise of bearing and range.
+    """Adds noise of bearing and range to a position.
 
     Args:
-        x: Of p_PS_B, m.
-        y: The same, m.
+        x: x of p_PS_B, m.
+        y: y of p_PS_B, m.
         numbers: Two standard normal numbers.
         hearing: ``IdealHearingParameters``.
 
@@ -59,11 +59,11 @@ def disturbed(x: Any, y: Any, numbers: Any, hearing: Any) -> Any:
 
 @register_jitable
 def stated_covariance(x: Any, y: Any, hearing: Any) -> Any:
-    """Covariance of a position for the noise that is set, row by row, m^2.
+    """Computes the covariance of a position for the noise in the parameters.
 
     Args:
-        x: Of p_PS_B, m; float or AutoDiffXd.
-        y: The same, m.
+        x: x of p_PS_B, m; float or AutoDiffXd.
+        y: y of p_PS_B, m.
         hearing: ``IdealHearingParameters``.
 
     Returns:
@@ -83,41 +83,43 @@ def stated_covariance(x: Any, y: Any, hearing: Any) -> Any:
 
 
 class _PerFrame:
-    """A table by number of the measurement, each row computed when it is read.
+    """Table with one row per measurement, which is computed when it is read.
 
     Args:
-        row: Takes the number.
+        row: Function that returns the row of a measurement.
     """
 
     def __init__(self, row: Callable[[int], Any]) -> None:
         self._row = row
 
     def __getitem__(self, frame: int) -> Any:
-        """The row of a measurement."""
+        """Returns the row of a measurement."""
         return self._row(frame)
 
 
 class IdealSourceNumbers(NamedTuple):
-    """What the step of ``IdealSourceSensor`` depends on."""
+    """Data of the step of ``IdealSourceSensor``."""
 
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     hearing: IdealHearingParameters
     frame_ticks: int
-    """Ticks from one measurement to the next."""
+    """Ticks between two measurements."""
     sounds: Any
-    """Whether there is sound, by number of the measurement: ``_PerFrame`` or (n,)."""
+    """Whether there is sound, by number of the measurement: ``_PerFrame`` or (n,)
+    array."""
     noisy: bool
     noise: Any
-    """Two standard normal numbers likewise: ``_PerFrame`` or (n, 2)."""
+    """Two standard normal numbers, by number of the measurement: ``_PerFrame`` or (n,
+    2)."""
 
 
 def ideal_source_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """What is heard at one tick.
+    """Measures the source in one tick.
 
-    The state has x and y of p_PS_B, m, and whether anything is heard.
+    The state contains x and y of p_PS_B, m, and whether anything is heard.
     """
     if tick % numbers.frame_ticks != 0:
         return
@@ -128,7 +130,7 @@ def ideal_source_step(
     heard = numbers.sounds[frame] and safe_norm(x, y) <= hearing.maximum_range_m
     if numbers.noisy:
         x, y = disturbed(x, y, numbers.noise[frame], hearing)
-    # Sums, as AutoDiffXd takes no float in its place.
+    # Sums, because AutoDiffXd elements accept no float.
     nothing = 0.0 * state[2]
     state[0], state[1], state[2] = nothing, nothing, nothing
     if heard:
@@ -136,7 +138,7 @@ def ideal_source_step(
 
 
 def _publish_ideal_source(state, outputs, numbers):
-    """The outputs of ``ideal_source_step``'s state."""
+    """Computes the outputs from the state of ``ideal_source_step``."""
     bearing, distance, p_PS_B, covariance, detected, range_valid, status = outputs
     x, y = state[0], state[1]
     bearing[0], distance[0] = atan2(y, x), safe_norm(x, y)
@@ -144,29 +146,30 @@ def _publish_ideal_source(state, outputs, numbers):
     stated = stated_covariance(x, y, numbers.hearing)
     for k in range(4):
         covariance[k] = stated[k]
-    # What is heard has a range: NOTHING_HEARD is 0 and RANGED is 1.
+    # Every sound has a range: NOTHING_HEARD is 0, and RANGED is 1.
     detected[0] = range_valid[0] = status[0] = state[2]
 
 
 @define_for_scalars("IdealSourceSensor_", __name__)
 def IdealSourceSensor_(T):
     class Impl(Block_[T]):
-        """Measures where the source is, exactly or with a set noise.
+        """Measures where the source is, exactly or with the noise in the parameters.
 
-        It replaces ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator`` and has
-        the outputs of the last. Discrete state, every frame: p_PS_B and detected.
-        Latency one tick, like the estimator's, so that both builds have the
-        same loop; unlike the estimator it tells front from back.
+        The block replaces ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator``, and it
+        has the outputs of ``TDOAEstimator``. Its discrete state, updated every frame,
+        is p_PS_B and ``detected``. Its latency is one tick, as that of the estimator,
+        so that both builds have the same loop. Unlike the estimator with a row, it
+        distinguishes front from back.
 
         Args:
-            robot: Place of P.
+            robot: Position of P.
             hearing: ``IdealHearingParameters``.
-            sound: ``SoundParameters``; its gate says when there is sound.
+            sound: ``SoundParameters``; its gate defines when there is sound.
             frame_s: Period of the measurements, s.
             seed: Seed of the noise.
 
         Raises:
-            InputError: Noise is set in an AutoDiffXd system.
+            InputError: The parameters contain noise, and the scalar type is AutoDiffXd.
         """
 
         part, stage = "hearing", "hearing"
@@ -217,7 +220,9 @@ def IdealSourceSensor_(T):
             self.declare(step, tick_s=frame_s)
 
         def _sounds(self, frame: Any) -> Any:
-            """Whether there is sound in the middle of the frame before a measurement.
+            """Returns whether there is sound in the middle of a measured frame.
+
+            The frame ends at the measurement.
 
             Args:
                 frame: Number of the measurement, or an array of numbers.
@@ -226,7 +231,7 @@ def IdealSourceSensor_(T):
             return sounds | (not self.step.numbers.hearing.burst_gaps)
 
         def step_for(self, run: RunFacts) -> Step:
-            """The step, with tables for all measurements of the run."""
+            """Returns the step with tables for all measurements of the run."""
             step, frame_s = self.step, self._frame_s
             frames = np.arange(math.ceil((run.ticks + 1) * run.tick_s / frame_s) + 1)
             noise = np.empty((0, 2))
@@ -244,7 +249,7 @@ def IdealSourceSensor_(T):
 
 
 def _noise(seed: int) -> _PerFrame:
-    """Two standard normal numbers for each measurement."""
+    """Returns two standard normal numbers for each measurement."""
     return _PerFrame(
         lambda frame: tick_generator(seed, frame).standard_normal(2).tolist()
     )

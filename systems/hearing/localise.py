@@ -1,4 +1,4 @@
-"""From one frame of sound to a place, with what has to be remembered for it."""
+"""Locates the source of sound in each frame, with a memory from frame to frame."""
 
 from __future__ import annotations
 
@@ -25,117 +25,123 @@ from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_fix import NEAREST_M, SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# From this correlation on, a frame holds hardly anything but the direct sound; and
-# where the noise was not heard alone yet, so that it may be the rest.
+# A frame with at least this correlation contains almost nothing but direct sound. The
+# second value applies until a frame of noise alone was heard, because noise may
+# explain the rest up to then.
 _DIRECT_CORRELATION = 0.98
 _FIRST_CORRELATION = 0.9
 
-# What channels do not share is noise as long as it is below this many times what
-# is heard between the sounds; beyond, it is echoes.
+# What the channels do not share counts as noise if its energy is below this many times
+# the energy between the sounds. Otherwise it counts as echoes.
 _NOISE_MARGIN = 3.0
 
-# Frames over which the level of the noise is averaged.
+# Number of frames over which the noise level is averaged.
 _NOISE_FRAMES = 8.0
 
-# A knock, or a sound that reverberates too much to be heard, may raise that level no
-# more than a noise of so many times it.
+# A knock, or a sound with too much reverberation to be detected, must not raise the
+# noise level. One frame therefore counts as at most this many times the noise level.
 _LOUDEST_NOISE = 1.5
 
-# Frames whose echoes were suppressed are believed from this correlation on, and up
+# After the suppression of echoes, a frame is accepted from this correlation on and up
 # to this ambiguity.
 _ECHO_CORRELATION = 0.4
 _ECHO_AMBIGUITY = 0.7
 
-# In the first frame of a sound it may not have reached all channels: noise alone
-# would seem to be heard there with more than this probability.
+# The first frame of a sound may contain it in some channels only. This is assumed if
+# noise alone explains the lowest peak with more than this probability.
 _SHARED_CHANCE = 1e-3
 
-# Of the frames that hold the weakest sound that can be heard so many are quieter
-# than expected by this many standard deviations: 1 %.
+# One percent of the frames with the weakest detectable sound are quieter than expected
+# by more than this number of standard deviations.
 _QUIET = 2.33
 
-# Sets of delays that are followed up where sounds overlap, and the least correlation
-# of one: of what chance leaves beside two sounds of 0.5-8 kHz a twentieth is higher.
+# Number of sets of delays that are examined where sounds overlap, and the least
+# correlation of a set. Beside two sounds of 0.5-8 kHz, one in twenty chance sets
+# correlates more.
 _SETS = 4
 _SET_CORRELATION = 0.1
 
-# Nothing that is left correlates as much as this.
+# No chance set correlates as much as this.
 _SURE_CORRELATION = 0.25
 
-# The delays of its pairs may disagree by so many standard deviations more.
+# The delays of the pairs in a set may disagree by this many standard deviations in
+# addition to the usual limit.
 _SET_CLOSURE = 2.0
 
-# Sets with all delays this near to each other are one sound, s.
+# Two sets are one sound if none of their delays differ by more than this, s.
 _ONE_SOUND_S = 1e-4
 
-# Microphones whose distances from the centroid differ by less are an even pair, m.
+# Two microphones are an even pair if their distances from the centroid differ by less
+# than this, m.
 _ALIKE_M = 1e-3
 
-# A sound begins within a frame whose energy is spread over less than this share
-# of it.
+# A sound begins within a frame if its energy is spread over less than this share of the
+# frame.
 _WHOLE_FRAME = 0.8
 
 
 class HearingMemory(NamedTuple):
-    """What a frame leaves behind for the next one."""
+    """What one frame leaves for the next one."""
 
     energy: float
-    """Of a frame between the sounds, without rumble, units of the frame squared; 0
-    until such a frame was heard."""
+    """Average energy of a frame between the sounds, without rumble, in units of the
+    frame squared. It is 0 until such a frame was heard."""
     noise_energy: float
-    """Of its mean channel within the band, of what is left at the plan's rate."""
+    """Average energy of the mean channel of such a frame, within the band, at the
+    sample rate of the plan."""
     echoes: NDArray[np.float32] | None = None
-    """(n, bins) see ``systems.delays.precedence``; None where the noise is louder."""
+    """(n, bins) memory of ``systems.delays.precedence``; None if it is below the
+    noise."""
     heard: bool = False
-    """Whether it held a sound."""
+    """Whether the frame contained a sound."""
 
 
 class Candidate(NamedTuple):
     """One of the sounds of a frame."""
 
     fix: SourceFix
-    """Where it comes from."""
+    """Estimated position or direction of its source."""
     tau: NDArray[np.float64]
-    """(n - 1,) its delays t_k - t_0, s."""
+    """(n - 1,) delays t_k - t_0, s."""
     covariance: NDArray[np.float64]
-    """(n - 1, n - 1) of them, s^2."""
+    """(n - 1, n - 1) covariance of the delays, s^2."""
     correlation: float
     """Least correlation coefficient of the pairs, 0 to 1."""
     sure: bool = True
-    """Whether it correlates more than chance does."""
+    """Whether the correlation is higher than any that occurs by chance."""
     alone: bool = False
-    """Whether it outweighs whatever else sounds."""
+    """Whether it dominates the frame: the delays of the whole frame are its delays."""
 
 
 class _Sound(NamedTuple):
-    """A frame that holds a sound."""
+    """A frame that contains a sound."""
 
     heard: NDArray[np.float32]
-    """(n, samples) at the plan's rate."""
+    """(n, samples) channels at the sample rate of the plan."""
     seen: tuple[DelaySearch, slice]
-    """What ``look`` returned."""
+    """Return value of ``look``."""
 
 
 def _averaged(known: float, new: float) -> float:
-    """The level of the noise after one more frame."""
+    """Returns the noise level after one more frame."""
     return known + (min(new, _LOUDEST_NOISE * known) - known) / _NOISE_FRAMES
 
 
 class Localiser:
-    """Where the sounds of successive frames come from.
+    """Locates the sources of sound in successive frames.
 
-    Frames as ``MicArray`` publishes them are heard at half their rate, where that
-    leaves the band, and delays need not be whole samples.
+    The frames have the form that ``MicArray`` publishes. They are processed at half
+    their sample rate if the band allows it. Delays are not restricted to whole samples.
 
     Args:
         parameters: Method, band and thresholds.
         shape: The microphones.
         c: True speed of sound, m/s.
-        sample_rate_hz: Of the frames, Hz.
-        frame_samples: Of a frame, a channel.
+        sample_rate_hz: Sample rate of the frames, Hz.
+        frame_samples: Samples per channel of a frame.
 
     Raises:
-        InputError: The array cannot serve at this rate and band.
+        InputError: The array cannot be used at this sample rate and band.
     """
 
     def __init__(
@@ -167,20 +173,23 @@ class Localiser:
         channels = plan.shape.count
         self._frame_shape = (channels, frame_samples)
         self._scatter = _QUIET * math.sqrt(2.0 / (channels * frame_samples))
-        # Pairs that no source ahead of the centroid is as far from.
+        # Uneven pairs: a source straight ahead of the centroid is not equally far from
+        # both microphones.
         i, j = plan.shape.pairs.T
         from_centre = np.linalg.norm(plan.shape.p_AM, axis=1)
         self._uneven = np.abs(from_centre[i] - from_centre[j]) > _ALIKE_M
         self._all = np.ones(len(i), dtype=bool)
-        # Both sides of the spectrum, all channels, all samples.
+        # Converts energy of the mean channel on one side of the spectrum to energy of
+        # all channels and samples on both sides.
         self._frame_share = 2.0 * channels * frame_samples / plan.frame_samples
-        # A band that is found may be as narrow as it likes.
+        # A band of the kind "found" may be arbitrarily narrow, so this limit is
+        # unknown.
         self._weakest = 0.0
         if parameters.band == "set":
             self._weakest = weakest_sound(plan, parameters.false_alarm_rate)
 
     def blank(self) -> HearingMemory:
-        """The memory before the first frame."""
+        """Returns the memory before the first frame."""
         return HearingMemory(0.0, 0.0)
 
     @property
@@ -191,18 +200,19 @@ class Localiser:
     def localise(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[SourceFix | None, HearingMemory]:
-        """Where the sound of a frame comes from.
+        """Locates the dominant sound of a frame.
 
         Args:
-            frame: (n, samples) channels, any unit; counts will do.
-            memory: What the last frame left.
+            frame: (n, samples) channels, in any unit, for example counts.
+            memory: What the previous frame left.
 
         Returns:
-            The source on the side of ``ArrayShape.ahead``, or None where nothing
-            is heard, and the new memory.
+            The source on the side of ``ArrayShape.ahead``, or None if nothing is heard;
+            and the new memory.
 
         Raises:
-            InputError: The frame is no frame of this array, or not finite.
+            InputError: The frame has another shape than this array needs, or is not
+                finite.
         """
         sound, after = self._sound(frame, memory)
         if sound is None:
@@ -215,25 +225,25 @@ class Localiser:
     def candidates(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[list[Candidate], HearingMemory]:
-        """Where each of the sounds of a frame comes from.
+        """Locates each of the sounds of a frame.
 
         Args:
-            frame: As of ``localise``.
-            memory: What the last frame left.
+            frame: (n, samples) channels, in any unit, for example counts.
+            memory: What the previous frame left.
 
         Returns:
-            What ``localise`` finds, if anything, then further sounds, those with the
-            greatest correlations first; and the new memory.
+            The sound that ``localise`` finds, if any, then further sounds in the order
+            of ``estimate_delay_sets``; and the new memory.
 
         Raises:
-            InputError: As ``localise``.
+            InputError: As for ``localise``.
         """
         sound, after = self._sound(frame, memory)
         if sound is None:
             return [], after
         first, after = self._first(sound, memory, after)
         found = [] if first is None else [first._replace(alone=True)]
-        # In a part of a frame chance correlates more.
+        # Chance correlations are higher if the sound fills only a part of the frame.
         spread = energy_spread(sound.heard)
         for delays in estimate_delay_sets(
             sound.heard, self.plan, self.parameters.method, sound.seen, _SETS
@@ -248,9 +258,10 @@ class Localiser:
         return [c for c in found if not self._is_copied(frame, c.fix, memory)], after
 
     def _one_of_several(self, delays: DelayEstimate) -> Candidate | None:
-        """The place behind a set of delays, where it is believed.
+        """Returns the position that explains a set of delays, or None.
 
-        To each sound the others are noise: its pairs may disagree by what that does.
+        The other sounds are noise for this one. The delays of its pairs may therefore
+        disagree by an additional multiple of their standard deviation.
         """
         scatter = math.sqrt(float(np.diag(delays.covariance).max()))
         closure = max(0.0, delays.closure - _SET_CLOSURE * scatter)
@@ -259,7 +270,15 @@ class Localiser:
     def _sound(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[_Sound | None, HearingMemory]:
-        """What a frame holds beside noise, None if nothing, and the new memory."""
+        """Detects a sound in a frame.
+
+        Three tests follow one another. The energy must be above that of noise. The
+        correlation peaks must be too high for noise alone. In the first frame of a
+        sound, all channels must contain it.
+
+        Returns:
+            The frame, or None if a test fails; and the new memory.
+        """
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):
             return None, self._after_noise(memory, energy)
@@ -285,7 +304,7 @@ class Localiser:
     def _first(
         self, sound: _Sound, before: HearingMemory, memory: HearingMemory
     ) -> tuple[Candidate | None, HearingMemory]:
-        """The sound that outweighs the others of a frame, if one does."""
+        """Locates the sound that dominates a frame, if there is one."""
         heard, seen = sound
         if not self.parameters.suppress_echoes:
             return self._fix(self._delays(heard, seen), heard), memory
@@ -293,9 +312,9 @@ class Localiser:
         return self._locate(heard, seen, memory, begins=begins)
 
     def _quietest(self, memory: HearingMemory) -> float:
-        """Energy that 99 of 100 frames reach that hold a sound above the noise."""
+        """Returns the energy that 99 % of the frames with a detectable sound exceed."""
         in_band = self._frame_share * memory.noise_energy
-        # What of it is no rumble.
+        # Noise in the band cannot have more energy than the noise without rumble.
         rise = self._weakest * min(in_band, memory.energy)
         return (1.0 - self._scatter) * memory.energy + rise
 
@@ -307,10 +326,15 @@ class Localiser:
         *,
         begins: bool,
     ) -> tuple[Candidate | None, HearingMemory]:
-        """Where the sound comes from that ``look`` has seen in a frame.
+        """Locates the sound that ``look`` found in a frame.
 
-        A sound that begins within the frame may have met the floor, which shows in
-        no channel alone: it is never taken to be free of echoes.
+        If the channels share almost all of their energy, the delays of the frame are
+        used as they are. Otherwise echoes are suppressed, and the delays are measured
+        again. The errors of echoes that remain are then added to the covariance.
+
+        A sound that begins within the frame may include a reflection off the floor,
+        which no single channel reveals. Its delays therefore always get the errors of
+        echoes.
         """
         delays = self._delays(frame, seen)
         direct = delays is not None and self._is_direct(delays, memory)
@@ -353,7 +377,7 @@ class Localiser:
         return energy
 
     def _is_place(self, fix: SourceFix, tau: NDArray[np.float64]) -> bool:
-        """Whether a source could be there, and the delays be those from there."""
+        """Returns whether a source can be at this position and cause these delays."""
         shape, c = self.plan.shape, self.plan.c
         if fix.range_valid and fix.range < NEAREST_M:
             return False
@@ -369,12 +393,15 @@ class Localiser:
         fix: SourceFix,
         memory: HearingMemory,
     ) -> bool:
-        """Whether channels of a located frame repeat each other.
+        """Returns whether two channels of a located frame repeat each other.
 
-        Without any noise, two microphones that are as far from the source do.
+        Without noise, microphones at equal distances from the source record equal
+        samples. In frames without noise, only uneven pairs are therefore compared at
+        lag 0.
         """
         shape = self.plan.shape
-        # A direction alone may belong to delays that are not its own: none counts too.
+        # A fix without range has the delays of a plane wave, which may not be those of
+        # the frame. Channels are compared at lag 0, too.
         later = self._sample_rate_hz * arrival_delays(fix, shape, self.plan.c)
         noisy = memory.energy > 0.0
         at_once = self._all if noisy else self._uneven
@@ -394,7 +421,13 @@ class Localiser:
     def _after_noise(
         self, memory: HearingMemory, energy: float, noise_energy: float | None = None
     ) -> HearingMemory:
-        """Noise of a frame's energy, and of that within the band if it is known."""
+        """Returns the memory after a frame of noise.
+
+        Args:
+            memory: What the previous frame left.
+            energy: Energy of the frame without rumble.
+            noise_energy: Energy within the band; None if it was not measured.
+        """
         echoes = memory.echoes
         if echoes is not None:
             echoes = self._sizes.faded(echoes, self.plan.frame_samples)
@@ -411,11 +444,11 @@ class Localiser:
         )
 
     def _noise_density(self, memory: HearingMemory) -> float:
-        """Energy of the noise a sample of the band."""
+        """Returns the mean square per sample of white noise as loud in the band."""
         return memory.noise_energy / self._band_samples
 
     def _is_direct(self, delays: DelayEstimate, memory: HearingMemory) -> bool:
-        """Whether noise alone explains what the channels do not share."""
+        """Returns whether noise alone explains what the channels do not share."""
         known = memory.noise_energy
         least = _DIRECT_CORRELATION if known > 0.0 else _FIRST_CORRELATION
         return (
@@ -428,12 +461,17 @@ class Localiser:
         frame: NDArray[np.float32] | None = None,
         echoes: NDArray[np.float64] | None = None,
     ) -> Candidate | None:
-        """The place behind the delays of a frame, where they are believed.
+        """Returns the position that explains the delays of a frame.
 
         Args:
-            delays: Of the sound.
-            frame: Where it is to be refined by the method ``ml``, if that is set.
-            echoes: Further covariance, of delays whose echoes were suppressed.
+            delays: Delays of the sound.
+            frame: The frame for the method ``ml``, which refines the position; None: no
+                refinement.
+            echoes: (n - 1, n - 1) additional covariance of the delays after the
+                suppression of echoes, s^2.
+
+        Returns:
+            The candidate, or None if the delays or the position are rejected.
         """
         parameters, plan = self.parameters, self.plan
         if (

@@ -1,7 +1,7 @@
-"""Where a source is, from the delays at microphones of any places.
+"""Locates a source from the delays at microphones in any arrangement.
 
-Three microphones equally spaced in a row have a closed form
-(``systems.hearing.near_field``); ``systems.hearing.delay_fit`` serves all others.
+Three equally spaced microphones in a row have a closed form
+(``systems.hearing.near_field``). ``systems.hearing.delay_fit`` serves all other arrays.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from systems.hearing.delay_fit import DelayProblem, fit_delays
 from systems.hearing.source_fix import RANGED, SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# Keeps errors of the azimuth finite right above an array.
+# Keeps the error of the azimuth finite for a source straight above an array.
 _LEAST_COSINE = 1e-3
 
 
@@ -26,19 +26,19 @@ def locate_source(
     shape: ArrayShape,
     c: float,
 ) -> SourceFix:
-    """Where the sound comes from.
+    """Computes where a sound comes from.
 
     Args:
         tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
-        covariance: (n - 1, n - 1) of the delays, s^2.
+        covariance: (n - 1, n - 1) covariance of the delays, s^2.
         shape: The n microphones.
         c: Speed of sound, m/s.
 
     Returns:
-        The source on the side of ``shape.ahead``. Its range is valid where it
-        exceeds its standard deviation. Otherwise the direction is that of a
-        source far away, and its error counts the unknown range, taken to be
-        rarely less than two apertures.
+        The source on the side of ``shape.ahead``. Its range is valid if it exceeds its
+        standard deviation. Otherwise the direction is that of a source far away. For
+        arrays without closed form, the error of this direction includes the unknown
+        range, which is assumed to be rarely less than two apertures.
     """
     if shape.equal_row is not None and shape.angles == ("bearing",):
         fix = near_field.locate_in_row(tau, covariance, shape.equal_row, c)
@@ -71,7 +71,7 @@ def locate_source(
 
 
 def whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """L^-1 of a covariance L L^T, which may be singular to rounding."""
+    """Returns L^-1 of a covariance L L^T, which may be singular to rounding."""
     floor = 1e-12 * np.diag(covariance) + 1e-30
     return np.linalg.inv(np.linalg.cholesky(covariance + np.diag(floor)))
 
@@ -79,15 +79,16 @@ def whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 def angles_of(
     u: NDArray[np.float64], of_u: NDArray[np.float64], shape: ArrayShape
 ) -> tuple[float, float | None, float | None]:
-    """Angles of a direction, with errors.
+    """Computes the angles of a direction and their errors.
 
     Args:
         u: (d,) unit vector.
-        of_u: (d, d) its covariance.
-        shape: The array, which may not tell every angle.
+        of_u: (d, d) covariance of u.
+        shape: The array, which may not measure every angle.
 
     Returns:
-        Standard deviation of the azimuth; elevation, and its own; rad.
+        Standard deviation of the azimuth, elevation and its standard deviation, rad;
+        None for an elevation that does not exist.
     """
     level = math.hypot(u[0], u[1])
     x, y = (u[0] / level, u[1] / level) if level > 0.0 else (1.0, 0.0)

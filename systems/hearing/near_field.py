@@ -1,10 +1,10 @@
-"""Range and bearing of a source from the delays at three microphones in a row.
+"""Computes range and bearing of a source from the delays at three microphones in a row.
 
-M1, M2 and M3 stand at y = l, 0, -l; the source lies ahead, x > 0. With
-a = c tau_12 and b = c tau_13, where tau_ij = t_j - t_i, Apollonius' theorem
-gives R1 = (2 l^2 + 2 a^2 - b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; eq. 9 of
-Han 2019 is not consistent with its own eq. 7), R2 = R1 + a, R3 = R1 + b and
-sin(bearing) = (R3^2 - R1^2) / (4 l R2), exact at any distance.
+M1, M2 and M3 are at y = l, 0, -l, and the source is ahead, x > 0. Let a = c tau_12 and
+b = c tau_13, where tau_ij = t_j - t_i. Apollonius' theorem gives R1 = (2 l^2 + 2 a^2 -
+b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; eq. 9 of Han 2019 is not consistent with its own
+eq. 7). Then R2 = R1 + a, R3 = R1 + b and sin(bearing) = (R3^2 - R1^2) / (4 l R2). These
+equations are exact at any distance.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from systems.framework.compiling import njit
 from systems.hearing.source_fix import RANGED, SourceFix, range_status
 from systems.sound.array_shape import EqualRow
 
-# Below this b - 2a is zero to rounding: the range is l^2 / (b - 2a) and more.
+# If b - 2a is below this, rounding dominates it. It counts as zero: a plane wave.
 _LEAST_GAP_M = 1e-9
 
 # Keeps the covariance finite for a source on the line of the microphones.
@@ -29,7 +29,7 @@ _LEAST_COSINE = 1e-3
 def _ranges(
     a: float, b: float, spacing: float
 ) -> tuple[int, float, float, float]:  # pragma: no cover  (compiled)
-    """Status of the range, and R1, R2, R3 in m."""
+    """Returns the status of the range, and R1, R2, R3 in m."""
     if b - 2.0 * a <= _LEAST_GAP_M:
         return range_status(0.0), 0.0, 0.0, 0.0
     r1 = (2.0 * spacing**2 + 2.0 * a * a - b * b) / (2.0 * (b - 2.0 * a))
@@ -42,18 +42,18 @@ def _ranges(
 def source_from_delays(
     tau_12: float, tau_13: float, spacing: float, c: float
 ) -> tuple[float, float, int]:  # pragma: no cover  (compiled)
-    """Bearing and range of the source from M2.
+    """Computes bearing and range of the source from M2.
 
     Args:
         tau_12: Time by which the sound reaches M2 later than M1, s.
         tau_13: Time by which the sound reaches M3 later than M1, s.
-        spacing: Distance l between neighbouring microphones, m.
+        spacing: Distance l between adjacent microphones, m.
         c: Speed of sound, m/s.
 
     Returns:
-        bearing in [-pi/2, pi/2] (rad, left positive), range (m) and its status
-        (``range_status``). Without a range, the range is 0 and the bearing is that
-        of a source far away.
+        Bearing in [-pi/2, pi/2], rad, left positive; range, m; and its status
+        (``range_status``). Without a range, the range is 0, and the bearing is that of
+        a source far away.
     """
     a, b = c * tau_12, c * tau_13
     status, r1, r2, r3 = _ranges(a, b, spacing)
@@ -66,7 +66,7 @@ def source_from_delays(
 def _spread(
     slopes: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """J C J^T."""
+    """Computes J C J^T."""
     rows = slopes.shape[0]
     spread = np.zeros((rows, rows))
     for i in range(rows):
@@ -81,7 +81,10 @@ def _spread(
 def _slopes(
     bearing: float, r2: float, a: float, b: float, spacing: float, c: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(4, 2) what the errors of the two delays do to range, bearing, x and y."""
+    """Computes the (4, 2) derivatives of range, bearing, x and y.
+
+    They are derivatives with respect to the delays tau_12 and tau_13.
+    """
     sine, cosine = math.sin(bearing), math.cos(bearing)
     r1, r3 = r2 - a, r2 - a + b
     gap = b - 2.0 * a
@@ -108,10 +111,10 @@ def _locate(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], float, float, int, float
 ]:  # pragma: no cover  (compiled)
-    """Place in the array's axes, with errors.
+    """Computes the position in the array's axes, with errors.
 
     Returns:
-        Place, its covariance, error of the bearing, range, its status and its error.
+        Position, its covariance, error of the bearing, range, its status and its error.
     """
     tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
     tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]
@@ -141,11 +144,11 @@ def locate_in_row(
     row: EqualRow,
     c: float,
 ) -> SourceFix:
-    """As ``source_from_delays``, with what the delays' errors make of it.
+    """Locates a source by ``source_from_delays``, with errors.
 
     Args:
         tau: (2,) delays t_k - t_0 in the order of the channels, s.
-        covariance: (2, 2) of them, s^2.
+        covariance: (2, 2) covariance of the delays, s^2.
         row: The microphones.
         c: Speed of sound, m/s.
 

@@ -1,11 +1,14 @@
-"""Which of the sounds of a frame comes from the source that is followed.
+"""Chooses the sound of the followed source among the sounds of a frame.
 
-Every source has a place in W with a covariance: the followed one that of the tracker,
-the others the one where they were last heard. Places are compared with what is heard by
-the delays that they would have (third-degree cubature, Arasaratnam and Haykin 2009): a
-row's two sides have the same, and a range that is not known is a large covariance. Each
-sound belongs to one source, so that all of them together are likeliest (global nearest
-neighbours); one that belongs to none is another source.
+Each source has a position in W with a covariance. For the followed source, it is that
+of the tracker. For each other source, it is where that source was last heard.
+
+Positions are compared with sounds through the delays that they would cause
+(third-degree cubature, Arasaratnam and Haykin 2009). The two sides of a row have the
+same delays, and an unknown range is a large covariance.
+
+Each sound is assigned to at most one source, so that the total likelihood is greatest
+(global nearest neighbors). A sound that belongs to no known source is a new source.
 """
 
 from __future__ import annotations
@@ -23,76 +26,79 @@ from systems.hearing.localise import Candidate
 from systems.hearing.tracking.target_filter import NEVER_HEARD_S
 from systems.sound.array_shape import ArrayShape
 
-# Other sources that are remembered, and for how long, s.
+# Number of other sources that are remembered, and for how long, s.
 _OTHERS = 4
 _FORGOTTEN_S = 6.0
 
-# One that was never heard together with the followed source may be that one, off its
-# expected place: it is forgotten after so long, when the source has missed a burst.
+# A competitor that was never heard together with the followed source may be that source
+# at a wrong position. It is dropped once the followed source has been silent for this
+# long, s.
 _DOUBTED_S = 3.0
 
-# What is not sure may be chance, which does not come twice: another source counts when
-# it was heard so many times, at most so long after one another; and the followed one,
-# after a silence, when it is heard a second time, s.
+# A sound that is not sure may be chance, which does not repeat. Another source is
+# confirmed once it was heard this many times, with gaps of at most this long, s. The
+# followed source is confirmed when it is heard a second time after a silence of this
+# length, s.
 _TIMES = 3
 _GAP_S = 0.06
 _SILENCE_S = 0.2
 
-# A delay of the source is farther off than the gate in one frame of so many.
+# Share of the frames in which the delays of the right source are outside the gate.
 _GATE = 3e-4
 
-# Cost of a sound of no known source: one in ten frames has one, with delays of any size
-# up to a metre.
+# Cost of a sound that belongs to no known source. It assumes that one in ten frames
+# contains such a sound, with delays of any size up to 1 m.
 _NOWHERE = -1.0
 
-# A second sound where the followed one is expected is as likely to be it when it
-# correlates more than this share of the first.
+# A second sound at the expected position makes the choice ambiguous if its correlation
+# exceeds this share of the first one's correlation.
 _SECOND = 0.6
 
-# Standard deviations: of what delays leave out, above all the robot's turning within a
-# frame; of what the tracker's covariance does; and of a source's velocity, m and m/s.
+# Standard deviations of errors that are not in the covariances. The first is that of
+# the delays, mainly due to turning of the robot within a frame, m. The second is that
+# of the tracker's position, m. The third is that of the velocity of a source, m/s.
 _DELAY_FLOOR_M = 0.008
 _PLACE_FLOOR_M = 0.03
 _SPEED_M_S = 0.35
 
-# Where only the direction is known the range is about this, and half of it off, m.
+# Assumed range if only the direction is known, m. Its standard deviation is half of it.
 _RANGE_M = 2.5
 
-# What is meant by a first bearing, standard deviation, rad.
+# Standard deviation of the first bearing that the user gives, rad.
 _BEARING = math.radians(4.0)
 
 
 class Belief(NamedTuple):
-    """What the tracker says of the followed source, and odometry of the robot."""
+    """Estimate of the followed source by the tracker, and odometry of the robot."""
 
     p_WS: NDArray[np.float64]
-    """(2,) m."""
+    """(2,) position of the source in W, m."""
     covariance: NDArray[np.float64]
-    """(2, 2) m^2."""
+    """(2, 2) covariance of the position, m^2."""
     age: float
-    """Of what was last heard of it, s; ``NEVER_HEARD_S`` and more: nothing yet."""
+    """Time since the source was last heard, s; ``NEVER_HEARD_S`` or more: never."""
     pose: NDArray[np.float64]
-    """(3,) of B in W, m and rad."""
+    """(3,) x, y, theta of B in W, m and rad."""
 
 
 class _Line(NamedTuple):
-    """That of a row of microphones, or of none."""
+    """Line of a row of microphones, or none."""
 
     p: NDArray[np.float64]
-    """(2,) a point of it in W, m."""
+    """(2,) point of the line in W, m."""
     normal: NDArray[np.float64]
-    """(2,) unit vector; zeros where nothing is mirrored."""
+    """(2,) unit normal of the line; zeros if there is no mirror image."""
 
     def mirrored(
         self, p: NDArray[np.float64], covariance: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A place's other side of it."""
+        """Mirrors a position and its covariance at the line."""
         flip = np.eye(2) - 2.0 * np.outer(self.normal, self.normal)
         return self.p + flip @ (p - self.p), flip @ covariance @ flip
 
 
 class _Place(NamedTuple):
-    """Where a source was when it was last heard."""
+    """Position of a source when it was last heard, m, with covariance, m^2."""
 
     p: NDArray[np.float64]
     covariance: NDArray[np.float64]
@@ -100,22 +106,22 @@ class _Place(NamedTuple):
 
 
 class ChoiceMemory(NamedTuple):
-    """What a frame leaves behind for the choice in the next one."""
+    """What the choice in one frame leaves for the next one."""
 
     line: NDArray[np.float64]
-    """(4,) point and normal of the row as the followed source was last heard."""
+    """(4,) point and normal of the row when the followed source was last heard."""
     others: NDArray[np.float64]
-    """(k, 13) other sources: time since each was heard, s, how often it was, 1 where
-    that was together with the followed one; place; covariance; point and normal of the
-    row."""
+    """(k, 13) other sources. Columns: time since the source was heard, s; number of
+    times; 1 if it was heard together with the followed source; position (2); covariance
+    (4); point (2) and normal (2) of the row."""
 
     @classmethod
     def unpack(cls, values: NDArray[np.float64]) -> ChoiceMemory:
-        """From the (n,) vector that ``pack`` gave."""
+        """Converts the (n,) vector of ``pack`` to a memory."""
         return cls(values[:4].copy(), values[4:].reshape(_OTHERS, -1).copy())
 
     def pack(self) -> NDArray[np.float64]:
-        """All of it in one vector."""
+        """Returns the memory as one vector."""
         return np.concatenate((self.line, self.others.ravel()))
 
 
@@ -123,12 +129,12 @@ class SourceChoice:
     """Chooses among the sounds of successive frames.
 
     Args:
-        shape: The microphones, in a plane; axes of B.
+        shape: The microphones, in a plane, in axes of B.
         c: Speed of sound, m/s.
-        p_BA: (2,) their centroid from the origin of B, m.
+        p_BA: (2,) centroid of the microphones from the origin of B, m.
         frame_s: Period of the frames, s.
-        first_bearing: Of the source before it is heard, rad; None: it is the first
-            sound that is heard alone.
+        first_bearing: Bearing of the source before it is heard, rad. None: the source
+            is the first sound that is heard alone.
     """
 
     def __init__(
@@ -143,11 +149,11 @@ class SourceChoice:
         self._frame_s, self._first_bearing = frame_s, first_bearing
         count = shape.count - 1
         self._gate = float(chdtri(count, _GATE))
-        # Every channel is off by itself.
+        # Each channel has an independent error.
         self._floor = _DELAY_FLOOR_M**2 * (np.eye(count) + 1.0)
 
     def blank(self) -> ChoiceMemory:
-        """Nothing heard yet."""
+        """Returns the memory before anything is heard."""
         others = np.zeros((_OTHERS, 13))
         others[:, 0] = NEVER_HEARD_S
         return ChoiceMemory(np.zeros(4), others)
@@ -160,20 +166,27 @@ class SourceChoice:
         *,
         may_sound: bool = True,
     ) -> tuple[int | None, ChoiceMemory]:
-        """The sound of the followed source.
+        """Returns the sound of the followed source.
+
+        The costs of all sounds are computed for the followed source (``own``) and for
+        the other known sources (``costs``). Infinite costs then exclude assignments
+        that are not credible. The assignment with the least total cost follows. It
+        updates the other sources, and it gives the sound of the followed source.
 
         Args:
             candidates: Sounds of a frame.
-            memory: What the last frame left.
-            belief: Now.
+            memory: What the previous frame left.
+            belief: Present estimate of the source, and pose of the robot.
             may_sound: Whether the source can sound by its schedule.
 
         Returns:
-            Its place among them, None where it is not heard; and the new memory.
+            Index of the sound in ``candidates``, or None if the source is not heard;
+            and the new memory.
         """
         others = _aged(memory.others, self._frame_s, doubted=belief.age > _DOUBTED_S)
         if not candidates:
             return None, memory._replace(others=others)
+        # Costs of each sound for each known source.
         centre, turn, line = self._array(belief.pose)
         microphones = centre + self._shape.p_AM @ turn.T
         places = [_grown(row) for row in others]
@@ -185,18 +198,21 @@ class SourceChoice:
         if may_sound and followed is not None:
             own = np.array([self._cost(c, followed, microphones) for c in candidates])
         elif may_sound and _is_alone(candidates):
+            # The first sound that is alone becomes the followed source.
             own[0] = _NOWHERE - 1.0
         counts = others[:, 1] >= _TIMES
-        # Beside a sound that goes on there are its side peaks.
+        # Sounds nearer to a confirmed source that still sounds are its side peaks.
         beside = counts & (others[:, 0] <= _SILENCE_S)
         own[own > costs.min(axis=1, initial=math.inf, where=beside)] = math.inf
+        # After a silence, a sound that is not sure must be heard twice.
         sure = np.array([c.sure for c in candidates])
         if belief.age > _SILENCE_S:
             again = np.isfinite(costs[:, ~counts]).any(axis=1)
             own[~again & ~sure] = math.inf
         shared = costs.copy()
-        # What was heard once is the followed source then, not another one.
+        # A sound that may be the followed source confirms no other source.
         shared[np.ix_(np.isfinite(own), ~counts)] = math.inf
+        # A sound that is not sure is none of a confirmed source that was silent.
         shared[np.ix_(~sure, counts & ~beside)] = math.inf
         belongs = _assigned(np.column_stack((own, shared)))
         chosen = belongs.index(0) if 0 in belongs else None
@@ -205,14 +221,16 @@ class SourceChoice:
                 self._remember(others, place, candidate, (centre, turn, line))
         if chosen is None or _is_ambiguous(chosen, own, belongs, candidates):
             return None, memory._replace(others=others)
+        # The chosen sound was not that of an unconfirmed source.
         others[~counts & np.isfinite(costs[chosen]), 0] = NEVER_HEARD_S
+        # These were heard together with the followed source.
         others[(others[:, 0] == 0.0) & (others[:, 1] > 1.0), 2] = 1.0
         return chosen, ChoiceMemory(np.concatenate(line), others)
 
     def _array(
         self, pose: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], _Line]:
-        """Centroid of the microphones in W, the rotation R_WB, and their line."""
+        """Returns the microphones' centroid in W, the rotation R_WB, and their line."""
         cosine, sine = math.cos(pose[2]), math.sin(pose[2])
         turn = np.array([[cosine, -sine], [sine, cosine]])
         centre = pose[:2] + turn @ self._p_BA
@@ -230,7 +248,7 @@ class SourceChoice:
         centre: NDArray[np.float64],
         turn: NDArray[np.float64],
     ) -> _Place | None:
-        """Where the followed source is expected; None: anywhere."""
+        """Returns the expected position of the followed source; None: unknown."""
         if belief.age < NEVER_HEARD_S:
             covariance = belief.covariance + _PLACE_FLOOR_M**2 * np.eye(2)
             return _Place(belief.p_WS, covariance, _Line(*memory.line.reshape(2, 2)))
@@ -247,7 +265,11 @@ class SourceChoice:
         place: _Place | None,
         microphones: NDArray[np.float64],
     ) -> float:
-        """Twice the negative log-likelihood of being heard so; infinity: beyond it."""
+        """Returns twice the negative log-likelihood of a sound from a source.
+
+        The smaller value of the two sides of the row counts. It is infinite if the
+        delays are outside the gate.
+        """
         if place is None:
             return math.inf
         sides = [place[:2]]
@@ -270,7 +292,15 @@ class SourceChoice:
         candidate: Candidate,
         array: tuple[NDArray[np.float64], NDArray[np.float64], _Line],
     ) -> None:
-        """Another source was heard: one of a place (from 1), or a new one."""
+        """Stores the position of another source that was heard.
+
+        Args:
+            others: Other sources, changed.
+            place: Number of the known source, from 1; None: a new source, which
+                replaces the one that was not heard for the longest time.
+            candidate: The sound.
+            array: Return value of ``_array``.
+        """
         centre, turn, line = array
         row = int(others[:, 0].argmax()) if place is None else place - 1
         fix = candidate.fix
@@ -285,10 +315,13 @@ class SourceChoice:
 
 
 def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
-    """Place that each sound belongs to, no two the same; None: none.
+    """Assigns sounds to sources with the least total cost.
 
     Args:
-        costs: (sounds, places), infinite where one is not the other's.
+        costs: (sounds, sources), infinite if a sound cannot be that of the source.
+
+    Returns:
+        Index of the source of each sound, each at most once; None: no known source.
     """
     sounds, places = costs.shape
     finite = np.where(np.isfinite(costs), costs, 1e9)
@@ -298,7 +331,7 @@ def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
 
 
 def _is_alone(candidates: Sequence[Candidate]) -> bool:
-    """Whether the first of all sounds is the only one, side peaks apart."""
+    """Returns whether the first sound is the only one, apart from side peaks."""
     most = _SECOND * candidates[0].correlation
     return candidates[0].alone and all(c.correlation <= most for c in candidates[1:])
 
@@ -309,7 +342,7 @@ def _is_ambiguous(
     belongs: Sequence[int | None],
     candidates: Sequence[Candidate],
 ) -> bool:
-    """Whether another sound that is no known source's may be the followed one's."""
+    """Returns whether another unassigned sound may be that of the followed source."""
     most = _SECOND * candidates[chosen].correlation
     return any(
         k != chosen and np.isfinite(own[k]) and not belongs[k] and c.correlation > most
@@ -320,7 +353,7 @@ def _is_ambiguous(
 def _aged(
     others: NDArray[np.float64], seconds: float, *, doubted: bool
 ) -> NDArray[np.float64]:
-    """Other sources so much later, without those that are forgotten."""
+    """Ages the other sources by some seconds and drops those to be forgotten."""
     others = others.copy()
     others[:, 0] += seconds
     gone = others[:, 0] > _FORGOTTEN_S
@@ -335,13 +368,13 @@ def _placed(
     u: NDArray[np.float64],
     covariance: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Place of a source of which only the direction is known, with covariance."""
+    """Returns the position of a source with unknown range, and its covariance."""
     along = np.outer(u, u) / 4.0
     return centre + _RANGE_M * u, _RANGE_M**2 * (covariance + along)
 
 
 def _grown(row: NDArray[np.float64]) -> _Place | None:
-    """Where another source may be by now; None: there is none."""
+    """Returns where another source may be now; None: this row holds no source."""
     if row[0] >= NEVER_HEARD_S:
         return None
     covariance = row[5:9].reshape(2, 2) + (_SPEED_M_S * row[0]) ** 2 * np.eye(2)
@@ -353,7 +386,16 @@ def _expected_delays(
     covariance: NDArray[np.float64],
     microphones: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n - 1,) mean and (n - 1, n - 1) covariance of the delays from a place, m."""
+    """Computes mean and covariance of the range differences to microphone 0.
+
+    Args:
+        p: (2,) position of the source in W, m.
+        covariance: (2, 2) covariance of the position, m^2.
+        microphones: (n, 2) positions in W, m.
+
+    Returns:
+        (n - 1,) mean, m, and (n - 1, n - 1) covariance, m^2.
+    """
     root = math.sqrt(2.0) * np.linalg.cholesky(covariance + 1e-12 * np.eye(2))
     points = np.vstack((p + root.T, p - root.T))
     ranges = np.linalg.norm(points[:, np.newaxis] - microphones, axis=2)

@@ -1,4 +1,4 @@
-"""Where a source is, as an array of microphones hears it."""
+"""Estimated position or direction of a source."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-#: A source nearer than this to the centroid is not believed, m.
+#: A source nearer to the centroid than this is rejected, m.
 NEAREST_M = 0.2
 
-#: Statuses of a range. The frame has no sound.
+#: Statuses of a range.
+#: The frame has no sound.
 NOTHING_HEARD = 0
 #: There is a range.
 RANGED = 1
 #: The delays are those of a plane wave: no finite range fits.
 PLANE_WAVE = 2
-#: No place has these delays.
+#: No position has these delays.
 NO_PLACE = 3
 #: The error of the range is too large.
 UNCERTAIN = 4
-#: A range is one unknown too many for the number of microphones.
+#: There are too few microphones for a range in addition to the direction.
 TOO_FEW_MICROPHONES = 5
 #: The frame has a sound, but the estimator rejects it.
 REJECTED = 6
@@ -37,13 +38,14 @@ def range_status(
     largest_error: float = 1.0,
     enough: bool = True,  # noqa: FBT001, FBT002  # compiled code calls it by position
 ) -> int:
-    """Whether the delays of a sound have a range, or why they have none.
+    """Returns whether the delays of a sound have a range, or why they have none.
 
     Args:
-        inverse_range: The best fit, 1/m: 0 or less for a plane wave, NaN if no place
-            has these delays.
-        error: Of the range, in any measure.
-        largest_error: Errors from this one on are too large, in the same measure.
+        inverse_range: Best fit, 1/m; 0 or less for a plane wave, NaN if no position has
+            these delays.
+        error: Error of the range, in any measure.
+        largest_error: Limit of the error in the same measure; the error must be below
+            it.
         enough: Whether there are enough microphones for a range.
 
     Returns:
@@ -61,44 +63,47 @@ def range_status(
 
 @dataclass(frozen=True)
 class SourceFix:
-    """A source seen from the microphones' centroid, with first-order errors.
+    """Estimated source relative to the microphones' centroid, with first-order errors.
 
-    The errors count those of the delays alone, not those of the microphones'
-    places or of the speed of sound.
+    The errors are those of the delays alone. They include no errors of the microphone
+    positions or of the speed of sound.
     """
 
     bearing: float
     """Azimuth in the x-y plane, CCW from +x, in (-pi, pi], rad."""
     bearing_std: float
-    """rad; infinity where the array cannot tell."""
+    """Standard deviation of the bearing, rad; infinite if the array cannot measure
+    it."""
     elevation: float | None
-    """From the x-y plane, rad; None for positions in the plane and for a level
-    row, which cannot tell."""
+    """Elevation from the x-y plane, rad. None for positions in the plane, and for a
+    level row, which cannot measure it."""
     elevation_std: float | None
-    """rad; infinity where the array cannot tell."""
+    """Standard deviation of the elevation, rad; infinite if the array cannot measure
+    it."""
     range: float
-    """m; 0 where it is not valid."""
+    """Distance from the centroid, m; 0 if it is not valid."""
     range_status: int
-    """Whether there is a range, or why there is none, see ``range_status``."""
+    """Whether there is a range, or why there is none (``range_status``)."""
     range_std: float
-    """m; infinity where the range is not valid."""
+    """Standard deviation of the range, m; infinite if the range is not valid."""
     p_AS: NDArray[np.float64]
-    """(d,) m; of unit length where the range is not valid."""
+    """(d,) position of the source from the centroid, m; a unit vector if the range is
+    not valid."""
     covariance: NDArray[np.float64]
-    """(d, d) of p_AS, m^2; of the unit vector where the range is not valid."""
+    """(d, d) covariance of p_AS, m^2; of the unit vector if the range is not valid."""
     chi_square: float = 0.0
-    """Squares of the delays' residuals over their errors. Where the geometry is
-    right it has ``ArrayShape.freedom`` as its mean."""
+    """Sum of the squared residuals of the delays over their errors. Its mean is
+    ``ArrayShape.freedom`` if the geometry is right."""
     twin: NDArray[np.float64] | None = None
-    """(d,) another place, no mirror image, that fits as well, m."""
+    """(d,) another position that fits as well and is no mirror image, m."""
 
     @property
     def range_valid(self) -> bool:
-        """Whether there is a range."""
+        """Whether the range is valid."""
         return self.range_status == RANGED
 
     def without_range(self) -> SourceFix:
-        """The same direction alone, for a range that is too uncertain."""
+        """Returns the same direction without a range, because it is too uncertain."""
         if not self.range_valid:
             return self
         u = self.p_AS / np.linalg.norm(self.p_AS)
@@ -113,13 +118,13 @@ class SourceFix:
         )
 
     def within_error(self, share: float) -> SourceFix:
-        """The same, without its range if that is too uncertain.
+        """Returns the same estimate, without its range if that is too uncertain.
 
         Args:
-            share: The error of the range has to be below this share of it.
+            share: The error of the range must be below this share of the range.
 
         Returns:
-            This one, or one without a range.
+            This estimate, or one without a range.
         """
         if not self.range_valid:
             return self
@@ -128,7 +133,7 @@ class SourceFix:
         return self if status == RANGED else self.without_range()
 
     def mirrored(self, shape: ArrayShape) -> SourceFix | None:
-        """The other candidate of an ambiguous array; None if there is none."""
+        """Returns the other candidate of an ambiguous array; None if there is none."""
         if shape.ahead is None:
             return None
         flip = np.eye(shape.dimension) - 2.0 * np.outer(shape.ahead, shape.ahead)

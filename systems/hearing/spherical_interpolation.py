@@ -1,4 +1,4 @@
-"""Place of a source from differences of range, by spherical interpolation."""
+"""Locates a source from range differences by spherical interpolation."""
 
 from __future__ import annotations
 
@@ -9,30 +9,32 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.hearing.source_fix import RANGED, range_status
 
-#: Places farther than this are none: the plane wave's bearing is better, m.
+#: Positions farther than this are rejected: the bearing of the plane wave is better, m.
 FARTHEST_M = 4.0
-#: A place counts if its bearing is this near to that of the plane wave, deg.
+#: Largest difference between the bearings of the position and of the plane wave, deg.
 AGREEMENT_DEG = 15.0
 
 
 def interpolate_sphere(
     p_RM: ArrayLike, d: ArrayLike
 ) -> tuple[NDArray[np.float64], float]:
-    """Least-squares place of a source (Song 2011, eq. 14 to 17; Smith, Abel 1987).
+    """Computes the least-squares position of a source.
+
+    See Song 2011, eq. 14 to 17; Smith, Abel 1987.
 
     Args:
-        p_RM: (n, k) microphones from the reference one, m; n at least k + 1, or k = 2
-            with three of them, for which the equations are exact.
-        d: (n,) range of the source from each less that from the reference one, m.
+        p_RM: (n, k) microphones from the reference microphone, m; n is at least k + 1.
+            With n = k + 1, the equations are exact.
+        d: (n,) range from each microphone less that from the reference microphone, m.
 
     Returns:
-        (k,) the source from the reference microphone, m, and its range, m, which is
-        negative or infinite where the differences fit no place.
+        (k,) source from the reference microphone, m, and its range, m. The range is
+        negative or infinite if no position has these differences.
     """
     S, d = np.asarray(p_RM, dtype=float), np.asarray(d, dtype=float)
     inverse = np.linalg.pinv(S)
     delta = np.sum(S * S, axis=1) - d * d
-    left = d - S @ (inverse @ d)  # P d, by which the range is known
+    left = d - S @ (inverse @ d)  # P d, which determines the range
     below = 2.0 * left @ d
     if abs(below) < 1e-15:
         return np.full(S.shape[1], np.inf), math.inf
@@ -41,14 +43,15 @@ def interpolate_sphere(
 
 
 def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:
-    """Bearing of a source far away.
+    """Computes the bearing of a source far away.
 
     Args:
-        p_RM: (n, 2) microphones from the reference one, m.
-        d: (n,) differences of range, m.
+        p_RM: (n, 2) microphones from the reference microphone, m.
+        d: (n,) range differences, m.
 
     Returns:
-        CCW from x, rad; never on the wrong side, near sources 5 deg off at 0.25 m.
+        Bearing CCW from x, rad. It is never on the wrong side. For a source at 0.25 m,
+        its error is about 5 deg.
     """
     x, y = -np.linalg.pinv(np.asarray(p_RM, dtype=float)) @ np.asarray(d, dtype=float)
     return math.atan2(y, x)
@@ -57,17 +60,18 @@ def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:
 def near_or_far(
     p_RM: ArrayLike, d: ArrayLike
 ) -> tuple[float, NDArray[np.float64] | None, int]:
-    """Bearing, and the place where one can be believed.
+    """Computes the bearing, and the position if it is credible.
 
-    Spherical interpolation turns by 180 deg where errors change the sign of the sum of
-    the differences; so its place counts only within 4 m and 15 deg of the plane wave.
+    Errors can change the sign of the sum of the range differences. Spherical
+    interpolation then turns the bearing by 180 deg. Its position is therefore used only
+    within 4 m, and within 15 deg of the plane wave.
 
     Args:
-        p_RM: (n, 2) microphones from the reference one, m.
-        d: (n,) differences of range, m.
+        p_RM: (n, 2) microphones from the reference microphone, m.
+        d: (n,) range differences, m.
 
     Returns:
-        Bearing, rad, (2,) the place from the reference microphone, m, or None, and the
+        Bearing, rad; (2,) position from the reference microphone, m, or None; and the
         status of the range (``range_status``).
     """
     plane = plane_wave_bearing(p_RM, d)
@@ -82,12 +86,12 @@ def near_or_far(
 
 
 def inverse_of(distance: float) -> float:
-    """The inverse of a range of ``interpolate_sphere``, as ``range_status`` takes it.
+    """Inverts a range of ``interpolate_sphere`` for ``range_status``.
 
     Args:
-        distance: m; 0 or less where no place fits.
+        distance: Range, m; 0 or less if no position fits.
 
     Returns:
-        1/m; 0 for a plane wave, NaN where no place fits.
+        Inverse range, 1/m; 0 for a plane wave, NaN if no position fits.
     """
     return 1.0 / distance if distance > 0.0 else math.nan

@@ -1,4 +1,4 @@
-"""Bearing by steering the array at places around it, near ones included."""
+"""Estimates a bearing by steering the array to positions around it."""
 
 from __future__ import annotations
 
@@ -7,46 +7,47 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-#: Ranges of the grid, m, near and far: more of them find more echoes.
+#: Ranges of the grid, m, one near and one far. More ranges would find more echoes.
 _RANGES_M = (0.4, 3.0)
-#: Bearings of the grid are so far apart, deg; the peak is refined between them.
+#: Step of the bearings of the grid, deg. The peak is refined between them.
 _STEP_DEG = 2.0
-#: Another peak this far off is another direction, deg.
+#: A peak counts as another direction if it is at least this far away, deg.
 _APART_DEG = 15.0
 
 
 class NearGrid(NamedTuple):
-    """Places around an array, and delays of sound from there."""
+    """Positions around an array, and the delays of sound from there."""
 
     bearings: NDArray[np.float64]
-    """(b,) from the reference microphone, rad CCW from x."""
+    """(b,) bearings from the reference microphone, CCW from x, rad."""
     delays: NDArray[np.float64]
-    """(pairs, r, b) t_j - t_i, s."""
+    """(pairs, r, b) delays t_j - t_i, s."""
 
 
 class Steered(NamedTuple):
-    """Where the response is strongest."""
+    """The strongest position of a grid."""
 
     bearing: float
-    """rad."""
+    """Bearing of the strongest position, rad."""
     delays: NDArray[np.float64]
-    """(pairs,) of the strongest place, s."""
+    """(pairs,) delays of the strongest position, s."""
     other: float
-    """Bearing of the strongest peak elsewhere, rad."""
+    """Bearing of the strongest other peak, rad."""
     other_share: float
-    """Its response over that of the strongest; 0: there is none."""
+    """Ratio of the response at the other peak to the strongest response. 0 if there is
+    no other peak."""
     response: float
-    """Of the strongest place: the sum of the correlations there."""
+    """Response of the strongest position: the sum of the correlations there."""
 
 
 def near_grid(
     p_RM: NDArray[np.float64], pairs: list[tuple[int, int]], c: float
 ) -> NearGrid:
-    """The grid of an array.
+    """Makes the grid of an array.
 
     Args:
-        p_RM: (n, 2) microphones from the reference one, m.
-        pairs: Of microphones.
+        p_RM: (n, 2) microphones from the reference microphone, m.
+        pairs: Pairs of microphones.
         c: Speed of sound, m/s.
 
     Returns:
@@ -67,15 +68,17 @@ def _wrapped(angle: Any) -> Any:
 def steer(
     grid: NearGrid, correlations: NDArray[np.float64], fine_rate_hz: float
 ) -> Steered:
-    """The strongest place of a grid.
+    """Finds the strongest position of a grid.
 
     Args:
-        grid: Places.
-        correlations: (pairs, n) over delays, 0 first, as ``cross_correlations`` gives.
-        fine_rate_hz: Points a second of them, Hz.
+        grid: The grid.
+        correlations: (pairs, n) correlations over the delay, 0 first, as those of
+            ``cross_correlations``.
+        fine_rate_hz: Correlation values per second, Hz.
 
     Returns:
-        The strongest bearing, between the grid's by a parabola, and the next one.
+        The strongest bearing, refined between those of the grid by a parabola, and the
+        strongest other peak.
     """
     response = np.zeros(grid.delays.shape[1:])
     length = correlations.shape[1]

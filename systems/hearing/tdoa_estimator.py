@@ -1,4 +1,4 @@
-"""Bearing and range of the source from the frames of the microphones."""
+"""Estimates bearing and range of the source from the microphone frames."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ def robot_localiser(
     acoustics: AcousticParameters,
     microphones: MicArrayParameters = MicArrayParameters(),
 ) -> tuple[Localiser, NDArray[np.float64]]:
-    """The localiser of the robot's own microphones.
+    """Makes the localizer of the robot's own microphones.
 
     Args:
-        parameters: Of the estimator.
-        robot: Places of the microphones.
+        parameters: Parameters of the estimator.
+        robot: Positions of the microphones.
         acoustics: Speed of sound.
         microphones: Sample rate and length of the frames.
 
     Returns:
-        The localiser, and (2,) the microphones' centroid from P in B axes, m.
+        The localizer, and (2,) centroid of the microphones from P in B axes, m.
     """
     shape = ArrayShape.of(robot.microphones_m)
     localiser = Localiser(
@@ -64,16 +64,16 @@ def robot_choice(
     p_PA_B: NDArray[np.float64],
     frame_s: float,
 ) -> SourceChoice:
-    """What chooses among the sounds that a robot's localiser finds.
+    """Makes the choice among the sounds that the localizer of a robot finds.
 
     Args:
-        localiser: Of ``robot_localiser``.
-        robot: Place of P.
-        p_PA_B: (2,) the microphones' centroid from P in B axes, m.
+        localiser: Localizer of ``robot_localiser``.
+        robot: Position of P.
+        p_PA_B: (2,) centroid of the microphones from P in B axes, m.
         frame_s: Period of the frames, s.
 
     Returns:
-        It, with the first bearing of the localiser's parameters.
+        The choice, with the first bearing of the localizer's parameters.
     """
     degrees = localiser.parameters.first_bearing_deg
     return SourceChoice(
@@ -88,70 +88,73 @@ def robot_choice(
 def may_sound(
     sound: SoundParameters, time: float, longest_way: float, frame_s: float
 ) -> bool:
-    """Whether a frame can hold direct sound of a source, by its schedule.
+    """Returns whether a frame can contain direct sound of a source by its schedule.
 
     Args:
-        sound: Its gate.
+        sound: Schedule of the source.
         time: End of the frame, s.
-        longest_way: Longest that sound can take to the microphones, s.
+        longest_way: Longest travel time of sound to the microphones, s.
         frame_s: Length of the frame, s.
 
     Returns:
-        False where the frame can only hold noise and reverberation.
+        False if the frame can contain only noise and reverberation.
     """
     phase = time - sound.start_s
-    # A frame that ends as a burst begins holds none of it.
+    # A frame that ends when a burst begins contains nothing of the burst.
     since_burst = phase % sound.period_s or sound.period_s
     open_for = sound.on_s + longest_way + frame_s
     return phase > 0.0 and since_burst < open_for
 
 
-#: Input ports for ``choose: followed``.
+#: Additional input ports for ``choose: followed``.
 _BELIEF = (
     Port("p_WS_estimated", 2, "m"),
     Port("covariance_W", 4, "m^2"),
     Port("age", 1, "s"),
     Port("pose_WB_estimated", 3, "m, m, rad"),
 )
-# Groups of the discrete state: the outputs one after the other, and memories.
+# Groups of the discrete state: the outputs in order, and three memories.
 _OUTPUTS, _MEMORY, _ECHOES, _CHOICE = range(4)
 
 
 class TDOAEstimator(Block):
-    """Hears where the source is.
+    """Estimates where the source is.
 
-    ``systems.hearing.localise`` computes where the sound of a frame comes from: delays
-    of all pairs of channels, a place that explains them, and its errors. Range and
-    bearing count from the microphones' centroid, for the default row M2 = P;
-    p_PS_B from P. Microphones in a row cannot tell front from back: the source
-    is reported in the front half plane. Where nothing is heard all outputs are
-    zero. Where ``range_valid`` is 0 the range is 0, p_PS_B is the unit vector
-    along the bearing and the covariance is that of this vector; ``range_status``
-    says why (``systems.hearing.source_fix``). The covariance
-    (row major, of p_PS_B) counts noise and echoes, not errors of the
-    microphones' places or of the speed of sound.
+    ``systems.hearing.localise`` measures the delays of all pairs of channels, finds the
+    position that explains them, and computes its errors.
 
-    With ``choose: followed`` it hears each of the sounds of a frame and chooses the one
-    that comes from where the source is expected (``systems.hearing.source_choice``). It
-    then has four further input ports, which ``SourceTracker`` and ``WheelOdometry``
-    publish: p_WS_estimated [m], covariance_W [m^2], age [s] and pose_WB_estimated [m,
-    m, rad]. They act on the state alone: no algebraic loop.
+    Range and bearing refer to the centroid of the microphones. For the default row,
+    this is M2 = P. ``p_PS_B`` refers to P. A row of microphones cannot distinguish
+    front from back, so the source is reported in the front half plane.
 
-    State: the outputs, ``HearingMemory``, and with ``choose: followed``
-    ``ChoiceMemory``.
-    Rate and latency: updated every ``frame_s`` of the microphones, 25 ms, from the
-    frame that ends then, and visible after it: one tick, the time that a processor
-    takes.
+    If there is no estimate, all outputs except ``range_status`` are zero. If there is
+    an estimate without range, the range is 0, and ``p_PS_B`` is the unit vector along
+    the bearing. ``range_status`` gives the reason (``systems.hearing.source_fix``).
+    ``covariance`` is that of ``p_PS_B``, in row-major order. It includes noise and
+    echoes, but no errors of microphone positions or of the speed of sound.
+
+    With ``choose: followed``, the block locates each of the sounds of a frame. It
+    chooses the one from the expected position of the source
+    (``systems.hearing.source_choice``). It then has four further input ports, which
+    ``SourceTracker`` and ``WheelOdometry`` publish: p_WS_estimated [m], covariance_W
+    [m^2], age [s] and pose_WB_estimated [m, m, rad]. These ports affect only the state,
+    so there is no algebraic loop.
+
+    State: the outputs, ``HearingMemory``, and ``ChoiceMemory`` with ``choose:
+    followed``.
+    Rate and latency: the block updates every ``frame_s`` of the microphones, 25 ms,
+    from the frame that ends then. The outputs change one tick later, which models the
+    computing time.
 
     Args:
         parameters: Method, band and thresholds.
-        robot: Places of the microphones.
+        robot: Positions of the microphones.
         acoustics: Speed of sound.
-        sound: What is listened to; its gate is the schedule where that is known.
+        sound: The sound of the source; its gate is the schedule if that is known.
         microphones: Sample rate and length of the frames.
 
     Raises:
-        InputError: The array cannot serve at this rate and band.
+        InputError: The array cannot be used at this sample rate and band.
 
     Reference: Han 2019, 2.2-2.3; Kim 2017, eq. 3-8.
     """
@@ -226,18 +229,19 @@ class TDOAEstimator(Block):
         memory: HearingMemory,
         choice: tuple[ChoiceMemory, Belief] | None = None,
     ) -> tuple[NDArray[np.float64], HearingMemory, ChoiceMemory | None]:
-        """Where the sound of a frame comes from.
+        """Processes one frame.
 
         Args:
             audio: The frame.
-            memory: What the last frame left.
-            choice: What it left for ``choose: followed``, and what is believed now.
+            memory: What the previous frame left.
+            choice: Memory and present belief for ``choose: followed``; otherwise None.
 
         Returns:
-            Values of the output ports, one after the other, and the new memories.
+            Values of the output ports in order, and the new memories.
 
         Raises:
-            InputError: The frame has another rate, or is none of this array.
+            InputError: The frame has another sample rate or shape than this array
+                needs.
         """
         check_rate(audio, self._microphones.sample_rate_hz, "TDOAEstimator")
         sounds = self._schedule is None or may_sound(
@@ -253,16 +257,16 @@ class TDOAEstimator(Block):
             found, after = self._localiser.candidates(audio.counts, memory)
             best, chosen = self._choice.choose(found, *choice, may_sound=sounds)
             fix = None if best is None else found[best].fix
-        # A frame with a silent channel leaves the memory as it is.
+        # A frame with a silent channel does not change the memory.
         heard = sounds and after.heard and after is not memory
         values = port_values(fix if sounds else None, self._p_PA_B, heard=heard)
         return np.concatenate(values), after, chosen
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each frame of a compiled loop.
+        """Returns the step of the block for the frames of a compiled loop.
 
         Args:
-            run: Has the frames.
+            run: Provides the frames.
 
         Returns:
             The step, which calls Python.
@@ -284,7 +288,7 @@ class TDOAEstimator(Block):
         return host_step(listen, inputs, self._output_size, period)
 
     def _remembered(self, context: Any) -> HearingMemory:
-        """The memory that the last frame left."""
+        """Returns the memory that the previous frame left."""
         numbers = context.get_discrete_state(_MEMORY).value().tolist()
         energy, noise_energy, echoing, heard = numbers
         echoes = None
@@ -295,7 +299,7 @@ class TDOAEstimator(Block):
 
 
 def _belief(values: NDArray[np.float64]) -> Belief:
-    """From the values of the ports ``_BELIEF``, one after the other."""
+    """Converts the values of the ports ``_BELIEF``, in order."""
     return Belief(
         values[:2].copy(),
         values[2:6].reshape(2, 2).copy(),
@@ -307,17 +311,17 @@ def _belief(values: NDArray[np.float64]) -> Belief:
 def port_values(
     fix: SourceFix | None, p_PA_B: NDArray[np.float64], *, heard: bool = False
 ) -> tuple[NDArray[np.float64], ...]:
-    """Values of the output ports, in order.
+    """Returns the values of the output ports in order.
 
     Args:
-        fix: Estimate of the source, if there is one.
-        p_PA_B: (2,) the microphones' centroid from P in B axes, m.
-        heard: Whether the frame has a sound, if there is no estimate.
+        fix: Estimate of the source, or None.
+        p_PA_B: (2,) centroid of the microphones from P in B axes, m.
+        heard: Whether the frame contains a sound although there is no estimate.
 
     Returns:
-        Bearing (1,), rad, range (1,), m, p_PS_B (2,), m, or a unit vector where the
-        range is not known, its covariance (4,), m^2, (1,) flags 0 or 1: heard, and
-        range known, and (1,) the status of the range.
+        Bearing (1,), rad; range (1,), m; p_PS_B (2,), m, or a unit vector without a
+        range; its covariance (4,), m^2; flags ``detected`` and ``range_valid`` (1,), 0
+        or 1; and the status of the range (1,).
     """
     if fix is None:
         sizes = (port.elements({}) for port in TDOAEstimator.outputs)

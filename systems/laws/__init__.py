@@ -1,1 +1,1 @@
-"""Virtual impedance: attraction, repulsion, a controller a law."""
+"""The laws: gains, equations, forces, and one controller per law."""

@@ -1,4 +1,4 @@
-"""The active virtual-impedance law of Han 2019: gains, force and equations."""
+"""The active virtual-impedance law of Han 2019: gains, force, and equations."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 def matched_decay(limit: float, ratio: float) -> float:
-    """Decay length or speed with which two laws are equal at half a limit.
+    """Computes the decay constant for which two laws are equal at half a limit.
 
     Args:
-        limit: The limit, m or m/s.
-        ratio: Of the two gains, above 1.
+        limit: Limit of distance or speed, m or m/s.
+        ratio: Ratio of the larger gain to the smaller gain, above 1.
 
     Returns:
-        limit / (2 ln ratio), as the limit.
+        limit / (2 ln ratio), in the unit of the limit.
     """
     return limit / (2.0 * math.log(ratio))
 
 
 def matched_share(limit: float, decay: float) -> float:
-    """Inverse of ``matched_decay``.
+    """Computes the inverse of ``matched_decay``.
 
     Args:
-        limit: The limit, m or m/s.
-        decay: Decay length or speed, as the limit.
+        limit: Limit of distance or speed, m or m/s.
+        decay: Decay length or decay speed, in the unit of the limit.
 
     Returns:
-        1/ratio of the two gains, exp(-limit / (2 decay)).
+        exp(-limit / (2 decay)), the ratio of the smaller gain to the larger gain.
     """
     return math.exp(-limit / (2.0 * decay))
 
@@ -43,22 +43,23 @@ def matched_share(limit: float, decay: float) -> float:
 class ActiveParameters(Parameters):
     """Spring and damper that vary with distance and speed (Han 2019, eq. 20-22).
 
-    alpha and beta make the law equal to a conventional one with ``matched``
-    gains at half the reach and at half the speed limit.
+    alpha and beta follow from the other fields. With them each term equals that of a
+    law with the constant gains K_0 and D_0: the spring at half the reach, the damper
+    at half the speed limit.
     """
 
     reference_stiffness_n_m: Stiffness = 84.5
-    """k_ref, N/m, above K_0."""
+    """Stiffness k_ref, N/m, above K_0."""
     matched_stiffness_n_m: Stiffness = 17.1
-    """K_0, N/m: the push at rho_0/2 is K_0 rho_0/2."""
+    """Stiffness K_0, N/m. The spring term at the distance rho_0/2 is K_0 rho_0/2."""
     reach_m: Length = 0.8
-    """rho_0, m (Han 2019, 5.2); the law itself has no limit of reach."""
+    """Distance rho_0, m (Han 2019, 5.2). The law acts beyond it, too."""
     reference_damping_n_s_m: Damping = 0.0811
-    """d_ref, N s/m, below D_0."""
+    """Damping d_ref, N s/m, below D_0."""
     matched_damping_n_s_m: Damping = 0.839
-    """D_0, N s/m: the velocity term at mu_0/2 is D_0 mu_0/2."""
+    """Damping D_0, N s/m. The velocity term at the speed mu_0/2 is D_0 mu_0/2."""
     speed_limit_m_s: Speed = 0.72
-    """mu_0: the velocity term acts below this speed, m/s (5.3)."""
+    """Speed mu_0 below which the velocity term acts, m/s (5.3)."""
 
     @model_validator(mode="after")
     def _check(self) -> ActiveParameters:
@@ -92,18 +93,20 @@ class ActiveParameters(Parameters):
 
 
 def active_force(c: Any, s: Any, gains: ActiveParameters) -> Any:
-    """k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s) (Han 2019, eq. 20).
+    """Computes k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s).
+
+    This is eq. 20 of Han 2019. The spring term is bounded. It is largest at c = alpha
+    and zero at contact. The velocity term is d_ref mu_0 for an obstacle at rest, at any
+    distance. Eq. 19-b multiplies K_0(c) by (rho_0 - c) once more, but eq. 20 and
+    table 4 agree with each other.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Its speed, m/s; from mu_0 on the second term is 0 (table 4).
-        gains: k_ref, d_ref, mu_0, and K_0, D_0, rho_0 through alpha, beta.
+        s: Speed of the obstacle, m/s. From mu_0 up, the velocity term is 0 (table 4).
+        gains: Gains of the law.
 
     Returns:
-        Force away from the obstacle, N. The first term is bounded, largest at
-        c = alpha, and zero at contact; the second is d_ref mu_0 at rest, at
-        any distance. Eq. 19-b multiplies K_0(c) by (rho_0 - c) once more; eq.
-        20 and table 4 are the consistent reading.
+        Force away from the obstacle, N.
     """
     spring = gains.reference_stiffness_n_m * exp(-c / gains.alpha_m) * c
     limit = gains.speed_limit_m_s
@@ -137,11 +140,11 @@ ACTIVE = Law(
     loop_gains=("reference_stiffness_n_m", "reference_damping_n_s_m"),
     tuning=Tuning(
         rule="matched",
-        # k_ref/e^2, at 2 alpha.
+        # The slope is steepest at c = 2 alpha: k_ref/e^2.
         stiffest=lambda gains, least_range_m: (
             gains.reference_stiffness_n_m * math.exp(-2.0)
         ),
-        # The velocity term is d_ref mu_0 at rest, and off from mu_0 on.
+        # The velocity term is d_ref mu_0 at rest, and 0 from mu_0 up.
         spring_speed=lambda gains: gains.speed_limit_m_s,
         sets_follow_distance=True,
     ),

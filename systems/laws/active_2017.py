@@ -1,4 +1,4 @@
-"""The active virtual-impedance law of Kim 2017: gains, force and equation."""
+"""The active virtual-impedance law of Kim 2017: gains, force, and equation."""
 
 from __future__ import annotations
 
@@ -9,40 +9,41 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 class Active2017Parameters(Parameters):
-    """Push that grows with nearness and saturates (Kim 2017, eq. 21, fig. 6).
+    """Push that grows as the distance falls, up to a limit (Kim 2017, eq. 21, fig. 6).
 
-    Kim 2017 prints neither gain.
+    Kim 2017 does not print the gains.
     """
 
     distance_gain_j: Positive = 1.22
-    """K_0, J: the push is K_0/c. Not the K_0 of Han's laws."""
+    """Gain K_0, J, of the push K_0/c. Han's laws use the symbol K_0 for a stiffness."""
     saturation_distance_m: Length = 0.1
-    """rho_1: nearer than this the push stays at K_0/rho_1, m (Kim 2017, 5)."""
+    """Distance rho_1 below which the push stays at K_0/rho_1, m (Kim 2017, 5)."""
     damping_n_s_m: Damping = 0.8
-    """D_0, N s/m."""
+    """Damping D_0, N s/m."""
     saturation_speed_m_s: Speed = 0.72
-    """mu_1: faster than this the velocity term stays at D_0 mu_1, m/s. Kim 2017, 5
-    chooses it by trial so that the robot stays below 720 mm/s, and prints no value; the
-    default is that speed."""
+    """Speed mu_1 above which the velocity term stays at D_0 mu_1, m/s. Kim 2017, 5
+    chooses mu_1 by trial so that the robot stays below 720 mm/s, and prints no value.
+    The default is that speed."""
 
 
 def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
-    """K_a(c)/c + D_a(s) s: inverse distance, both terms saturating.
+    """Computes K_a(c)/c + D_a(s) s, in which both terms saturate.
 
-    Kim 2017 gives eq. 21 and, in words, K_a and D_a (figure 6): the push must
-    saturate below rho_1, the speed term above mu_1. Our reading: K_a is K_0
-    from rho_1 on and K_0 c/rho_1 below; D_a is D_0 up to mu_1 and D_0 mu_1/s
-    above. The text says that K *increases* down to rho_1: so does the push.
+    Kim 2017 prints eq. 21 and describes K_a and D_a in words (figure 6). The push must
+    saturate below rho_1, and the velocity term above mu_1. Our reading is: K_a is K_0
+    at distances above rho_1 and K_0 c/rho_1 below. D_a is D_0 at speeds below mu_1 and
+    D_0 mu_1/s above. The paper says that K *increases* as c falls to rho_1. In our
+    reading the push increases.
+
+    The law has no limit of reach. The push halves when the distance doubles.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Its speed, m/s.
-        gains: K_0, rho_1, D_0, mu_1.
+        s: Speed of the obstacle, m/s.
+        gains: Gains of the law.
 
     Returns:
         Force away from the obstacle, N: K_0/max(c, rho_1) + D_0 min(s, mu_1).
-        At contact, at rest, it is K_0/rho_1. Its reach has no end: the push halves
-        when the distance doubles.
     """
     near, fast = gains.saturation_distance_m, gains.saturation_speed_m_s
     spring = gains.distance_gain_j / (c if c > near else near + 0.0 * c)
@@ -68,7 +69,7 @@ ACTIVE_2017 = Law(
     loop_gains=("distance_gain_j", "damping_n_s_m"),
     tuning=Tuning(
         rule="barrier",
-        # K_0/c^2 just outside of rho_1.
+        # The slope is steepest just outside rho_1: K_0/rho_1^2.
         stiffest=lambda gains, least_range_m: (
             gains.distance_gain_j / gains.saturation_distance_m**2
         ),

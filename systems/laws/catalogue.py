@@ -1,4 +1,4 @@
-"""The laws that come with the package, in the order in which all lists have them."""
+"""The laws of the package, in the order of all lists."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from systems.laws.trajectory.trajectory_laws import (
 )
 from systems.laws.vector_field_histogram import VFH_PLUS
 
-#: The laws that come with the package, by name.
+#: The laws of the package by name.
 LAWS: Mapping[str, Law] = {
     law.name: law
     for law in (
@@ -46,10 +46,10 @@ LAWS: Mapping[str, Law] = {
     )
 }
 
-#: Names of those that are compared and analysed together: forces on a virtual mass.
+#: Names of the laws that are forces on the virtual mass. The analyses compare them.
 FORCE_LAWS = tuple(name for name, law in LAWS.items() if not law.plans)
 
 
 def law_title(name: str) -> str:
-    """A law's heading in reports; of a user's own law its name."""
+    """Returns the heading of a law in reports. For a user's law this is its name."""
     return LAWS[name].title if name in LAWS else name

@@ -1,4 +1,4 @@
-"""The conventional virtual-impedance law of Han 2019: gains, force and equation."""
+"""The conventional virtual-impedance law of Han 2019: gains, force, and equation."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ class ConventionalParameters(Parameters):
     """Spring and damper within a reach (Han 2019, eq. 19-a)."""
 
     stiffness_n_m: Stiffness = 12.3
-    """K_0, N/m."""
+    """Stiffness K_0, N/m."""
     damping_n_s_m: Damping = 0.8
-    """D_0, N s/m."""
+    """Damping D_0, N s/m."""
     reach_m: Length = 0.8
-    """rho_0: the law acts below this distance, m (Han 2019, 5.2)."""
+    """Distance rho_0 below which the law acts, m (Han 2019, 5.2)."""
 
 
 def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
-    """K_0 (rho_0 - c) + D_0 s below rho_0, else 0 (Han 2019, eq. 19-a).
+    """Computes K_0 (rho_0 - c) + D_0 s below rho_0, else 0 (Han 2019, eq. 19-a).
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Its speed, m/s.
-        gains: K_0, D_0, rho_0.
+        s: Speed of the obstacle, m/s.
+        gains: Gains of the law.
 
     Returns:
-        Force away from the obstacle, N. It steps by D_0 s at rho_0.
+        Force away from the obstacle, N. It jumps by D_0 s at rho_0.
     """
     if c < gains.reach_m:
         return gains.stiffness_n_m * (gains.reach_m - c) + gains.damping_n_s_m * s

@@ -1,4 +1,4 @@
-"""The conventional virtual-impedance law of Kim 2017: gains, force and equation."""
+"""The conventional virtual-impedance law of Kim 2017: gains, force, and equation."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 class Conventional2017Parameters(Parameters):
-    """Push that grows with nearness without a bound (Kim 2017, eq. 20).
+    """Push that grows without a bound as the distance falls (Kim 2017, eq. 20).
 
-    Kim 2017 prints neither gain.
+    Kim 2017 does not print the gains.
     """
 
     distance_gain_j: Positive = 0.917
-    """K_0, J: the push is K_0/c. Not the K_0 of Han's laws."""
+    """Gain K_0, J, of the push K_0/c. Han's laws use the symbol K_0 for a stiffness."""
     damping_n_s_m: Damping = 0.8
-    """D_0, N s/m."""
+    """Damping D_0, N s/m."""
 
 
 def conventional_2017_force(
     c: Any, s: Any, gains: Conventional2017Parameters, least_range_m: float
 ) -> Any:
-    """K_0/c + D_0 s, at any distance (Kim 2017, eq. 20).
+    """Computes K_0/c + D_0 s at any distance (Kim 2017, eq. 20).
 
-    As printed, the push has no bound as c approaches 0. The least range of the sensors
-    bounds it, because the sensors cannot distinguish distances below that range.
+    As printed, the push has no bound as c approaches 0. Here the least range of the
+    sensors bounds it, because the sensors cannot distinguish distances below that
+    range. The law has no limit of reach. The push halves when the distance doubles.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Its speed, m/s.
-        gains: K_0, D_0.
+        s: Speed of the obstacle, m/s.
+        gains: Gains of the law.
         least_range_m: Least range of the sensors, m, above 0.
 
     Returns:
-        Force away from the obstacle, N: at most K_0/least_range_m at rest. Its reach
-        has no end: the push halves when the distance doubles.
+        Force away from the obstacle, N. For s = 0 it is at most K_0/least_range_m.
     """
     nearest = c if c > least_range_m else least_range_m + 0.0 * c
     return gains.distance_gain_j / nearest + gains.damping_n_s_m * s
@@ -60,7 +60,7 @@ CONVENTIONAL_2017 = Law(
     loop_gains=("distance_gain_j", "damping_n_s_m"),
     tuning=Tuning(
         rule="barrier",
-        # K_0/c^2 just outside of the least range.
+        # The slope is steepest just outside the least range c_min: K_0/c_min^2.
         stiffest=lambda gains, least_range_m: gains.distance_gain_j / least_range_m**2,
     ),
 )

@@ -1,4 +1,4 @@
-"""The dynamic window approach: gains, equation and record."""
+"""The dynamic window approach: gains, equation, and record."""
 
 from __future__ import annotations
 
@@ -18,21 +18,22 @@ class DynamicWindowParameters(MapParameters):
     """Weights and limits of the dynamic window."""
 
     clearance_m: NonNegativeLength = 0.19
-    """Distance kept from places of echoes, m."""
+    """Distance that the robot keeps from cells with echoes, m."""
     heading_gain: NonNegative = 0.91
-    """Weight alpha of the heading (the paper's: 2)."""
+    """Weight alpha of the heading (paper: 2)."""
     distance_gain: NonNegative = 3.0
-    """Weight beta of the distance to the next obstacle (the paper's: 0.2)."""
+    """Weight beta of the distance to the nearest obstacle on the arc (paper: 0.2)."""
     speed_gain: NonNegative = 3.6
-    """Weight gamma of the speed (the paper's: 0.2)."""
+    """Weight gamma of the speed (paper: 0.2)."""
     acceleration_m_s2: Acceleration = 1.0
-    """Acceleration of the window and of braking, m/s^2."""
+    """Acceleration that limits the window, and braking deceleration, m/s^2."""
     turn_acceleration_rad_s2: Positive = 6.1
-    """Turning acceleration of the window and of braking, rad/s^2."""
+    """Yaw acceleration that limits the window, and that stops a turn, rad/s^2."""
     period_s: Duration = 0.1
     """Time from one choice to the next, s."""
     farthest_m: Length = 2.6
-    """Obstacles farther along an arc count as being at this distance, m."""
+    """Largest distance to an obstacle on the arc that counts, m. Obstacles beyond it
+    count as being at this distance."""
 
 
 DWA = Law(

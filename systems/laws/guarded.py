@@ -1,4 +1,4 @@
-"""The guarded law: gains, equation and record."""
+"""The guarded law: gains, equation, and record."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from systems.laws.law import Equation, Law
 
 
 class GuardedParameters(Parameters):
-    """How the guarded law drives, looks and plans."""
+    """How the guarded law drives, looks, and plans."""
 
     look_ahead_m: Length = 1.5
-    """Greatest distance of the points of its path that it heads for, m."""
+    """Greatest distance of the point of the route for which the robot heads, m."""
     weave_rad: float = Field(default=0.3, ge=0.0, le=1.5)
-    """Amplitude of weaving to both sides, with which its sensors sweep, rad."""
+    """Amplitude of weaving to both sides, rad. The sensors sweep by this weaving."""
     weave_period_s: Duration = 2.4
     """Period of weaving, s."""
     search_rad: float = Field(default=1.0, ge=0.0, le=1.5)
-    """Amplitude of weaving where the target or another body moves, rad."""
+    """Amplitude of weaving while the target or another body moves, rad."""
     search_period_s: Duration = 3.4
-    """Period of weaving where something moves, s."""
+    """Period of weaving while the target or another body moves, s."""
     search_less: Fraction = 0.3
-    """Share by which it weaves less where it lags behind the target."""
+    """Share by which this amplitude shrinks when the robot lags far behind the
+    target."""
     hazard_speed_m_s: Speed = 0.6
-    """Greatest speed of the bodies that it tracks, m/s."""
+    """Greatest speed of the bodies that the robot tracks, m/s."""
     risk_gain: NonNegative = 8.0
     """Cost of a predicted contact with a body, as loss of wanted speed, m/s."""
     watch_gain: NonNegative = 0.7
@@ -40,21 +41,22 @@ class GuardedParameters(Parameters):
     replan_s: Duration = 0.5
     """Time from one plan to the next, s."""
     patience_s: Duration = 0.3
-    """After being blocked by the guard for this time it looks at the obstacle, s."""
+    """Time for which the guard blocks the robot before it looks at the obstacle, s."""
     give_up_s: Duration = 5.5
-    """Longest time that it stays there before it marks the obstacle ahead and backs
-    off, s."""
+    """Longest time that the robot stays at one place, s. Then it marks the place ahead
+    as blocked and backs off."""
     search_way_s: Duration = 20.0
-    """Time that it seeks a path where all paths lead through echoes, s."""
+    """Time that the robot searches while all routes cross cells with echoes, s. Then
+    it reports that it gives up."""
     mark_s: Duration = 10.0
-    """Time that it seeks paths away from the obstacle that blocked it, s."""
+    """Time for which routes avoid a place that was marked as blocked, s."""
     clearance_m: NonNegativeLength = 0.02
-    """Distance that paths keep between the disc around the body and echoes, m."""
+    """Distance that routes keep between the disc around the body and echoes, m."""
     source_clearance_m: NonNegativeLength = 0.85
-    """Echoes within this distance of the target do not block paths, m."""
+    """Distance from the target within which echoes do not block routes, m."""
     source_radius_m: Length = 0.35
-    """Echoes within this distance of the target count as echoes of the target: no other
-    body is there, m."""
+    """Distance from the target within which echoes count as echoes of the target, m.
+    The robot expects no other body there."""
 
 
 GUARDED = Law(

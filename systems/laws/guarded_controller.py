@@ -1,4 +1,4 @@
-"""The guarded law: it plans through what is known, and looks before it moves."""
+"""The guarded law, which plans a route on a map and looks before it moves."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from systems.safety.parameters import FreeSpaceParameters
 def guarded_step(
     tick: int, state: DriveState, inputs: Any, outputs: Any, numbers: DriveNumbers
 ) -> None:
-    """The twist of one tick."""
+    """Computes the twist, the plan, and the port ``gives_up`` of one tick."""
     drive_guarded(tick, state, inputs, numbers)
     memory, (twist, plan, gives_up) = state.memory, outputs
     twist[0], twist[1] = memory[0, SPEED], memory[0, TURN]
@@ -46,38 +46,43 @@ def guarded_step(
 
 
 class GuardedController(Block):
-    """Plans a way to the target through seen and unknown space, and looks ahead.
+    """Plans a route to the target through free and unknown space, and looks ahead.
 
-    Every ``replan_s`` it finds the cheapest way for the disc that holds the body:
-    unknown cells cost a little more than those seen free, cells with echoes much more.
-    It drives toward the farthest point of the way that it can reach straight at little
-    cost, at a speed for the way to go, and weaves, so that narrow cones sweep what lies
-    beside it. Before it first moves it looks to both sides. Where the guard stops it,
-    it looks past both sides of the cell that blocks; if this cell stays unseen, ways
-    avoid it for a time. If nothing changes, it backs off.
+    Every ``replan_s`` the block finds the cheapest route for the disc that holds the
+    body. Unknown cells cost a little more than free cells. Cells with echoes cost much
+    more. The robot drives toward the farthest point of the route that it can reach
+    straight at little extra cost. Its speed depends on the remaining distance. It
+    weaves, so that its narrow sensor cones sweep the space beside it.
 
-    It tracks moving bodies (``systems.planning.hazards``): echoes from floor that was
-    seen free are of bodies that have come there. While one may come near, it takes of
-    some speeds and headings the one of least cost: the deviation from what is wanted,
-    the distance from the bodies, and whether the sensors see them.
+    The robot looks to both sides before it first moves. If the guard stops it, it looks
+    past both sides of the blocking cell. If the robot does not see this cell free,
+    routes avoid the cell for a time. If the robot still does not get away, it backs
+    off.
 
-    If for ``search_way_s`` every way leads through cells with echoes, and unknown space
-    leads nowhere, it stops and reports this (``gives_up``), until there is a way.
+    The block tracks moving bodies (``systems.planning.hazards``). It attributes echoes
+    from floor that was free before to bodies that have moved there. While a body may
+    come near, the block chooses among some speeds and headings the pair of least cost.
+    The cost has three terms: the deviation from the wanted motion, the distance from
+    the bodies, and whether the sensors see them.
 
-    ``plan``: 0 no target, 1 driving, 2 looking, 3 backing off, 4 no way found; the
-    point it heads for, and the way to go. It needs the guard: by itself it avoids
-    nothing.
+    If every route crosses cells with echoes for ``search_way_s``, the robot stops and
+    reports this (``gives_up``) until there is a route.
 
-    Abstract state: ``DriveState``. Rate and latency: a function of state and present
-    inputs, at every tick; no latency.
+    The port ``plan`` has the mode, the point for which the robot heads, and the
+    remaining distance. The modes are 0 no target, 1 driving, 2 looking, 3 backing off,
+    and 4 no route found. This law needs the guard, because it does not avoid obstacles
+    by itself.
+
+    Abstract state: ``DriveState``. The outputs are functions of the state and the
+    present inputs at every tick. There is no latency.
 
     Args:
-        robot: Its body, and place of P.
-        attraction: The follow distance.
+        robot: Size of the body, and position of P.
+        attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``guarded``.
-        following: How fast it drives and turns.
-        sensors: The range sensors.
-        known: Grid of the map.
+        following: Speeds and gains of driving and turning.
+        sensors: Parameters of the range sensors.
+        known: Parameters of the map.
         tick_s: Period of the controller, s.
 
     Reference: ours; docs/guard.md.
@@ -153,17 +158,17 @@ def hazard_sensors(
     own: GuardedParameters,
     tick_s: float,
 ) -> HazardSensors:
-    """What the tracks of what moves need to know.
+    """Returns the sensor constants that the tracker of moving bodies uses.
 
     Args:
-        sensors: The range sensors.
-        robot: Place of P.
-        known: Of the map, for the margin of ranges.
+        sensors: Parameters of the range sensors.
+        robot: Robot, for the position of P.
+        known: Parameters of the map, for the error of the ranges.
         own: Parameters of the law.
         tick_s: Period of the controller, s.
 
     Returns:
-        Places, directions and errors of the sensors, and the bodies' top speed.
+        Positions, directions, and errors of the sensors; top speed of the bodies.
     """
     axes, places, half_angle = sensors.beams
     return HazardSensors(

@@ -1,6 +1,10 @@
-"""The block of all laws that are a force, and its functions: attraction and push.
+"""The block of all laws that compute a force, and the functions of these forces.
+
+The virtual mass M at the control point P moves by::
 
     M p'' = F_m + sum of f(c, s) u,   u = -C/|C|,  c = |C|,  s = |dC/dt|
+
+F_m is the attraction. C is the collision vector from P to an obstacle.
 
 Han 2019, eq. 17-18 print the repulsion with the wrong sign and with forces
 that grow with distance; eq. 19 replaces them. See docs/errata.md.
@@ -31,10 +35,10 @@ from systems.ranging.collision_vector import SLOTS
 from systems.ranging.parameters import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
-#: Numbers that are remembered per tick: feature, C_x and C_y of each slot.
+#: Numbers in the state per tick: feature, C_x and C_y of each slot.
 _ROW = 3 * SLOTS
 
-#: A target that is farther than this straight behind P pulls a little aside, m.
+#: If a target is straight behind P by more than this, the pull turns aside, m.
 _BEHIND_M = 0.3
 
 
@@ -42,18 +46,18 @@ _BEHIND_M = 0.3
 def attraction_force(
     p_WP: Any, v_WP: Any, p_WS: Any, valid: Any, attraction: Any, mass: Any
 ) -> Any:
-    """Force on the virtual mass towards the follow point, N.
+    """Computes the force that pulls the virtual mass to the follow distance.
 
     Args:
-        p_WP: Control point, m; floats or AutoDiffXd.
-        v_WP: Velocity of the virtual mass, m/s.
-        p_WS: Target, m.
-        valid: Whether there is a target; without one the mass is braked.
+        p_WP: Position (x, y) of the control point in W, m; floats or AutoDiffXd.
+        v_WP: Velocity (vx, vy) of the virtual mass in W, m/s.
+        p_WS: Position (x, y) of the target in W, m.
+        valid: Whether there is a target. If not, the force brakes the mass.
         attraction: ``AttractionParameters``.
-        mass: kg.
+        mass: Virtual mass, kg.
 
     Returns:
-        (Fx, Fy) in W: K_r (p_S - p) (1 - d_f/|p_S - p|) - D_r v.
+        (Fx, Fy) in W, N: K_r (p_S - p) (1 - d_f/|p_S - p|) - D_r v.
     """
     if not valid:
         brake = mass / attraction.brake_time_s
@@ -68,16 +72,16 @@ def attraction_force(
 
 @register_jitable
 def obstacle_speed(C_now: Any, C_before: Any, closing: Any, period_s: Any) -> Any:
-    """s in m/s: how fast the collision vector changes.
+    """Computes the speed s at which a collision vector changes.
 
     Args:
-        C_now: (x, y) in W, m; floats or AutoDiffXd.
-        C_before: The vector of the same feature a period ago.
+        C_now: Collision vector (x, y) in W, m; floats or AutoDiffXd.
+        C_before: Collision vector of the same feature one period earlier, m.
         closing: Whether s is max(0, -d|C|/dt) instead of |dC/dt|.
-        period_s: s.
+        period_s: Time between both vectors, s.
 
     Returns:
-        s, m/s, not negative; its type is that of ``C_now``.
+        s, m/s, not negative. It has the scalar type of ``C_now``.
     """
     if not closing:
         return safe_norm(C_now[0] - C_before[0], C_now[1] - C_before[1]) / period_s
@@ -89,13 +93,13 @@ def obstacle_speed(C_now: Any, C_before: Any, closing: Any, period_s: Any) -> An
 
 @register_jitable
 def repulsion_force(C_W: Any, s: Any, force: Any, arguments: Any = ()) -> Any:
-    """Force on the virtual mass away from one obstacle.
+    """Computes the force that pushes the virtual mass away from one obstacle.
 
     Args:
         C_W: Collision vector (x, y) in W, m; floats or AutoDiffXd.
         s: Speed of the obstacle, m/s.
-        force: ``force(c, s, *arguments)``, N.
-        arguments: Of the force, after c and s.
+        force: Function ``force(c, s, *arguments)`` that returns N.
+        arguments: Further arguments of ``force`` after c and s.
 
     Returns:
         (Fx, Fy) in W, N.
@@ -106,21 +110,21 @@ def repulsion_force(C_W: Any, s: Any, force: Any, arguments: Any = ()) -> Any:
 
 
 class ImpedanceNumbers(NamedTuple):
-    """What the step of ``ImpedanceController`` depends on."""
+    """Constants of the step of ``ImpedanceController``."""
 
     force: Callable[..., Any]
-    """``force(c, s, *arguments)``, N."""
+    """Function ``force(c, s, *arguments)`` that returns N."""
     arguments: tuple[Any, ...]
-    """Gains, and for some laws the least range of the sensors, m."""
+    """Gains of the law; for some laws also the least range of the sensors, m."""
     attraction: AttractionParameters
     mass_kg: float
-    """Of the virtual mass, kg."""
+    """Virtual mass, kg."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     closing: bool
-    """Whether s is the speed of approach alone."""
+    """Whether s counts only the speed of approach."""
     round_s: float
-    """Time of a round of the sensors, s."""
+    """Time in which every sensor fires once, s."""
 
 
 def impedance_step(
@@ -128,10 +132,15 @@ def impedance_step(
 ) -> None:
     """Computes the acceleration of the virtual mass, the forces and the speeds s.
 
-    The state has one row for each tick of a round, the last tick first: feature, C_x
-    and C_y in W, m, of each slot.
+    The state has one row per tick of a round of the sensors. The first row belongs to
+    the last tick. A row has the feature, C_x, and C_y (in W, m) of each slot.
+
+    The step sums the attraction and the push of each occupied slot. It computes s from
+    the row of one round ago, where this row has the same feature. Then it shifts the
+    rows by one tick and writes the new vectors to the first row.
     """
     p_WS, valid, C_B, features, pose, v_WP = inputs
+    # Attraction, computed relative to P.
     acceleration, forces, speeds = outputs
     x, y = control_point(pose, numbers.control_point_m)
     dx, dy = turned_off_back(p_WS[0] - x, p_WS[1] - y, pose[2], _BEHIND_M)
@@ -143,6 +152,7 @@ def impedance_step(
         numbers.attraction,
         numbers.mass_kg,
     )
+    # Push of each slot.
     Fx = Fy = 0.0 * valid[0]
     oldest, seen = len(state) - _ROW, 0
     now = [0.0 * valid[0]] * _ROW
@@ -160,9 +170,11 @@ def impedance_step(
             now[3 * seen] = features[k]
             now[3 * seen + 1], now[3 * seen + 2] = C_W[0], C_W[1]
             seen += 1
+    # Sum of all forces.
     acceleration[0] = (F_m[0] + Fx) / numbers.mass_kg
     acceleration[1] = (F_m[1] + Fy) / numbers.mass_kg
     forces[0], forces[1], forces[2], forces[3] = F_m[0], F_m[1], Fx, Fy
+    # Shift the rows, and write the new first row.
     for k in range(len(state) - 1, _ROW - 1, -1):
         state[k] = state[k - _ROW]
     for k in range(_ROW):
@@ -171,7 +183,7 @@ def impedance_step(
 
 @register_jitable
 def _same_feature(before, now):
-    """Features are whole numbers from 1 on, whatever their scalar type."""
+    """Compares two features, which are whole numbers from 1 up; 0 is an empty slot."""
     return before > 0.5 and abs(float_of(before) - float_of(now)) < 0.5
 
 
@@ -188,7 +200,7 @@ _OUTPUTS = (
     Port("forces_W", 4, "N, attraction then repulsion, x and y each", FORCE_COLUMNS),
     Port("obstacle_speeds", SLOTS, "m/s, s of each slot", "obstacle_speed_{}"),
 )
-#: Columns of the ports of a law, also of a user's own block.
+#: Table columns of the ports of a law. Blocks of users have the same columns.
 LAW_COLUMNS: Mapping[str, tuple[str, ...]] = {
     port.name: port.column_names({}) for port in _OUTPUTS if port.columns
 }
@@ -197,29 +209,29 @@ LAW_COLUMNS: Mapping[str, tuple[str, ...]] = {
 @define_for_scalars("ImpedanceController_", __name__)
 def ImpedanceController_(T):
     class Impl(Block_[T]):
-        """Follows the target; pushes off obstacles by the force of a law.
+        """Pulls the robot to the target and pushes it off obstacles by a law's force.
 
-        Each collision vector's s is the change of the same feature over one round of
-        the sensors, divided by the time of that round; 0 where the feature was not
-        there a round ago. A round is a tick where all sensors fire at every tick, and
-        three ticks where three sensors fire one after the other: every sensor has then
-        fired once since, and both vectors contain the held ranges. At constant
-        velocities s is exact at every tick, for a pair of sensors as for one sensor.
-        Otherwise s is the mean over the round, which is itself up to a round less a
-        tick old.
+        Each collision vector has a speed s. The block subtracts the vector of the same
+        feature one sensor round ago and divides by the time of the round. s is 0 if
+        the feature was absent one round ago. A round is the time in which every sensor
+        fires once: one tick if all sensors fire at every tick, three ticks if three
+        sensors fire in turn. Over a round every range is measured anew. Therefore s is
+        exact at constant velocities, also if a vector comes from two sensors. At other
+        velocities s is the mean over the round. The ranges of this mean may be older
+        than the present by up to one round minus one tick.
 
         Discrete state, every tick: the collision vectors of the last round of the
-        sensors, for s. The outputs are functions of state and present input:
+        sensors. The outputs are functions of the state and the present input. There is
         no latency.
 
         Args:
-            law: A law of ``systems.laws.catalogue`` that has a force; or a function
-                ``law(c, s, repulsion)``: force away from the obstacle in N at
-                distance c in m and speed s in m/s. Use pydrake.math in such a
-                function, so that it can be differentiated.
-            robot: Mass and place of P.
+            law: A law of ``systems.laws.catalogue`` that has a force, or a function
+                ``law(c, s, repulsion)``. The function returns the force away from the
+                obstacle in N for a distance c in m and a speed s in m/s. It must use
+                pydrake.math to be differentiable.
+            robot: Mass, and position of P.
             attraction: ``AttractionParameters``.
-            repulsion: ``RepulsionParameters``: gains of the law, and what s is.
+            repulsion: ``RepulsionParameters``: gains of the law, and definition of s.
             sensors: ``UltrasonicParameters``: period and order of firing, least range.
             tick_s: Period of the controller, s.
         """
@@ -253,7 +265,7 @@ def ImpedanceController_(T):
             self.declare(step, tick_s=tick_s)
 
         def radial_force(self, c: Any, s: Any) -> Any:
-            """Force away from an obstacle at distance c in m and speed s in m/s, N."""
+            """Returns the force away from an obstacle, N, for c in m and s in m/s."""
             numbers = self.step.numbers
             return numbers.force(c, s, *numbers.arguments)
 
@@ -272,7 +284,7 @@ def _force_and_arguments(
 
 
 def _slot_names(round_ticks: int) -> tuple[str, ...]:
-    """Names of what is remembered, the last tick first."""
+    """Returns the names of the state variables, those of the last tick first."""
     return tuple(
         f"{name}_{slot}{after}"
         for after in ("", *(f"_{k}_ticks_ago" for k in range(2, round_ticks + 1)))
@@ -282,16 +294,16 @@ def _slot_names(round_ticks: int) -> tuple[str, ...]:
 
 
 def _define(name: str, block_name: str, documentation: str, **fixed: Any) -> Any:
-    """``ImpedanceController_`` under another name, with some arguments fixed.
+    """Defines ``ImpedanceController_`` under another name with fixed arguments.
 
     Args:
-        name: Of the class.
-        block_name: Of the block in diagrams.
+        name: Name of the class.
+        block_name: Name of the block in diagrams.
         documentation: Docstring of the class.
         fixed: Arguments of ``ImpedanceController`` that the class sets.
 
     Returns:
-        The template.
+        The template of the class for all scalar types.
     """
 
     @define_for_scalars(f"{name}_", __name__)
@@ -311,7 +323,7 @@ def _define(name: str, block_name: str, documentation: str, **fixed: Any) -> Any
 
 
 def _define_for(law: Law, block_name: str) -> Any:
-    """The template of a law that comes with the package."""
+    """Defines the template of the controller of one law of the package."""
     equations = ", ".join(f"``{equation.text}``" for equation in law.equations)
     documentation = f"""Follows the target; pushes off obstacles by one law.
 

@@ -1,4 +1,4 @@
-"""What a law says of itself, once: all lists of laws are made from these records."""
+"""The record of a law. All lists of laws are made from these records."""
 
 from __future__ import annotations
 
@@ -15,36 +15,42 @@ FORCE_COLUMNS = "attraction_x", "attraction_y", "repulsion_x", "repulsion_y"
 
 @dataclass(frozen=True)
 class Equation:
-    """A formula."""
+    """A formula of a law."""
 
     title: str
-    """What it is."""
+    """Title of the formula."""
     tex: str
-    """In matplotlib's subset of TeX, without the dollar signs."""
+    """Formula in matplotlib's subset of TeX, without dollar signs."""
     text: str
-    """The same in plain signs."""
+    """Formula in plain text."""
 
 
 def _always_at_rest(gains: Any) -> float:
-    """Of a velocity term that is nothing at rest, m/s."""
+    """Returns the spring speed of a law whose velocity term is 0 at rest, m/s."""
     return 0.0
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """How ``phonotaxis design`` finds a law's gains from requirements."""
+    """How ``phonotaxis design`` derives the gains of a law from requirements."""
 
     rule: Literal["barrier", "matched"]
-    """``barrier``: the first of ``Law.loop_gains``, to which the push is
-    proportional, holds the barrier, and the second puts back the energy allowed.
-    ``matched``: a law with the gains of the active law of 2019, its way."""
+    """How the gains follow from the requirements.
+
+    ``barrier``: the first gain of ``Law.loop_gains``, to which the push is
+    proportional, follows from the required barrier. The second gain follows from the
+    energy that the velocity term may put back. ``matched``: the rule of the active law
+    of 2019, for laws with the same gains."""
     stiffest: Callable[[Any, float], float]
-    """Largest -df/dc at rest, N/m, from gains and the sensors' least range, m."""
+    """Function of the gains and the sensors' least range in m. It returns the largest
+    -df/dc for an obstacle at rest, N/m."""
     spring_speed: Callable[[Any], float] = _always_at_rest
-    """The speed s, from the gains, at which f(c, s) is the spring alone, m/s."""
+    """Function of the gains. It returns the speed s at which f(c, s) has only its
+    spring term, m/s."""
     sets_follow_distance: bool = False
-    """Whether a follow distance has to allow for the law's push: not for one
-    without an end, which pushes a robot off any distance worth following at."""
+    """Whether the design chooses a follow distance that allows for the push of the law.
+    This makes no sense for a law without a limit of reach, because its push acts at
+    every useful follow distance."""
 
 
 @dataclass(frozen=True)
@@ -52,65 +58,69 @@ class Law:
     """One law. ``systems.laws.catalogue`` lists them all."""
 
     name: str
-    """As in ``Scenario.law`` and, of its gains, in ``Scenario.repulsion``."""
+    """Name of the law in ``Scenario.law``, and of its gains in
+    ``Scenario.repulsion``."""
     title: str
     """Heading in reports."""
     label: str
-    """In the legends of pictures."""
+    """Label in the legends of pictures."""
     equations: tuple[Equation, ...]
-    """For the model sheet."""
+    """Equations for the model sheet."""
     force: Callable[..., Any] | None = None
-    """``force(c, s, gains)``: push away from an obstacle, N.
+    """Function ``force(c, s, gains)``: push away from an obstacle, N.
 
-    It takes a distance in m and a speed in m/s, floats or AutoDiffXd. Its part f(c, 0)
-    has an energy. A law whose block decides on a motion has no force."""
+    The function takes a distance in m and a speed in m/s, floats or AutoDiffXd. Its
+    part f(c, 0) has a potential energy. None: the block of the law decides on a motion
+    instead of a force."""
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
-    """Model of its gains; every field has a default."""
+    """Model of the gains. Every field has a default."""
     controller_name: str = ""
-    """Name of its block's class in ``systems``; without one ``RadialLawController``
-    runs the force."""
+    """Class name of the law's block in ``systems``. If it is empty,
+    ``RadialLawController`` runs the force."""
     loop_gains: tuple[str, str] | None = None
-    """Gains of the distance term and of the velocity term, for root loci."""
+    """Names of the gains of the distance term and the velocity term, for root loci."""
     tuning: Tuning | None = None
-    """None for a law without gains to choose."""
+    """How the design chooses the gains. None: there are no gains to choose."""
     plans: bool = False
-    """Whether its block decides on a motion in the place of a force: it may ask for
-    ``following``, ``known``, the map's parameters, ``bodies``, how many there are, and
-    ``seed``, too, and has no linear model."""
+    """Whether the block decides on a motion instead of a force.
+
+    Such a block has no linear model. It may also take the arguments ``following``,
+    ``known`` (parameters of the map), ``bodies`` (their number), and ``seed``."""
     on_route: bool = False
-    """Whether it drives to a goal on a planned way, in the place of following a
-    sound; it then ``plans``, too."""
+    """Whether the robot drives to a goal on a planned route instead of following a
+    sound. Such a law also has ``plans``."""
     searches: Literal["odor", "sound"] | None = None
-    """What it searches for step by step, in the place of following a sound; it then
-    ``plans``, too."""
+    """What the robot searches for step by step instead of following a sound. Such a
+    law also has ``plans``."""
     guarded: bool = False
-    """Whether its robot is always guarded."""
+    """Whether the robot of this law always has the guard."""
     colour: str | None = None
-    """In pictures; none: the next one of the palette."""
+    """Color in pictures. None: the next color of the palette."""
 
     @property
     def controller(self) -> Callable[..., Any] | None:
-        """Class of its block, if the law names one.
+        """Class of the law's block, or None if the law names none.
 
-        The class takes robot, attraction, repulsion and sensors. It is loaded on the
-        first call: the check of a scenario needs neither Drake nor compiled code.
+        The class takes robot, attraction, repulsion, and sensors. It is imported on
+        the first call, because the check of a scenario needs no Drake and no compiled
+        code.
         """
         if not self.controller_name:
             return None
         return getattr(import_module("systems"), self.controller_name)
 
     def arguments(self, repulsion: Any, least_range_m: float) -> tuple[Any, ...]:
-        """What ``force`` takes after c and s.
+        """Returns the arguments of ``force`` after c and s.
 
         Args:
             repulsion: ``RepulsionParameters``.
             least_range_m: Least range of the sensors, m.
 
         Returns:
-            The gains, or None where the law has none; then the least range, m, where it
-            counts.
+            The gains, or None for a law without gains. If ``least_range`` is true, the
+            least range in m follows.
         """
         gains: Any = None
         if self.gains is not None:

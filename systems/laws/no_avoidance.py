@@ -1,4 +1,4 @@
-"""No avoidance at all: the lower anchor of every comparison."""
+"""The law without avoidance, which is the lower bound of every comparison."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from systems.laws.law import Equation, Law
 
 
 def no_force(c: Any, s: Any, gains: Any) -> Any:
-    """No push, N.
+    """Returns a force of zero.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Its speed, m/s.
+        s: Speed of the obstacle, m/s.
         gains: Not used.
 
     Returns:
-        Zero, of the type of c.
+        Zero, N, with the scalar type of c.
     """
     return 0.0 * c
 

@@ -1,4 +1,4 @@
-"""ORCA: gains, equation and record."""
+"""Optimal reciprocal collision avoidance (ORCA): gains, equation, and record."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from systems.laws.law import Equation, Law
 
 
 class ReciprocalAvoidanceParameters(Parameters):
-    """Horizon and disc of ORCA."""
+    """Horizon and distances of ORCA."""
 
     horizon_s: Duration = 1.8
-    """Time for which the law avoids contacts, s."""
+    """Time for which the chosen velocity avoids contacts, s."""
     offset_m: Length = 0.045
     """Distance of the holonomic point ahead of the axle, m."""
     clearance_m: NonNegativeLength = 0.02
-    """Distance kept from all bodies, m."""
+    """Distance that the robot keeps from all bodies, m."""
     farthest_m: Length = 5.0
-    """Bodies farther away than this do not count, m."""
+    """Distance beyond which bodies do not count, m."""
 
 
 ORCA = Law(

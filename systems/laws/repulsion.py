@@ -1,8 +1,8 @@
-"""The gains of all laws, one set a law.
+"""The gains of all laws, one set per law.
 
-K_0, k_ref, D_0 and d_ref are not printed in the papers. These defaults are what
-``phonotaxis design`` derives from stated requirements, the same for each law;
-docs/avoidance.md explains.
+The papers do not print K_0, k_ref, D_0, and d_ref. The command ``phonotaxis design``
+derives the defaults from requirements, which are the same for each law.
+docs/avoidance.md explains them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from systems.laws.parameters import SharedRepulsion
 if TYPE_CHECKING:
 
     class RepulsionParameters(SharedRepulsion):
-        """The fields are the catalogue's, which no type checker can read."""
+        """Stub for type checkers, which cannot see the fields from the catalogue."""
 
         def __init__(self, **fields: Any) -> None: ...
         def __getattr__(self, name: str) -> Any: ...

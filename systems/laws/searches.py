@@ -1,4 +1,4 @@
-"""The records of the searches, which take the place of a law."""
+"""The records of the searches, which a robot runs instead of a law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stop when near: gains, equation and record."""
+"""Stop when near: gains, equation, and record."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from systems.laws.law import Equation, Law
 
 
 class StopWhenNearParameters(Parameters):
-    """When it stops."""
+    """When the robot stops."""
 
     stop_m: Length = 0.6
-    """The robot stops while an echo is nearer than this, m."""
+    """Distance below which an echo stops the robot, m."""
 
 
 STOP_WHEN_NEAR = Law(

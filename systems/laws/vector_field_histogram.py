@@ -1,4 +1,4 @@
-"""VFH+: gains, equation and record."""
+"""The vector field histogram VFH+: gains, equation, and record."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ class VectorFieldHistogramParameters(MapParameters):
     """Weights and thresholds of VFH+."""
 
     clearance_m: NonNegativeLength = 0.04
-    """Distance kept from places of echoes, m."""
+    """Distance that the robot keeps from cells with echoes, m."""
     window_m: Length = 1.1
-    """Cells within this distance count, m; half of the paper's active window is
-    1.65."""
+    """Distance within which cells count, m (half of the paper's active window:
+    1.65)."""
     low_threshold: NonNegative = 0.33
-    """A sector with a lower density is free."""
+    """Density below which a sector becomes free."""
     high_threshold: NonNegative = 0.66
-    """A sector with a higher density is blocked; in between it keeps its state."""
+    """Density above which a sector becomes blocked. Between the two thresholds a
+    sector keeps its state."""
     slow_density: Positive = 69.0
-    """Density ahead at which the robot would stop."""
+    """Density in the chosen direction at which the speed falls to 0."""
     target_gain: NonNegative = 5.0
-    """Weight mu_1 of the target's direction (the paper's)."""
+    """Weight mu_1 of the target's direction (paper: 5)."""
     heading_gain: NonNegative = 2.0
-    """Weight mu_2 of the robot's heading (the paper's)."""
+    """Weight mu_2 of the robot's heading (paper: 2)."""
     previous_gain: NonNegative = 2.9
-    """Weight mu_3 of the direction chosen before (the paper's: 2)."""
+    """Weight mu_3 of the previously chosen direction (paper: 2)."""
 
     @model_validator(mode="after")
     def _check_thresholds(self) -> VectorFieldHistogramParameters:

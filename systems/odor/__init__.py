@@ -1,1 +1,1 @@
-"""Wind, odour plume, and the sensors that feel them."""
+"""Wind, odor plume, and the sensors that measure them."""

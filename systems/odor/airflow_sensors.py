@@ -1,4 +1,4 @@
-"""Two hot-wire airflow sensors beside a partition."""
+"""Two hot-wire airflow sensors next to a partition."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from systems.framework.signals import TICK_S
 from systems.odor.parameters import AirflowParameters
 from systems.odor.wind import WIND_SIZE, wind_velocity
 
-#: What a crosswind wire feels of wind along it, as a share of its square.
+#: Square of the relative sensitivity of a crosswind wire to wind along the wire.
 _ALONG = 0.04
 
 
 @register_jitable
 def airflow_reading(angle: float, side: int, crosswind: bool) -> float:  # noqa: FBT001
-    """What a sensor reads of a wind of unit speed.
+    """Computes the relative reading of a sensor.
 
     Args:
-        angle: Where the wind comes from, from ahead, CCW, rad.
-        side: 0 left, 1 right.
-        crosswind: Whether its lobe is that of a wire along the axis.
+        angle: Direction from which the wind comes, CCW from the x axis of B, rad.
+        side: 0 left sensor, 1 right sensor.
+        crosswind: Whether the sensor has the lobe ``crosswind``, else ``cosine``.
 
     Returns:
-        0 to 1.
+        Reading divided by the wind speed and the gain, 0 to 1.
     """
     if not crosswind:
         axis = 0.25 * math.pi if side == 0 else -0.25 * math.pi
@@ -37,7 +37,7 @@ def airflow_reading(angle: float, side: int, crosswind: bool) -> float:  # noqa:
 
 
 class AirflowNumbers(NamedTuple):
-    """What the step of ``AirflowSensors`` depends on."""
+    """Constants of the step of ``AirflowSensors``."""
 
     gain: float
     crosswind: bool
@@ -49,7 +49,7 @@ class AirflowNumbers(NamedTuple):
 def airflow_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: AirflowNumbers
 ) -> None:
-    """The readings of both sensors."""
+    """Computes the readings of both sensors."""
     wind, pose = inputs
     ux, uy = wind_velocity(wind, pose[0], pose[1])
     speed = math.hypot(ux, uy)
@@ -61,19 +61,19 @@ def airflow_step(
 
 
 class AirflowSensors(Block):
-    """Measures from which side the wind blows.
+    """Measures the wind on the left and on the right of the robot.
 
-    F1 points 45 deg to the left, F2 45 deg to the right; the wind is that at the origin
-    of B.
+    With the lobe ``cosine``, F1 points 45 deg to the left and F2 45 deg to the right.
+    Both sensors measure the wind at the origin of B.
 
-    No state; noise is drawn every tick. Latency: none.
+    The block has no state. It draws new noise every tick. Latency: none.
 
     Args:
-        parameters: ``AirflowParameters``.
+        parameters: Gain, lobe and noise.
         seed: Seed of the noise.
         tick_s: Period of the robot, s.
 
-    Reference: Song 2011, 2.1, 2.3.3; the lobes are ours.
+    Reference: Song 2011, 2.1, 2.3.3. The lobes are ours.
     """
 
     part, stage = "airflow", "obstacle sensing"

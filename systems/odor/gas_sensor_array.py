@@ -28,23 +28,23 @@ _DEAD, _STUCK = 1, 2
 
 
 class GasNumbers(NamedTuple):
-    """What the step of ``GasSensorArray`` depends on."""
+    """Constants of the step of ``GasSensorArray``."""
 
     positions: NDArray[np.float64]
-    """(3, 2) in B, m."""
+    """(3, 2) positions of the sensors in B, m."""
     height_m: float
     scales: NDArray[np.float64]
-    """(3,) of R0."""
+    """(3,) factors of the readings, due to the mismatch of R0."""
     exponents: NDArray[np.float64]
-    """(3,)"""
+    """(3,) exponents of the power law."""
     response: float
-    """Share of the way that is gone in a tick where the gas grows."""
+    """Share of the deviation that vanishes per tick while the concentration grows."""
     recovery: float
-    """And where it fades."""
+    """Share of the deviation that vanishes per tick while the concentration falls."""
     noise_share: float
     drift_per_s: float
     faults: NDArray[np.float64]
-    """(3, 2) kind, 0 none, and since when, s, of each sensor."""
+    """(3, 2) kind of the fault (0: none) and its start, s, per sensor."""
     tick_s: float
     noise: TickNoise
 
@@ -64,9 +64,9 @@ def _concentrations(
 def gas_sensor_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: GasNumbers
 ) -> None:
-    """The readings of the sensors.
+    """Computes the readings of the sensors.
 
-    State: ratio of each sensor without noise, then its last reading.
+    State: the three ratios without noise, then the three last readings.
     """
     ratios, truths = outputs
     gas = np.empty(3)
@@ -74,9 +74,11 @@ def gas_sensor_step(
     normals = tick_normals(numbers.noise, tick, 1, 4)
     time = tick * numbers.tick_s
     for k in range(3):
+        # First-order lag toward the steady ratio. More gas means a smaller ratio.
         rest = (1.0 + gas[k]) ** -numbers.exponents[k]
         share = numbers.response if rest < state[k] else numbers.recovery
         state[k] += share * (rest - state[k])
+        # Mismatch, drift, noise and faults.
         value = state[k] * numbers.scales[k] * (1.0 + numbers.drift_per_s * time)
         value *= 1.0 + numbers.noise_share * float(normals[0, k])
         kind = numbers.faults[k, 0] if time >= numbers.faults[k, 1] else 0.0
@@ -89,21 +91,22 @@ def gas_sensor_step(
 
 
 class GasSensorArray(Block):
-    """Measures the concentration of gas at three places.
+    """Measures the concentration of gas at three positions.
 
-    A reading is Rs/R0: 1 in clean air, less in gas. It follows
-    (1 + C/C1)^-exponent with a first-order lag, which is faster when the concentration
-    grows than when it falls. ``gas_concentration`` is the true C/C1.
+    A reading is the ratio Rs/R0. It is 1 in clean air, and smaller in gas. It follows
+    (1 + C/C1)^-exponent with a first-order lag. By default, the lag is shorter when the
+    concentration grows than when it falls. ``gas_concentration`` is the true C/C1.
 
-    Discrete state, every tick: ratio and last reading of each sensor. Latency: the lag
-    only.
+    Discrete state, every tick: ratio and last reading of each sensor. Latency: only the
+    lag.
 
     Args:
-        parameters: ``GasSensorParameters``.
+        parameters: Positions, power law, lag, errors and faults.
         seed: Seed of noise and mismatch.
         tick_s: Period of the robot, s.
 
-    Reference: Song 2011, 2.1, 2.3.3; power law and times of the TGS2620 from GADEN.
+    Reference: Song 2011, 2.1, 2.3.3. The power law and the times of the TGS2620 are
+    from GADEN.
     """
 
     part, stage = "gas", "obstacle sensing"
@@ -144,7 +147,7 @@ class GasSensorArray(Block):
         )
 
     def step_for(self, run: RunFacts) -> Step:
-        """The step, with noise and mismatch of the run."""
+        """Returns the step, with the noise and the mismatch of the run."""
         numbers = self._numbers_of(run.seed_of(self.get_name()))
         return self.step._replace(numbers=numbers)
 

@@ -1,4 +1,4 @@
-"""The plume of a source of odour: puffs that the wind carries, or their mean."""
+"""The plume of an odor source: puffs that the wind carries, or their mean."""
 
 from __future__ import annotations
 
@@ -19,95 +19,95 @@ from systems.odor.parameters import OdorParameters, WindParameters
 from systems.odor.steady_plume import steady_concentration
 from systems.odor.wind import WIND_PERIOD_S, WIND_SIZE, initial_wind, wind_velocity
 
-#: Puffs that are kept, the youngest.
+#: Largest number of puffs. The plume drops the oldest puffs first.
 MOST_PUFFS = 320
 
 
 class _PlumePlaces(NamedTuple):
-    """Places in the port ``plume``, before the puffs."""
+    """Indices in the port ``plume``, before the puffs."""
 
     background: int
-    """Concentration everywhere."""
+    """Uniform background concentration, in units of C1."""
     steady: int
     """Whether the plume is steady, 0 or 1."""
     puffs: int
-    """Number of the puffs."""
+    """Number of puffs."""
     part: int
-    """Of the next puff that is already due, 0 to 1."""
+    """Share of the next puff that the source has already released, 0 to 1."""
     height: int
-    """Of the source, m."""
+    """Height of the source above the floor, m."""
     age: int
-    """Time since the release began, s."""
+    """Time since the beginning of the release, s."""
 
 
 class _PuffPlaces(NamedTuple):
-    """Places of what is known of a puff, from its first number."""
+    """Indices in the numbers of a puff."""
 
     x: int
-    """In W, m."""
+    """Position of the center in W, x and y, m."""
     y: int
     vx: int
-    """Its own velocity in W, m/s."""
+    """Velocity relative to the wind in W, x and y, m/s."""
     vy: int
     level: int
-    """Its spread in the plane, m."""
+    """Horizontal spread, m."""
     upright: int
-    """Its vertical spread, m."""
+    """Vertical spread, m."""
     amount: int
-    """What it holds, in units of C1, m^3."""
+    """Amount of odor, in units of C1, m^3."""
 
 
 class _SteadyPlaces(NamedTuple):
-    """Places in the port ``plume`` of a steady plume, in the place of puffs."""
+    """Indices in the port ``plume`` for a steady plume, which has no puffs."""
 
     x: int
-    """Of the source in W, m."""
+    """Position of the source in W, x and y, m."""
     y: int
     cosine: int
-    """Of the direction of the wind."""
+    """Cosine and sine of the direction toward which the wind blows."""
     sine: int
     rate: int
-    """Of the source, in units of C1, m^3/s."""
+    """Release rate of the source, in units of C1, m^3/s."""
     speed: int
-    """Of the wind, m/s."""
+    """Speed of the wind, m/s."""
     level: int
-    """Growth of the spread in the plane, m/s."""
+    """Growth of the horizontal spread, m/s."""
     upright: int
     """Growth of the vertical spread, m/s."""
 
 
 _AT = _PlumePlaces(*range(6))
-#: Where the puffs begin in the port.
+#: Index of the first puff in the port.
 PUFFS_BEGIN = len(_AT)
 _PUFF = _PuffPlaces(*range(7))
-#: Numbers of a puff.
+#: Number of values of a puff.
 PUFF_SIZE = len(_PUFF)
 _MEAN_PLUME = _SteadyPlaces(*range(PUFFS_BEGIN, PUFFS_BEGIN + 8))
 #: Size of the port ``plume``.
 PLUME_SIZE = PUFFS_BEGIN + PUFF_SIZE * MOST_PUFFS
-#: A puff's spread is no less than this, m.
+#: Smallest spread of a puff, m.
 _SMALLEST_M = 0.01
-#: Puffs spread as in a wind of this speed at least, m/s.
+#: Smallest wind speed for the growth of the spreads, m/s.
 _STILL_M_S = 0.05
-#: A slower wind than this makes no steady plume, m/s.
+#: Smallest wind speed of a steady plume, m/s.
 _STEADY_M_S = 1e-3
-#: A puff's part farther off than so many spreads is nothing.
+#: The concentration of a puff is 0 beyond this number of horizontal spreads.
 _FAR = 6.0
-#: No more than this is gone through before a run, s.
+#: Longest simulated time before a run, s.
 _LONGEST_SPIN_UP_S = 25.0
-#: Of the sensor by which the strength of the source is given: its power law, at a
-#: distance downwind, m, in a wind of so many m/s.
+#: The strength of the source refers to a gas sensor with this exponent, at this
+#: distance downwind, m, in a wind of this speed, m/s.
 _EXPONENT, _REFERENCE_M, _REFERENCE_M_S = 0.7155, 2.0, 1.0
 
 
 def release_rate(own: OdorParameters) -> float:
-    """Rate of the source, by what a gas sensor reads 2 m downwind.
+    """Computes the release rate from the reading of a gas sensor 2 m downwind.
 
     Args:
-        own: The source.
+        own: Parameters of the source.
 
     Returns:
-        Q in units of the sensor's concentration C1, m^3/s.
+        Release rate Q, in units of the concentration C1 of the sensor, m^3/s.
     """
     wanted = own.ratio_at_2_m ** (-1.0 / _EXPONENT) - 1.0
     spreads = own.mean_intensity, own.mean_intensity, own.upright_growth
@@ -121,16 +121,19 @@ def release_rate(own: OdorParameters) -> float:
 def concentration(
     plume: Any, x: float, y: float, z: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Concentration at a point, in units of the gas sensors' C1.
+    """Computes the concentration at a point.
+
+    A puff is a Gaussian distribution around its center, and the floor reflects it. The
+    concentration is the sum over all puffs. A steady plume has a closed form.
 
     Args:
-        plume: (PLUME_SIZE,) of the port ``plume``.
-        x: In W, m.
-        y: In W, m.
-        z: Above the floor, m.
+        plume: (PLUME_SIZE,) value of the port ``plume``.
+        x: x coordinate of the point in W, m.
+        y: y coordinate of the point in W, m.
+        z: Height of the point above the floor, m.
 
     Returns:
-        That of the plume and of the background.
+        Concentration of plume and background, in units of the C1 of the gas sensors.
     """
     total, height = plume[_AT.background], plume[_AT.height]
     if plume[_AT.steady] > 0.5:
@@ -149,6 +152,7 @@ def concentration(
         off = (dx * dx + dy * dy) / (level * level)
         if off > _FAR * _FAR:
             continue
+        # The mirror image of the puff below the floor models the reflection.
         low, high = (z - height) / upright, (z + height) / upright
         lift = math.exp(-0.5 * low * low) + math.exp(-0.5 * high * high)
         dense = plume[first + _PUFF.amount] / (level * level * upright)
@@ -157,10 +161,10 @@ def concentration(
 
 
 class PlumeNumbers(NamedTuple):
-    """What the step of ``OdorPlume`` depends on."""
+    """Constants of the step of ``OdorPlume``."""
 
     x: float
-    """Of the source in W, m."""
+    """Position of the source in W, x and y, m."""
     y: float
     rate: float
     puffs_per_s: float
@@ -168,12 +172,12 @@ class PlumeNumbers(NamedTuple):
     upright_growth: float
     own_intensity: float
     own_keep: float
-    """Share of a puff's own velocity that is left a period later."""
+    """Share of a puff's own velocity that remains after one period."""
     reach_m: float
     volume: float
-    """m^3; 0: no background."""
+    """Volume of the room, m^3. 0: no background."""
     period: int
-    """Ticks."""
+    """Period of the changes, ticks."""
     period_s: float
     steady: bool
     noise: TickNoise
@@ -183,7 +187,15 @@ class PlumeNumbers(NamedTuple):
 def _advance(
     plume: Any, wind: Any, tick: int, numbers: PlumeNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Carries all puffs on by a period, and releases new ones."""
+    """Moves all puffs by one period, and releases new puffs.
+
+    Each puff moves with the wind at its center and with its own velocity. The own
+    velocity is an Ornstein-Uhlenbeck process. Its standard deviation is proportional to
+    the wind speed. The spreads grow with the distance that the wind covers. Puffs
+    beyond ``reach_m`` are removed. If there are more than ``MOST_PUFFS`` puffs, the
+    oldest are removed. The port contains the puffs in the order of their age, with the
+    oldest first.
+    """
     dt = numbers.period_s
     plume[_AT.age] += dt
     if numbers.volume > 0.0:
@@ -192,6 +204,7 @@ def _advance(
         return
     normals = tick_normals(numbers.noise, tick, 2 * MOST_PUFFS, 2)
     change = math.sqrt(1.0 - numbers.own_keep**2) * numbers.own_intensity
+    # Moves the existing puffs, and closes the gaps of removed puffs.
     kept = 0
     for puff in range(int(plume[_AT.puffs])):
         old, new = PUFFS_BEGIN + PUFF_SIZE * puff, PUFFS_BEGIN + PUFF_SIZE * kept
@@ -212,6 +225,7 @@ def _advance(
         plume[new + _PUFF.upright] = plume[old + _PUFF.upright] + upright
         plume[new + _PUFF.amount] = plume[old + _PUFF.amount]
         kept += 1
+    # Computes the number of new puffs, and makes space for them.
     before = plume[_AT.part]
     plume[_AT.part] += dt * numbers.puffs_per_s
     fresh = int(plume[_AT.part])
@@ -221,10 +235,11 @@ def _advance(
         for k in range(PUFF_SIZE * (kept - drop)):
             plume[PUFFS_BEGIN + k] = plume[PUFFS_BEGIN + PUFF_SIZE * drop + k]
         kept -= drop
+    # Releases the new puffs at the source.
     ux, uy = wind_velocity(wind, numbers.x, numbers.y)
     speed = math.hypot(ux, uy)
     for k in range(fresh):
-        # Released within the period, the oldest first.
+        # Time since the release of the puff within the period. The oldest is first.
         age = dt - (k + 1.0 - before) / numbers.puffs_per_s
         first, row = PUFFS_BEGIN + PUFF_SIZE * kept, MOST_PUFFS + k
         vx = numbers.own_intensity * speed * normals[row, 0]
@@ -244,7 +259,7 @@ def _advance(
 def plume_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlumeNumbers
 ) -> None:
-    """The plume after a tick.
+    """Updates the plume once per period.
 
     State: the output port ``plume``.
     """
@@ -254,39 +269,39 @@ def plume_step(
 
 @njit(cache=True)
 def _copy(values: Any, into: Any) -> None:  # pragma: no cover  (compiled)
-    """Copies (n,) numbers; in Python the loop would take longer than the step."""
+    """Copies (n,) numbers. In Python, this loop would take longer than the step."""
     for k in range(len(values)):
         into[k] = values[k]
 
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: PlumeNumbers) -> None:
-    """The output of ``plume_step``'s state."""
+    """Copies the output from the state of ``plume_step``."""
     _copy(state, outputs[0])
 
 
 class OdorPlume(Block):
-    """The odor over the whole floor.
+    """Models the odor plume over the whole floor.
 
-    ``concentration`` gives the odor at a point. A puff moves with the wind at its
-    center plus a velocity of its own, and grows with the distance that it has traveled.
-    The floor reflects the odor, walls do not, and robots leave no wake. When a run
-    begins, the source has released odor for ``age_s``.
+    The function ``concentration`` computes the concentration at a point. A puff moves
+    with the wind at its center and with its own velocity. It grows with the distance
+    that the wind carries it. The floor reflects the odor. Walls and robots do not
+    affect it. At the beginning of a run, the source has released odor for ``age_s``.
 
-    Discrete state: the output, which changes every 0.1 s and depends on the wind of
-    0.1 s before.
+    Discrete state: the output. It changes every 0.1 s and depends on the wind 0.1 s
+    before.
 
     Args:
-        parameters: ``OdorParameters``.
+        parameters: Kind, strength and spread of the plume.
         wind: Wind before the run, and wind of a steady plume.
         p_WO: Position of the source in W, m.
         seed: Seed of the puffs' own velocities.
-        tick_s: Period of the robots, s; 0.1 s is a multiple of it.
+        tick_s: Period of the robots, s. 0.1 s is a multiple of it.
 
     Raises:
         InputError: A steady plume has no wind.
 
-    Reference: Song 2011, 2.2, eq. 1 to 6; puffs and all numbers are ours.
+    Reference: Song 2011, 2.2, eq. 1 to 6. The puffs and all numbers are ours.
     """
 
     part, stage = "plume", "world"
@@ -315,7 +330,7 @@ class OdorPlume(Block):
         self.declare(self._step_of(seed), tick_s=tick_s, arrays=True)
 
     def step_for(self, run: RunFacts) -> Step:
-        """The step, with noise and initial plume of the run."""
+        """Returns the step, with the noise and the initial plume of the run."""
         return self._step_of(run.seed_of(self.get_name()))
 
 
@@ -369,7 +384,7 @@ def _spin_up(
     own: OdorParameters,
     numbers: PlumeNumbers,
 ) -> None:
-    """Releases the puffs of the time before the run, in a wind that does not change."""
+    """Simulates the plume before the run, in a constant wind."""
     plume[_AT.age] = own.age_s
     for k in range(round(min(own.age_s, _LONGEST_SPIN_UP_S) / numbers.period_s)):
         _advance(plume, wind, -1 - k, numbers)

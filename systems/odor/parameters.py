@@ -1,4 +1,4 @@
-"""Parameters of the wind, of a source of odour and of what senses both."""
+"""Parameters of the wind, the odor source, the gas sensors and the airflow sensors."""
 
 from __future__ import annotations
 
@@ -21,114 +21,124 @@ from systems.framework.parameters import (
 
 
 class WindParameters(Parameters):
-    """The wind; the paper prints only its range of speeds (Song 2011, 4.1)."""
+    """The wind. The paper prints only the range of its speed (Song 2011, 4.1)."""
 
     kind: Literal["uniform", "meandering", "jet"] = "meandering"
-    """``uniform``: always the mean; ``meandering``: its velocity changes slowly,
-    equally everywhere; ``jet``: the jet of a fan, which also meanders, widens and slows
-    down."""
+    """``uniform``: constant wind. ``meandering``: the velocity changes slowly, in the
+    same way everywhere. ``jet``: the jet of a fan, which also meanders, and becomes
+    wider and slower along its axis."""
     speed_m_s: float = Field(default=1.0, ge=0.0, le=20.0)
-    """Mean speed, of a jet at its outlet, m/s."""
+    """Mean speed, m/s. For a jet: mean speed at its outlet."""
     direction_deg: Angle = 0.0
-    """Direction toward which it blows, deg CCW from the x axis of W."""
+    """Direction toward which the wind blows, CCW from the x axis of W, deg."""
     meander_intensity: float = Field(default=0.12, ge=0.0, le=1.0)
-    """Standard deviation of each component over the mean speed."""
+    """Standard deviation of each velocity component, divided by the mean speed."""
     meander_time_s: float = Field(default=8.0, ge=0.1, le=3_600.0)
     """Correlation time of the meandering, s."""
     jet_origin_m: Point = (-2.2, 0.0)
-    """Outlet of the jet in W, m."""
+    """Position of the outlet of the jet in W, m."""
     jet_diameter_m: Length = 0.3
-    """Diameter of the outlet, m."""
+    """Diameter of the outlet of the jet, m."""
     jet_growth: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Growth of the half width, at which the speed is exp(-1/2), per meter."""
+    """Growth of the half width of the jet per meter along its axis. At the half width,
+    the speed is exp(-1/2) of the speed on the axis."""
 
 
 class OdorParameters(Parameters):
-    """A source of odour; the paper prints nothing of it but that it smells."""
+    """The odor source. The paper prints no properties of it."""
 
     kind: Literal["puffs", "steady"] = "puffs"
-    """``puffs``: as they come; ``steady``: their mean, Song 2011, eq. 6."""
+    """``puffs``: single puffs. ``steady``: their mean (Song 2011, eq. 6)."""
     ratio_at_2_m: float = Field(default=0.76, ge=1e-3, le=0.999)
-    """Strength: mean ratio Rs/R0 of a gas sensor 2 m downwind on the axis in a wind of
-    1 m/s; the sensor's power law converts it to a concentration."""
+    """Strength of the source: mean ratio Rs/R0 of a gas sensor on the axis, 2 m
+    downwind, in a wind of 1 m/s. The power law of the default sensor converts it to a
+    concentration."""
     height_m: NonNegativeLength = 0.0
-    """H, above the floor, m."""
+    """H, height of the source above the floor, m."""
     puffs_per_s: float = Field(default=16.0, ge=1.0, le=50.0)
-    """Puffs released per second, 1/s; 320 are kept, which reach 6 m at 1 m/s."""
+    """Number of puffs released per second, 1/s. The model stores 320 puffs. Even
+    at 50 puffs per second, they reach 6 m in a wind of 1 m/s."""
     level_growth: float = Field(default=0.12, ge=1e-3, le=1.0)
-    """Growth of a puff's horizontal spread with its travel."""
+    """Growth of the horizontal spread of a puff per distance traveled."""
     upright_growth: float = Field(default=0.13, ge=1e-3, le=1.0)
-    """Growth of a puff's vertical spread with its travel."""
+    """Growth of the vertical spread of a puff per distance traveled. Also gamma_2 / u
+    of the steady plume."""
     own_intensity: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Standard deviation of each component of a puff's own velocity over the speed of
-    the wind."""
+    """Standard deviation of each component of a puff's own velocity, divided by the
+    wind speed."""
     own_time_s: float = Field(default=2.0, ge=0.01, le=3_600.0)
     """Correlation time of a puff's own velocity, s."""
     mean_intensity: float = Field(default=0.197, ge=1e-3, le=1.0)
-    """gamma_1 / u of the mean. 0.197 is the value of the default puffs in the default
-    wind close to the source; 2 m downwind their value is about 0.19."""
+    """gamma_1 / u, growth of the horizontal spread of the steady plume. The default is
+    the value of the default puffs in the default wind near the source. 2 m downwind,
+    their value is about 0.19."""
     reach_m: float = Field(default=6.0, ge=0.5, le=1_000.0)
-    """Puffs farther from the source are left out, m."""
+    """Distance from the source beyond which puffs are removed, m."""
     age_s: Time = 60.0
-    """Time since the beginning of the release when a run begins, s."""
+    """Time from the beginning of the release to the start of a run, s."""
     room_volume_m3: float | None = Field(default=None, ge=1.0, le=1e6)
-    """Volume of a closed room, m^3, in which the odor accumulates evenly; null: an open
-    room."""
+    """Volume of a closed room, m^3. In a closed room, the odor also accumulates as a
+    uniform background. null: an open room."""
 
 
 GAS_SENSORS = 3
 
-#: Time constants that differ from the paper's.
+#: Time constants that replace those of the paper.
 _PRESETS = {
     "song2011": {},
-    # GADEN's table of the TGS2620, ethanol.
+    # Values for the TGS2620 and ethanol in the table of GADEN.
     "tgs2620": {"response_s": 2.96, "recovery_s": 15.71},
 }
 
 
 class GasSensorFaultParameters(Parameters):
-    """A gas sensor that fails in a run, and how."""
+    """A fault of a gas sensor."""
 
     sensor: int = Field(default=1, ge=1, le=GAS_SENSORS)
-    """R1 right front, R2 rear, R3 left front."""
+    """Number of the sensor: 1 right front, 2 rear, 3 left front."""
     kind: Literal["dead", "stuck"] = "dead"
-    """``dead``: it reads 1, clean air, without noise; ``stuck``: it repeats its last
-    reading."""
+    """``dead``: the reading is 1 (clean air) without noise. ``stuck``: the sensor
+    repeats its last reading."""
     start_s: Time = 0.0
-    """When that begins, s."""
+    """Start of the fault, s."""
 
 
 class GasSensorParameters(Parameters):
-    """Three TGS2620 on arms of 20 cm, 120 deg apart (Song 2011, 2.1)."""
+    """Three TGS2620 sensors on arms of 20 cm, 120 deg apart (Song 2011, 2.1)."""
 
     preset: Literal["song2011", "tgs2620"] = "song2011"
-    """Time constants: those of the paper, or those of GADEN for the TGS2620."""
+    """Time constants of the paper, or of GADEN for the TGS2620."""
     positions_m: Annotated[tuple[Point, Point, Point], Strict(False)] = (
         (0.1, -0.1732),
         (-0.2, 0.0),
         (0.1, 0.1732),
     )
-    """R1 right front, R2 rear, R3 left front, from the origin of B in its axes, m."""
+    """Positions of R1 (right front), R2 (rear) and R3 (left front) in B, m."""
     height_m: NonNegativeLength = 0.0
-    """Above the floor, m."""
+    """Height of the sensors above the floor, m."""
     exponent: Positive = 0.7155
-    """Exponent in Rs/R0 = (1 + C/C1)^-exponent: ethanol in GADEN's table."""
+    """Exponent in Rs/R0 = (1 + C/C1)^-exponent. The default is the value for ethanol in
+    the table of GADEN."""
     response_s: Duration = 2.5
-    """Time constant where the gas grows, s: 95 % in 7.5 s (2.3.3: 5 to 10)."""
+    """Time constant while the concentration grows, s. The default reaches 95 % in 7.5 s
+    (2.3.3: 5 to 10)."""
     recovery_s: Duration = 5.8
-    """Time constant where the gas fades, s: 95 % in 17.4 s (2.3.3: 15 to 20)."""
+    """Time constant while the concentration falls, s. The default reaches 95 % in
+    17.4 s (2.3.3: 15 to 20)."""
     noise: float = Field(default=0.003, ge=0.0, le=1.0)
-    """Standard deviation of a reading, as a share of it."""
+    """Standard deviation of a reading, divided by the reading."""
     mismatch: float = Field(default=0.01, ge=0.0, le=0.1)
-    """Mismatch of each sensor's R0, drawn once."""
+    """Relative standard deviation of R0 between sensors. Each sensor has a constant
+    value."""
     slope_mismatch: float = Field(default=0.03, ge=0.0, le=0.15)
-    """Mismatch of each sensor's exponent, drawn once."""
+    """Relative standard deviation of the exponent between sensors. Each sensor has a
+    constant value."""
     drift_per_h: float = Field(default=0.0, ge=-0.03, le=0.03)
-    """Growth of all readings, as a share per hour, 1/h."""
+    """Relative growth of all readings per hour, 1/h."""
     faults: Annotated[
         tuple[GasSensorFaultParameters, ...], Strict(False), Field(max_length=8)
     ] = ()
-    """Sensors that fail in a run."""
+    """Faults of the sensors, at most one per sensor."""
 
     @model_validator(mode="before")
     @classmethod
@@ -148,13 +158,14 @@ class GasSensorParameters(Parameters):
 
 
 class AirflowParameters(Parameters):
-    """The two wires; unit, gain and direction pattern are not printed."""
+    """The two hot wires. The paper prints no unit, no gain and no lobe."""
 
     gain_s_m: Positive = 3.0
-    """k: reading of a sensor per m/s of wind straight onto it, s/m."""
+    """k, reading of a sensor per m/s of wind from its most sensitive direction, s/m."""
     lobe: Literal["cosine", "crosswind"] = "cosine"
-    """``cosine``: each wire measures wind from a direction 45 deg to its side;
-    ``crosswind``: wires along the robot's axis, next to a partition, measure the wind
-    across if it comes from their side, and a fifth of the wind along them."""
+    """Directional sensitivity. ``cosine``: the wires are most sensitive to wind from 45
+    deg to the left and to the right. ``crosswind``: the wires are parallel to the axis
+    of the robot, next to a partition. They measure the crosswind if it comes from their
+    side, and a fifth of the wind along the axis."""
     noise: float = Field(default=0.02, ge=0.0, le=1.0)
-    """Standard deviation of a reading, as a share of it."""
+    """Standard deviation of a reading, divided by the reading."""

@@ -1,4 +1,4 @@
-"""Mean concentration of a source in a steady wind, in closed form."""
+"""Closed form of the mean concentration of a source in a steady wind."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from typing import Any
 
 from systems.framework.compiling import njit
 
-#: From here on the series of ``scaled_erfc`` is right to double precision.
+#: From this x on, the series of ``scaled_erfc`` is accurate to double precision.
 _ASYMPTOTIC = 12.0
 
 
 @njit(cache=True)
 def scaled_erfc(x: float) -> float:  # pragma: no cover  (compiled)
-    """exp(x^2) erfc(x) without overflow, for x >= 0.
+    """Computes exp(x^2) erfc(x) without overflow.
 
     Args:
-        x: At least 0.
+        x: Argument, at least 0.
 
     Returns:
-        From 1 downwards, right to 1e-12 of itself.
+        Value above 0 and up to 1, with a relative error of at most 1e-12.
     """
     if x < 5.0:
         return math.exp(x * x) * math.erfc(x)
     if x < _ASYMPTOTIC:
-        # Continued fraction of Laplace, from its end; 60 terms are enough from 5 on.
+        # Continued fraction of Laplace, from its end. For x >= 5, 60 terms are enough.
         tail = x
         for k in range(60, 0, -1):
             tail = x + 0.5 * k / tail
@@ -38,9 +38,9 @@ def scaled_erfc(x: float) -> float:  # pragma: no cover  (compiled)
 
 @njit(cache=True)
 def _kernel(s: float, cut: float) -> float:  # pragma: no cover  (compiled)
-    """exp(-cut) (1 + sqrt(2 pi) s exp(s^2/2) Phi(s)), for s^2/2 <= cut."""
+    """Computes exp(-cut) (1 + sqrt(2 pi) s exp(s^2/2) Phi(s)), for s^2/2 <= cut."""
     if s < 0.0:
-        # Phi(s) exp(s^2/2) is half the scaled erfc of -s/sqrt(2).
+        # Phi(s) exp(s^2/2) is half of scaled_erfc(-s / sqrt(2)).
         tail = 0.5 * scaled_erfc(-s / math.sqrt(2.0))
         return math.exp(-cut) * (1.0 + math.sqrt(2.0 * math.pi) * s * tail)
     phi = 0.5 * math.erfc(-s / math.sqrt(2.0))
@@ -58,22 +58,24 @@ def steady_concentration(
     speed: float,
     spreads: Any,
 ) -> float:  # pragma: no cover  (compiled)
-    """Concentration of puffs that grow as they go (Song 2011, eq. 1 to 6).
+    """Computes the mean concentration of growing puffs (Song 2011, eq. 1 to 6).
 
-    The integral of eq. 1 with sigma_x = a t, sigma_y = b t, sigma_z = c t, which alone
-    leads to eq. 6: there a = b = gamma_1, c = gamma_2, z = H = 0.
+    The result is the integral of eq. 1 over the time t since the release of a puff. The
+    spreads are sigma_x = a t, sigma_y = b t and sigma_z = c t. Only these spreads lead
+    to eq. 6, where a = b = gamma_1, c = gamma_2 and z = H = 0. The floor reflects the
+    odor: a mirror image of the source below the floor adds the second term.
 
     Args:
-        x: Downwind of the source, m; may be upwind.
-        y: Across, m.
-        z: Above the floor, m.
-        height: H of the source, m.
-        rate: Q, amount a second.
-        speed: u of the wind, m/s, above 0.
-        spreads: (a, b, c), m/s.
+        x: Distance downwind of the source, m. Negative: upwind.
+        y: Distance across the wind, m.
+        z: Height above the floor, m.
+        height: H, height of the source, m.
+        rate: Q, amount per second.
+        speed: u, speed of the wind, above 0, m/s.
+        spreads: (a, b, c), growth of the spreads, m/s.
 
     Returns:
-        Amount a cubic metre; reflected by the floor.
+        Concentration, amount per cubic meter.
     """
     a, b, c = spreads
     factor = rate / ((2.0 * math.pi) ** 1.5 * a * b * c)
@@ -96,20 +98,22 @@ def sharan_concentration(
     speed: float,
     intensities: Any,
 ) -> float:  # pragma: no cover  (compiled)
-    """Concentration with eddy diffusivities that grow downwind (Sharan 1996).
+    """Computes the concentration with diffusivities that grow downwind (Sharan 1996).
 
-    For a source on the floor; the flux through each x is exactly Q.
+    The source is on the floor. The flux through each plane across the wind is exactly
+    Q. The concentration upwind of the source is 0.
 
     Args:
-        x: Downwind, m; 0 upwind.
-        y: Across, m.
-        z: Above the floor, m.
-        rate: Q, amount a second.
-        speed: u of the wind, m/s.
-        intensities: (alpha, beta, gamma), each sigma^2 / x^2 of its direction.
+        x: Distance downwind of the source, m.
+        y: Distance across the wind, m.
+        z: Height above the floor, m.
+        rate: Q, amount per second.
+        speed: u, speed of the wind, m/s.
+        intensities: (alpha, beta, gamma), sigma^2 / x^2 along the wind, across the
+            wind, and vertically.
 
     Returns:
-        Amount a cubic metre.
+        Concentration, amount per cubic meter.
     """
     if x <= 0.0:
         return 0.0

@@ -1,4 +1,4 @@
-"""Wind over the floor: uniform, meandering, or a fan's jet."""
+"""The wind over the floor: uniform, meandering, or the jet of a fan."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ from systems.odor.parameters import WindParameters
 
 
 class _Places(NamedTuple):
-    """Places in the port ``wind``."""
+    """Indices in the port ``wind``."""
 
     jet: int
-    """Whether it is a jet, 0 or 1."""
+    """Whether the wind is a jet, 0 or 1."""
     mean: int
     """Mean velocity, x and y, m/s."""
     gust: int
     """Unsteady velocity, x and y, m/s."""
     origin: int
-    """Of a jet, x and y, m."""
+    """Position of the outlet of a jet in W, x and y, m."""
     diameter: int
-    """Of a jet at its origin, m."""
+    """Diameter of the outlet of a jet, m."""
     growth: int
-    """Of a jet."""
+    """Growth of the half width of a jet per meter."""
     size: int
-    """Of the port."""
+    """Size of the port."""
 
 
 _AT = _Places(*accumulate((1, 2, 2, 2, 1, 1), initial=0))
 #: Size of the port ``wind``.
 WIND_SIZE = _AT.size
-#: Wind and plume change so often, s.
+#: Period with which wind and plume change, s.
 WIND_PERIOD_S = 0.1
-#: Diameters along which a round jet keeps its speed on the axis (Pope 2000, 5.1: the
-#: decay constant of 6 for a uniform outlet).
+#: Distance along which a round jet keeps its speed on the axis, in diameters of the
+#: outlet (Pope 2000, 5.1: decay constant 6 for a uniform outlet).
 _CORE = 6.0
 
 
@@ -56,15 +56,19 @@ _CORE = 6.0
 def wind_velocity(
     wind: Any, x: float, y: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Wind at a point.
+    """Computes the wind at a point.
+
+    Upwind of the outlet of a jet, there is no wind. Downwind, the speed on the axis is
+    constant along ``_CORE`` diameters, and then falls with the distance. Across the
+    jet, the speed is a Gaussian function.
 
     Args:
-        wind: (WIND_SIZE,) of the port ``wind``.
-        x: In W, m.
-        y: In W, m.
+        wind: (WIND_SIZE,) value of the port ``wind``.
+        x: x coordinate of the point in W, m.
+        y: y coordinate of the point in W, m.
 
     Returns:
-        (ux, uy) in W, m/s.
+        (ux, uy), velocity of the wind in W, m/s.
     """
     share = 1.0
     speed = math.hypot(wind[_AT.mean], wind[_AT.mean + 1])
@@ -82,21 +86,21 @@ def wind_velocity(
 
 
 class WindNumbers(NamedTuple):
-    """What the step of ``WindField`` depends on."""
+    """Constants of the step of ``WindField``."""
 
     spread: float
-    """Standard deviation of a component, m/s."""
+    """Standard deviation of each component of the unsteady velocity, m/s."""
     keep: float
-    """Share of it that is left a period later."""
+    """Share of the unsteady velocity that remains after one period."""
     period: int
-    """Ticks."""
+    """Period of the changes, ticks."""
     noise: TickNoise
 
 
 def wind_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: WindNumbers
 ) -> None:
-    """The wind after a tick.
+    """Updates the unsteady velocity once per period.
 
     State: the output port ``wind``.
     """
@@ -111,20 +115,22 @@ def wind_step(
 
 
 def _publish(state: Any, outputs: Any, numbers: WindNumbers) -> None:
-    """The output of ``wind_step``'s state."""
+    """Copies the output from the state of ``wind_step``."""
     for k in range(WIND_SIZE):
         outputs[0][k] = state[k]
 
 
 def initial_wind(own: WindParameters, seed: int) -> NDArray[np.float64]:
-    """The port ``wind`` at the first instant.
+    """Computes the port ``wind`` at the start of a run.
+
+    The initial unsteady velocity has the stationary distribution of the process.
 
     Args:
-        own: The wind.
-        seed: By which its unsteady part is drawn, as it is at any instant.
+        own: Parameters of the wind.
+        seed: Seed of the unsteady velocity.
 
     Returns:
-        (WIND_SIZE,) numbers.
+        (WIND_SIZE,) value of the port.
     """
     wind = np.zeros(WIND_SIZE)
     direction = math.radians(own.direction_deg)
@@ -144,19 +150,20 @@ def _spread(own: WindParameters) -> float:
 
 
 class WindField(Block):
-    """The wind over the whole floor.
+    """Models the wind over the whole floor.
 
-    ``wind_velocity`` gives the wind at a point. Each component of the unsteady velocity
-    is an Ornstein-Uhlenbeck process, advanced exactly.
+    The function ``wind_velocity`` computes the wind at a point. Each component of the
+    unsteady velocity is an Ornstein-Uhlenbeck process, with an exact discretization.
+    Obstacles and robots do not affect the wind.
 
-    Discrete state: the output, which changes every 0.1 s. Nothing affects the wind.
+    Discrete state: the output. It changes every 0.1 s.
 
     Args:
-        parameters: ``WindParameters``.
+        parameters: Kind, mean and unsteadiness of the wind.
         seed: Seed of the unsteady velocity.
-        tick_s: Period of the robots, s; 0.1 s is a multiple of it.
+        tick_s: Period of the robots, s. 0.1 s is a multiple of it.
 
-    Reference: Song 2011, 4.1, for the speeds; the rest is ours.
+    Reference: Song 2011, 4.1, for the speeds. The rest is ours.
     """
 
     part, stage = "wind", "world"
@@ -180,6 +187,6 @@ class WindField(Block):
         )
 
     def step_for(self, run: RunFacts) -> Step:
-        """The step, with noise and initial wind of the run."""
+        """Returns the step, with the noise and the initial wind of the run."""
         wind = self._initial(run.seed_of(self.get_name()))
         return super().step_for(run)._replace(state=wind)

@@ -1,1 +1,1 @@
-"""Ways through what a robot knows of the floor."""
+"""Paths, evasion and velocity filters that use what a robot knows of the floor."""

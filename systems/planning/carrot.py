@@ -1,4 +1,4 @@
-"""Where to head on a way: its farthest point that is worth driving to straight."""
+"""The point of a path to head for: the farthest one that a straight drive may reach."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import math
 from systems.framework.compiling import njit
 from systems.planning.way import STRAIGHT, Way
 
-#: The straight line may cost so much more than the way, which zigzags on its cells.
+#: The straight line may cost this multiple of the path, which zigzags between cells.
 _DEARER = 1.1
-#: Nearer points need not be worth it: a robot stands beside the middle of its cell, m.
+#: Points within this distance are always accepted, m: the robot may stand beside the
+#: middle of its cell, which makes the comparison inexact.
 _NEAREST_M = 0.4
 
 
@@ -17,16 +18,19 @@ _NEAREST_M = 0.4
 def find_carrot(
     way: Way, x: float, y: float, farthest_m: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """The farthest point of a way to which the straight line costs no more.
+    """Returns the farthest point of a path to which the straight line costs no more.
+
+    The cost of the straight line is its length times the mean price of the cells under
+    it. The function compares this cost with the cost of the path to the same point.
 
     Args:
         way: From ``find_way``.
-        x: Where the robot is, m.
-        y: See x.
-        farthest_m: No point farther away is looked at, m.
+        x: Position of the robot, m.
+        y: Position of the robot, m.
+        farthest_m: The search ends at the first point that is farther away, m.
 
     Returns:
-        (x, y) m; the robot's own place where there is no way.
+        (x, y) m; the position of the robot if there is no path.
     """
     found, begin, cell = (x, y), 0, way.facts[0, 5]
     for k in range(int(way.facts[0, 0])):
@@ -37,6 +41,7 @@ def find_carrot(
             begin = way.cost[i, j]
         elif distance > farthest_m:
             break
+        # Mean price at points half a cell apart.
         steps, price = max(1, math.ceil(2.0 * distance / cell)), 0.0
         for step in range(steps):
             part = (step + 0.5) / steps
@@ -52,7 +57,7 @@ def find_carrot(
 def _cell(
     way: Way, x: float, y: float
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Number of the cell of a place, the nearest one of a place beyond all cells."""
+    """Return the cell of a place, or the nearest cell of the window."""
     size, cell = way.price.shape[0], way.facts[0, 5]
     i = math.floor(x / cell) - int(way.facts[0, 3])
     j = math.floor(y / cell) - int(way.facts[0, 4])

@@ -1,4 +1,4 @@
-"""Which speed and heading keeps off bodies that move, and keeps an eye on them."""
+"""Choice of a speed and heading that avoid moving bodies and keep them in view."""
 
 from __future__ import annotations
 
@@ -11,51 +11,60 @@ from systems.framework.compiling import njit
 from systems.planning.hazards import AGE_S, SPREAD, VX, VY, WEIGHT, X, Y
 from systems.planning.turning import wrapped
 
-#: What is looked ahead, s, and in which steps.
+#: How far motions are predicted, s, and the step of the prediction, s.
 _AHEAD_S, _STEP_S = 4.0, 0.2
-#: Nearer to the body than the first a particle counts full, up to the second less, m.
+#: A particle nearer to the robot's body than the first distance counts fully. Up to the
+#: second distance it counts less, m.
 _HIT_M, _NEAR_M = 0.15, 0.43
-#: What is far ahead counts less, by this share at the end.
+#: Share by which a contact at the end of the prediction counts less than one now.
 _LATER = 0.2
-#: What comes nearer than the first in the next seconds is a full threat, up to the
-#: second less, m.
+#: A particle that comes nearer than the first distance is a full threat. Up to the
+#: second distance it is a smaller one, m. Contacts later than the third number do not
+#: count, s.
 _THREAT_M, _NO_THREAT_M, _THREAT_S = 0.8, 1.6, 4.0
-#: A threat that goes away counts for this share.
+#: Factor for a threat that moves away.
 _GOING = 0.25
-#: A track that was not seen for so long, s, or whose velocity is known so badly, m/s,
-#: has to be looked at; one that is just being watched a little all the same.
+#: The need to look at a track is 1 after this time without an echo, s. It is also 1 if
+#: its velocity has 1.5 times this standard deviation, m/s. Least need, and largest need
+#: of a track without echoes.
 _STALE_S, _UNSURE_M_S, _LEAST_NEED, _MOST_NEED = 0.8, 0.1, 0.1, 2.0
-#: A threat that is no farther off the heading is in view, rad; at most so much counts.
+#: Angle off the heading within which a threat is in view, rad. Largest angle out of
+#: view that counts, rad.
 _IN_VIEW_RAD, _OUT_OF_VIEW_RAD = 0.55, 1.0
-#: Speeds that are tried besides the wanted one, m/s.
+#: Speeds that are tried in addition to the wanted speed, m/s.
 _SPEEDS = (-0.6, -0.4, -0.2, 0.0, 0.15, 0.3, 0.45, 0.62)
-#: Headings that are tried around the wanted one, rad, and limit of a gaze around it.
+#: Angles between the tried headings and the wanted heading, rad. Largest angle between
+#: the wanted heading and a heading towards a threat, rad.
 _ASIDE = (0.0, 0.5, -0.5, 1.0, -1.0)
 _GAZE_RAD = 0.8
-#: A guard that reckons with moving bodies lets a robot move on beside one within this
-#: of its rim, m, and of what it goes in so long, s, a turn taken for so much of a way,
-#: m, only if it gets away by this share of its way.
+#: A guard that allows for moving bodies checks the bodies beside the robot. A body is
+#: beside the robot if its gap to the rim is below ``_BESIDE_M``, m, plus the distance
+#: that the robot covers in ``_BESIDE_S``, s. A turn counts as ``_BESIDE_TURN_M`` of
+#: distance, m/rad. The guard then permits only motions that lead away from the body, by
+#: at least the share ``_WITHDRAWS`` of their speed.
 _BESIDE_M, _BESIDE_S, _BESIDE_TURN_M, _WITHDRAWS = 0.09, 0.4, 0.2, 0.2
-#: Else it may turn slowly, rad/s. So much of a body counts as one.
+#: Turn rate that the guard always permits, rad/s. Total weight of particles that counts
+#: as a body.
 _SLOW_RAD_S, _BODY_SHARE = 0.3, 0.3
-#: Price of a heading that is not the wanted one, m/s a rad.
+#: Price of a deviation from the wanted heading, m/s per rad.
 _TURN_PRICE = 0.1
-#: The guard lets the robot not go on to within this of its heading, rad.
+#: Angle off the robot's heading within which a speed that the guard has refused is not
+#: tried again, rad.
 _HELD_RAD = 0.6
 
 
 class EvasionNumbers(NamedTuple):
-    """What a choice depends on."""
+    """Constants of a choice."""
 
     turn_gain: float
-    """Yaw rate per error of the heading, 1/s."""
+    """Yaw rate per heading error, 1/s."""
     turn_rate_rad_s: float
-    """The largest one, rad/s."""
+    """Largest yaw rate, rad/s."""
     half_size: tuple[float, float]
-    """Of the body's length and width, m."""
+    """Half of the body's length and width, m."""
     top_speed_m_s: float
     risk_gain: float
-    """Price of a body that is hit, m/s."""
+    """Price of a predicted contact with a body, m/s."""
     watch_gain: float
     """Price of a threat that is 1 rad out of view, m/s."""
 
@@ -64,7 +73,7 @@ class EvasionNumbers(NamedTuple):
 def _between(
     value: float, none: float, full: float
 ) -> float:  # pragma: no cover  (compiled)
-    """1 below ``full``, 0 above ``none``, and in between in proportion."""
+    """Return 1 below ``full``, 0 above ``none``, and a linear ramp between them."""
     return min(max((none - value) / (none - full), 0.0), 1.0)
 
 
@@ -72,7 +81,11 @@ def _between(
 def _is_held(
     bodies: Any, count: int, pose: Any, motion: Any, time: float, numbers: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a guard lets the robot not move so, beside bodies as they are by then."""
+    """Return whether the guard would refuse a motion because of bodies nearby.
+
+    The bodies are moved on by ``time`` seconds. A body does not count if the robot
+    moves away from it fast enough.
+    """
     x, y, theta = pose
     speed, omega = motion
     c, s = math.cos(theta), math.sin(theta)
@@ -84,6 +97,7 @@ def _is_held(
         dx = bodies[n, X] + time * bodies[n, VX] - x
         dy = bodies[n, Y] + time * bodies[n, VY] - y
         distance = math.hypot(dx, dy)
+        # The speed away from the body is a sufficient share of the speed of motion.
         withdraws = -speed * (c * dx + s * dy) >= moved * distance
         if distance < beside and not withdraws:
             near += bodies[n, WEIGHT]
@@ -99,18 +113,23 @@ def risk_of(
     heading: float,
     numbers: EvasionNumbers,
 ) -> float:  # pragma: no cover  (compiled)
-    """How many bodies come near the robot if it goes on so, or where a guard holds it.
+    """Predicts how many bodies come near the robot if it uses a speed and heading.
+
+    The robot turns to the heading and keeps the speed for 4 s. The guard may refuse
+    this motion at some time. The function then also predicts the motion that the guard
+    permits, and returns the larger risk.
 
     Args:
         bodies: (n, 7) from ``pick_hazards``.
-        count: How many of them there are.
+        count: Number of particles in ``bodies``.
         pose: (x, y, theta) now, m and rad.
-        speed: Ahead, m/s.
-        heading: That it turns to, rad.
-        numbers: The robot.
+        speed: Forward speed, m/s.
+        heading: Heading to which the robot turns, rad.
+        numbers: Properties of the robot.
 
     Returns:
-        Bodies: those within 15 cm of its sides full, up to 43 cm less and less.
+        Expected number of bodies. A body counts fully within 15 cm of the robot's
+        sides, and less up to 43 cm.
     """
     let, held = _risk_along(bodies, count, pose, speed, heading, numbers, np.inf)
     if held:
@@ -131,7 +150,14 @@ def _risk_along(
     numbers: EvasionNumbers,
     held_rad_s: float,
 ) -> tuple[float, bool]:  # pragma: no cover  (compiled)
-    """``risk_of``, and whether a guard would hold the robot; to which turn, if any."""
+    """Return the risk of a motion, and whether the guard would hold the robot.
+
+    ``held_rad_s`` selects the prediction. If it is infinite, the robot moves as if
+    without a guard. Otherwise the robot stands wherever the guard holds it, and turns
+    at most at this rate. In each step, the function moves the robot, and then compares
+    its rectangle with all particles. Each particle counts with its nearest approach,
+    and a later approach counts less.
+    """
     steps, total, held = math.ceil(_AHEAD_S / _STEP_S), 0.0, False
     x, y, theta = pose[0], pose[1], pose[2]
     worst = np.zeros(count)
@@ -146,6 +172,7 @@ def _risk_along(
             held = True
             if guarded:
                 v, omega = 0.0, min(max(omega, -held_rad_s), held_rad_s)
+        # Move the robot by one step.
         theta += omega * _STEP_S
         c, s = math.cos(theta), math.sin(theta)
         x += v * _STEP_S * c
@@ -153,6 +180,7 @@ def _risk_along(
         for n in range(count):
             dx = bodies[n, X] + time * bodies[n, VX] - x
             dy = bodies[n, Y] + time * bodies[n, VY] - y
+            # Gaps between the particle and the robot's rectangle, in B.
             u = max(abs(c * dx + s * dy) - numbers.half_size[0], 0.0)
             w = max(abs(-s * dx + c * dy) - numbers.half_size[1], 0.0)
             if u + w > 2.0 * _NEAR_M:
@@ -168,7 +196,10 @@ def _risk_along(
 def _least_distance(
     dx: float, dy: float, ux: float, uy: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Least distance to come, m, and when, s, at a relative place and velocity."""
+    """Return the least distance in the next 4 s, m, and when it occurs, s.
+
+    ``(dx, dy)`` and ``(ux, uy)`` are the relative position and velocity.
+    """
     square, time = ux * ux + uy * uy, 0.0
     if square > 1e-6:
         time = min(max(-(dx * ux + dy * uy) / square, 0.0), _THREAT_S)
@@ -179,20 +210,22 @@ def _least_distance(
 def find_threats(
     bodies: Any, count: int, pose: Any, wanted: Any, threats: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """How much each particle has to be watched, and where it is.
+    """Finds how much each particle has to be watched, and in which direction it is.
 
-    One has to if it comes near the robot, that drives as wanted or stands, and was not
-    seen for a while, or its velocity is not known well.
+    A particle is a threat if it will come near the robot. The function compares a robot
+    that drives as wanted with one that stands, and takes the nearer approach. The robot
+    has to watch a threat that it has not seen for a while, or whose velocity is
+    uncertain.
 
     Args:
         bodies: (n, 7) from ``pick_hazards``.
-        count: How many of them there are.
+        count: Number of particles in ``bodies``.
         pose: (x, y, theta) of the robot, m and rad.
-        wanted: Its wanted speed, m/s, and heading, rad.
-        threats: (n, 2) filled: bearing in W, rad, and bodies to be watched.
+        wanted: Wanted speed, m/s, and heading, rad.
+        threats: (n, 2) filled: bearing in W, rad, and number of bodies to be watched.
 
     Returns:
-        Sum of the latter.
+        Sum of these numbers.
     """
     speed, heading = max(wanted[0], 0.0), wanted[1]
     vx, vy = speed * math.cos(heading), speed * math.sin(heading)
@@ -202,8 +235,10 @@ def find_threats(
         driving, comes = _least_distance(dx, dy, bodies[n, VX] - vx, bodies[n, VY] - vy)
         standing, later = _least_distance(dx, dy, bodies[n, VX], bodies[n, VY])
         threat = _between(min(driving, standing), _NO_THREAT_M, _THREAT_M)
+        # The nearest approach is now: the particle moves away.
         if comes + later < 0.2:
             threat *= _GOING
+        # Need to watch: by the uncertain velocity, and by the time without an echo.
         unsure = min(max(bodies[n, SPREAD] / _UNSURE_M_S - 0.5, _LEAST_NEED), 1.0)
         need = max(min(bodies[n, AGE_S] / _STALE_S, _MOST_NEED), unsure)
         threats[n, 0] = math.atan2(dy, dx)
@@ -216,15 +251,15 @@ def find_threats(
 def watch_of(
     threats: Any, count: int, heading: float
 ) -> float:  # pragma: no cover  (compiled)
-    """How much of what has to be watched is out of view at a heading.
+    """Computes how much of the threats is out of view at a heading.
 
     Args:
         threats: (n, 2) from ``find_threats``.
-        count: How many of them there are.
-        heading: rad.
+        count: Number of threats.
+        heading: Heading of the robot, rad.
 
     Returns:
-        Bodies, times how far out of view they are, rad, up to 1.
+        Sum over the threats: bodies times their angle out of view, rad, at most 1 each.
     """
     total = 0.0
     for n in range(count):
@@ -242,23 +277,32 @@ def choose_motion(
     held: float,
     numbers: EvasionNumbers,
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """The speed and heading of the least price.
+    """Chooses the speed and heading with the lowest price.
 
-    The price is that of not going as wanted, of what comes near within 4 s, and of what
-    has to be watched and is not.
+    The price of a motion is the sum of four terms:
+
+    * the difference between its velocity and the wanted velocity;
+    * the angle between its heading and the weaving heading, times a small price;
+    * the threats that are out of view at this heading, times ``watch_gain``;
+    * the bodies that come near within 4 s, times ``risk_gain``.
+
+    The function tries all pairs of a heading and a speed. The headings are five around
+    the path, the current one, the weaving one, and two towards the threats. The last
+    term is expensive, so the function skips it for motions that are already too
+    expensive without it.
 
     Args:
         bodies: (n, 7) from ``pick_hazards``.
-        count: How many of them there are.
+        count: Number of particles in ``bodies``.
         pose: (x, y, theta) of the robot, m and rad.
-        wanted: Speed, m/s, heading of the way, rad, and heading that is wanted now,
-            which weaves about it, rad.
-        held: Speed at which the guard does not let the robot go on, m/s; 0: it does.
-        numbers: The robot and the prices.
+        wanted: Wanted speed, m/s; heading of the path, rad; and the momentary heading
+            that weaves around it, rad.
+        held: Speed that the guard has just refused, m/s; 0: none.
+        numbers: Properties of the robot, and prices.
 
     Returns:
-        Speed, m/s, heading, rad, and how much there is to watch: nothing, and there is
-        no need to go otherwise than wanted.
+        Speed, m/s; heading, rad; and the number of bodies to be watched. If the last
+        number is zero, there is no reason to deviate from the wanted motion.
     """
     threats = np.zeros((count, 2))
     way = wanted[0], wanted[1]
@@ -267,6 +311,7 @@ def choose_motion(
     for n in range(count):
         cosine += threats[n, 1] * math.cos(threats[n, 0])
         sine += threats[n, 1] * math.sin(threats[n, 0])
+    # Mean direction of the threats.
     gaze = math.atan2(sine, cosine)
     headings = np.empty(len(_ASIDE) + 4)
     for k in range(len(_ASIDE)):
@@ -277,6 +322,7 @@ def choose_motion(
     best, chosen = np.inf, (wanted[0], wanted[2])
     for heading in headings:
         weaving = abs(wrapped(heading - wanted[2]))
+        # The angle off the path, or off the weaving heading if this angle is smaller.
         off = min(abs(wrapped(heading - wanted[1])), weaving)
         base = _TURN_PRICE * weaving
         base += numbers.watch_gain * watch_of(threats, count, heading)
@@ -288,6 +334,7 @@ def choose_motion(
             if speed > numbers.top_speed_m_s or price >= best:
                 continue
             ahead = abs(wrapped(heading - pose[2])) < _HELD_RAD
+            # The guard has just refused such a motion.
             if ahead and speed * held > 0.0:
                 continue
             risk = risk_of(bodies, count, pose, speed, heading, numbers)

@@ -1,4 +1,4 @@
-"""What following a target asks of a robot: how fast it should go, and where to."""
+"""How fast the robot should go to follow a target, and in which direction."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from systems.planning.parameters import FollowingParameters
 
 
 class FollowNumbers(NamedTuple):
-    """What following depends on."""
+    """Constants of following."""
 
     own: FollowingParameters
     distance_m: float
-    """At which P is to stay, m."""
+    """Distance that P should keep from the target, m."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
 
 
 @register_jitable
 def wanted_speed(left: float, along: float, own: Any) -> float:
-    """How fast to go.
+    """Computes the wanted speed.
 
     Args:
-        left: Way to go to the follow distance, m.
-        along: Speed of the target along it, m/s.
+        left: Remaining distance to the follow distance, m.
+        along: Speed of the target in the direction of travel, m/s.
         own: ``FollowingParameters``.
 
     Returns:
@@ -38,15 +38,16 @@ def wanted_speed(left: float, along: float, own: Any) -> float:
 
 @register_jitable
 def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
-    """How fast to go straight to the target, and in which direction it is.
+    """Computes how fast to go straight to the target, and in which direction it is.
 
     Args:
-        inputs: Place and velocity of the target, m and m/s, whether there is one, and
-            pose of the robot, m and rad; more are not read.
-        follow: How it follows.
+        inputs: Position and velocity of the target, m and m/s; whether there is a
+            target; pose of the robot, m and rad. Further inputs are not read.
+        follow: Constants of following.
 
     Returns:
-        Wanted speed, m/s, 0 without a target, and bearing from the axle in W, rad.
+        Wanted speed, m/s, and bearing of the target from the axle in W, rad. Without a
+        target, speed 0 and the heading of the robot.
     """
     target, velocity, valid, pose = inputs[0], inputs[1], inputs[2][0], inputs[3]
     if valid < 0.5:

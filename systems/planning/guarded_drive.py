@@ -1,4 +1,11 @@
-"""How the guarded law drives and looks: one tick of its five modes."""
+"""One tick of the guarded law: where to drive, when to look, and how to evade bodies.
+
+The robot is in one of five modes. It waits without a target. It drives along the path
+that `systems.planning.way` finds. It looks around before it first moves, and at a place
+that blocks it. It backs off after it has stayed in one place for too long. It gives up
+for the moment when all paths lead through occupied cells. In every mode,
+`systems.planning.evasion` may replace the motion to avoid moving bodies.
+"""
 
 from __future__ import annotations
 
@@ -26,75 +33,79 @@ from systems.planning.way import NEAR, OCCUPIED, TIGHT, Way, find_way, mark_bloc
 from systems.safety.braking import TURNED
 from systems.safety.free_space import ROLLED, FreeSpace, edge_cells
 
-#: What the robot does.
+#: Modes of the robot.
 WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)
-#: Places in ``DriveState.memory``; times in s, places in m, headings in rad.
+#: Indices of ``DriveState.memory``: times in s, positions in m, headings in rad.
 (
-    HAS_BEGUN,
-    SPEED,
-    TURN,
-    MODE,
-    CARROT_X,
+    HAS_BEGUN,  # 1 after the first tick
+    SPEED,  # wanted forward speed, m/s
+    TURN,  # wanted yaw rate, rad/s
+    MODE,  # WAITING to GIVING_UP
+    CARROT_X,  # point of the path to which the robot heads
     CARROT_Y,
-    WAY_LEFT,
-    PLANNED_S,
-    BLOCKED_S,
-    STAYS_X,
+    WAY_LEFT,  # remaining length of the path, m
+    PLANNED_S,  # time of the last plan
+    BLOCKED_S,  # when the guard last let the robot go on
+    STAYS_X,  # where the robot was when it last moved on
     STAYS_Y,
-    STAYS_S,
-    HAS_LOOKED,
-    FIRST_LOOK,
+    STAYS_S,  # and when
+    HAS_LOOKED,  # 1 after the first look around
+    FIRST_LOOK,  # headings of the current look
     SECOND_LOOK,
-    LOOKS_DONE,
-    BLOCK_X,
+    LOOKS_DONE,  # number of these headings that are done
+    BLOCK_X,  # cell that blocks the robot
     BLOCK_Y,
-    BACKED_S,
-    HELD,
-    HELD_S,
-    PASSABLE_S,
-    MEMORY,
+    BACKED_S,  # start of backing off
+    HELD,  # speed that the guard last refused, m/s; 0: none
+    HELD_S,  # and when
+    PASSABLE_S,  # time of the last path without occupied cells
+    MEMORY,  # number of entries
 ) = range(23)
 
-#: Half of the first look around, before the robot has moved, and of one at what blocks
-#: it, rad.
+#: Half of the angle of a look, rad: for the first look, before the robot has moved; and
+#: for a look at a cell that blocks the robot.
 _FIRST_LOOK_RAD, _LOOK_RAD = 0.4, 0.6
-#: A look is done within this, rad, and turns by this much of what is left each second.
+#: A heading of a look is done within this error, rad. Yaw rate per error, 1/s.
 _LOOKED_RAD, _LOOK_GAIN = 0.1, 4.0
-#: The disc has room again, m: what blocked the way is seen free.
+#: A look ends early if the disc is this much farther from non-free space than it has to
+#: be, m.
 _ROOM_M = 0.03
-#: Farther off its heading than this, the robot turns before it drives, rad.
+#: If the heading error is larger, the robot turns before it drives, rad.
 _TURN_FIRST_RAD = 1.0
-#: A robot that has come so far has not stayed, m.
+#: A robot that has moved this far does not stay in one place, m.
 _STAYS_M = 0.15
-#: Within this of the follow distance of what rests it is there, m; slower rests, m/s.
+#: The robot has arrived if the error of its distance from the target is smaller, m, and
+#: the target is slower than this, m/s.
 _THERE_M, _RESTS_M_S = 0.2, 0.1
-#: A way that is no longer than so many times the straight line is straight.
+#: A path is straight if its length is at most this multiple of the direct distance.
 _DETOUR = 1.15
-#: It backs off for so long, s.
+#: Duration of backing off, s.
 _BACKING_S = 2.0
-#: Where something was found to move, it searches for so long, s; less the farther it
-#: lags behind what it follows, from the first to the second, m.
+#: Time after the detection of a moving body in which the robot weaves more widely, s.
 _MOVES_S = 5.0
+#: The robot weaves less if it lags behind the target. The reduction starts at the first
+#: lag and is complete at the second, m.
 _LITTLE_BEHIND_M, _FAR_BEHIND_M = 0.3, 0.9
-#: Bodies within this are evaded, m; less than this to be watched is none.
+#: Distance within which the robot evades bodies, m. If the need to watch bodies is
+#: below the second number, the robot does not evade.
 _NEAR_M, _WATCHED = 3.5, 0.05
-#: Where the guard has not let the robot go on it does not try again for so long, s.
+#: After the guard has refused a speed, the robot avoids this speed for a time, s.
 _HELD_S = 0.4
-#: Cells around the robot that may block it.
+#: Largest number of cells that are compared to find the one that blocks the robot.
 _MOST_CELLS = 1_000
 
 
 class DriveState(NamedTuple):
-    """What the robot remembers from tick to tick."""
+    """State of the guarded law between two ticks."""
 
     memory: NDArray[np.float64]
-    """(1, MEMORY), see ``MEMORY``."""
+    """(1, MEMORY) values at the indices from ``HAS_BEGUN`` to ``PASSABLE_S``."""
     way: Way
     hazards: Hazards
 
 
 class DriveNumbers(NamedTuple):
-    """What a tick depends on."""
+    """Constants of one tick."""
 
     own: Any
     """``GuardedParameters``."""
@@ -106,7 +117,7 @@ class DriveNumbers(NamedTuple):
     sensors: HazardSensors
     evasion: EvasionNumbers
     radius_m: float
-    """Of the disc for which ways are searched, m."""
+    """Radius of the disc for which paths are planned, m."""
     tick_s: float
 
 
@@ -119,30 +130,42 @@ def _within(value: float, limit: float) -> float:  # pragma: no cover  (compiled
 def drive_guarded(
     tick: int, state: DriveState, inputs: Any, numbers: DriveNumbers
 ) -> None:
-    """Decides what the robot wants in a tick: ``SPEED`` and ``TURN`` of the memory.
+    """Decides which speed and yaw rate the robot wants in one tick.
+
+    The function writes ``SPEED`` and ``TURN`` of the memory. It works in these steps:
+
+    1. Update the tracks of moving bodies with the new echoes.
+    2. Plan a path at regular intervals, and compute the wanted speed and heading error.
+    3. Update three timers: since when the robot stays in one place, since when the
+       guard blocks it, and since when all paths lead through occupied cells.
+    4. Change the mode if a timer has expired, and compute the motion of this mode.
+    5. Replace this motion if moving bodies are near (``_evade``).
 
     Args:
-        tick: Its number.
+        tick: Number of the tick.
         state: Changed.
-        inputs: Place and velocity of the target, m and m/s, whether there is one, pose
-            of the robot, m and rad, the guard's report, ranges, echoes and ages of the
-            range sensors, and the free space.
-        numbers: What the tick depends on.
+        inputs: Position and velocity of the target, m and m/s; whether there is a
+            target; pose of the robot, m and rad; report of the guard; ranges, echoes
+            and ages of the range sensors; free space.
+        numbers: Constants.
     """
     target, velocity, valid = inputs[0], inputs[1], inputs[2][0]
     pose, report, space = inputs[3], inputs[4], inputs[8]
     m, own, time = state.memory, numbers.own, tick * numbers.tick_s
     if m[0, HAS_BEGUN] < 0.5:
+        # First tick: start all timers, and plan at once.
         m[0, PLANNED_S], m[0, BLOCKED_S], m[0, PASSABLE_S] = -np.inf, time, time
         _stays(m, pose, time)
         m[0, HAS_BEGUN] = 1.0
     _remember_held(m, report, time)
     m[0, SPEED], m[0, TURN] = 0.0, 0.0
+    # Without a target, no echo is attributed to it.
     nowhere = np.inf, np.inf
     x, y = (target[0], target[1]) if valid > 0.5 else nowhere
     followed = x, y, own.source_radius_m
     readings = inputs[5], inputs[6], inputs[7]
     track_hazards(state.hazards, time, pose, readings, space, followed, numbers.sensors)
+    # No target: stand still, but evade.
     if valid < 0.5:
         m[0, MODE], m[0, BLOCKED_S], m[0, PASSABLE_S] = WAITING, time, time
         _stays(m, pose, time)
@@ -151,10 +174,14 @@ def drive_guarded(
     wanted, error, there = _find_heading(
         time, target, velocity, pose, state, space, numbers
     )
+    # Timer 1: since when the robot stays in one place.
     if math.hypot(pose[0] - m[0, STAYS_X], pose[1] - m[0, STAYS_Y]) > _STAYS_M or there:
         _stays(m, pose, time)
+    # Timer 2: since when the guard blocks the robot. The guard does not block it if it
+    # passes the command or only slows it.
     if report[0] < TURNED or there or wanted <= 0.0:
         m[0, BLOCKED_S] = time
+    # Timer 3: since when all paths lead through occupied cells.
     if time - m[0, PASSABLE_S] > own.search_way_s and not there:
         m[0, MODE], m[0, BLOCKED_S] = GIVING_UP, time
         _stays(m, pose, time)
@@ -166,6 +193,8 @@ def drive_guarded(
         _begin_look(time, pose, pose[2] + error, state, space, numbers)
     if m[0, MODE] == LOOKING:
         _look(time, pose, report, state, numbers)
+    # The robot has stayed in one place for too long. It marks the place in front of it
+    # as blocked, backs off, and plans a new path.
     if m[0, MODE] == DRIVING and time - m[0, STAYS_S] > own.give_up_s:
         ahead, at = pose[2] + error, numbers.radius_m + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
@@ -185,7 +214,7 @@ def drive_guarded(
 def _remember_held(
     m: Any, report: Any, time: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Remembers at which speed the guard has not let the robot go on."""
+    """Remember the speed that the guard has refused in the last tick."""
     if report[0] >= TURNED and m[0, SPEED] != 0.0:
         m[0, HELD], m[0, HELD_S] = m[0, SPEED], time
     elif time - m[0, HELD_S] > _HELD_S:
@@ -194,11 +223,17 @@ def _remember_held(
 
 @register_jitable
 def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untyped-def]
-    """Changes speed and turn where a body may come near."""
+    """Replace speed and turn if a moving body may come near.
+
+    The heading that the current turn aims at includes the weaving. ``choose_motion``
+    compares other motions with it. A look at a blocked place ends when the robot has to
+    evade. The first look around continues.
+    """
     m, hazards = state.memory, state.hazards
     count = pick_hazards(hazards, time, pose, _NEAR_M)
     if count == 0:
         return
+    # The current turn is the gain times the error of this heading.
     weaving = pose[2] + m[0, TURN] / numbers.following.turn_gain
     way = wanted, pose[2] + error, weaving
     speed, heading, watched = choose_motion(
@@ -214,7 +249,7 @@ def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untype
 
 @njit(cache=True)
 def _stays(m: Any, pose: Any, time: float) -> None:  # pragma: no cover  (compiled)
-    """Remembers from where and since when the robot stays."""
+    """Restart the timer that measures how long the robot stays in one place."""
     m[0, STAYS_X], m[0, STAYS_Y], m[0, STAYS_S] = pose[0], pose[1], time
 
 
@@ -222,7 +257,14 @@ def _stays(m: Any, pose: Any, time: float) -> None:  # pragma: no cover  (compil
 def _find_heading(  # type: ignore[no-untyped-def]
     time, target, velocity, pose, state, space, numbers
 ):
-    """Wanted speed, m/s, error of the heading, rad, and whether the robot is there."""
+    """Return the wanted speed, m/s, the heading error, rad, and whether it has arrived.
+
+    A new path is planned every ``replan_s``. Echoes near the target and near tracked
+    bodies do not block it. The robot heads to the carrot: the farthest point of the
+    path to which a straight drive costs no more. The wanted speed depends on the
+    distance that remains beyond the follow distance. This distance is the length of the
+    path, or the direct distance if the path is almost straight.
+    """
     m, own, way, hazards = state.memory, numbers.own, state.way, state.hazards
     x, y, theta = pose[0], pose[1], pose[2]
     if time - m[0, PLANNED_S] >= own.replan_s - 0.5 * numbers.tick_s:
@@ -235,6 +277,7 @@ def _find_heading(  # type: ignore[no-untyped-def]
         m[0, PLANNED_S] = time
         if way.facts[0, 2] < OCCUPIED:
             m[0, PASSABLE_S] = time
+    # Distance from P to the target.
     follow, offset = numbers.follow_distance_m, numbers.control_point_m
     dx = target[0] - x - offset * math.cos(theta)
     dy = target[1] - y - offset * math.sin(theta)
@@ -242,12 +285,15 @@ def _find_heading(  # type: ignore[no-untyped-def]
     carrot = find_carrot(way, x, y, own.look_ahead_m)
     left = max(distance, length - offset)
     direct = math.hypot(target[0] - x, target[1] - y)
-    # Around nothing: the way on its cells is longer than it is.
+    # A path over cells is longer than the straight line, even without obstacles. If the
+    # path avoids nothing, the direct distance counts. Close to the target, the robot
+    # heads to the target itself.
     if way.facts[0, 2] <= TIGHT and length < _DETOUR * direct:
         left = distance
         if distance < follow + 3.0 * _THERE_M:
             carrot = target[0], target[1]
     bearing = math.atan2(carrot[1] - y, carrot[0] - x)
+    # Speed of the target away from the robot.
     along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
     wanted = wanted_speed(left - follow, along, numbers.following)
     rests = math.hypot(velocity[0], velocity[1]) < _RESTS_M_S
@@ -259,7 +305,12 @@ def _find_heading(  # type: ignore[no-untyped-def]
 def _begin_look(  # type: ignore[no-untyped-def]
     time, pose, ahead, state, space, numbers
 ):
-    """The robot looks before it first moves, and where the guard stops it."""
+    """Begin a look before the robot first moves, or when the guard blocks it.
+
+    The first look is centered on the direction of the path. A later look is centered on
+    the cell that blocks the robot, as seen from P. It begins after the guard has
+    blocked the robot for ``patience_s``. The robot first turns to the nearer side.
+    """
     m, x, y = state.memory, pose[0], pose[1]
     half = _FIRST_LOOK_RAD
     if m[0, HAS_LOOKED] > 0.5:
@@ -279,7 +330,12 @@ def _begin_look(  # type: ignore[no-untyped-def]
 
 @register_jitable
 def _look(time, pose, report, state, numbers):  # type: ignore[no-untyped-def]
-    """Turns to both sides of the cell that blocks, until that is seen free."""
+    """Turn to both sides of the blocking cell, until there is room.
+
+    The look ends as soon as the guard reports room. If both sides are done without
+    room, the cell is marked as blocked for ``mark_s``. Then the robot plans a new path
+    and drives. The first look around always turns to both sides and marks nothing.
+    """
     m, own = state.memory, numbers.own
     first = m[0, HAS_LOOKED] < 0.5
     heading = m[0, FIRST_LOOK] if m[0, LOOKS_DONE] < 0.5 else m[0, SECOND_LOOK]
@@ -300,7 +356,10 @@ def _look(time, pose, report, state, numbers):  # type: ignore[no-untyped-def]
 def _blocking(
     space: FreeSpace, x: float, y: float, theta: float, radius: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Middle of the cell that is not free and nearest to where the robot would go."""
+    """Return the middle of the non-free cell nearest to a point ahead of the axle.
+
+    The point is 0.1 m ahead. It is returned itself if all cells are free.
+    """
     corners = np.empty((_MOST_CELLS, 2))
     count = edge_cells(space, x, y, radius + 0.3, space.facts[0, ROLLED], corners)
     ahead = x + 0.1 * math.cos(theta), y + 0.1 * math.sin(theta)
@@ -317,7 +376,14 @@ def _blocking(
 def _drive(  # type: ignore[no-untyped-def]
     time, velocity, wanted, error, there, state, numbers
 ):
-    """Towards the carrot, weaving, so that the sensors sweep what lies beside."""
+    """Drive towards the carrot.
+
+    The heading weaves around the direction of the carrot, so that the range sensors
+    sweep the floor beside the path. The robot weaves more widely while the target moves
+    in open space, and for ``_MOVES_S`` after a moving body was detected. In this case
+    it weaves less the farther it lags behind the target. With a large heading error,
+    the robot only turns.
+    """
     m, own = state.memory, numbers.own
     if there:
         m[0, SPEED], m[0, TURN] = wanted, 0.5 * numbers.following.turn_gain * error
@@ -329,6 +395,7 @@ def _drive(  # type: ignore[no-untyped-def]
         narrow = state.way.facts[0, 2] >= NEAR
         recent = time - state.hazards.memory[0, MOVED_S] < _MOVES_S
         if recent or (moves and not narrow):
+            # Weave widely, but less if the robot lags behind the target.
             behind = m[0, WAY_LEFT] - numbers.follow_distance_m - _LITTLE_BEHIND_M
             part = min(max(behind / (_FAR_BEHIND_M - _LITTLE_BEHIND_M), 0.0), 1.0)
             width = own.search_rad * (1.0 - own.search_less * part)

@@ -9,9 +9,9 @@ import numpy as np
 
 from systems.framework.compiling import njit
 
-#: Rounding of a constraint, m/s.
+#: Tolerance of a constraint, m/s.
 _ROUNDING = 1e-9
-#: Halvings in which the least slack is found.
+#: Number of bisections that find the least slack.
 _HALVINGS = 40
 
 
@@ -19,6 +19,7 @@ _HALVINGS = 40
 def _obeys(
     planes: Any, x: float, y: float, top: float, slack: float, hard: int
 ) -> bool:  # pragma: no cover  (compiled)
+    """Return whether a velocity obeys all planes, with the given slack."""
     if x * x + y * y > (top + _ROUNDING) ** 2:
         return False
     for k in range(len(planes)):
@@ -32,7 +33,7 @@ def _obeys(
 def _offset(
     planes: Any, k: int, slack: float, hard: int
 ) -> float:  # pragma: no cover  (compiled)
-    """Of a plane, moved back by a slack unless it is one of the last, hard ones."""
+    """Return the offset of a plane, less the slack unless the plane is hard."""
     soft = k < len(planes) - hard
     return planes[k, 2] - slack if soft else planes[k, 2]
 
@@ -41,10 +42,12 @@ def _offset(
 def _nearest(
     planes: Any, wanted: Any, top: float, slack: float, hard: int
 ) -> tuple[float, float, bool]:  # pragma: no cover  (compiled)
-    """The nearest one with planes moved back by a slack, and whether there is one.
+    """Return the nearest velocity for a given slack, and whether there is one.
 
-    The optimum of so small a problem is the wanted one, its projection on a border, or
-    where two borders cross: all are tried.
+    The optimum of such a small problem is the wanted velocity, its projection on a
+    border, or the intersection of two borders. The function tries all these candidates
+    and keeps the nearest one that obeys all constraints. Index -1 stands for no border,
+    0 to ``count - 1`` for the planes, and ``count`` for the circle of the top speed.
     """
     count = len(planes)
     found = 0.0, 0.0, False
@@ -54,14 +57,16 @@ def _nearest(
     for i in range(-1, count + 1):
         for j in range(-1, i) if i > 0 else range(-1, 0):
             tried = 0
+            # The wanted velocity itself.
             if i < 0:
                 candidates[0, 0], candidates[0, 1], tried = wanted[0], wanted[1], 1
             elif i == count and j < 0:
-                # On the circle of the top speed.
+                # The projection on the circle of the top speed.
                 part = top / speed if speed > 0.0 else 0.0
                 candidates[0, 0], candidates[0, 1] = part * wanted[0], part * wanted[1]
                 tried = 1
             elif i == count:
+                # The two intersections of plane j with the circle.
                 n0, n1 = planes[j, 0], planes[j, 1]
                 b = _offset(planes, j, slack, hard)
                 if abs(b) <= top:
@@ -71,6 +76,7 @@ def _nearest(
                         candidates[tried, 1] = n1 * b + sign * n0 * along
                         tried += 1
             elif j < 0:
+                # The projection on plane i.
                 n0, n1 = planes[i, 0], planes[i, 1]
                 b = _offset(planes, i, slack, hard)
                 to = b - n0 * wanted[0] - n1 * wanted[1]
@@ -78,6 +84,7 @@ def _nearest(
                 candidates[0, 1] = wanted[1] + to * n1
                 tried = 1
             else:
+                # The intersection of planes i and j.
                 cross = planes[i, 0] * planes[j, 1] - planes[i, 1] * planes[j, 0]
                 if abs(cross) > 1e-9:
                     b = _offset(planes, i, slack, hard)
@@ -97,19 +104,21 @@ def _nearest(
 def nearest_velocity(
     planes: Any, wanted: Any, top: float, hard: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """The velocity nearest to a wanted one that obeys all half planes.
+    """Returns the velocity nearest to a wanted one that obeys all half planes.
 
-    Where none does, planes are moved back by the least distance with which one does:
-    the worst is broken by least.
+    If no velocity obeys all of them, the function moves the soft planes back by the
+    same distance. It finds the least distance for which there is a velocity by
+    bisection.
 
     Args:
         planes: (n, 3) unit normal x, y and offset, m/s, of n . v >= offset.
         wanted: (x, y) m/s.
         top: Largest speed, m/s.
-        hard: So many of the last planes are never moved; rest obeys them.
+        hard: Number of planes at the end that are never moved. Standing still obeys
+            them.
 
     Returns:
-        x, y, m/s, and how far planes were moved, m/s.
+        x, y, m/s, and the distance by which planes were moved, m/s.
     """
     x, y, obeys = _nearest(planes, wanted, top, 0.0, hard)
     if obeys:

@@ -1,8 +1,9 @@
-"""Bodies that move: a track each, of particles that fit what range sensors have read.
+"""Tracks of moving bodies: a particle filter per body, fed with range readings.
 
-A range sensor tells how far, not where in its aperture. What it reads of a body over
-time, from other places and at the apertures' edges, leaves few of the places and
-velocities that were possible at first.
+A range sensor measures the distance of a body, but not its direction within the
+aperture. Readings from several positions, and at the edges of apertures, exclude most
+of the positions and velocities that were possible at first. Each track therefore has
+200 particles. Each particle is one hypothesis about position and velocity.
 """
 
 from __future__ import annotations
@@ -17,100 +18,105 @@ from systems.framework.compiling import njit
 from systems.planning.turning import wrapped
 from systems.safety.free_space import FIRST_I, FIRST_J, ROLLED, FreeSpace
 
-#: Tracks, particles of each, and how many of these are looked at to choose a motion.
+#: Number of tracks; particles per track; particles per track that are used to choose a
+#: motion.
 _TRACKS, _PARTICLES, _PICKED = 8, 200, 25
-#: Places in a particle: m, m/s, and its share of the track.
+#: Indices in a particle: position, m; velocity, m/s; and its share of the track.
 X, Y, VX, VY, WEIGHT = range(5)
-#: Places in a picked particle besides: of its track, for how long it was not seen, s,
-#: and by how much its velocity is not known, m/s.
+#: Additional indices in a picked particle: time since its track was last seen, s, and
+#: standard deviation of the velocity in its track, m/s.
 AGE_S, SPREAD = 5, 6
-#: Places in a track: probability that the body is there, and when it was last seen, s.
+#: Indices in a track: probability that the body exists, and when it was last seen, s.
 EXISTS, SEEN_S = range(2)
-#: Places in the memory: state of the random numbers, and when a body was last found.
+#: Indices in the memory: state of the random generator, and when the last track began,
+#: s.
 RANDOM, MOVED_S = range(2)
-#: Places in a look: range, m, whether there was an echo, time, s, and where from:
-#: place, m, and direction, rad.
+#: Indices in a look, which is one reading of one sensor: range, m; whether there was an
+#: echo; time, s; position of the sensor, m; and direction of its axis, rad.
 R, HEARD, TIME, SX, SY, AXIS = range(6)
-#: Looks of each sensor that are kept.
+#: Number of looks per sensor that are kept.
 _LOOKS = 3
 
-#: A particle is in a body, so far behind the surface that echoes, m.
+#: Distance of a particle behind the surface that echoes, m.
 _BEYOND_M = 0.02
-#: A range that is farther off than this is not that of the particle, m.
+#: A range does not fit a particle if it differs by more than this, m.
 _GATE_M = 0.10
-#: Half of a body may reach so far into an aperture, m.
+#: A body may be in an aperture although its particle is this far beside the edge, m.
 _EDGE_M = 0.04
-#: What a look leaves of a particle that should have been seen and was not, and of one
-#: that did not echo where its track did.
+#: Factors for the weight of a particle: it should have been seen and was not; or it
+#: does not fit the echo that its track explains.
 _UNSEEN, _ELSEWHERE = 0.1, 0.5
-#: Standard deviation of a particle's range when its velocity is right, m, besides the
-#: sensor's, and what a wrong range leaves of it at least.
+#: Standard deviation of the range of a particle with the right velocity, m, in addition
+#: to the noise of the sensor. Least factor for the weight of a particle with a wrong
+#: range.
 _FIT_M, _LEAST_FIT = 0.01, 0.5
-#: Share of an error of the range that goes to the velocity, each tick.
+#: Share of a range error, per tick, that corrects the velocity.
 _TO_VELOCITY = 0.1
-#: Standard deviation of the first rate of a range, m/s: as a body comes into an
-#: aperture, its nearest visible point jumps from one corner to another.
+#: Standard deviation of the first range rate of a track, m/s. It is large because the
+#: nearest visible point jumps between corners when a body enters an aperture.
 _RATE_M_S = 0.2
-#: Particles that are drawn anew differ by this share of their spread, and by so much
-#: at least, m/s, and in place, m.
+#: Noise that is added when particles are drawn again: share of the spread of the
+#: velocity; least noise of the velocity, m/s; noise of the position, m.
 _JITTER, _JITTER_M_S, _JITTER_M = 0.5, 0.01, 0.005
-#: Share of bodies that stop, each second.
+#: Share of bodies that stop per second.
 _STOPS_HZ = 0.04
-#: Less of a track than this is none, and of its particles near an echo, no reason.
+#: A track with a lower probability ends. A track explains an echo only if this share of
+#: a body is near the echo.
 _LEAST_EXISTS, _LEAST_SHARE = 0.03, 0.03
-#: No body is certain, and of the doubt an echo takes away a share.
+#: Highest probability of a track. Share of the remaining doubt that one echo removes.
 _CERTAIN, _SEEN_AGAIN = 0.98, 0.2
-#: A track that was not seen for so long, s, or is so far off, m, is forgotten.
+#: A track ends if it was not seen for this time, s, or is farther away than this, m.
 _FORGET_S, _FAR_M = 12.0, 5.0
-#: Of an arc, and behind it, places at this distance are looked at, cells, and so far
-#: behind it, cells.
+#: Spacing of the points at which an arc is checked, and how far behind the arc they
+#: reach, both in cells.
 _ARC_STEP, _BEHIND = 0.3, 0.6
-#: A body that is so likely, and was seen so lately, s, is where its track says; its
-#: echoes come from within this, m.
+#: ``find_movers`` lists tracks with at least this probability that were seen within
+#: this time, s. Echoes within this radius come from the body, m.
 _LIKELY, _LATELY_S, _BODY_M = 0.3, 3.0, 0.5
-#: How often a place is drawn that was not visible before.
+#: Largest number of draws for a particle that no sensor would have seen before.
 _TRIES = 12
-#: A range that changes faster is that of another body, m/s; one older than so many
-#: ticks is not compared with.
+#: A range that changes faster belongs to another body, m/s. A look that is older than
+#: this is not compared, ticks.
 _FASTEST_M_S, _OLDEST_TICKS = 2.0, 4.5
 
 
 class HazardSensors(NamedTuple):
-    """What the tracks need to know of the sensors and the bodies."""
+    """Properties of the sensors and the bodies that the tracks depend on."""
 
     places: NDArray[np.float64]
-    """(sensors, 2) from the axle in B, m."""
+    """(sensors, 2) position relative to the axle in B, m."""
     directions: NDArray[np.float64]
-    """(sensors, 2) axis in B and half of the aperture, rad."""
+    """(sensors, 2) direction of the axis in B and half of the aperture, rad."""
     farthest_m: float
     """Greatest range, m."""
     margin_m: float
-    """What ranges may be off, m."""
+    """Largest error of a range, m."""
     noise_m: float
     """Standard deviation of a range, m."""
     top_speed_m_s: float
-    """Of bodies, m/s."""
+    """Largest speed of a body, m/s."""
     tick_s: float
 
 
 class Hazards(NamedTuple):
-    """What moves, as far as it is known. All arrays change."""
+    """The tracks of moving bodies. All arrays change."""
 
     tracks: NDArray[np.float64]
     """(tracks, 2) ``EXISTS`` and ``SEEN_S``."""
     particles: NDArray[np.float64]
-    """(tracks, particles, 5) of each track; weights add up to 1."""
+    """(tracks, particles, 5) particles of each track; the weights of a track add up to
+    1."""
     looks: NDArray[np.float64]
-    """(3, sensors, 6) the last looks of each sensor, the newest first."""
+    """(3, sensors, 6) last looks of each sensor, the newest first."""
     memory: NDArray[np.float64]
     """(1, 2) ``RANDOM`` and ``MOVED_S``."""
     picked: NDArray[np.float64]
-    """(n, 7) particles that stand for all, from ``pick_hazards``; their weights are
-    numbers of bodies."""
+    """(n, 7) particles that ``pick_hazards`` has chosen to represent all others. Their
+    weights are expected numbers of bodies."""
 
 
 def make_hazards(sensors: int) -> Hazards:
-    """Nothing that moves.
+    """Returns a memory without tracks.
 
     Args:
         sensors: Number of range sensors.
@@ -140,26 +146,34 @@ def track_hazards(
     target: Any,
     sensors: HazardSensors,
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the tracks on by a tick, and weighs them by what the sensors read.
+    """Moves the tracks by one tick, and weighs them with the new readings.
 
-    An echo that no track explains begins one if it came from floor that was seen free
-    all along its arc: what rests is never there. Particles of a new track are drawn
-    along the arc, where the body was not visible a look before, with the rate of the
-    range and any speed across up to the top speed.
+    Each new reading passes through these steps:
+
+    1. An echo near the target belongs to the target, and is not attributed to a track.
+    2. The track that explains the echo best is the one that has echoed.
+    3. All tracks are weighed with the reading (``_weigh``). The track that has echoed
+       becomes more probable.
+    4. An echo that no track explains begins a new track. This requires that the whole
+       arc of the echo was seen free before: an obstacle at rest is never there. The
+       previous echo of the sensor has to fit, so that the range rate is known.
+
+    Finally, improbable tracks end, and particles are drawn again where few have weight.
 
     Args:
         hazards: Changed.
         time: s.
         pose: (x, y, theta) of the robot, m and rad.
-        readings: Ranges, m, echoes, 0 or 1, and for how long each was held, s.
-        space: What was seen free.
-        target: (x, y, radius) of what is followed, m: it explains its own echoes.
-        sensors: The sensors.
+        readings: Ranges, m; echoes, 0 or 1; and their ages, s.
+        space: Cells that were seen free.
+        target: (x, y, radius) of the followed target, m. Echoes near it belong to it.
+        sensors: Properties of the sensors.
     """
     ages, tick_s = readings[2], sensors.tick_s
     _move_on(hazards, tick_s)
     _remember_looks(hazards, time, pose, readings, sensors)
     for k in range(len(ages)):
+        # The sensor has not fired in this tick.
         if ages[k] > 0.5 * tick_s:
             continue
         look, half = hazards.looks[0, k], sensors.directions[k, 1]
@@ -183,13 +197,15 @@ def track_hazards(
 
 @njit(cache=True)
 def _move_on(hazards: Hazards, tick_s: float) -> None:  # pragma: no cover  (compiled)
+    """Move all particles by one tick with their velocities."""
     for t in range(len(hazards.tracks)):
         if hazards.tracks[t, EXISTS] > 0.0:
             p = hazards.particles[t]
             for n in range(len(p)):
                 p[n, X] += tick_s * p[n, VX]
                 p[n, Y] += tick_s * p[n, VY]
-            # Now and then a particle stops, as bodies do.
+            # Bodies stop sometimes. On average, the share ``_STOPS_HZ`` of the
+            # particles stops per second.
             if _chance(hazards.memory) < _STOPS_HZ * tick_s * len(p):
                 n = int(_chance(hazards.memory) * len(p))
                 p[n, VX], p[n, VY] = 0.0, 0.0
@@ -199,7 +215,7 @@ def _move_on(hazards: Hazards, tick_s: float) -> None:  # pragma: no cover  (com
 def _best_track(
     hazards: Hazards, look: Any, half: float
 ) -> int:  # pragma: no cover  (compiled)
-    """The track that explains an echo best; -1: none does."""
+    """Return the track that explains an echo best; -1 if no track explains it."""
     best, most = -1, _LEAST_SHARE
     for t in range(len(hazards.tracks)):
         exists = hazards.tracks[t, EXISTS]
@@ -214,7 +230,10 @@ def _best_track(
 def _goes_on(
     hazards: Hazards, k: int, time: float, sensors: HazardSensors
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether an echo is of what echoed a look ago, so that its rate is known."""
+    """Return whether an echo fits the previous look of its sensor.
+
+    Only then is the range rate known.
+    """
     look, then = hazards.looks[0, k], hazards.looks[1, k]
     since = time - then[TIME]
     if then[HEARD] < 0.5 or since > _OLDEST_TICKS * sensors.tick_s:
@@ -226,7 +245,7 @@ def _goes_on(
 def _forget(
     hazards: Hazards, time: float, pose: Any
 ) -> None:  # pragma: no cover  (compiled)
-    """Ends tracks of what is not likely, old or far; draws the others anew."""
+    """End improbable, old and distant tracks, and resample the others."""
     for t in range(len(hazards.tracks)):
         exists, seen_s = hazards.tracks[t, EXISTS], hazards.tracks[t, SEEN_S]
         if exists <= 0.0:
@@ -241,14 +260,14 @@ def _forget(
 
 @njit(cache=True)
 def _chance(memory: Any) -> float:  # pragma: no cover  (compiled)
-    """The next of a fixed sequence of numbers from 0 to 1 (Park and Miller, 1988)."""
+    """Return the next pseudorandom number from 0 to 1 (Park and Miller, 1988)."""
     memory[0, RANDOM] = (48271 * int(memory[0, RANDOM])) % 2147483647
     return memory[0, RANDOM] / 2147483647.0
 
 
 @njit(cache=True)
 def _normal(memory: Any) -> float:  # pragma: no cover  (compiled)
-    """About normal: mean 0, deviation 1, never beyond 3."""
+    """Return an approximately normal number: mean 0, deviation 1, at most 3 in size."""
     return 2.0 * (_chance(memory) + _chance(memory) + _chance(memory) - 1.5)
 
 
@@ -256,6 +275,7 @@ def _normal(memory: Any) -> float:  # pragma: no cover  (compiled)
 def _remember_looks(
     hazards: Hazards, time: float, pose: Any, readings: Any, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
+    """Store the new readings as looks, with position and direction of each sensor."""
     ranges, echo, ages = readings
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(ranges)):
@@ -276,7 +296,7 @@ def _remember_looks(
 def _seen_from(
     look: Any, x: float, y: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Distance of a place, m, and angle off the sensor's axis, rad."""
+    """Return the distance of a place, m, and its angle off the sensor's axis, rad."""
     dx, dy = x - look[SX], y - look[SY]
     return math.hypot(dx, dy), abs(wrapped(math.atan2(dy, dx) - look[AXIS]))
 
@@ -285,6 +305,7 @@ def _seen_from(
 def _is_target(
     look: Any, half: float, target: Any
 ) -> bool:  # pragma: no cover  (compiled)
+    """Return whether an echo may come from the followed target."""
     distance, off = _seen_from(look, target[0], target[1])
     beside = off - half < target[2] / max(distance, target[2])
     return beside and abs(distance - look[R]) < target[2]
@@ -292,7 +313,7 @@ def _is_target(
 
 @njit(cache=True)
 def _share_at(p: Any, look: Any, half: float) -> float:  # pragma: no cover  (compiled)
-    """Share of a track that may be what has echoed."""
+    """Return the share of a track's particles, by weight, that fit an echo."""
     share = 0.0
     for n in range(len(p)):
         distance, off = _seen_from(look, p[n, X], p[n, Y])
@@ -308,7 +329,23 @@ def _share_at(p: Any, look: Any, half: float) -> float:  # pragma: no cover  (co
 def _weigh(
     hazards: Hazards, t: int, k: int, best: int, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Weighs a track by a look; the best one has echoed, and is pulled to the range."""
+    """Weigh the particles of a track with the newest look of sensor ``k``.
+
+    ``best`` is the track that explains the echo, -1 if there is none. For each
+    particle, ``gap`` is the measured distance minus the distance of the particle.
+    Without an echo, ``gap`` is infinite for particles within the greatest range. There
+    are four cases:
+
+    * The particle is outside the aperture. If its track has echoed, it loses weight.
+    * The sensor has seen past the particle (large gap). It loses most of its weight,
+      unless it is near the edge of the aperture.
+    * The particle fits the echo of its track. Its weight depends on the gap, and the
+      particle moves to the measured range.
+    * The particle is behind the echo of its track. It loses weight.
+
+    Other particles keep their weight: the echo of something nearer may hide them. If
+    the track has not echoed, the lost weight lowers its probability by Bayes' rule.
+    """
     p, fit_m = hazards.particles[t], math.hypot(_FIT_M, sensors.noise_m)
     look, half, echoed = hazards.looks[0, k], sensors.directions[k, 1], t == best
     total = 0.0
@@ -318,10 +355,12 @@ def _weigh(
         gap = look[R] + _BEYOND_M - distance
         if look[HEARD] < 0.5:
             gap = np.inf if distance < sensors.farthest_m - 0.05 else 0.0
+        # Outside the aperture.
         if off > half + edge:
             if echoed:
                 p[n, WEIGHT] *= _ELSEWHERE
         elif gap > _GATE_M:
+            # The sensor has seen past the particle.
             if off < half - 0.5 * edge:
                 p[n, WEIGHT] *= _UNSEEN
         elif echoed and gap > -_GATE_M:
@@ -335,6 +374,7 @@ def _weigh(
         hazards.tracks[t, EXISTS] = 0.0
         return
     if not echoed:
+        # Bayes' rule: ``total`` is the likelihood of the look if the body exists.
         exists = min(exists, _CERTAIN)
         exists *= total / (exists * total + 1.0 - exists)
     hazards.tracks[t, EXISTS] = exists
@@ -346,7 +386,10 @@ def _weigh(
 def _pull(
     particle: Any, look: Any, distance: float, gap: float, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves a particle by what its range is off, and its velocity by a part of it."""
+    """Move a particle to the measured range.
+
+    A part of the range error also corrects the velocity of the particle.
+    """
     ux = (particle[X] - look[SX]) / max(distance, 1e-6)
     uy = (particle[Y] - look[SY]) / max(distance, 1e-6)
     particle[X] += gap * ux
@@ -364,7 +407,12 @@ def _pull(
 def _came_from_free(
     space: FreeSpace, look: Any, half: float, margin_m: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether all of an echo's arc was seen free before, as far as it may be off."""
+    """Return whether the whole arc of an echo was seen free before.
+
+    The function checks points along the arc, over the width of the aperture. In depth
+    the points begin at the range less its error. They end at the range plus its error
+    and a part of a cell. All cells there must still count as free.
+    """
     cells, cell = space.hits.shape[0], space.cell_m
     step_m = _ARC_STEP * cell
     across = max(8, math.ceil(2.0 * half * look[R] / step_m))
@@ -378,7 +426,7 @@ def _came_from_free(
             di, dj = i - space.facts[0, FIRST_I], j - space.facts[0, FIRST_J]
             if not (0 <= di < cells and 0 <= dj < cells):
                 return False
-            # Of a cell that is forgotten nobody knows any more where it is.
+            # The position of a forgotten cell is no longer known.
             if space.free_until[i % cells, j % cells] < space.facts[0, ROLLED]:
                 return False
     return True
@@ -388,17 +436,26 @@ def _came_from_free(
 def _begin(
     hazards: Hazards, k: int, time: float, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Begins a track, in the place of the least likely one."""
+    """Begin a track that replaces the least probable one.
+
+    The body is anywhere on the arc of the newest echo of sensor ``k``. Its radial speed
+    follows from the range rate and the motion of the sensor, with an error. Its speed
+    across is unknown: it is drawn uniformly, so that the total speed stays below the
+    top speed. A draw is repeated, at most 12 times, if a sensor would have seen the
+    body at its oldest look. This check is left out if the oldest look is too old.
+    """
     tracks, memory, top = hazards.tracks, hazards.memory, sensors.top_speed_m_s
     look, then, half = (
         hazards.looks[0, k],
         hazards.looks[1, k],
         sensors.directions[k, 1],
     )
+    # Find the least probable track.
     t = 0
     for other in range(len(tracks)):
         if tracks[other, EXISTS] < tracks[t, EXISTS]:
             t = other
+    # Range rate, its error, and velocity of the sensor.
     p, since = hazards.particles[t], time - then[TIME]
     rate = (look[R] - then[R]) / since
     rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m / since)
@@ -407,9 +464,10 @@ def _begin(
     at = look[R] + _BEYOND_M
     for n in range(len(p)):
         for _ in range(_TRIES):
+            # Draw a direction within the aperture.
             angle = look[AXIS] + half * (2.0 * _chance(memory) - 1.0)
             ux, uy = math.cos(angle), math.sin(angle)
-            # Of the body: the range grows by its speed less the sensor's.
+            # The range rate is the radial speed of the body minus that of the sensor.
             radial = rate + own_x * ux + own_y * uy + rate_error * _normal(memory)
             radial = min(max(radial, -top), top)
             across = math.sqrt(max(top * top - radial * radial, 0.0))
@@ -428,7 +486,12 @@ def _begin(
 def _was_visible(
     hazards: Hazards, particle: Any, ago: float, sensors: HazardSensors
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a sensor would have seen a particle at its oldest look, and did not."""
+    """Return whether the oldest looks contradict a particle.
+
+    The particle is moved back by ``ago`` seconds with its velocity. A look contradicts
+    the particle if the particle was inside the aperture and nearer than the reading,
+    both by at least 3 cm: the sensor would have seen it, but did not.
+    """
     x, y = particle[X] - ago * particle[VX], particle[Y] - ago * particle[VY]
     for k in range(hazards.looks.shape[1]):
         look, half = hazards.looks[_LOOKS - 1, k], sensors.directions[k, 1]
@@ -442,7 +505,13 @@ def _was_visible(
 
 @njit(cache=True)
 def _draw_anew(hazards: Hazards, t: int) -> None:  # pragma: no cover  (compiled)
-    """Draws a track's particles by their weights, once few of them count."""
+    """Draw the particles of a track again in proportion to their weights.
+
+    This happens only if the effective number of particles is at most half. It is one
+    over the sum of the squared weights. The draw is systematic: it takes particles at
+    equal steps of the cumulated weight. Small noise then separates copies of the same
+    particle.
+    """
     p, memory = hazards.particles[t], hazards.memory
     squares = 0.0
     for n in range(len(p)):
@@ -466,7 +535,7 @@ def _draw_anew(hazards: Hazards, t: int) -> None:  # pragma: no cover  (compiled
 
 @njit(cache=True)
 def _spread(p: Any, which: int) -> float:  # pragma: no cover  (compiled)
-    """Standard deviation of a value of all particles, whatever their weights."""
+    """Return the standard deviation of one value of all particles, without weights."""
     mean, square = 0.0, 0.0
     for n in range(len(p)):
         mean += p[n, which] / len(p)
@@ -478,16 +547,16 @@ def _spread(p: Any, which: int) -> float:  # pragma: no cover  (compiled)
 def find_movers(
     hazards: Hazards, time: float, places: Any
 ) -> int:  # pragma: no cover  (compiled)
-    """Where the bodies are that were seen lately.
+    """Lists the positions of probable bodies that were seen recently.
 
     Args:
         hazards: The tracks.
         time: s.
-        places: (n, 3) filled: middle of a track, m, and how far its echoes may be from
-            there, m.
+        places: (n, 3) filled: mean position of a track, m, and the radius around it
+            from which its echoes may come, m.
 
     Returns:
-        How many there are.
+        Number of bodies.
     """
     count = 0
     for t in range(len(hazards.tracks)):
@@ -507,7 +576,10 @@ def find_movers(
 def pick_hazards(
     hazards: Hazards, time: float, pose: Any, within_m: float
 ) -> int:  # pragma: no cover  (compiled)
-    """Picks particles of the tracks near a robot, which stand for all of them.
+    """Picks particles of the tracks near a robot that represent all others.
+
+    The function takes 25 particles of each track, at equal steps of the cumulated
+    weight. Each gets an equal part of the probability of the track.
 
     Args:
         hazards: ``picked`` changes.
@@ -516,7 +588,7 @@ def pick_hazards(
         within_m: Tracks that are farther away are left out, m.
 
     Returns:
-        How many there are.
+        Number of picked particles.
     """
     picked, count = hazards.picked, 0
     for t in range(len(hazards.tracks)):

@@ -1,7 +1,7 @@
-"""Places from which range sensors had echoes, as far as they were not seen free since.
+"""Cells that range sensors received echoes from and have not seen free since.
 
-The map of baselines, which know no more of space: an occupancy grid without the
-unknown.
+This is the map of the baselines: an occupancy grid that does not distinguish unknown
+cells from free ones.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.safety.free_space import FIRST_I, FIRST_J, FreeSpace
 
-#: From a cell with fewer hits nothing has echoed for sure; more of them do not count.
+#: A cell with fewer hits is not occupied. More hits than the second number do not make
+#: it more certain.
 _LEAST_HITS, _MOST_HITS = 1.0, 6.0
 
 
@@ -23,17 +24,17 @@ _LEAST_HITS, _MOST_HITS = 1.0, 6.0
 def list_occupied(
     space: FreeSpace, x: float, y: float, reach: float, clear: Any
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Cells that have echoed, around a place.
+    """Lists the occupied cells around a place.
 
     Args:
-        space: What is known.
-        x: The place, m.
-        y: See x.
-        reach: Cells within a square of this half side, m.
-        clear: (x, y, radius) of what is followed, m: its echoes do not count.
+        space: Hits of the cells.
+        x: Position of the place, m.
+        y: Position of the place, m.
+        reach: Half of the side of the square in which cells are listed, m.
+        clear: (x, y, radius) of the followed target, m: its echoes do not count.
 
     Returns:
-        (n, 3) middles, m, and how certain they are, 0 to 1.
+        (n, 3) middles of the cells, m, and how certain they are, from 0 to 1.
     """
     cell, cells = space.cell_m, space.hits.shape[0]
     found, count = np.empty((64, 3)), 0

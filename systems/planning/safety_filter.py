@@ -20,12 +20,12 @@ from systems.planning.parameters import SafetyFilterParameters
 from systems.planning.velocity_filter import FilterNumbers, filtered_velocity
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: The robot leaves a moving object that has come too near within this time, s.
+#: Time within which the robot leaves a moving object that has come too near, s.
 _LEAVE_S = 0.1
 
 
 class SafetyNumbers(NamedTuple):
-    """What the step of ``SafetyFilter`` depends on."""
+    """Constants of the step of ``SafetyFilter``."""
 
     limits: FilterNumbers
     robot: RobotParameters
@@ -36,7 +36,10 @@ class SafetyNumbers(NamedTuple):
 def safety_filter_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SafetyNumbers
 ) -> None:
-    """Wheel speeds, velocity of P, slack and action of the next tick: the state."""
+    """Computes wheel speeds, velocity of P, slack and action of the next tick.
+
+    They are the state of the block.
+    """
     acceleration, pose, objects = inputs
     robot, theta = numbers.robot, pose[2]
     before = state[2], state[3]
@@ -54,7 +57,7 @@ def safety_filter_step(
 
 
 def _publish(state: Any, outputs: Any, numbers: SafetyNumbers) -> None:
-    """The outputs of ``safety_filter_step``'s state."""
+    """Copy the state of ``safety_filter_step`` to the outputs."""
     for port in range(3):
         for k in range(2):
             outputs[port][k] = state[2 * port + k]
@@ -63,15 +66,17 @@ def _publish(state: Any, outputs: Any, numbers: SafetyNumbers) -> None:
 class SafetyFilter(Block):
     """Moves P as a law commands, except where this would lead into objects.
 
-    It replaces ``WheelCommand``. The virtual mass moves by the velocity that the filter
-    gives, so that it does not wind up. Of all velocities that the wheels can do and
-    that lead into no object, the filter takes the nearest. If there is none, it lets
-    moving objects come nearer than allowed, by as little as possible, but it does not
-    approach objects at rest for that. The first number of ``filter_report`` is by how
-    much, the second whether the filter changed anything.
+    The block replaces ``WheelCommand``. The virtual mass moves with the velocity that
+    the filter returns, which prevents windup. The filter considers all velocities that
+    the wheels can produce and that lead into no object. It chooses the one nearest to
+    the commanded velocity. If there is none, the filter lets moving objects come nearer
+    than allowed, by as little as possible. It never approaches objects at rest for that
+    purpose. The first number of ``filter_report`` is the slack, by which the
+    constraints are violated. The second number states whether the filter changed the
+    velocity.
 
-    It knows objects, not space: it does not know what no sensor has detected as an
-    object, and it promises less than ``MotionGuard``.
+    The filter knows only objects that sensors have detected, and no free space. It
+    therefore guarantees less than ``MotionGuard``.
 
     Discrete state, every tick: the outputs. Rate and latency are those of
     ``WheelCommand``.

@@ -1,4 +1,4 @@
-"""From a heading that is wanted to a twist."""
+"""Forward speed and yaw rate that turn a robot to a wanted heading."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-#: Farther off its heading than this, the robot turns before it drives, rad.
+#: If the heading error is larger, the robot turns before it drives, rad.
 _TURN_FIRST_RAD = 1.0
 
 
 @register_jitable
 def wrapped(angle: float) -> float:
-    """The same angle from -pi to pi, rad."""
+    """Returns the same angle in the range from -pi to pi, rad."""
     return (angle + math.pi) % math.tau - math.pi
 
 
@@ -21,12 +21,12 @@ def wrapped(angle: float) -> float:
 def turn_towards(
     speed: float, heading: float, theta: float, own: Any
 ) -> tuple[float, float]:
-    """Turns to a heading while it drives; far off it turns first.
+    """Turns to a heading while driving; with a large heading error it only turns.
 
     Args:
-        speed: Wanted, m/s.
-        heading: Wanted, in W, rad.
-        theta: Of the robot, in W, rad.
+        speed: Wanted speed, m/s.
+        heading: Wanted heading in W, rad.
+        theta: Heading of the robot in W, rad.
         own: ``FollowingParameters``.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Half planes of velocities that keep P off objects, and that wheels can do."""
+"""Half planes of velocities that avoid objects, and that the wheels can produce."""
 
 from __future__ import annotations
 
@@ -13,45 +13,50 @@ from systems.planning.half_planes import nearest_velocity
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: What is slower rests, m/s.
+#: Objects below this speed count as at rest, m/s.
 _RESTS_M_S = 0.02
-#: Of what is nearer to P, there is no telling on which side it is, m.
+#: The direction of an object that is nearer to P than this is unknown, m.
 _TOUCHES_M = 1e-9
 
 
 class FilterNumbers(NamedTuple):
-    """How far P keeps off, and what wheels can do."""
+    """Distances that P keeps, and limits of the wheels."""
 
     keep_m: float
-    """Of P from objects: radius of the body about the axle, epsilon and margin, m."""
+    """Distance of P from objects, m: radius of the body about the axle, epsilon and
+    margin."""
     approach_rate: float
     """alpha, 1/s."""
     horizon_s: float
-    """For which velocities are kept from leading into what moves, s."""
+    """Time within which a velocity must not lead into moving objects, s."""
     top_speed: float
-    """Of each wheel's rim and of P, m/s."""
+    """Top speed of each wheel's rim and of P, m/s."""
     turn_share: float
     """L/(2 epsilon)."""
     leave_s: float
-    """In which it leaves what moves and has come too near, s."""
+    """Time within which the robot leaves a moving object that has come too near, s."""
 
 
 @njit(cache=True)
 def disc_plane(
     center: Any, radius: float, velocity: Any, horizon_s: float, leave_s: float
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """The nearest way out of the velocities that lead into a disc.
+    """Returns the shortest way out of the velocities that lead into a disc.
+
+    These velocities form a cone with a round end (the velocity obstacle of van den Berg
+    and others). The function finds the point of its border that is nearest to the
+    velocity. This point is on the round end or on one of the two legs.
 
     Args:
-        center: (x, y) of the disc from P, m.
-        radius: Of both together, m.
+        center: (x, y) of the disc relative to P, m.
+        radius: Sum of both radii, m.
         velocity: (x, y) relative to the disc, m/s.
         horizon_s: Contacts later than this do not count, s.
-        leave_s: In which one leaves what overlaps, s.
+        leave_s: Time within which the velocity has to end an overlap, s.
 
     Returns:
-        Outward normal x, y, and by how much the velocity is inside along it, m/s;
-        negative: outside by so much.
+        Outward normal x, y, and the depth of the velocity inside the cone, m/s. A
+        negative depth is the distance outside the cone.
     """
     x, y = center[0], center[1]
     far = math.hypot(x, y)
@@ -60,10 +65,11 @@ def disc_plane(
     size = math.hypot(wx, wy)
     toward = wx * x + wy * y
     if far <= radius or (toward < 0.0 and toward**2 > (radius * size) ** 2):
-        # The round end of the cone.
+        # The nearest border is the round end of the cone.
         if size < 1e-12:
             return -x / max(far, 1e-12), -y / max(far, 1e-12), radius / time
         return wx / size, wy / size, radius / time - size
+    # The nearest border is a leg: a tangent from P to the disc.
     leg = math.sqrt(far * far - radius * radius)
     if x * wy - y * wx > 0.0:
         dx, dy = (x * leg - y * radius) / far**2, (x * radius + y * leg) / far**2
@@ -77,14 +83,14 @@ def disc_plane(
 def wheel_planes(
     theta: float, numbers: FilterNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """|v_xB +- (L/2 epsilon) v_yB| <= top speed: what the wheels can do.
+    """Returns |v_xB +- (L/2 epsilon) v_yB| <= top speed as half planes.
 
     Args:
         theta: Heading, rad.
-        numbers: The limits.
+        numbers: Limits of the wheels.
 
     Returns:
-        (4, 3) as of ``nearest_velocity``.
+        (4, 3) in the format of ``nearest_velocity``.
     """
     planes = np.empty((4, 3))
     length = math.hypot(1.0, numbers.turn_share)
@@ -102,29 +108,32 @@ def wheel_planes(
 def filtered_velocity(
     wanted: Any, v_WP: Any, theta: float, objects: Any, numbers: FilterNumbers
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """The velocity of P nearest to a wanted one that keeps off objects.
+    """Returns the velocity of P nearest to a wanted one that avoids objects.
 
-    What rests, and what moves in an unknown way, may be approached by alpha times what
-    is left of the distance. Of what moves, the way out of the velocities that lead into
-    it is the robot's; of another robot, which does the same, half of it.
+    Each object contributes one half plane:
 
-    Where not all can be had, the demands to get away are broken, all by the same: by
-    what moves, and by what rests and is too near. That nothing which rests is
-    approached faster is not, nor what the wheels can do: the robot can always stand.
-    With one slack for all, what comes faster than the robot can get away drove it
-    through walls.
+    * P may approach an object at rest, or with unknown motion, at alpha times the
+      remaining distance.
+    * P has to leave the velocities that lead into a moving object (``disc_plane``).
+    * Another robot uses the same filter, so P makes half of that change.
+
+    The constraints may contradict each other. Then two kinds are relaxed, all by the
+    same slack: the constraints of moving objects, and those to leave objects at rest
+    that are too near. The limits on approaching objects at rest and the wheel limits
+    are hard. A robot that stands still satisfies them. If all constraints shared the
+    slack, a fast object would push the robot through walls.
 
     Args:
         wanted: (x, y) m/s.
         v_WP: (x, y) of P now, m/s.
         theta: Heading, rad.
-        objects: As of the port ``objects_W``.
+        objects: In the format of the port ``objects_W``.
         numbers: Distances and limits.
 
     Returns:
-        x, y, m/s, and by how much the worst half plane is broken, m/s.
+        x, y, m/s, and the slack of the worst half plane, m/s.
     """
-    # Those that may be broken come first; rest obeys the others.
+    # Soft planes come first, then the hard planes, which a standing robot obeys.
     planes, used = np.empty((2 * OBJECT_SLOTS + 4, 3)), 0
     kept, resting = np.empty((OBJECT_SLOTS, 3)), 0
     for slot in range(OBJECT_SLOTS):
@@ -138,6 +147,7 @@ def filtered_velocity(
         is_robot = objects[at + ROBOT] > 0.5
         moves = objects[at + KNOWN] > 0.5 and math.hypot(vx, vy) > _RESTS_M_S
         if moves or is_robot:
+            # A moving object or a robot: a disc behind its nearest point.
             center = x - radius * nx, y - radius * ny
             relative = v_WP[0] - vx, v_WP[1] - vy
             nx, ny, inside = disc_plane(
@@ -150,6 +160,8 @@ def filtered_velocity(
             share = 0.5 if is_robot else 1.0
             offset = nx * v_WP[0] + ny * v_WP[1] + share * inside
         else:
+            # An object at rest. A hard plane limits the approach. If the object is too
+            # near, a soft plane also requires P to move away.
             offset = -numbers.approach_rate * (distance - numbers.keep_m)
             kept[resting, 0], kept[resting, 1] = nx, ny
             kept[resting, 2] = min(offset, 0.0)

@@ -1,4 +1,4 @@
-"""The cheapest way through seen and unknown space, on cells twice as wide."""
+"""The cheapest path through seen and unknown space, on cells twice as wide."""
 
 from __future__ import annotations
 
@@ -11,55 +11,62 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.safety.free_space import FIRST_I, FIRST_J, NEVER, FreeSpace
 
-#: Price of a cell: seen free; unknown; so that the disc is near, or tight to, what
-#: echoed; so that it would lie on what echoed now and then, or often.
+#: Prices of a cell: seen free; unknown; disc near an occupied cell; disc very near an
+#: occupied cell; disc over a possibly occupied cell; disc over an occupied cell.
 FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
-#: Hits of a cell that make it doubtful, and occupied.
+#: Least number of hits of a possibly occupied cell, and of an occupied cell.
 _DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
-#: So much farther off than it has to be, the disc is tight, or near, m.
+#: If the gap between the disc and an occupied cell is smaller, the place is tight, or
+#: near, m.
 _TIGHT_M, _NEAR_M = 0.07, 0.19
-#: Of a step to a cell beside and to one across the corner, times its price.
+#: Length of a straight and of a diagonal step. A step costs its length times the price
+#: of the cell that it enters.
 STRAIGHT, ACROSS = 10, 14
-#: More than any step costs.
+#: Number of buckets: more than the cost of any step. ``_FAR``: cost of cells that the
+#: search has not reached.
 _BUCKETS = 2048
 _FAR = 2**31 - 1
 
 
 class Way(NamedTuple):
-    """Cells twice as wide as those of a ``FreeSpace``, and the way through them.
+    """A path through cells twice as wide as those of a ``FreeSpace``.
 
-    All arrays are changed by ``find_way``.
+    All arrays are changed by ``find_way``. The number of cell (i, j) of the window is i
+    m + j.
     """
 
     price: NDArray[np.int32]
-    """(m, m) of each cell, from ``FREE`` to ``OCCUPIED``."""
+    """(m, m) price of each cell, from ``FREE`` to ``OCCUPIED``."""
     cost: NDArray[np.int32]
-    """(m, m) of the way from each cell to the goal, as far as it was looked for."""
+    """(m, m) cost of the cheapest path from each cell to the goal, as far as
+    searched."""
     towards: NDArray[np.int32]
-    """(m, m) number of the next cell of that way."""
+    """(m, m) number of the next cell on that path."""
     queue: NDArray[np.int32]
-    """(k, 2) number of a cell, and the next entry of its bucket."""
+    """(k, 2) number of a cell, and index of the next entry in its bucket."""
     heads: NDArray[np.int32]
-    """(buckets, 1) first entry of each bucket."""
+    """(buckets, 1) index of the first entry of each bucket."""
     path: NDArray[np.float64]
-    """(p, 2) middles of the cells of the way, from the robot to the goal, m."""
+    """(p, 2) middles of the cells of the path, from the robot to the goal, m."""
     facts: NDArray[np.float64]
-    """(1, 6): points of ``path``, its length, m, the highest price on it, the numbers
-    of the first of these cells on the floor, and their side, m."""
+    """(1, 6): number of points of ``path``; its length, m; highest price after its
+    first cell; numbers on the floor, along x and y, of the first cell of the window;
+    side of a cell, m."""
     marks: NDArray[np.float64]
-    """(q, 3) places that were found blocked, m, and until when that counts, s."""
+    """(q, 3) positions marked as blocked, m, and the time until which a mark counts,
+    s."""
     marked: NDArray[np.float64]
-    """(1, 1) how many places were marked: the oldest is replaced."""
+    """(1, 1) number of marks so far; a new mark replaces the oldest."""
 
 
 def make_way(cells: int) -> Way:
-    """Room for a way.
+    """Allocates the arrays of a path.
 
     Args:
-        cells: Of the window along a side.
+        cells: Number of cells along a side of the window.
 
     Returns:
-        The way, of no points.
+        A path without points.
     """
     size = cells // 2
     grid = size, size
@@ -86,17 +93,21 @@ def find_way(
     radius: float,
     clear: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Finds the way from a robot to a goal.
+    """Finds the cheapest path from a robot to a goal.
+
+    The function computes the prices of all cells, searches from the goal to the start,
+    and then follows the search back from the start to the goal. It stores the points,
+    the length and the highest price of the path.
 
     Args:
         way: Changed.
-        space: What is known.
+        space: Cells that were seen free, and hits.
         start: (x, y) of the axle, m.
-        goal: (x, y); beyond the window the nearest of its cells counts, m.
+        goal: (x, y), m. Outside the window, the nearest cell of the window counts.
         time: s.
-        radius: Of the disc that must pass, m.
-        clear: (n, 3) places, m, and how near to them echoes come from what is followed
-            or moves, m, and block no way.
+        radius: Radius of the disc that has to pass, m.
+        clear: (n, 3) positions and radii, m. Hits within such a radius do not block the
+            path: they come from the target or a moving body.
     """
     size, cell = way.price.shape[0], 2.0 * space.cell_m
     low = _first_cells(space)
@@ -127,12 +138,12 @@ def find_way(
 def mark_blocked(
     way: Way, place: Any, until: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Keeps ways off a place for a time.
+    """Marks a place, so that paths avoid it for a time.
 
     Args:
         way: Changed.
         place: (x, y), m.
-        until: When that ends, s.
+        until: End of that time, s.
     """
     k = int(way.marked[0, 0]) % len(way.marks)
     way.marks[k, 0], way.marks[k, 1], way.marks[k, 2] = place[0], place[1], until
@@ -141,7 +152,7 @@ def mark_blocked(
 
 @njit(cache=True)
 def _first_cells(space: FreeSpace) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Wide cell with which the window begins, as a number on the floor."""
+    """Return the numbers of the first wide cell of the window, along x and y."""
     first_i, first_j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
     return (first_i + 1) // 2, (first_j + 1) // 2
 
@@ -150,6 +161,7 @@ def _first_cells(space: FreeSpace) -> tuple[int, int]:  # pragma: no cover  (com
 def _cell_at(
     place: Any, low: Any, cell: float, size: int
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
+    """Return the cell of a place, or the nearest cell of the window."""
     i = math.floor(place[0] / cell) - low[0]
     j = math.floor(place[1] / cell) - low[1]
     return min(max(i, 0), size - 1), min(max(j, 0), size - 1)
@@ -164,6 +176,13 @@ def _set_prices(
     radius: float,
     clear: Any,
 ) -> None:  # pragma: no cover  (compiled)
+    """Set the price of each cell from its knowledge, nearby hits and marks.
+
+    A wide cell is unknown if one of its four narrow cells was never seen free. Narrow
+    cells with enough hits raise the prices around them (``_keep_off``), except hits
+    near the places in ``clear``. Marked places count as occupied until their time has
+    passed.
+    """
     size, cells, cell = way.price.shape[0], space.free_until.shape[0], 2 * space.cell_m
     for i in range(size):
         for j in range(size):
@@ -188,6 +207,7 @@ def _set_prices(
 
 @njit(cache=True)
 def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (compiled)
+    """Return whether a point is within the radius of one of the clear places."""
     for k in range(len(clear)):
         if math.hypot(x - clear[k, 0], y - clear[k, 1]) < clear[k, 2]:
             return True
@@ -198,7 +218,12 @@ def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (comp
 def _keep_off(
     way: Way, place: Any, low: Any, cell: float, radius: float, highest: int
 ) -> None:  # pragma: no cover  (compiled)
-    """Gives the cells around a narrow cell at least the prices of their distances."""
+    """Raise the prices of the cells near a narrow cell, according to their distance.
+
+    The distance is from the middle of a wide cell to the nearest point of the narrow
+    cell. Within the radius of the disc the price is ``highest``. Farther away it is
+    ``TIGHT``, then ``NEAR``.
+    """
     size, x, y = way.price.shape[0], place[0] / cell - low[0], place[1] / cell - low[1]
     reach = (radius + _NEAR_M) / cell
     half = 0.25
@@ -218,7 +243,14 @@ def _keep_off(
 
 @njit(cache=True)
 def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (compiled)
-    """Dijkstra from the goal up to the start, with buckets for whole costs (Dial)."""
+    """Search with Dijkstra's algorithm from the goal, until the start is reached.
+
+    All costs are whole numbers, so a ring of buckets replaces the priority queue
+    (Dial). Bucket ``cost % _BUCKETS`` is a linked list of all waiting cells of that
+    cost. No step costs as much as the number of buckets, so costs in one bucket never
+    mix. A cell that gets a lower cost enters the queue again; its older entry is
+    skipped.
+    """
     size = way.price.shape[0]
     way.cost[:, :] = _FAR
     way.towards[:, :] = -1
@@ -228,6 +260,7 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
     way.heads[0, 0] = 0
     entries, waiting, cost = 1, 1, 0
     while waiting > 0:
+        # Take the next cell of the current cost; without one, go to the next bucket.
         entry = way.heads[cost % _BUCKETS, 0]
         if entry < 0:
             cost += 1
@@ -236,6 +269,7 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
         waiting -= 1
         at = way.queue[entry, 0]
         i, j = at // size, at % size
+        # An older entry: the cell has got a lower cost since.
         if way.cost[i, j] != cost:
             continue
         if at == start:
@@ -246,7 +280,7 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
                 if (di == 0 and dj == 0) or a < 0 or b < 0 or a >= size or b >= size:
                     continue
                 step = STRAIGHT if di == 0 or dj == 0 else ACROSS
-                # From there the way leads here: what it costs to enter this cell.
+                # The path leads from (a, b) to this cell: the step enters this cell.
                 new = cost + step * way.price[i, j]
                 if new < way.cost[a, b] and entries < len(way.queue):
                     way.cost[a, b] = new

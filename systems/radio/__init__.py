@@ -1,1 +1,1 @@
-"""Radio: frames, the air between robots, and who listens."""
+"""Radio: frames, the channel between the robots, and the receivers."""

@@ -1,4 +1,4 @@
-"""The nine-byte frames by which the robots and the sink talk (Song 2011, 3.3)."""
+"""The radio frames of nine bytes that robots and sink exchange (Song 2011, 3.3)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from numba.extending import register_jitable
 
 from systems.framework.input_error import InputError
 
-#: Bytes of a frame: FA FB, address, function, four of data, sum of the others.
+#: Number of bytes of a frame: FA, FB, address, function, four bytes of data, checksum.
+#: The checksum is the sum of the other bytes modulo 256.
 FRAME_BYTES = 9
-#: Frames that a robot sends in a tick at most.
+#: Largest number of frames that a robot sends per tick.
 MOST_FRAMES = 4
-#: Size of the port ``frames``: how many, then their bytes.
+#: Size of the port ``frames``: the number of frames, then their bytes.
 FRAMES_SIZE = 1 + FRAME_BYTES * MOST_FRAMES
-#: By which a frame begins.
+#: The first two bytes of each frame.
 FIRST_BYTE, SECOND_BYTE = 0xFA, 0xFB
-#: Address of the sink, beside those of the robots, 1 to 3.
+#: Address of the sink. The robots have the addresses 1 to 3.
 SINK = 4
 _FILL = 0xFF
 
-#: Functions (Song 2011, table 5).
+#: Names of the functions of frames (Song 2011, table 5).
 FRAME_NAMES: Mapping[int, str] = {
     0: "stop",
     1: "run",
@@ -67,13 +68,14 @@ def write_frame(
     """Writes the nine bytes of a frame.
 
     Args:
-        out: Numbers; the bytes are written from ``first`` on.
-        first: Place of the first one.
-        address: Of the sender, 1 to 3; in a frame of the sink that of the robot that
-            it is for. Nothing in a frame names both.
-        function: 0 to 16, see ``FRAME_NAMES``.
-        value: Angles in deg, sent as 0 to 359.9 to a tenth; flags 0 or 1; commands
-            have none; all else 0 to 99.99 to a hundredth, limited to that.
+        out: Sequence that receives the bytes as floats.
+        first: Index of the first byte.
+        address: Address of the sender, 1 to 3. A frame of the sink contains the address
+            of the receiver instead.
+        function: Number of the function, 0 to 16, see ``FRAME_NAMES``.
+        value: The value. Angles are in deg and are sent as 0 to 359.9, with one
+            decimal. Flags are 0 or 1. Commands have no value. All other values are
+            limited to 0 to 99.99, with two decimals.
     """
     out[first], out[first + 1] = float(FIRST_BYTE), float(SECOND_BYTE)
     out[first + 2], out[first + 3] = float(address), float(function)
@@ -100,14 +102,14 @@ def write_frame(
 
 @register_jitable
 def frame_is_sound(data: Any, first: int) -> bool:
-    """Whether nine bytes are a frame.
+    """Checks whether nine bytes are a valid frame.
 
     Args:
-        data: Bytes.
-        first: Place of the first one.
+        data: The bytes.
+        first: Index of the first byte.
 
     Returns:
-        False where head, address, function, data or sum are none of a frame.
+        Whether the first two bytes, address, function, data and checksum are valid.
     """
     total = 0
     for k in range(8):
@@ -126,15 +128,15 @@ def frame_is_sound(data: Any, first: int) -> bool:
 
 @register_jitable
 def frame_value(data: Any, first: int) -> float:
-    """What a sound frame carries.
+    """Decodes the value of a valid frame.
 
     Args:
-        data: Bytes.
-        first: Place of the first one.
+        data: The bytes.
+        first: Index of the first byte.
 
     Returns:
-        In the unit of ``write_frame``; the sound's direction (13) from -180 to 180 deg,
-        of a command 0.
+        The value in the unit of ``write_frame``. The direction of the sound (function
+        13) is above -180 and up to 180 deg. The value of a command is 0.
     """
     function = int(data[first + 3])
     if _is_command(function):
@@ -152,27 +154,27 @@ def frame_value(data: Any, first: int) -> float:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame as people read it."""
+    """The content of a frame."""
 
     address: int
-    """Of the sender; in a frame of the sink that of the robot that it is for."""
+    """Address of the sender. A frame of the sink has the address of the receiver."""
     function: int
-    """0 to 16, see ``FRAME_NAMES``."""
+    """Number of the function, 0 to 16, see ``FRAME_NAMES``."""
     value: float = 0.0
-    """As of ``write_frame``."""
+    """Value in the unit of ``write_frame``."""
 
 
 def encode_frame(frame: Frame) -> bytes:
-    """The nine bytes of a frame.
+    """Encodes a frame as nine bytes.
 
     Args:
-        frame: What to send.
+        frame: The content of the frame.
 
     Returns:
-        They.
+        The nine bytes.
 
     Raises:
-        InputError: The address, the function or the value cannot be sent.
+        InputError: The address, the function or the value is out of its range.
     """
     if not 1 <= frame.address <= SINK:
         raise InputError("address", f"is {frame.address}; use 1 to {SINK}")
@@ -192,13 +194,13 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 def decode_frame(data: Sequence[int]) -> Frame | None:
-    """The frame that nine bytes are.
+    """Decodes nine bytes.
 
     Args:
-        data: Nine bytes.
+        data: The bytes.
 
     Returns:
-        None where they are no frame.
+        The content of the frame, or None if the bytes are not a valid frame.
     """
     if len(data) != FRAME_BYTES or not frame_is_sound(data, 0):
         return None

@@ -1,4 +1,4 @@
-"""The air between the robots' radios."""
+"""The radio channel between the robots."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from systems.framework.signals import TICK_S
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES
 from systems.radio.parameters import RadioParameters
 
-#: Frames that arrive in a tick at most.
+#: Largest number of frames that arrive per tick.
 _MOST_ON_AIR = 3 * MOST_FRAMES
-#: Size of the port ``air``: how many bytes, then these.
+#: Size of the port ``air``: the number of bytes, then the bytes.
 AIR_SIZE = 1 + FRAME_BYTES * _MOST_ON_AIR
 
 
 class ChannelNumbers(NamedTuple):
-    """What the step of ``RadioChannel`` depends on."""
+    """Constants of the step of ``RadioChannel``."""
 
     delay: int
-    """Ticks, at least 1."""
+    """Latency, ticks, at least 1."""
     loss: float
     byte_error: float
     noise: TickNoise
@@ -32,16 +32,22 @@ class ChannelNumbers(NamedTuple):
 
 @register_jitable
 def _share(number: float) -> float:
-    """An even number from 0 to 1 of a normal one."""
+    """Converts a normal random number to a uniform random number from 0 to 1."""
     return 0.5 * (1.0 + math.erf(number / math.sqrt(2.0)))
 
 
 @register_jitable
-def _send(state: Any, place: int, frames: Any, numbers: Any, random: Any) -> None:
-    """Puts a robot's frames behind what is sent in this tick."""
+def _send(
+    state: Any, place: int, frames: Any, numbers: Any, random: Any, sent: int
+) -> int:
+    """Appends the frames of one robot to the bytes that are sent in this tick.
+
+    Each frame has a row of random numbers of its own, whether it is lost or not.
+    Returns the number of frames sent so far.
+    """
     for frame in range(int(frames[0])):
+        row, sent = sent, sent + 1
         count = int(state[place])
-        row = count // FRAME_BYTES
         if _share(random[row, 0]) < numbers.loss or count + FRAME_BYTES >= AIR_SIZE:
             continue
         for k in range(FRAME_BYTES):
@@ -51,15 +57,16 @@ def _send(state: Any, place: int, frames: Any, numbers: Any, random: Any) -> Non
                 byte = (byte + 1.0 + other) % 256.0
             state[place + 1 + count + k] = byte
         state[place] = count + float(FRAME_BYTES)
+    return sent
 
 
 @register_jitable
 def radio_channel_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: ChannelNumbers
 ) -> None:
-    """What is on the air after a tick.
+    """Shifts the bytes in transit by one tick, and adds the frames of this tick.
 
-    State: ``delay`` rows of the size of ``air``, the next one first.
+    State: ``delay`` rows with the size of the port ``air``. The first row arrives next.
     """
     for k in range((numbers.delay - 1) * AIR_SIZE):
         state[k] = state[k + AIR_SIZE]
@@ -69,38 +76,41 @@ def radio_channel_step(
     for frames in inputs:
         sends = sends or frames[0] > 0.5
     if sends:
-        rows, columns = _MOST_ON_AIR + 1, 1 + 2 * FRAME_BYTES
+        rows = max(_MOST_ON_AIR, len(inputs) * MOST_FRAMES)
+        columns = 1 + 2 * FRAME_BYTES
         random = tick_normals(numbers.noise, tick, rows, columns)
+        sent = 0
         for frames in inputs:
-            _send(state, place, frames, numbers, random)
+            sent = _send(state, place, frames, numbers, random, sent)
 
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: ChannelNumbers) -> None:
-    """The outputs of ``radio_channel_step``'s state."""
+    """Copies the output from the state of ``radio_channel_step``."""
     air = outputs[0]
     for k in range(AIR_SIZE):
         air[k] = state[k]
 
 
 class RadioChannel(Block):
-    """Brings what each robot sends to all radios.
+    """Transmits the frames of each robot to all radios.
 
     For each robot that sends, the block has an input port ``frames_<robot>`` (number of
-    frames, and nine bytes each). All radios hear the same bytes, and a robot hears its
-    own frames, too: frames contain addresses. By chance a frame is lost as a whole, or
-    one of its bytes is changed.
+    frames, and nine bytes per frame). All radios receive the same bytes. A robot also
+    receives its own frames. The addresses in the frames identify the senders. A frame
+    is lost with the probability ``loss``, whatever happens to other frames. A byte
+    changes with the probability ``byte_error``.
 
-    Discrete state, every tick: the bytes on their way. Latency: ``latency_s``, rounded
-    to ticks, at least one.
+    Discrete state, every tick: the bytes in transit. Latency: ``latency_s``, rounded to
+    ticks, at least one tick.
 
     Args:
-        parameters: ``RadioParameters``.
+        parameters: Latency, losses and errors.
         robots: Names of the robots that send.
         seed: Seed of losses and errors.
         tick_s: Period of the update, s.
 
-    Reference: Song 2011, 3.3; latency and losses are ours.
+    Reference: Song 2011, 3.3. Latency and losses are ours.
     """
 
     part, stage = "radio", "world"

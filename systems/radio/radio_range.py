@@ -1,4 +1,4 @@
-"""How strongly a robot's radio hears the one that it comes to."""
+"""The received level of the radio that a robot approaches."""
 
 from __future__ import annotations
 
@@ -12,50 +12,50 @@ from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
 from systems.radio.parameters import RadioParameters
 
-#: Levels are measured so often, s.
+#: Period of the measurements, s.
 _PERIOD_S = 0.1
-#: Antennas are no nearer to one another, m.
+#: Smallest distance in the path loss, m.
 _LEAST_M = 0.01
 
 
 @register_jitable
 def radio_level(distance: float, level_at_1_m_dbm: float, exponent: float) -> float:
-    """Level by the path loss of Song 2011, eq. 8.
+    """Computes the level at a distance (path loss of Song 2011, eq. 8).
 
     Args:
-        distance: m.
-        level_at_1_m_dbm: -A, dBm.
-        exponent: n.
+        distance: d, distance between the antennas, m.
+        level_at_1_m_dbm: -A, level at a distance of 1 m, dBm.
+        exponent: n, exponent of the path loss.
 
     Returns:
-        R = -(10 n lg d + A), dBm.
+        Level R = -(10 n lg d + A), dBm.
     """
     return level_at_1_m_dbm - 10.0 * exponent * math.log10(max(distance, _LEAST_M))
 
 
 @register_jitable
 def radio_distance(level: float, level_at_1_m_dbm: float, exponent: float) -> float:
-    """Distance of a level: undoes ``radio_level``.
+    """Computes the distance from a level, as the inverse of ``radio_level``.
 
     Args:
-        level: dBm.
-        level_at_1_m_dbm: -A, dBm.
-        exponent: n.
+        level: R, dBm.
+        level_at_1_m_dbm: -A, level at a distance of 1 m, dBm.
+        exponent: n, exponent of the path loss.
 
     Returns:
-        m.
+        Distance, m.
     """
     return 10.0 ** ((level_at_1_m_dbm - level) / (10.0 * exponent))
 
 
 class RangeNumbers(NamedTuple):
-    """What the step of ``RadioRange`` depends on."""
+    """Constants of the step of ``RadioRange``."""
 
     level_at_1_m_dbm: float
     exponent: float
     fading_db: float
     period: int
-    """Ticks."""
+    """Period of the measurements, ticks."""
     noise: TickNoise
 
 
@@ -63,9 +63,9 @@ class RangeNumbers(NamedTuple):
 def radio_range_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: RangeNumbers
 ) -> None:
-    """The level that the radio hears.
+    """Measures the level once per period.
 
-    State: the last level, dBm.
+    State: the last measured level, dBm.
     """
     if tick % numbers.period == 0:
         pose, other = inputs
@@ -79,12 +79,15 @@ def radio_range_step(
 class RadioRange(Block):
     """Measures the level of the radio that the robot approaches.
 
-    Every 0.1 s it draws a level: that of the distance between the centers of the two
-    bodies, plus a normal error. Discrete state: the last level. Latency: none.
+    The block measures a level every 0.1 s. The level is the sum of the path loss and a
+    normally distributed error. The path loss depends on the distance between the
+    origins of the two robots.
+
+    Discrete state: the last measured level. Latency: none.
 
     Args:
         parameters: Levels and fading.
-        seed: Of the errors.
+        seed: Seed of the errors.
         tick_s: Period of the update, s.
 
     Reference: Song 2011, eq. 8.

@@ -1,4 +1,4 @@
-"""What the operator's computer knows of the robots, by radio alone."""
+"""The status of the robots that the computer of the operator receives by radio."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from systems.framework.signals import TICK_S
 from systems.radio.radio_channel import AIR_SIZE
 from systems.radio.stream import PARSER_SIZE, parse_byte
 
-#: What the sink knows of each robot: frames so far, the last one's function (-1: none
-#: yet) and value, time since then, s, and what it says of its search: -1 nothing, 0
-#: not found, 1 found.
+#: Status of each robot: number of frames received, function of the last frame (-1: no
+#: frame yet), its value, time since it was received, s, and result of the search (-1:
+#: none yet, 0: not found, 1: found).
 SINK_FIELDS = ("frames", "function", "value", "age_s", "result")
 _COUNT, _FUNCTION, _VALUE, _AGE, _RESULT = range(len(SINK_FIELDS))
 
 
 class SinkNumbers(NamedTuple):
-    """What the step of ``SinkMonitor`` depends on."""
+    """Constants of the step of ``SinkMonitor``."""
 
     addresses: NDArray[np.int64]
-    """Of the robots."""
+    """Addresses of the robots."""
     tick_s: float
 
 
@@ -33,9 +33,9 @@ class SinkNumbers(NamedTuple):
 def sink_monitor_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SinkNumbers
 ) -> None:
-    """What is known of each robot after a tick.
+    """Updates the status of each robot with the bytes of this tick.
 
-    State: ``SINK_FIELDS`` of each robot, then the state of the parser.
+    State: the ``SINK_FIELDS`` of each robot, then the state of the parser.
     """
     air, fields, robots = inputs[0], 5, len(numbers.addresses)
     for robot in range(robots):
@@ -59,16 +59,16 @@ def sink_monitor_step(
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: SinkNumbers) -> None:
-    """The outputs of ``sink_monitor_step``'s state."""
+    """Copies the output from the state of ``sink_monitor_step``."""
     status = outputs[0]
     for k in range(len(status)):
         status[k] = state[k]
 
 
 class SinkMonitor(Block):
-    """Listens to all frames, and keeps the last frame of each robot.
+    """Receives all frames, and stores the last frame of each robot.
 
-    Discrete state, every tick: the output, and the state of the parser. Latency: a
+    Discrete state, every tick: the output, and the state of the parser. Latency: one
     tick.
 
     Args:

@@ -1,4 +1,4 @@
-"""Frames out of a stream of bytes that may be damaged."""
+"""A parser that finds frames in a stream of bytes that may contain errors."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from systems.radio.codec import (
     frame_value,
 )
 
-#: Numbers of a parser's state: how many bytes it holds, and these.
+#: Size of the state of a parser: the number of stored bytes, then the bytes.
 PARSER_SIZE = 1 + FRAME_BYTES
 
 
 @register_jitable
 def _is_begin(state: Any, count: int) -> bool:
-    """Whether the bytes held can still become a frame."""
+    """Returns whether the stored bytes can be the beginning of a frame."""
     if count >= 1 and state[1] != FIRST_BYTE:
         return False
     return not (count >= 2 and state[2] != SECOND_BYTE)
@@ -30,7 +30,7 @@ def _is_begin(state: Any, count: int) -> bool:
 
 @register_jitable
 def _drop_one(state: Any) -> None:
-    """Drops the first byte, and all after it that cannot begin a frame."""
+    """Drops bytes from the front until the rest can be the beginning of a frame."""
     count = int(state[0])
     while count > 0:
         for k in range(1, count):
@@ -43,17 +43,18 @@ def _drop_one(state: Any) -> None:
 
 @register_jitable
 def parse_byte(state: Any, byte: float) -> tuple[bool, int, int, float]:
-    """Takes the next byte of a stream.
+    """Processes the next byte of a stream.
 
-    What turns out to be no frame is looked through again from its second byte on, so
-    that garbage costs no good frame after it; a sum that is FA is no new head.
+    If the stored bytes are not a valid frame, the parser searches for the beginning of
+    a frame from the second byte on. Therefore wrong bytes do not destroy a valid frame
+    after them. A checksum with the value FA does not begin a new frame.
 
     Args:
-        state: ``PARSER_SIZE`` numbers, 0 at first; changed.
-        byte: 0 to 255.
+        state: ``PARSER_SIZE`` numbers, initially 0. The function changes them.
+        byte: The next byte, 0 to 255.
 
     Returns:
-        Whether a frame ends here; its address, function and value.
+        Whether a valid frame ends with this byte; then its address, function and value.
     """
     count = int(state[0]) + 1
     state[count] = byte
@@ -73,19 +74,19 @@ def parse_byte(state: Any, byte: float) -> tuple[bool, int, int, float]:
 
 
 class StreamParser:
-    """``parse_byte`` for bytes that come in pieces."""
+    """Applies ``parse_byte`` to a stream that arrives in pieces."""
 
     def __init__(self) -> None:
         self._state = [0.0] * PARSER_SIZE
 
     def feed(self, data: Iterable[int]) -> list[Frame]:
-        """Takes the next piece of the stream.
+        """Processes the next piece of the stream.
 
         Args:
-            data: Bytes.
+            data: The bytes of the piece.
 
         Returns:
-            Frames that end in it.
+            The frames that end in this piece.
         """
         frames = []
         for byte in data:

@@ -1,1 +1,1 @@
-"""Range sensors, and the collision vector that they give."""
+"""Range sensors, contact switches, and the detection of obstacles and objects."""

@@ -1,4 +1,4 @@
-"""From the hits of single beams to the surfaces that they lie on."""
+"""Grouping of the hits of single beams into surfaces."""
 
 from __future__ import annotations
 
@@ -11,32 +11,36 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.ranging.collision_vector import foot_on_segment
 
-#: Numbers of a group: vectors from P to its nearest point and to the middle between its
-#: outer hits, m; how far these are apart, m; how far beams are apart there, m; and
-#: whether it may go on beyond one of them.
+#: Columns of a group. NEAR is the vector from P to its nearest point, m. MIDDLE is the
+#: vector from P to the middle between its two outer hits, m. EXTENT is the distance
+#: between the outer hits, m. CHORD is the spacing of the beams at the nearest point, m.
+#: OPEN is 1 if the surface may continue beyond an outer hit, otherwise 0.
 NEAR_X, NEAR_Y, MIDDLE_X, MIDDLE_Y, EXTENT, CHORD, OPEN = range(7)
 GROUP_SIZE = 7
 
 
 class BeamNumbers(NamedTuple):
-    """What is known of the beams."""
+    """Directions of the beams, and limits that separate objects."""
 
     apart_rad: NDArray[np.float64]
-    """(n,) angle of each beam to its right neighbour; 0: it has none."""
+    """(n,) angle between each beam and its right neighbor, rad; 0 if it has none."""
     maximum_range_m: float
+    """Surfaces farther away give no echo, m."""
     gap_m: float
-    """Hits of neighbours are on one surface if they are nearer than this and"""
+    """Constant part of the largest distance between adjacent hits on one surface, m."""
     stretch: float
-    """so many times the distance of the beams there."""
+    """Part of this largest distance that grows with the spacing of the beams, as a
+    factor."""
     dip_m: float
-    """Between two objects the distance from P is larger by this than at each, m."""
+    """Two objects meet where the distance from P exceeds both minima by more than this,
+    m."""
 
 
 @njit(cache=True)
 def _goes_on(
     hits: Any, ranges: Any, heard: Any, k: int, beams: BeamNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether beam k and its right neighbour hit one surface."""
+    """Whether beam k and its right neighbor hit the same surface."""
     other = (k + 1) % len(ranges)
     apart = beams.apart_rad[k]
     if apart == 0.0 or heard[k] < 0.5 or heard[other] < 0.5:
@@ -50,11 +54,25 @@ def _goes_on(
 def _is_open(
     ranges: Any, heard: Any, own: int, other: int, apart: float, beams: BeamNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a surface may go on from an outer hit towards the beam beside it."""
+    """Whether a surface may continue beyond its outer hit.
+
+    The beam beside the outer hit decides. If there is no such beam, the surface may
+    continue. If the beam has an echo, a nearer hit may hide the surface, and a farther
+    hit shows its end. Without an echo, the surface may continue if it would be out of
+    range there.
+
+    Args:
+        ranges: (n,) ranges of the beams, m.
+        heard: (n,) 1 where there is an echo, else 0.
+        own: Beam of the outer hit.
+        other: Beam beside it.
+        apart: Angle between the two beams, rad; 0 if there is no beam beside it.
+        beams: Limits of the beams.
+    """
     if apart == 0.0:
         return True
     if heard[other] < 0.5:
-        # A flat face would be out of range there.
+        # A flat face perpendicular to the own beam would be out of range there.
         return ranges[own] > beams.maximum_range_m * math.cos(apart)
     return bool(ranges[other] < ranges[own])
 
@@ -63,7 +81,18 @@ def _is_open(
 def _describe(
     row: Any, hits: Any, ranges: Any, heard: Any, ends: Any, beams: BeamNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills a row of a group from its first to its last beam, counted on in a ring."""
+    """Fills the row of one group.
+
+    The nearest point is sought on the line segments between adjacent hits.
+
+    Args:
+        row: (GROUP_SIZE,) row to be filled.
+        hits: (n, 2) hits from P, m.
+        ranges: (n,) ranges of the beams, m.
+        heard: (n,) 1 where there is an echo, else 0.
+        ends: First and last beam of the group; numbers of n or more wrap around.
+        beams: Directions and limits of the beams.
+    """
     count = len(ranges)
     first, last = ends[0] % count, ends[1] % count
     nearest = hits[first, 0], hits[first, 1]
@@ -88,25 +117,27 @@ def _describe(
 def group_beams(
     hits: Any, ranges: Any, heard: Any, beams: BeamNumbers
 ) -> tuple[NDArray[np.float64], int]:  # pragma: no cover  (compiled)
-    """Objects that beams have hit: surfaces without a hollow.
+    """Groups the hits of the beams into objects.
 
-    Neighbouring hits are on one surface if they are near enough. A surface that comes
-    nearer to P twice, as the two walls of a corner, is two objects: of a hollow one the
-    nearest point alone would say nothing of its other side.
+    The function visits the beams from left to right. Adjacent hits belong to one
+    surface if they are close enough. A surface can approach P twice, for example at the
+    two walls of a corner. The function splits such a hollow surface where it is
+    farthest from P, because the nearest point alone would not describe its other side.
+    The beam at the split belongs to both objects.
 
     Args:
-        hits: (n, 2) from P, m, left to right.
-        ranges: (n,) of the beams, m.
-        heard: (n,) 1 where there was an echo, else 0.
-        beams: What is known of the beams.
+        hits: (n, 2) hits from P, m, from left to right.
+        ranges: (n,) ranges of the beams, m.
+        heard: (n,) 1 where there is an echo, else 0.
+        beams: Directions and limits of the beams.
 
     Returns:
-        (n, GROUP_SIZE) groups, and how many there are.
+        (n, GROUP_SIZE) groups, and the number of groups.
     """
     count = len(ranges)
     rows, used = np.zeros((count, GROUP_SIZE)), 0
     far = np.hypot(hits[:, 0], hits[:, 1])
-    # A ring begins behind a gap, or at its farthest hit.
+    # Start after the first gap. A closed ring without a gap starts at its farthest hit.
     begin = int(np.argmax(far * heard))
     for k in range(count):
         if not _goes_on(hits, ranges, heard, k, beams):
@@ -119,7 +150,8 @@ def group_beams(
             continue
         if first < 0:
             first, low, high, top = k, far[now], -1.0, k
-        # Up from the least distance by more than a dip, and down again: another one.
+        # Split at the top, when the distance has risen by more than the dip and has
+        # fallen by more than the dip again.
         low = min(low, far[now])
         if far[now] > max(low + beams.dip_m, high):
             high, top = far[now], k

@@ -1,4 +1,4 @@
-"""From three ranges to the vector that points at the obstacle."""
+"""From the ranges of the sensors to vectors that point at obstacles."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from systems.framework.signals import TICK_S
 from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
-#: Collision vectors that a controller takes at once.
+#: Largest number of collision vectors in one tick.
 SLOTS = 3
 
 
 @register_jitable
 def echo_point(range_: Any, axis: Any, position: Any) -> Any:
-    """Where an echo is taken to lie: on the sensor's axis.
+    """Position of an echo, which is assumed to lie on the axis of the sensor.
 
     Args:
         range_: Range r_i, m; float or AutoDiffXd.
         axis: Direction phi_i of the sensor in B, rad.
-        position: Place p_PU_i of the sensor from P, m.
+        position: Position p_PU_i of the sensor from P in B axes, m.
 
     Returns:
-        (x, y) from P in B axes, m. Han 2019, eq. 11 prints a minus sign and
-        mixes d with r; eq. 13 swaps the axes.
+        (x, y) from P in B axes, m. Han 2019, eq. 11 prints a minus sign and mixes d
+        with r; eq. 13 swaps the axes.
     """
     return (
         position[0] + range_ * math.cos(axis),
@@ -40,15 +40,15 @@ def echo_point(range_: Any, axis: Any, position: Any) -> Any:
 
 
 def echo_points(ranges: Any, echo: Any, sensors: UltrasonicParameters) -> Any:
-    """The points that the sensors see, None where there is no echo.
+    """Positions of the echoes of all sensors.
 
     Args:
         ranges: (n,) ranges r_i, m; floats or AutoDiffXd.
         echo: (n,) 1 where there is an echo, else 0.
-        sensors: Axes and places of the sensors.
+        sensors: Directions and positions of the sensors.
 
     Returns:
-        For each sensor (x, y) from P in B, m, or None.
+        One entry per sensor: (x, y) from P in B axes, m, or None without an echo.
     """
     return [
         echo_point(range_, axis, position) if heard > 0.5 else None
@@ -62,16 +62,16 @@ def echo_points(ranges: Any, echo: Any, sensors: UltrasonicParameters) -> Any:
 def carried_point(
     point: Any, pose_then: Any, pose_now: Any, control_point_m: Any
 ) -> Any:
-    """Where a point that was seen from another pose lies now, if it rests.
+    """Present position of a point at rest that was seen from an earlier pose.
 
     Args:
-        point: (x, y) from P in B axes as seen then, m; floats or AutoDiffXd.
-        pose_then: (x, y, theta) of the robot then, m and rad.
-        pose_now: The same now.
+        point: (x, y) from P in B axes at the earlier pose, m; floats or AutoDiffXd.
+        pose_then: Earlier pose (x, y, theta) of the robot, m and rad.
+        pose_now: Present pose of the robot, m and rad.
         control_point_m: Distance of P ahead of the axle, m.
 
     Returns:
-        (x, y) from P in B axes now, m.
+        (x, y) from P in B axes at the present pose, m.
     """
     p_then = control_point(pose_then, control_point_m)
     p_now = control_point(pose_now, control_point_m)
@@ -85,13 +85,13 @@ def foot_on_segment(a: Any, b: Any) -> Any:
     """Point of the segment a-b that is nearest to the origin.
 
     Args:
-        a: (x, y), m; floats or AutoDiffXd.
-        b: (x, y), m.
+        a: (x, y) of one end, m; floats or AutoDiffXd.
+        b: (x, y) of the other end, m.
 
     Returns:
-        (x, y), m. Han 2019, eq. 14 has a wrong sign and a singular slope, and
-        does not keep the foot on the segment; a foot outside of it points at
-        empty space.
+        (x, y), m. Han 2019, eq. 14 has a wrong sign and a singular slope. It also does
+        not limit the foot to the segment; a foot outside the segment points at empty
+        space.
     """
     ex, ey = b[0] - a[0], b[1] - a[1]
     squared = ex * ex + ey * ey
@@ -108,20 +108,21 @@ def foot_on_segment(a: Any, b: Any) -> Any:
 def collision_vectors(
     points: Any, parameters: CollisionVectorParameters, neighbours: Any = None
 ) -> Any:
-    """Collision vectors from the points that the sensors see.
+    """Collision vectors from the positions of the echoes.
 
     Args:
-        points: n entries, left to right: (x, y) from P in m, or None where there
-            is no echo.
+        points: One entry per sensor, from left to right: (x, y) from P, m, or None
+            without an echo.
         parameters: The aggregation rule.
-        neighbours: Pairs of sensors next to one another, from 0, the left one first
-            (``UltrasonicParameters.neighbours``); none: each and the next.
+        neighbours: Pairs of adjacent sensors, counted from 0, the left one first
+            (``UltrasonicParameters.neighbours``). None pairs each sensor with the next
+            one.
 
     Returns:
-        Up to ``SLOTS`` (feature, x, y), the nearest ones. The feature names what the
-        vector stands on, so that a jump from one to another is not taken for a
-        motion: 1 to n one sensor (case I, Han 2019, eq. 12), n + k sensor k and its
-        right neighbour (case II, eq. 14).
+        At most ``SLOTS`` entries (feature, x, y) with x and y from P, m. The feature
+        states which sensors the vector comes from, so that a change of the sensor is
+        not mistaken for a motion. Features 1 to n are single sensors (case I, Han 2019,
+        eq. 12). Feature n + k is sensor k with its right neighbor (case II, eq. 14).
     """
     if neighbours is None:
         neighbours = pairwise(range(len(points)))
@@ -137,16 +138,28 @@ def collision_vectors(
 
 @register_jitable
 def _vectors(points, heard, neighbours, separation, joined, every):
-    """``collision_vectors``; points that are not heard may lie anywhere."""
+    """Compiled form of ``collision_vectors``.
+
+    Args:
+        points: n positions (x, y) from P, m; arbitrary where there is no echo.
+        heard: n flags, true where there is an echo.
+        neighbours: Pairs of adjacent sensors, the left one first.
+        separation: Echoes farther apart are not joined, m.
+        joined: Whether to join the nearest echo with its nearer neighbor.
+        every: Whether to return one vector per pair and per single echo.
+    """
+    # Find the nearest echo.
     nearest = -1
     for k in range(len(points)):
         if not heard[k]:
             continue
         if nearest < 0 or _squared(points[k]) < _squared(points[nearest]):
             nearest = k
+    # The empty slice gives the empty list its type in compiled code.
     found = [(0.0 * x, x, y) for x, y in points[:0]]
     if nearest < 0:
         return found
+    # Keep pairs of adjacent sensors whose echoes are close enough to each other.
     pairs = [
         (int(pair[0]), int(pair[1]))
         for pair in neighbours
@@ -157,7 +170,7 @@ def _vectors(points, heard, neighbours, separation, joined, every):
     if every:
         return _all_vectors(points, heard, pairs, found)
     if joined:
-        # Of the neighbours that are close enough the nearer to P.
+        # Join the nearest echo with the neighbor that is nearer to P.
         best, least = -1, math.inf
         for index in range(len(pairs)):
             left, right = pairs[index]
@@ -191,7 +204,7 @@ def _pair(points, left, right):
 
 @register_jitable
 def _all_vectors(points, heard, pairs, vectors):
-    """A vector for each pair, and for each echo that is in none; the nearest."""
+    """Vectors of all pairs and unpaired echoes, but at most the nearest ``SLOTS``."""
     for left, right in pairs:
         vectors.append(_pair(points, left, right))
     for k in range(len(points)):
@@ -214,12 +227,12 @@ def _all_vectors(points, heard, pairs, vectors):
 
 @register_jitable
 def fill_slots(vectors: Any, outputs: Any) -> None:
-    """Fills the ports of vectors, mask and features: 6, 3 and 3 elements.
+    """Writes vectors to the ports of vectors, mask and features.
 
     Args:
-        vectors: At most three (feature, x, y), from P, m.
-        outputs: Vectors, m, mask, 1 or 0, and features; zeros, which they remain
-            where there is nothing.
+        vectors: At most three entries (feature, x, y) with x and y from P, m.
+        outputs: Vectors, m (6 elements), mask, 0 or 1 (3), and features (3). All
+            elements are 0 before the call; unused slots remain 0.
     """
     vectors_B, mask, features = outputs
     for k in range(len(vectors)):
@@ -229,8 +242,7 @@ def fill_slots(vectors: Any, outputs: Any) -> None:
         features[k] = feature
 
 
-#: What every block says of itself that obstacle sensing ends in.
-#: Output ports of every block that senses obstacles.
+#: Output ports of every block that computes collision vectors.
 COLLISION_PORTS = (
     Port(
         "collision_vectors_B",
@@ -253,20 +265,20 @@ COLLISION_PORTS = (
 
 
 class CollisionNumbers(NamedTuple):
-    """What the step of ``CollisionVector`` depends on."""
+    """Parameters of ``collision_step``."""
 
     separation_m: float
     """Echoes farther apart are not joined, m."""
     joined: bool
-    """Whether the nearest echo is joined with a neighbour."""
+    """Whether the nearest echo is joined with a neighboring echo."""
     every: bool
-    """Whether every echo or pair has its own vector."""
+    """Whether every pair and every unpaired echo has its own vector."""
     axes: list[float]
-    """Of the sensors in B, rad."""
+    """Directions of the sensors in B, rad."""
     places: list[tuple[float, float]]
-    """Of the sensors from P, m."""
+    """Positions of the sensors from P in B axes, m."""
     neighbours: list[tuple[int, int]]
-    """Pairs of sensors."""
+    """Pairs of adjacent sensors, counted from 0, the left one first."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     tick_s: float
@@ -279,10 +291,10 @@ def collision_step(
 
     Args:
         tick: Not used.
-        state: Poses at the ticks of a round before this one, the last tick first, m
-            and rad; none where every range is new at every tick.
-        inputs: As the input ports.
-        outputs: As the output ports.
+        state: Poses at the previous ticks of a round, the latest first, m and rad;
+            empty if every sensor fires at every tick.
+        inputs: Values of the input ports.
+        outputs: Values of the output ports.
         numbers: ``CollisionNumbers``.
     """
     ranges, echo, ages, pose = inputs
@@ -291,14 +303,16 @@ def collision_step(
         for k in range(len(ranges))
     ]
     if len(state):
+        # Convert each held range to the present pose.
         for k in range(len(points)):
             ticks = round(float_of(ages[k]) / numbers.tick_s)
             if ticks > 0:
-                # A sensor that has failed is older than all poses that are kept.
+                # The age of a failed sensor can exceed that of the oldest stored pose.
                 at = min(3 * (ticks - 1), len(state) - 3)
                 then = state[at], state[at + 1], state[at + 2]
                 now = pose[0], pose[1], pose[2]
                 points[k] = carried_point(points[k], then, now, numbers.control_point_m)
+        # Store the present pose in front of the previous ones.
         for k in range(len(state) - 1, 2, -1):
             state[k] = state[k - 3]
         for k in range(3):
@@ -319,22 +333,24 @@ def CollisionVector_(T):
     class Impl(Block_[T]):
         """Turns echoes into collision vectors from P (cases I and II).
 
-        Slots are filled from the first; only ``aggregation: sum`` fills more
-        than one. Where all sensors fire at every tick, a function of the present
-        ranges: no state, no latency; the ports of age and pose are not read.
-        Otherwise a range that is held stands for a point at rest in W: the block
-        converts this point to the present pose. An obstacle's own motion since that
-        sensor fired, up to a round less a tick, remains an error.
+        Slots are filled from the first; only ``aggregation: sum`` fills more than one.
+        If all sensors fire at every tick, the output is a function of the present
+        ranges: there is no state and no latency, and the ports of age and pose are not
+        read. Otherwise the block assumes that a held range belongs to a point at rest
+        in W, and converts this point to the present pose. The motion of an obstacle
+        since the sensor fired remains as an error; this time is at most one round less
+        one tick.
 
-        Discrete state, every tick, where ranges are held: the poses of the ticks of
-        a round before this one, two for three sensors that fire one after the other.
+        Discrete state, updated every tick, if ranges are held: the poses at the
+        previous ticks of a round. Three sensors that fire one after the other, one per
+        tick, need two poses.
 
         Args:
-            parameters: ``CollisionVectorParameters``.
-            sensors: Places, period and order of firing, ``UltrasonicParameters``.
-            robot: Place of P.
+            parameters: Aggregation rule, ``CollisionVectorParameters``.
+            sensors: Positions, period and order of firing, ``UltrasonicParameters``.
+            robot: Position of P.
             initial_pose: (x, y, theta) before time zero, m and rad.
-            tick_s: Period of the robot, s.
+            tick_s: Control period of the robot, s.
 
         Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
         """
@@ -379,7 +395,7 @@ def CollisionVector_(T):
             )
 
         def step_for(self, run: RunFacts) -> Step:
-            """The step, with the initial pose of the run."""
+            """Step that starts from the initial pose of the run."""
             past_poses = len(self.step.state) // 3
             return self.step._replace(state=[*run.initial_pose] * past_poses)
 

@@ -1,4 +1,4 @@
-"""Micro switches in the robot's front that feel what it touches."""
+"""Micro switches behind the front bumper of the robot."""
 
 from __future__ import annotations
 
@@ -15,27 +15,31 @@ from systems.framework.signals import TICK_S
 from systems.ranging.parameters import ContactParameters
 from systems.world.geometry import beyond_rectangle
 
-#: Points along half of the front edge at which it feels.
+#: Number of test points on each half of the front edge, in addition to its middle.
 _POINTS = 8
-#: A touch this near to the middle closes both switches, as a share of the width.
+#: A touch within this distance of the middle closes both switches; share of the width.
 _MIDDLE = 0.1
 
 
 class SwitchNumbers(NamedTuple):
-    """What the step of ``ContactSwitches`` depends on."""
+    """Parameters of ``contact_switches_step``."""
 
     points: NDArray[np.float64]
-    """(n, 2) points of the front edge in B, m, from left to right."""
+    """(n, 2) test points of the front edge in B, m, from left to right."""
     middle_m: float
-    """A touch this near to the body's axis closes both switches."""
+    """A touch within this distance of the longitudinal axis closes both switches, m."""
     reach_m: float
+    """A switch closes where a body is within this distance of a test point, m."""
     length_m: float
-    """Of what is followed."""
+    """Length of the body at ``pose_WS``, m."""
     width_m: float
+    """Width of the body at ``pose_WS``, m."""
     open_from_s: tuple[float, float]
-    """Switches are stuck open from then on, s; infinite: never."""
+    """Time from which the left and the right switch are stuck open, s; infinite:
+    never."""
     closed_from_s: tuple[float, float]
-    """Or closed."""
+    """Time from which the left and the right switch are stuck closed, s; infinite:
+    never."""
     tick_s: float
 
 
@@ -43,8 +47,17 @@ class SwitchNumbers(NamedTuple):
 def _feel(
     pose: Any, body: Any, points: Any, middle: float, reach: float
 ) -> tuple[bool, bool]:  # pragma: no cover  (compiled)
-    """Whether a body closes the left and the right switch."""
+    """Whether a body closes the left and the right switch.
+
+    Args:
+        pose: (x, y, theta) of the robot, m and rad.
+        body: x, y, theta, length and width of the body in W, m and rad.
+        points: (n, 2) test points of the front edge in B, m.
+        middle: A touch within this distance of the x axis closes both switches, m.
+        reach: Largest distance from a test point at which the body is felt, m.
+    """
     c, s = math.cos(pose[2]), math.sin(pose[2])
+    # Skip a body whose circumscribed circle is more than 1 m from the origin of B.
     far = 0.5 * math.hypot(body[3], body[4]) + 1.0
     if math.hypot(body[0] - pose[0], body[1] - pose[1]) > far:
         return False, False
@@ -63,11 +76,15 @@ def _feel(
 def contact_switches_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SwitchNumbers
 ) -> None:
-    """Which switches are closed, and what the robot touches."""
+    """Which switches are closed, and which body the robot touches.
+
+    If the robot touches several bodies, the last one is reported.
+    """
     pose, poses, sizes, followed = inputs
     bodies = len(poses) // 3
     touched, left, right = -1, False, False
     body = np.empty(5)
+    # The body at pose_WS is the last one.
     for number in range(bodies + 1):
         if number < bodies:
             for k in range(3):
@@ -83,6 +100,7 @@ def contact_switches_step(
         left, right = left or felt[0], right or felt[1]
     time, contact = tick * numbers.tick_s, outputs[0]
     contact[0], contact[1] = 1.0 if left else 0.0, 1.0 if right else 0.0
+    # A fault changes the reading of a switch, but not the number of the touched body.
     for k in range(2):
         if time >= numbers.open_from_s[k]:
             contact[k] = 0.0
@@ -92,21 +110,22 @@ def contact_switches_step(
 
 
 class ContactSwitches(Block):
-    """Detects what the front of the robot touches.
+    """Detects bodies at the front of the robot.
 
-    A switch closes when a body is within its reach of its half of the front edge; in
-    the middle of the edge both switches close. Flanks and rear have no switches.
-    ``touched`` is the true number of the body; the body at ``pose_WS`` is the last one.
-    The switches cannot tell a source from a wall.
+    A switch closes when a body is within its reach of its half of the front edge. In
+    the middle of the edge, both switches close. Flanks and rear have no switches.
+    ``touched`` is the true number of the touched body, counted from 0. The body at
+    ``pose_WS`` has the last number. The switches cannot distinguish a source from a
+    wall.
 
     No state. Rate: every tick; latency: none.
 
     Args:
-        parameters: ``ContactParameters``.
+        parameters: Reach and faults, ``ContactParameters``.
         robot: Size of the robot.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
         source_size: Length and width of the body at ``pose_WS``, m.
-        tick_s: Period of the robot, s.
+        tick_s: Control period of the robot, s.
 
     Reference: Song 2011, 2.1, 4.2.
     """
@@ -154,7 +173,7 @@ class ContactSwitches(Block):
 
 
 def _since(own: ContactParameters, kind: str) -> tuple[float, float]:
-    """When each switch begins to fail so, s; infinite: never."""
+    """Start times of a fault of the left and the right switch, s; infinite: never."""
     left, right = (
         min(
             (f.start_s for f in own.faults if f.kind == kind and f.switch == switch),

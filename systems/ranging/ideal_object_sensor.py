@@ -1,4 +1,4 @@
-"""Exact places and velocities of objects about the robot, in the place of a scan."""
+"""Exact positions and velocities of the bodies around the robot."""
 
 from __future__ import annotations
 
@@ -35,29 +35,33 @@ from systems.world.geometry import (
     segment_clearance,
 )
 
-#: A body that moves is taken for a disc unless it is longer than this many times its
-#: width.
+#: A moving body is a disc if its longer side is at most this many times its shorter
+#: side.
 _LONG = 2.0
-#: A body that is slower rests, m/s.
+#: A body whose speed is below this is at rest, m/s.
 _RESTS_M_S = 1e-9
-#: One body hides another where the line to it passes this near, m.
+#: A body blocks a line of sight that passes within this distance, m.
 _GRAZE_M = 1e-6
 
 
 class ObjectNumbers(NamedTuple):
-    """What the step of ``IdealObjectSensor`` depends on."""
+    """Parameters of ``ideal_object_step``."""
 
     maximum_range_m: float
+    """Bodies farther from P are not seen, m."""
     noise_m: float
+    """Standard deviation of each coordinate of a position, m."""
     velocity_noise_m_s: float
+    """Standard deviation of each component of a velocity, m/s."""
     occlusion: bool
+    """Whether bodies hide other bodies."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     robots: NDArray[np.bool_]
-    """(n,) which of the bodies are robots."""
+    """(n,) true for bodies that are robots."""
     noise: TickNoise
     delay: int
-    """Ticks."""
+    """Latency, ticks."""
     tick_s: float
 
 
@@ -65,15 +69,18 @@ class ObjectNumbers(NamedTuple):
 def _see(
     slot: Any, p_WP: Any, before: Any, now: Any, size: Any, tick_s: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills a slot with one body.
+    """Fills the slot of one body.
+
+    A body at rest is its nearest point. A moving body is a disc around its center, or
+    its nearest point if it is long or its disc contains P.
 
     Args:
-        slot: (OBJECT_SIZE,) of zeros.
-        p_WP: (x, y) m.
-        before: (3,) pose of the body a tick before, m and rad.
-        now: (3,) pose now.
-        size: Length and width, m.
-        tick_s: s; 0: the velocity is not known.
+        slot: (OBJECT_SIZE,) zeros, to be filled.
+        p_WP: (x, y) of P in W, m.
+        before: (3,) pose of the body one tick ago, m and rad.
+        now: (3,) present pose of the body, m and rad.
+        size: Length and width of the body, m.
+        tick_s: Control period, s; 0 if the velocity is unknown.
     """
     rectangle = now[0], now[1], now[2], size[0], size[1]
     x, y = nearest_point_on_rectangle(p_WP, rectangle)
@@ -81,17 +88,20 @@ def _see(
     if tick_s == 0.0:
         return
     slot[KNOWN] = 1.0
+    # Compare the fastest point of the body with the limit of a body at rest.
     vx, vy = (now[0] - before[0]) / tick_s, (now[1] - before[1]) / tick_s
     turn = ((now[2] - before[2] + math.pi) % math.tau - math.pi) / tick_s
     radius = 0.5 * math.hypot(size[0], size[1])
     if math.hypot(vx, vy) + abs(turn) * radius < _RESTS_M_S:
         return
+    # Vector from P to the center of the body.
     cx, cy = now[0] - p_WP[0], now[1] - p_WP[1]
     far = math.hypot(cx, cy)
     if max(size) <= _LONG * min(size) and far > radius:
         slot[X], slot[Y] = cx * (1.0 - radius / far), cy * (1.0 - radius / far)
         slot[VX], slot[VY], slot[RADIUS] = vx, vy, radius
         return
+    # A long body, or a disc that contains P: velocity of the nearest point.
     slot[VX], slot[VY] = vx - turn * (y - cy), vy + turn * (x - cx)
     slot[RADIUS] = 0.5 * min(size)
 
@@ -100,13 +110,25 @@ def _see(
 def _is_hidden(
     number: int, p_WP: Any, slot: Any, poses: Any, sizes: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether other bodies stand on the lines from P to a place and all corners."""
+    """Whether other bodies hide a body from P.
+
+    A body is hidden if the lines from P to its reported point and to all four corners
+    are blocked.
+
+    Args:
+        number: Number of the body.
+        p_WP: (x, y) of P in W, m.
+        slot: (OBJECT_SIZE,) slot of the body.
+        poses: (3 n,) poses of all bodies, m and rad.
+        sizes: (2 n,) lengths and widths of all bodies, m.
+    """
     x, y, theta = poses[3 * number], poses[3 * number + 1], poses[3 * number + 2]
     c, s = 0.5 * math.cos(theta), 0.5 * math.sin(theta)
     length, width = sizes[2 * number], sizes[2 * number + 1]
     for place in range(5):
         end = p_WP[0] + slot[X], p_WP[1] + slot[Y]
         if place > 0:
+            # Places 1 to 4 are the corners.
             u = length if place < 3 else -length
             w = width if place % 2 else -width
             end = x + c * u - s * w, y + s * u + c * w
@@ -119,7 +141,7 @@ def _is_hidden(
 def _is_blocked(
     number: int, p_WP: Any, end: Any, poses: Any, sizes: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a body other than one stands on the line from P to a place."""
+    """Whether a body other than ``number`` is on the line from P to a point."""
     for k in range(len(sizes) // 2):
         x, y, theta = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
         box = x, y, theta, sizes[2 * k], sizes[2 * k + 1]
@@ -132,7 +154,21 @@ def _is_blocked(
 def _seen(
     state: Any, pose: Any, poses: Any, sizes: Any, numbers: ObjectNumbers
 ) -> Any:  # pragma: no cover  (compiled)
-    """(n, OBJECT_SIZE) all bodies in range; and the poses kept for the next tick."""
+    """Objects in range, nearest first, without noise and latency.
+
+    The function also stores the present poses for the next tick.
+
+    Args:
+        state: First element: 1 if poses are stored, else 0. Then the poses of one tick
+            ago.
+        pose: (x, y, theta) of the robot, m and rad.
+        poses: (3 n,) poses of all bodies, m and rad.
+        sizes: (2 n,) lengths and widths of all bodies, m.
+        numbers: ``ObjectNumbers``.
+
+    Returns:
+        (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
+    """
     count = len(sizes) // 2
     p_WP = control_point(pose, numbers.control_point_m)
     slots = np.zeros((count, OBJECT_SIZE))
@@ -153,10 +189,11 @@ def _seen(
 def ideal_object_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: ObjectNumbers
 ) -> None:
-    """The objects that the sensor reports.
+    """Objects that the sensor reports.
 
-    State: whether there was a tick before, the poses of the bodies then, and the
-    objects that are not reported yet, oldest first.
+    The state holds a flag that is 1 after the first tick, then the poses of the bodies
+    one tick ago. With a latency, the objects that are not reported yet follow, oldest
+    first.
     """
     pose, poses, sizes = inputs
     seen = _seen(state, pose, poses, sizes, numbers)
@@ -167,6 +204,7 @@ def ideal_object_step(
                 seen[k, X + j] += numbers.noise_m * normals[k, j]
                 if seen[k, KNOWN] > 0.5:
                     seen[k, VX + j] += numbers.velocity_noise_m_s * normals[k, 2 + j]
+    # The end of the state is a queue: report the oldest objects, append the new ones.
     first = len(state) - numbers.delay * OBJECTS_SIZE
     last = len(state) - OBJECTS_SIZE
     for k in range(OBJECTS_SIZE):
@@ -181,30 +219,33 @@ def ideal_object_step(
 class IdealObjectSensor(Block):
     """Gives positions and velocities of the bodies around P, in all directions.
 
-    The output has the eight nearest bodies within the range. A body at rest is its
-    rectangle: x and y lead to its nearest point. A moving body is the disc around its
-    center that contains it, of ``RADIUS``, with the velocity of its center. A long
-    moving body, or one whose disc contains P, is its nearest point with the velocity of
-    this point, and a disc of half its width behind it. Velocities are known from the
-    second tick on, from the poses of the tick before.
+    The output holds the eight nearest bodies within the range. A body at rest is a
+    rectangle: x and y lead to its nearest point. A moving body is a disc of radius
+    ``RADIUS`` around its center that contains the body; it has the velocity of the
+    center. A long moving body is its nearest point with the velocity of this point, and
+    a disc of half its width behind this point. The same applies to a moving body whose
+    disc contains P. The block computes velocities from the poses of the previous tick;
+    they are known from the second tick on.
 
-    Discrete state: poses of the tick before and, with ``latency_s``, the objects since
-    then; their positions are relative to P at their tick. Without ``latency_s`` there
-    is no latency. Noise is drawn once per tick.
+    Discrete state: poses of the bodies at the previous tick and, with ``latency_s``,
+    the objects that are not reported yet. Positions are relative to P at the tick of
+    the measurement. Without ``latency_s`` there is no latency. Noise is drawn once per
+    tick.
 
     Args:
-        parameters: ``ObjectSensorParameters``.
-        robot: Place of P.
+        parameters: Range and errors, ``ObjectSensorParameters``.
+        robot: Position of P.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
         robots: Numbers of the bodies that are robots.
         seed: Seed of the noise.
-        tick_s: Period of the robot, s.
+        tick_s: Control period of the robot, s.
 
     Raises:
-        InputError: The latency is no multiple of the tick.
+        InputError: The latency is not a multiple of the tick.
 
-    Reference: ours. It replaces the scan of Engelbrecht, Steyn and Djouani (2021), who
-    print neither how beams become obstacles nor how they get the velocities.
+    Reference: this block is our own. It replaces the scan of Engelbrecht, Steyn and
+    Djouani (2021). They print neither how beams become obstacles nor how they obtain
+    the velocities.
     """
 
     part, stage = "objects", "obstacle sensing"

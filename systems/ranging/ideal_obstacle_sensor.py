@@ -1,4 +1,4 @@
-"""Exact obstacle sensing in place of cones and collision vector."""
+"""Exact obstacle sensing, without the errors of range sensors."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ def nearest_vectors(
     """Vectors from P to the nearest points of the nearest bodies.
 
     Args:
-        pose_WB: (x, y, theta), m and rad; floats or AutoDiffXd.
-        rectangles: Rectangles in W.
+        pose_WB: (x, y, theta) of the robot, m and rad; floats or AutoDiffXd.
+        rectangles: Rectangles (x, y, theta, length, width) in W, m and rad.
         control_point_m: Distance of P ahead of the axle, m.
-        maximum_range: Bodies beyond it are not seen, m.
+        maximum_range: Bodies farther from P are not seen, m.
         slots: Largest number of vectors.
 
     Returns:
-        (feature, x, y) in B axes, nearest first; the feature is the body's
-        number from 1.
+        (feature, x, y) with x and y in B axes, m, nearest first. The feature is the
+        number of the body, counted from 1.
     """
     p_WP = control_point(pose_WB, control_point_m)
     seen = []
@@ -45,6 +45,7 @@ def nearest_vectors(
         if dx * dx + dy * dy <= maximum_range * maximum_range:
             x, y = rotate(-pose_WB[2], dx, dy)
             seen.append((float_of(dx * dx + dy * dy), 0.0 * x + (1.0 + index), x, y))
+    # The empty slice gives the empty list its type in compiled code.
     nearest = [(feature, x, y) for _, feature, x, y in seen[:0]]
     while len(nearest) < slots and len(seen) > 0:
         first = 0
@@ -57,16 +58,16 @@ def nearest_vectors(
 
 
 class ObstacleNumbers(NamedTuple):
-    """What the step of ``IdealObstacleSensor`` depends on."""
+    """Parameters of ``ideal_obstacle_step``."""
 
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     maximum_range_m: float
-    """Bodies beyond it are not seen, m."""
+    """Bodies farther from P are not seen, m."""
     slots: int
-    """Most vectors."""
+    """Largest number of vectors."""
     source_size: tuple[float, float]
-    """Length and width of the master robot, m."""
+    """Length and width of the leader, m."""
 
 
 def ideal_obstacle_step(
@@ -77,8 +78,8 @@ def ideal_obstacle_step(
     Args:
         tick: Not used.
         state: None.
-        inputs: As the input ports.
-        outputs: As the output ports.
+        inputs: Values of the input ports.
+        outputs: Values of the output ports.
         numbers: ``ObstacleNumbers``.
     """
     pose_WB, poses, sizes, pose_WS = inputs
@@ -86,7 +87,7 @@ def ideal_obstacle_step(
     bodies = [(pose_WS[0], pose_WS[1], pose_WS[2], length, width)]
     for k in range(len(sizes) // 2):
         x, y, theta = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
-        # The master robot is the last one.
+        # The leader stays the last one.
         bodies.insert(k, (x, y, theta, sizes[2 * k], sizes[2 * k + 1]))
     vectors = nearest_vectors(
         pose_WB,
@@ -103,15 +104,15 @@ def IdealObstacleSensor_(T):
     class Impl(Block_[T]):
         """Gives the exact nearest points of the bodies, in all directions.
 
-        It replaces ``UltrasonicArray`` and ``CollisionVector`` and has the same
-        outputs. A function of the present input: no state, no latency, no
-        noise; differentiable wherever the nearest point is unique.
+        The block replaces ``UltrasonicArray`` and ``CollisionVector`` and has the same
+        outputs. The output is a function of the present input: there is no state, no
+        latency and no noise. It is differentiable wherever the nearest point is unique.
 
         Args:
-            robot: Place of P.
-            maximum_range_m: Bodies beyond it are not seen, m.
-            all_bodies: Up to three bodies (``aggregation: sum``) instead of
-                the nearest one.
+            robot: Position of P.
+            maximum_range_m: Bodies farther from P are not seen, m.
+            all_bodies: Whether to report up to three bodies (``aggregation: sum``)
+                instead of the nearest one.
             source_size: Length and width of the leader, m.
             obstacle_count: Number of boxes on the obstacle ports.
         """

@@ -1,4 +1,4 @@
-"""From the ranges of beams to objects with places and velocities."""
+"""From the ranges of beams to objects with positions and velocities."""
 
 from __future__ import annotations
 
@@ -27,32 +27,45 @@ from systems.ranging.parameters import (
 )
 from systems.world.geometry import control_point
 
-#: Numbers that are kept of a beam: its last hit in W and its range, m, and whether
-#: there was an echo.
+#: State of one beam: its last hit in W, m, its range, m, and 1 if there was an echo.
 _HIT_X, _HIT_Y, _RANGE, _HEARD = range(4)
 _BEAM_SIZE = 4
 
 
 class DetectorNumbers(NamedTuple):
-    """What the step of ``ObjectDetector`` depends on."""
+    """Parameters of ``object_detector_step``."""
 
     axes: NDArray[np.float64]
     """(n,) directions of the beams in B, rad."""
     places: NDArray[np.float64]
-    """(n, 2) where they begin, from P in B, m."""
+    """(n, 2) origins of the beams from P in B, m."""
     beams: BeamNumbers
+    """Limits that separate objects."""
     tracks: TrackNumbers
+    """Parameters of the tracking."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     oldest_s: float
-    """An older range is that of a sensor that fires no more, s."""
+    """If the range of a sensor is older than this, the sensor has failed, s."""
 
 
 @njit(cache=True)
 def _keep_hits(
     kept: Any, ranges: Any, echo: Any, ages: Any, pose: Any, numbers: DetectorNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Puts what beams have just hit into W; of a held range the hit is kept."""
+    """Stores the new hits of the beams in W.
+
+    A beam that holds its range keeps its last hit. A beam whose range is too old has no
+    echo.
+
+    Args:
+        kept: (n, _BEAM_SIZE) state of the beams, changed.
+        ranges: (n,) ranges, m.
+        echo: (n,) 1 where there is an echo, else 0.
+        ages: (n,) times since each sensor fired, s.
+        pose: (x, y, theta) of the robot, m and rad.
+        numbers: ``DetectorNumbers``.
+    """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(ranges)):
         if ages[k] > numbers.oldest_s:
@@ -72,7 +85,11 @@ def _keep_hits(
 def _detect(
     state: Any, ranges: Any, echo: Any, ages: Any, pose: Any, numbers: DetectorNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(OBJECT_SLOTS, OBJECT_SIZE) of one tick; the state is changed."""
+    """Detects the objects of one tick, and updates the state.
+
+    Returns:
+        (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
+    """
     count = len(ranges)
     kept = state[: _BEAM_SIZE * count].reshape(count, _BEAM_SIZE)
     tracks = state[_BEAM_SIZE * count :].reshape(TRACKS, TRACK_SIZE)
@@ -91,9 +108,9 @@ def _detect(
 def object_detector_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DetectorNumbers
 ) -> None:
-    """The objects that the beams hit.
+    """Objects that the beams hit.
 
-    State: last hit of each beam, and the tracks.
+    The state holds the last hit of each beam, then the tracks.
     """
     ranges, echo, ages, pose = inputs
     found = _detect(state, ranges, echo, ages, pose, numbers)
@@ -104,35 +121,39 @@ def object_detector_step(
 class ObjectDetector(Block):
     """Groups the hits of beams into objects, and tracks them for their velocities.
 
-    It replaces ``IdealObjectSensor`` and has the same output port. Hits of neighboring
-    beams that are near enough are one object; a hollow surface is several objects. Of
-    each object the block gives the vector to the nearest point of the hits and of the
-    lines between them at this tick; the filtered velocity, once it has tracked the
-    object for long enough; and as the radius half of its width, or 0 if it is wide. An
-    object that is no longer seen stays for a while, because narrow beams lose what is
-    between them. The beams do not show whether an object is a robot.
+    The block replaces ``IdealObjectSensor`` and has the same output port. Hits of
+    adjacent beams that are close enough are one object; a hollow surface is several
+    objects. For each object, the block gives three quantities:
 
-    Beams detect only what they hit: with 7 beams a disc 0.2 m wide is sure to be seen
-    only within 0.4 m of P. Motion along a surface shows only at its edges, and only as
-    finely as the beams are spaced. For boxes that cross at 0.15 to 0.3 m/s at a
-    distance of 1 m, a second after they have come into view, half of the velocities
-    have an error of more than 25 % with 36 beams all around, 15 % with 72 and 7 % with
-    360. While the robot turns, bodies at rest seem to move at up to 0.3, 0.12 and 0
-    m/s. Where the beams are farther apart than ``coarse_m``, as the 7 beams from 0.48 m
-    on, no velocity is known.
+    - the vector to the nearest point of the present hits and of the lines between them;
+    - the filtered velocity, once the block has tracked the object for long enough;
+    - the radius, which is half of the width of the object, or 0 if the object is wide.
 
-    Discrete state, every tick: hits and tracks. The output is a function of state and
-    inputs: no latency, but the velocity takes about 0.5 s to follow a change.
+    An object that is no longer seen stays for a while, because an object between narrow
+    beams is not hit. The beams do not show whether an object is a robot.
+
+    Beams detect only what they hit. With 7 beams, a disc 0.2 m wide is certain to be
+    seen only within 0.4 m of P. Motion along a surface shows only at the edges of the
+    surface, with a resolution equal to the spacing of the beams. Consider boxes that
+    cross at 0.15 to 0.3 m/s at a distance of 1 m, one second after they come into view.
+    Half of their velocities have an error of more than 25 % with 36 beams all around,
+    15 % with 72 and 7 % with 360. While the robot turns, bodies at rest seem to move at
+    up to 0.3, 0.12 and 0 m/s. Where the spacing of the beams exceeds ``coarse_m``, no
+    velocity is known. For the 7 beams, this is the case from 0.48 m on.
+
+    Discrete state, updated every tick: hits and tracks. The output is a function of
+    state and inputs: there is no latency, but the velocity takes about 0.5 s to follow
+    a change.
 
     Args:
-        parameters: ``ObjectDetectorParameters``.
-        sensors: Places, directions and rate of the beams.
-        robot: Place of P.
-        tick_s: Period of the robot, s.
+        parameters: Limits of grouping and tracking, ``ObjectDetectorParameters``.
+        sensors: Positions, directions and rate of the beams.
+        robot: Position of P.
+        tick_s: Control period of the robot, s.
 
-    Reference: ours. Engelbrecht, Steyn and Djouani (2021) print neither how beams
-    become obstacles nor how they get the velocities; a sum over beams gives more
-    damping than is stable at this tick.
+    Reference: this block is our own. Engelbrecht, Steyn and Djouani (2021) print
+    neither how beams become obstacles nor how they obtain the velocities. A sum over
+    beams gives more damping than is stable at this tick.
     """
 
     part, stage = "objects", "obstacle sensing"

@@ -1,4 +1,4 @@
-"""Velocities of objects, from where they are tick by tick."""
+"""Tracking of objects, which yields their velocities."""
 
 from __future__ import annotations
 
@@ -21,41 +21,45 @@ from systems.ranging.beam_groups import (
 from systems.ranging.objects import KNOWN, RADIUS, THERE, VX, VY, X, Y, nearest_objects
 from systems.ranging.parameters import OBJECT_SIZE
 
-#: Tracks, and numbers of one: whether it exists; for how long its motion was seen, and
-#: for how long it was not seen at all, s; its nearest point in W, m; its radius and how
-#: far behind its surface the place of its state is, m; its state of place and velocity,
-#: m and m/s, and the covariance of these, row by row.
+#: Largest number of tracks.
 TRACKS = 12
+
+# Elements of a track. EXISTS is 1 or 0. SURE is the time for which the motion has been
+# visible without interruption, s. UNSEEN is the time since the object was last seen, s.
+# QX and QY are its nearest point in W, m. RADIUS is its radius, m. DEPTH is how far
+# the tracked position is behind the nearest point, as seen from P, m. STATE is position
+# and velocity in W, m and m/s. COVARIANCE is the 4 x 4 covariance of STATE, row by row.
 _EXISTS, _SURE, _UNSEEN, _QX, _QY, _RADIUS, _DEPTH, _STATE = range(8)
 _COVARIANCE = _STATE + 4
 TRACK_SIZE = _COVARIANCE + 16
 
-#: Standard deviations: of a velocity at first, m/s, and of how far along a surface a
-#: hit is that may go on, m.
+# Standard deviations: of each component of an initial velocity, m/s, and of an unknown
+# position along a surface, m.
 _FIRST_M_S, _ANYWHERE_M = 0.5, 10.0
-#: In which what an object's place is behind its nearest point follows what is seen, s.
+# Time constant with which the depth of a track follows the measured depth, s.
 _DEPTH_S = 4.0
-#: In which a motion along a surface that cannot be seen any more is forgotten.
+# Time constant with which an invisible velocity along a surface decays, s.
 _FORGET_S = 5.0
 
 
 class TrackNumbers(NamedTuple):
-    """How objects are followed."""
+    """Parameters of the tracking."""
 
     gate_m: float
-    """A group farther from where a track is to be is another object's, m."""
+    """A group farther from the predicted position of a track is another object, m."""
     wide_m: float
-    """Of what is wider, the motion along it cannot be seen, m."""
+    """If an object is wider than this, its motion along its surface is not visible,
+    m."""
     coarse_m: float
-    """Where beams are farther apart, motion cannot be seen, m."""
+    """If the spacing of the beams exceeds this, motion is not visible, m."""
     noise_m: float
-    """Standard deviation of a group's distance, m."""
+    """Standard deviation of the distance of a group, m."""
     walk: float
-    """Variance by which a component of a velocity changes, (m/s)^2/s."""
+    """Rate at which the variance of each velocity component grows, (m/s)^2/s."""
     confirmation_s: float
-    """A velocity is known when it could be seen for so long, s."""
+    """A velocity is known once the motion has been visible for this long, s."""
     memory_s: float
-    """What is not seen is there for so long, s."""
+    """A track that is not seen is kept for this long, s."""
     resting_m_s: float
     """Objects slower than this count as at rest, m/s."""
     tick_s: float
@@ -63,19 +67,24 @@ class TrackNumbers(NamedTuple):
 
 @njit(cache=True)
 def _move_on(track: Any, own: TrackNumbers) -> None:  # pragma: no cover  (compiled)
-    """To the next tick: constant velocity, but for white noise of acceleration."""
+    """Predicts a track one tick ahead.
+
+    The model is a constant velocity with white noise of acceleration.
+    """
     t = own.tick_s
     track[_UNSEEN] += t
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     for i in range(2):
         track[_QX + i] += t * state[2 + i]
         state[i] += t * state[2 + i]
+    # Covariance F P F^T: first the rows, then the columns.
     for i in range(4):
         for j in range(2):
             p[j, i] += t * p[2 + j, i]
     for i in range(4):
         for j in range(2):
             p[i, j] += t * p[i, 2 + j]
+    # Noise of the acceleration.
     for i in range(2):
         p[i, i] += own.walk * t**3 / 3.0
         p[i, 2 + i] += own.walk * t**2 / 2.0
@@ -87,7 +96,14 @@ def _move_on(track: Any, own: TrackNumbers) -> None:  # pragma: no cover  (compi
 def _correct(
     track: Any, off: float, h: Any, variance: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Takes in how far off a place is along a unit vector, m."""
+    """Corrects a track by one scalar measurement of its position (Kalman update).
+
+    Args:
+        track: (TRACK_SIZE,) the track, changed.
+        off: Measured less predicted position along ``h``, m.
+        h: (x, y) unit vector of the measured direction in W.
+        variance: Variance of the measurement, m^2.
+    """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     gain = p[:, 0] * h[0] + p[:, 1] * h[1]
     total = gain[0] * h[0] + gain[1] * h[1] + variance
@@ -102,11 +118,19 @@ def _correct(
 def _turn_surface(
     track: Any, p_WP: Any, along: Any, own: TrackNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """The place of a surface slides to where it is nearest now, as far from P.
+    """Rotates the position of a surface about P to its present nearest point.
 
-    By the noise of ranges it slides to and fro by more than a beam, and only how far it
-    is tells of motion. What is known of that goes with it; of motion along the surface
-    nothing is, and it comes to count as none.
+    The noise of the ranges moves the nearest point along the surface by more than the
+    spacing of the beams. Only the distance from P shows a motion. The function
+    therefore keeps this distance and rotates its variance to the new direction. The
+    position along the surface becomes unknown. The velocity along the surface is not
+    measured; it decays to zero.
+
+    Args:
+        track: (TRACK_SIZE,) the track, changed.
+        p_WP: (x, y) of P in W, m.
+        along: (x, y) unit vector from P to the present nearest point.
+        own: Parameters of the tracking.
     """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     x, y = state[0] - p_WP[0], state[1] - p_WP[1]
@@ -114,6 +138,7 @@ def _turn_surface(
     old = np.array([x / far, y / far])
     new, across = np.array([along[0], along[1]]), np.array([-along[1], along[0]])
     old_across = np.array([-old[1], old[0]])
+    # Of each 2 x 2 block, keep the variances towards P and across, in new axes.
     outer, outer_across = np.outer(new, new), np.outer(across, across)
     for i in range(2):
         for j in range(2):
@@ -121,7 +146,7 @@ def _turn_surface(
             aside = 0.0
             if i == j:
                 aside = np.sum(part * np.outer(old_across, old_across))
-            # Where along the surface tells nothing of the middle of what is seen.
+            # A position along the surface says nothing about the middle of the hits.
             if i == 0 and j == 0:
                 aside = _ANYWHERE_M**2
             towards = np.sum(part * np.outer(old, old))
@@ -129,6 +154,7 @@ def _turn_surface(
                 towards * outer + aside * outer_across
             )
     state[0], state[1] = p_WP[0] + far * along[0], p_WP[1] + far * along[1]
+    # Reduce the velocity along the surface.
     aside_m_s = along[0] * state[3] - along[1] * state[2]
     lost = own.tick_s / _FORGET_S * aside_m_s
     state[2] += lost * along[1]
@@ -139,7 +165,7 @@ def _turn_surface(
 def _hides_motion(
     group: Any, own: TrackNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether motion along a group's surface cannot be seen."""
+    """Whether motion along the surface of a group is not visible."""
     wide = group[OPEN] > 0.5 or group[EXTENT] > own.wide_m
     return bool(wide or group[CHORD] > own.coarse_m)
 
@@ -148,9 +174,24 @@ def _hides_motion(
 def _take_in(
     track: Any, group: Any, p_WP: Any, own: TrackNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """A group that is a track's, or begins it."""
+    """Corrects a track by its group, or starts the track.
+
+    The measured position depends on the group. If motion along the surface is not
+    visible, the position is the nearest point, and only its distance from P is
+    measured. Otherwise the position is in the direction of the middle of the group. Its
+    distance is that of the nearest point plus the smoothed depth. Both coordinates are
+    then measured; across, the noise is larger by the spacing of the beams.
+
+    Args:
+        track: (TRACK_SIZE,) the track, changed.
+        group: (GROUP_SIZE,) row of ``group_beams``.
+        p_WP: (x, y) of P in W, m.
+        own: Parameters of the tracking.
+    """
     wide = _hides_motion(group, own)
     sure = group[CHORD] < own.coarse_m and (not wide or group[EXTENT] > 0.0)
+    # Smooth the depth, which is the distance of the middle less that of the nearest
+    # point.
     near = math.hypot(group[NEAR_X], group[NEAR_Y])
     far = max(math.hypot(group[MIDDLE_X], group[MIDDLE_Y]), 1e-9)
     if track[_EXISTS] < 0.5:
@@ -159,13 +200,14 @@ def _take_in(
     track[_DEPTH] += own.tick_s / _DEPTH_S * (far - near - track[_DEPTH])
     x, y = group[NEAR_X], group[NEAR_Y]
     if not wide:
-        # The middle of what is seen, but not its distance: that jumps when a beam
-        # comes to hit another side.
+        # Use the direction of the middle, but not its distance. The distance jumps when
+        # a beam begins to hit another side of the object.
         part = (near + track[_DEPTH]) / far
         x, y = part * group[MIDDLE_X], part * group[MIDDLE_Y]
     far = max(math.hypot(x, y), 1e-9)
     along = x / far, y / far
     place = p_WP[0] + x, p_WP[1] + y
+    # Start a track at the measured position, with unknown velocity.
     if track[_EXISTS] < 0.5:
         track[_EXISTS] = 1.0
         track[_STATE], track[_STATE + 1] = place
@@ -175,6 +217,7 @@ def _take_in(
             p[2 + i, 2 + i] = _FIRST_M_S**2
     if wide:
         _turn_surface(track, p_WP, along, own)
+    # Correct the distance from P, then the position across.
     dx, dy = place[0] - track[_STATE], place[1] - track[_STATE + 1]
     _correct(track, dx * along[0] + dy * along[1], along, own.noise_m**2)
     if not wide:
@@ -193,7 +236,14 @@ def _take_in(
 def _tracks_of(
     tracks: Any, groups: Any, p_WP: Any, own: TrackNumbers
 ) -> NDArray[np.int64]:  # pragma: no cover  (compiled)
-    """(n,) track of each group, each once, the nearest pairs first; -1: none."""
+    """Assigns groups to tracks.
+
+    The nearest pair of group and track is assigned first, then the next one, up to a
+    distance of ``gate_m``. Each track gets at most one group.
+
+    Returns:
+        (n,) number of the track of each group; -1 if it has none.
+    """
     count = len(groups)
     away = np.full((count, TRACKS), np.inf)
     for g in range(count):
@@ -220,45 +270,53 @@ def _tracks_of(
 def track_objects(
     tracks: Any, groups: Any, p_WP: Any, own: TrackNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Follows objects by a tick.
+    """Tracks the objects for one tick.
 
-    A Kalman filter of constant velocity each (Bar-Shalom, Li and Kirubarajan,
-    Estimation with Applications to Tracking and Navigation, 2001, 6.2.2), in W, so that
-    the robot's own motion is none of theirs. A beam tells how far, but not
-    where between its neighbours: the place is good towards P and, across, as coarse as
-    the beams. Of what is wide, or may go on beyond what is seen, motion along the
-    surface cannot be seen and stays what it was, at first none. One beam on a surface
-    takes motion along it for motion towards P, the more the more oblique it is: where
-    beams are far apart, and of a single hit that may be one of a longer surface, no
-    velocity is known.
+    Each track is a Kalman filter with constant velocity (Bar-Shalom, Li and
+    Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, 6.2.2).
+    The filter works in W, so that the motion of the robot does not appear as a motion
+    of objects.
+
+    A beam measures a distance, but not a position between itself and its neighbors. The
+    position is therefore accurate towards P; across, it is as coarse as the beams. The
+    motion of a surface along itself is not visible if the surface is wide or may
+    continue beyond its hits. The filter then does not measure this velocity, which
+    starts at zero.
+
+    A beam on an oblique surface shows motion along the surface as motion towards P.
+    Therefore no velocity is known where the spacing of the beams is large. The same
+    applies to a single hit that may be part of a longer surface.
 
     Args:
-        tracks: (TRACKS, TRACK_SIZE), changed.
-        groups: (n, GROUP_SIZE) of ``group_beams``.
-        p_WP: (x, y) m.
-        own: How they are followed.
+        tracks: (TRACKS, TRACK_SIZE) the tracks, changed.
+        groups: (n, GROUP_SIZE) groups of ``group_beams``.
+        p_WP: (x, y) of P in W, m.
+        own: Parameters of the tracking.
 
     Returns:
         (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
     """
+    # Predict all tracks, and drop those that were not seen for too long.
     for t in range(TRACKS):
         if tracks[t, _EXISTS] > 0.5:
             _move_on(tracks[t], own)
             if tracks[t, _UNSEEN] > own.memory_s + 0.5 * own.tick_s:
                 tracks[t, _EXISTS] = 0.0
+    # Correct each track by its group.
     of = _tracks_of(tracks, groups, p_WP, own)
     for g in range(len(groups)):
         if of[g] >= 0:
             _take_in(tracks[of[g]], groups[g], p_WP, own)
     for g in range(len(groups)):
         if of[g] < 0:
-            # The place of none, or of what was not seen for longest.
+            # Start a track in a free row, or instead of the track unseen for longest.
             rank = np.where(tracks[:, _EXISTS] > 0.5, tracks[:, _UNSEEN], np.inf)
             free = int(np.argmax(rank))
             if rank[free] == 0.0:
                 continue
             tracks[free, _EXISTS] = 0.0
             _take_in(tracks[free], groups[g], p_WP, own)
+    # Publish the tracks; velocities only where they are known.
     slots = np.zeros((TRACKS, OBJECT_SIZE))
     for t in range(TRACKS):
         track, slot = tracks[t], slots[t]

@@ -1,14 +1,15 @@
-"""The port ``objects_W``: what a robot knows of the objects about it.
+"""The port ``objects_W``: the objects around a robot.
 
-It has ``OBJECT_SLOTS`` slots of ``OBJECT_SIZE`` numbers, nearest first; empty slots are
-zero. Their places in a slot:
+The port has ``OBJECT_SLOTS`` slots of ``OBJECT_SIZE`` numbers, nearest object first.
+Empty slots are zero. A slot has these elements:
 
 - THERE: 1, or 0 in an empty slot;
-- X, Y: vector from P to the object's nearest point in W axes, m;
-- VX, VY: velocity of the object in W, m/s, and KNOWN: whether it is known, 0 or 1;
-- RADIUS: of the disc behind the nearest point that stands for the object, m; 0: a point
-  or a flat face;
-- ROBOT: whether it is a robot, 0 or 1.
+- X, Y: vector from P to the nearest point of the object in W axes, m;
+- VX, VY: velocity of the object in W, m/s;
+- KNOWN: 1 if the velocity is known, else 0;
+- RADIUS: radius of a disc behind the nearest point that represents the object, m; 0 for
+  a point or a flat face;
+- ROBOT: 1 if the object is a robot, else 0.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ OBJECTS_PORT = Port(
 
 @njit(cache=True)
 def nearest_objects(slots: Any) -> Any:  # pragma: no cover  (compiled)
-    """What the port has of any number of objects.
+    """The nearest objects, as many as the port has slots.
 
     Args:
-        slots: (n, OBJECT_SIZE) in any order.
+        slots: (n, OBJECT_SIZE) objects and empty slots, in any order.
 
     Returns:
-        (OBJECT_SLOTS, OBJECT_SIZE) the nearest ones, nearest first.
+        (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
     """
     chosen = np.zeros((OBJECT_SLOTS, OBJECT_SIZE))
     away = np.hypot(slots[:, X], slots[:, Y])

@@ -1,4 +1,4 @@
-"""Parameters of range sensors, switches, and detectors of objects."""
+"""Parameters of range sensors, contact switches, and object detectors."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from systems.framework.signals import TICK_S, whole
 from systems.ranging.sensor_faults import SensorFaultParameters
 from systems.ranging.sensor_presets import SENSOR_PRESETS, SensorPreset
 
-#: Objects that a port holds, and numbers of each; see ``systems.ranging.objects``.
+#: Number of slots of a port with objects, and number of elements of each slot; see
+#: ``systems.ranging.objects``.
 OBJECT_SLOTS, OBJECT_SIZE = 8, 8
 
-#: Neighbours are sensors next to one another whose directions differ by this at most,
-#: deg.
+#: The directions of neighboring sensors differ by at most this angle, deg.
 NEIGHBOURS_DEG = 90.0
 
 _Axes = Annotated[tuple[Angle, ...], Strict(False), Field(min_length=1, max_length=360)]
@@ -50,33 +50,35 @@ class UltrasonicParameters(Parameters):
     """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
 
     preset: SensorPreset = "three"
-    """A named set: defaults of the other fields; fields that are set take
-    precedence."""
+    """Named set of sensors. It provides the defaults of the other fields; fields that
+    are set take precedence."""
     axes_deg: _Axes = (30.0, 0.0, -30.0)
-    """Directions of the cones in B, left to right, deg CCW from x; or the number of
-    cones all around."""
+    """Directions of the cones in B, from left to right, counterclockwise from x, deg.
+    An integer n stands for n evenly spaced cones all around, the first of which points
+    backward."""
     positions_m: _Places = ()
-    """Positions of the sensors from P, in B axes, m; one: for all sensors; none: all
-    are at P."""
+    """Positions of the sensors from P, in B axes, m. One position applies to all
+    sensors; without a position, all sensors are at P."""
     beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
-    """Half of each cone's opening angle, deg."""
+    """Half of the opening angle of each cone, deg."""
     minimum_range_m: Length = 0.03
-    """Nearer surfaces give this range, m."""
+    """Smallest reported range, m; nearer surfaces also give this range."""
     maximum_range_m: Length = 3.0
-    """Farther surfaces give no echo, m."""
+    """Largest range, m; farther surfaces give no echo."""
     noise_m: NonNegativeLength = 0.001
     """Standard deviation of a range, m."""
     dropout_probability: Fraction = 0.0
-    """Probability that an echo is missed."""
+    """Probability that an echo is lost."""
     period_s: Period = TICK_S
     """Time from one firing to the next, s."""
     firing: Literal["simultaneous", "sequential"] = "simultaneous"
-    """All sensors at once, or one after the other, each for one period."""
+    """Whether all sensors fire at once, or one after the other with one period between
+    them."""
     assumed_sound_speed_m_s: SoundSpeed | None = None
-    """Speed of sound by which the sensors convert time to range, m/s; none: the true
-    one."""
+    """Speed of sound with which the sensors convert time to range, m/s. Unset, it is
+    the true speed of sound."""
     faults: _Faults = ()
-    """Sensors that fail."""
+    """Sensors that fail during a run."""
 
     @model_validator(mode="before")
     @classmethod
@@ -124,7 +126,7 @@ class UltrasonicParameters(Parameters):
     )
     @classmethod
     def _ring(cls, axes: Any) -> Any:
-        """So many directions all around, one of them ahead."""
+        """Replaces a number by that many directions all around, starting at 180 deg."""
         if isinstance(axes, int) and not isinstance(axes, bool):
             if not 1 <= axes <= 360:
                 raise InputError("", f"{axes} sensors; use 1 to 360")
@@ -138,14 +140,14 @@ class UltrasonicParameters(Parameters):
 
     @property
     def places(self) -> tuple[tuple[float, float], ...]:
-        """Of the sensors from P, in B axes, m."""
+        """Positions of the sensors from P, in B axes, m."""
         if len(self.positions_m) == self.count:
             return self.positions_m
         return (self.positions_m or ((0.0, 0.0),)) * self.count
 
     @cached_property
     def neighbours(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of sensors next to one another, the left one first."""
+        """Pairs of adjacent sensors, counted from 0, the left one first."""
         around = [*self.axes_deg, self.axes_deg[0] - 360.0]
         pairs = [
             (k, (k + 1) % self.count)
@@ -161,15 +163,15 @@ class UltrasonicParameters(Parameters):
 
     @cached_property
     def beams(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Axes (n,) in B, rad, places (n, 2) from P, m, and half angle, rad."""
+        """Directions (n,), rad, and positions (n, 2), m, in B; and half angle, rad."""
         half_angle = math.radians(self.beam_half_angle_deg)
         return np.array(self.axes), np.array(self.places), half_angle
 
     def period_ticks(self, tick_s: float) -> int:
-        """Ticks from one firing to the next.
+        """Number of ticks from one firing to the next.
 
         Raises:
-            InputError: The period is no multiple of the tick.
+            InputError: The period is not a multiple of the tick.
         """
         ticks = self.period_s / tick_s
         if not whole(ticks):
@@ -181,30 +183,31 @@ class UltrasonicParameters(Parameters):
         return round(ticks)
 
     def round_ticks(self, tick_s: float) -> int:
-        """Ticks from one reading of a sensor to its next."""
+        """Number of ticks from one reading of a sensor to its next reading."""
         rounds = self.count if self.firing == "sequential" else 1
         return rounds * self.period_ticks(tick_s)
 
     def turns(self, tick_s: float) -> NDArray[np.int64]:
-        """(n,) ticks into the round at which each sensor fires."""
+        """(n,) tick within the round at which each sensor fires."""
         turns = np.arange(self.count) * self.period_ticks(tick_s)
         return turns if self.firing == "sequential" else 0 * turns
 
     def errors(self, sound_speed: float) -> tuple[float, float, float, float, float]:
-        """Stretch of the ranges, noise, m, least luck, least and greatest range, m.
+        """Errors and limits of the ranges.
 
         Args:
             sound_speed: True speed of sound, m/s.
 
         Returns:
-            As ``_measured_ranges`` takes them.
+            Factor of the ranges, standard deviation of the noise, m, the number
+            ``least_luck``, and smallest and largest range, m.
         """
         stretch = (self.assumed_sound_speed_m_s or sound_speed) / sound_speed
         limits = self.minimum_range_m, self.maximum_range_m
         return stretch, self.noise_m, self.least_luck, *limits
 
     def fault_ticks(self, tick_s: float) -> NDArray[np.int64]:
-        """(n, 2) kind of each sensor's fault, 0 none, and tick of its begin."""
+        """(n, 2) kind of the fault of each sensor, 0 for none, and its first tick."""
         ticks = np.zeros((self.count, 2), dtype=np.int64)
         for fault in self.faults:
             begin = round(fault.start_s / tick_s)
@@ -213,7 +216,7 @@ class UltrasonicParameters(Parameters):
 
     @cached_property
     def least_luck(self) -> float:
-        """Standard normal numbers below this drop an echo."""
+        """An echo is lost if its standard normal number is below this."""
         from scipy.special import ndtri  # takes longer to load than all parameters
 
         return float(ndtri(self.dropout_probability))
@@ -223,80 +226,82 @@ Aggregation = Literal["paper", "nearest", "sum"]
 
 
 class CollisionVectorParameters(Parameters):
-    """How echoes become collision vectors."""
+    """Conversion of echoes to collision vectors."""
 
     aggregation: Aggregation = "paper"
-    """``paper``: the nearest echo, joined with its nearer neighbor if that is close
-    enough; ``nearest``: only the nearest echo; ``sum``: one vector per echo or pair,
-    whose forces add; if there are more than three, the nearest three."""
+    """``paper``: the nearest echo, joined with the nearer of its neighbors if that is
+    close enough; ``nearest``: only the nearest echo; ``sum``: one vector per echo or
+    pair, whose forces are added; if there are more than three vectors, only the nearest
+    three."""
     pair_separation_m: NonNegativeLength = 0.5
-    """Echoes farther apart than this are taken as two obstacles, m."""
+    """Echoes farther apart than this belong to two obstacles, m."""
 
 
 class ContactFaultParameters(Parameters):
-    """A switch that fails in a run, and how."""
+    """A switch that fails during a run, and the kind of its fault."""
 
     switch: int = Field(default=1, ge=1, le=2)
-    """Which switch: 1 left, 2 right."""
+    """Number of the switch: 1 is left, 2 is right."""
     kind: Literal["stuck_open", "stuck_closed"] = "stuck_open"
-    """``stuck_open``: it never closes; ``stuck_closed``: it never opens."""
+    """``stuck_open``: the switch never closes; ``stuck_closed``: it never opens."""
     start_s: Time = 0.0
-    """When that begins, s."""
+    """Start of the fault, s."""
 
 
 class ContactParameters(Parameters):
     """The two switches behind the front bumper (Song 2011, 2.1), with our sizes."""
 
     reach_m: Length = 0.01
-    """A switch closes where a body is this near to the front, m."""
+    """A switch closes where a body is within this distance of the front edge, m."""
     faults: Annotated[
         tuple[ContactFaultParameters, ...], Strict(False), Field(max_length=2)
     ] = ()
-    """Switches that fail in a run."""
+    """Switches that fail during a run."""
 
 
 class ObjectSensorParameters(Parameters):
     """Range and errors of the object sensor."""
 
     maximum_range_m: Length = 2.0
-    """Objects beyond it are not seen, m: R, the range of the scan (table 1)."""
+    """Range R of the scan, m (table 1); objects beyond it are not seen."""
     noise_m: NonNegativeLength = 0.0
     """Standard deviation of each coordinate of a position, m."""
     velocity_noise_m_s: NonNegativeSpeed = 0.0
     """Standard deviation of each component of a velocity, m/s."""
     latency_s: Time = 0.0
-    """Age of the measured objects, s, a multiple of the tick."""
+    """Age of the reported objects, s; a multiple of the tick."""
     occlusion: bool = False
-    """Whether bodies hide those behind them, unless they leave a corner or the nearest
-    place in view."""
+    """Whether bodies hide other bodies behind them. A body is hidden if its nearest
+    point and all four corners are hidden."""
 
 
 class ObjectDetectorParameters(Parameters):
-    """How beams become objects; the paper prints no values."""
+    """Grouping of beams into objects, and tracking; the paper prints no values."""
 
     gap_m: Length = 0.2
-    """Hits of neighboring beams belong to one object if they are nearer than this plus
-    the spacing on a surface at the angle of the next field, m."""
+    """Adjacent hits belong to one object if their distance is below this plus the
+    spacing of the beams on a surface tilted by ``most_oblique_deg``, m."""
     most_oblique_deg: float = Field(default=60.0, ge=0.0, le=85.0)
-    """Angle of a beam to a surface's normal up to which hits belong together, deg."""
+    """Largest angle between a beam and the normal of a surface at which adjacent hits
+    still belong together, deg."""
     dip_m: Length = 0.08
     """Two objects meet where the distance from P rises by this and falls again, m."""
     wide_m: Length = 0.8
-    """The motion of an object along itself is not seen if the object is wider than
-    this, m."""
-    coarse_m: Length = 0.25
-    """No velocity is known where beams are farther apart than this, m."""
-    gate_m: Length = 0.3
-    """An object farther than this from its predicted position counts as another object,
+    """If an object is wider than this, its motion along its surface is not visible,
     m."""
+    coarse_m: Length = 0.25
+    """No velocity is known where the spacing of the beams exceeds this, m."""
+    gate_m: Length = 0.3
+    """Objects farther than this from a predicted position are different objects, m."""
     noise_m: NonNegativeLength = 0.04
-    """Standard deviation of an object's distance in addition to the noise of ranges, m:
-    beams hit other points of it from tick to tick."""
+    """Standard deviation of the distance of an object in addition to the noise of the
+    ranges, m. The beams hit different points of an object from tick to tick."""
     velocity_change_m_s: Speed = 0.1
-    """Standard deviation of a velocity's change within a second, m/s."""
+    """Standard deviation of the change of a velocity within one second, m/s."""
     confirmation_s: Time = 0.5
-    """An object's velocity is known when it was seen for this long, s."""
+    """A velocity is known once the motion has been visible for this long without
+    interruption, s."""
     memory_s: Time = 0.5
-    """Time for which an object that beams do not see any more is kept, s."""
+    """Time for which an object is kept after it was last seen, s."""
     resting_m_s: NonNegativeSpeed = 0.05
     """Objects slower than this count as at rest, m/s."""

@@ -1,4 +1,4 @@
-"""Range sensors that fail, to see what the rest does."""
+"""Faults of range sensors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field
 from systems.framework.parameters import Parameters, Time
 
 FaultKind = Literal["silent", "blind", "frozen", "noisy"]
-#: Numbers of the kinds; 0: sound.
+#: Numbers of the kinds of faults; 0 is a sensor without a fault.
 SILENT, BLIND, FROZEN, NOISY = range(1, 5)
 _KINDS: dict[FaultKind, int] = {
     "silent": SILENT,
@@ -20,17 +20,18 @@ _KINDS: dict[FaultKind, int] = {
 
 
 class SensorFaultParameters(Parameters):
-    """A range sensor that fails in a run, and how."""
+    """A range sensor that fails during a run, and the kind of its fault."""
 
     sensor: int = Field(default=1, ge=1, le=360)
-    """Number of the sensor, counted from the left, from 1."""
+    """Number of the sensor, counted from the left, starting at 1."""
     kind: FaultKind = "silent"
-    """``silent``: it does not fire any more; ``blind``: it never has an echo;
-    ``frozen``: it repeats its last reading; ``noisy``: its noise is 0.3 m more."""
+    """``silent``: the sensor no longer fires; ``blind``: it never has an echo;
+    ``frozen``: it repeats its last reading; ``noisy``: the standard deviation of its
+    range is 0.3 m larger."""
     start_s: Time = 0.0
-    """When that begins, s."""
+    """Start of the fault, s."""
 
     @property
     def number(self) -> int:
-        """Of the kind."""
+        """Number of the kind of the fault."""
         return _KINDS[self.kind]

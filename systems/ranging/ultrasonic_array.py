@@ -1,4 +1,4 @@
-"""Ultrasonic range finders, the papers' three or any others."""
+"""Ultrasonic range finders: the three sensors of the papers, or any others."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from systems.ranging.sensor_faults import (
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
 
-#: Standard deviation of what a noisy sensor's ranges are off besides, m.
+#: Additional standard deviation of the ranges of a noisy sensor, m.
 _NOISY_M = 0.3
 
 
@@ -35,12 +35,12 @@ _NOISY_M = 0.3
 def body_rectangles(
     poses_WO: NDArray[np.float64], sizes: NDArray[np.float64], more: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Bodies that can be seen or hit, with room for more.
+    """Rectangles of the bodies, with further rows for other bodies.
 
     Args:
-        poses_WO: (3 n,) x, y, theta of each, m and rad.
-        sizes: (2 n,) length and width of each, m.
-        more: Rows that are left to be filled.
+        poses_WO: (3 n,) x, y, theta of each body, m and rad.
+        sizes: (2 n,) length and width of each body, m.
+        more: Number of further rows, which the caller fills.
 
     Returns:
         (n + more, 5) x, y, theta, length, width in W, m and rad.
@@ -48,7 +48,8 @@ def body_rectangles(
     count = len(sizes) // 2
     rectangles = np.empty((count + more, 5))
     for k in range(count):
-        # An assignment to a slice compiles words about shapes too: seconds of it.
+        # An assignment to a slice would also compile error messages about shapes,
+        # which takes seconds.
         for i in range(3):
             rectangles[k, i] = poses_WO[3 * k + i]
         for i in range(2):
@@ -63,13 +64,13 @@ def world_rectangles(
     pose_WS: NDArray[np.float64] | tuple[float, float, float],
     source_size: tuple[float, float],
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """All bodies that can be seen or hit, (n + 1, 5); the master robot is last.
+    """Rectangles of all bodies; the leader is the last one.
 
     Args:
         poses_WO: (3 n,) x, y, theta of each obstacle, m and rad.
-        sizes: (2 n,) length and width of each, m.
-        pose_WS: (3,) x, y, theta of the master robot, m and rad.
-        source_size: Its length and width, m.
+        sizes: (2 n,) length and width of each obstacle, m.
+        pose_WS: (3,) x, y, theta of the leader, m and rad.
+        source_size: Length and width of the leader, m.
 
     Returns:
         (n + 1, 5) x, y, theta, length, width in W, m and rad.
@@ -93,11 +94,11 @@ def cone_ranges(
     Args:
         pose_WB: (x, y, theta) of the robot, m and rad.
         rectangles: (n, 5) bodies in W.
-        parameters: The sensors.
+        parameters: Positions and directions of the k sensors.
         control_point_m: Distance of P ahead of the axle, m.
 
     Returns:
-        (n,) m; infinity where a cone is empty.
+        (k,) distances, m; infinite where a cone is empty.
     """
     pose = np.asarray(pose_WB, dtype=np.float64)
     return fan_ranges(pose, rectangles, *parameters.beams, control_point_m)
@@ -109,18 +110,19 @@ def measured_ranges(
     sound_speed: float,
     numbers: NDArray[np.floating],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What the sensors report of the true ranges.
+    """Ranges that the sensors report.
 
     Args:
-        true_ranges: (n,) m, infinity where a cone is empty.
-        parameters: The sensors.
+        true_ranges: (n,) true ranges, m; infinite where a cone is empty.
+        parameters: Errors of the sensors.
         sound_speed: True speed of sound, m/s.
-        numbers: (2, n) standard normal: noise, and luck, which drops an echo
-            where it is below the quantile of the probability of that.
+        numbers: (2, n) standard normal numbers. The first row is the noise. The second
+            row decides about dropouts: an echo is lost if its number is below the
+            quantile of the dropout probability.
 
     Returns:
-        (n,) ranges in [minimum, maximum], m, and (n,) echoes, 0 or 1. Without
-        an echo the range is finite and means nothing.
+        (n,) ranges in [minimum, maximum], m, and (n,) echoes, 0 or 1. Without an echo,
+        the range is finite but has no meaning.
     """
     return _measured_ranges(true_ranges, numbers, *parameters.errors(sound_speed))
 
@@ -147,28 +149,28 @@ def _measured_ranges(
 
 
 class UltrasonicNumbers(NamedTuple):
-    """What the step of ``UltrasonicArray`` depends on."""
+    """Parameters of ``ultrasonic_step``."""
 
     axes: NDArray[np.float64]
     """(n,) directions of the cones in B, rad."""
     places: NDArray[np.float64]
-    """(n, 2) sensors from P, m."""
+    """(n, 2) positions of the sensors from P in B axes, m."""
     half_angle: float
-    """Of the cones, rad."""
+    """Half of the opening angle of the cones, rad."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     source_size: tuple[float, float]
-    """Length and width of the master robot, m."""
+    """Length and width of the leader, m."""
     errors: tuple[float, float, float, float, float]
     """See ``UltrasonicParameters.errors``."""
     noise: TickNoise
     turns: NDArray[np.int64]
-    """(n,) ticks into the round at which each sensor fires."""
+    """(n,) tick within the round at which each sensor fires."""
     round: int
-    """Ticks of a round."""
+    """Length of a round, ticks."""
     tick_s: float
     faults: NDArray[np.int64]
-    """As of ``UltrasonicParameters.fault_ticks``."""
+    """(n, 2) faults, see ``UltrasonicParameters.fault_ticks``."""
 
 
 def ultrasonic_step(
@@ -178,9 +180,9 @@ def ultrasonic_step(
 
     Args:
         tick: Number of the tick.
-        state: Ranges, m, and echoes, as they were last read.
-        inputs: As the input ports.
-        outputs: As the output ports.
+        state: Last readings: ranges, m, then echoes, 0 or 1.
+        inputs: Values of the input ports.
+        outputs: Values of the output ports.
         numbers: ``UltrasonicNumbers``.
     """
     pose_WB, poses_WO, sizes, pose_WS = inputs
@@ -191,13 +193,13 @@ def ultrasonic_step(
 def sourceless_ultrasonic_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
 ) -> None:
-    """``ultrasonic_step`` where there is no master robot.
+    """``ultrasonic_step`` without a leader.
 
     Args:
         tick: Number of the tick.
-        state: Ranges, m, and echoes, as they were last read.
-        inputs: As the input ports.
-        outputs: As the output ports.
+        state: Last readings: ranges, m, then echoes, 0 or 1.
+        inputs: Values of the input ports.
+        outputs: Values of the output ports.
         numbers: ``UltrasonicNumbers``.
     """
     pose_WB, poses_WO, sizes = inputs
@@ -214,6 +216,11 @@ def _read_ranges(
     outputs: Any,
     numbers: UltrasonicNumbers,
 ) -> None:
+    """Measures all ranges, applies the faults, and updates the sensors that fire.
+
+    All sensors are measured at every tick. A sensor stores its new reading only at the
+    ticks at which it fires. The outputs are the stored readings and their ages.
+    """
     ranges, echo, ages = outputs
     beams = numbers.axes, numbers.places, numbers.half_angle
     true = fan_ranges(pose_WB, bodies, *beams, numbers.control_point_m)
@@ -225,7 +232,7 @@ def _read_ranges(
         kind, begin = numbers.faults[k]
         late = tick - begin if kind > 0 else -1
         if late >= 0 and kind == SILENT:
-            # As old as its last reading before.
+            # The age counts from the last reading before the fault.
             age = late + 1 + (begin - 1 - numbers.turns[k]) % numbers.round
         elif late >= 0 and kind == BLIND:
             new_ranges[k], new_echo[k] = numbers.errors[4], 0.0
@@ -240,24 +247,25 @@ def _read_ranges(
 
 
 class UltrasonicArray(Block):
-    """Ranges of the nearest surfaces in cones, the papers' three or any others.
+    """Measures the ranges of the nearest surfaces in cones.
 
     The leader is a body like the obstacles; without a leader there is no port
     ``pose_WS``. Surfaces beyond the maximum range give no echo. Surfaces nearer than
-    the minimum range read the minimum: without an echo at contact, the law would not
-    push. A cone reports a range, not a direction.
+    the minimum range give the minimum range: without an echo at contact, the law would
+    not push. A cone reports a range, not a direction.
 
-    State: ranges and echoes of the last tick, for sensors that hold them.
-    Rate and latency: a function of the present poses; no latency. The noise is
-    drawn once per tick. All sensors fire every ``period_s``, at multiples of it, and
-    hold their reading in between. With ``firing: sequential`` one sensor fires per
-    period, from left to right, and the others hold their reading: with three sensors
-    and periods of 25 ms the ranges are 0, 25 and 50 ms old, and a sensor fires again
+    State: the last range and echo of each sensor. The output is a function of state and
+    present poses; there is no latency. The noise is drawn once per tick.
+
+    All sensors fire every ``period_s``, at multiples of this period, and hold their
+    reading in between. With ``firing: sequential``, one sensor fires per period, from
+    left to right, and the others hold their reading. For example, with three sensors
+    and periods of 25 ms the ranges are 0, 25 and 50 ms old. A sensor then fires again
     after a round of 75 ms.
 
     Args:
-        parameters: The sensors.
-        robot: Place of P.
+        parameters: Positions, directions, errors and faults of the sensors.
+        robot: Position of P.
         acoustics: Speed of sound, from which the time of flight follows.
         source_size: Length and width of the leader, m; None if there is no leader.
         obstacle_count: Number of boxes on the obstacle ports.
@@ -265,7 +273,7 @@ class UltrasonicArray(Block):
         tick_s: Control period of the robot, s.
 
     Raises:
-        InputError: The sensors' period is not a multiple of the tick.
+        InputError: The period of the sensors is not a multiple of the tick.
     """
 
     part, stage = "ultrasonic", "obstacle sensing"

@@ -1,1 +1,1 @@
-"""Routes through a known map: found before a run, and anew where a robot stalls."""
+"""Routes through a known map, planned before a run and again when a robot stalls."""

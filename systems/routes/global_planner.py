@@ -1,4 +1,4 @@
-"""The route to the goal: planned from the map, and again where the robot stalls."""
+"""The route to the goal: planned from the map, and again when the robot stalls."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ from systems.routes.seen_points import (
 )
 from systems.world.geometry import control_point
 
-#: Places in ``PlannerState.progress``: number of new routes, and since when, s, and
-#: from where along the route, m, P has not advanced.
+#: Indices of ``PlannerState.progress``: number of new routes; time of the last advance
+#: of P, s; and position of P along the route at that time, m.
 REPLANS, SINCE_S, FROM_M = range(3)
 
 
 class PlannerNumbers(NamedTuple):
-    """What the step of ``GlobalPlanner`` depends on."""
+    """Constants of the step of ``GlobalPlanner``."""
 
     grid: OccupancyGrid
-    """With the cells blocked that are too near to known obstacles."""
+    """Grid in which the cells too near to known obstacles are blocked."""
     rectangles: NDArray[np.float64]
     """(k, 5) known obstacles in W."""
     goal: tuple[float, float]
@@ -62,12 +62,12 @@ class PlannerNumbers(NamedTuple):
 
 
 class PlannerState(NamedTuple):
-    """The state of ``GlobalPlanner``."""
+    """State of ``GlobalPlanner``."""
 
     route: NDArray[np.float64]
-    """(ROUTE_SIZE,) as the port ``route``."""
+    """(ROUTE_SIZE,) value of the port ``route``."""
     progress: NDArray[np.float64]
-    """(3,) ``REPLANS``, ``SINCE_S`` and ``FROM_M``."""
+    """(3,) values at ``REPLANS``, ``SINCE_S`` and ``FROM_M``."""
     seen: SeenPoints
 
 
@@ -75,7 +75,7 @@ class PlannerState(NamedTuple):
 def _find_route_again(
     numbers: PlannerNumbers, seen: SeenPoints, objects: Any, p_WP: tuple[float, float]
 ) -> Any:  # pragma: no cover  (compiled)
-    """Points of a route from P past all that is known, has been seen or rests."""
+    """Plan a route from P past known obstacles, seen points and robots at rest."""
     grid, clearance = numbers.grid, numbers.clearance_m
     discs = discs_to_avoid(seen, objects, p_WP)
     now = OccupancyGrid(grid.blocked.copy(), grid.low, grid.cell_m)
@@ -86,7 +86,11 @@ def _find_route_again(
 def planner_step(
     tick: int, state: PlannerState, inputs: Any, outputs: Any, numbers: PlannerNumbers
 ) -> None:
-    """The route of the next tick."""
+    """Computes the route of the next tick.
+
+    The planner remembers the objects in view. If P has not advanced for ``stalled_s``,
+    it plans a new route.
+    """
     if numbers.stalled_s == math.inf:
         return
     objects, pose, route_progress = inputs
@@ -95,9 +99,10 @@ def planner_step(
     remember_objects(seen, numbers.grid, numbers.rectangles, objects, (x, y))
     time = tick * numbers.tick_s
     away = math.hypot(numbers.goal[0] - x, numbers.goal[1] - y)
+    # P has advanced, or has arrived: restart the timer.
     if reached >= progress[FROM_M] + numbers.stall_m or away <= numbers.arrived_m:
         progress[FROM_M], progress[SINCE_S] = reached, time
-    # Half a tick is more than the rounding of times.
+    # Half a tick exceeds the rounding of times.
     if time - progress[SINCE_S] < numbers.stalled_s - 0.5 * numbers.tick_s:
         return
     progress[SINCE_S], progress[FROM_M] = time, reached
@@ -109,7 +114,7 @@ def planner_step(
 
 
 def _publish_route(state: PlannerState, outputs: Any, numbers: PlannerNumbers) -> None:
-    """The outputs of ``planner_step``'s state."""
+    """Copy the state of ``planner_step`` to the outputs."""
     route, replans = outputs
     for k in range(len(route)):
         route[k] = state.route[k]
@@ -117,25 +122,25 @@ def _publish_route(state: PlannerState, outputs: Any, numbers: PlannerNumbers) -
 
 
 class GlobalPlanner(Block):
-    """Gives the route to the goal, and plans a new one where the robot stalls.
+    """Plans the route to the goal, and a new one when the robot stalls.
 
-    The first route leads from the place of P at the start past the known obstacles
+    The first route leads from the initial position of P past the known obstacles
     (``plan_route``). The planner remembers the nearest points of objects that are not
-    known to move, one per cell of the grid. If P advances by less than ``stall_m``
-    along the route in ``stalled_s``, and is farther from the goal than ``arrived_m``,
-    the block plans a route from the place of P, which also avoids these points and
-    robots at rest. If there is none, the old route stays, and the block tries again
-    after ``stalled_s``.
+    known to move, one per cell of the grid. The robot stalls if P advances by less than
+    ``stall_m`` along the route in ``stalled_s``, and is farther from the goal than
+    ``arrived_m``. Then the block plans a route from the position of P that also avoids
+    these points and robots at rest. If there is none, the old route stays, and the
+    block tries again after ``stalled_s``.
 
-    State, every tick: ``PlannerState``. An update at t reads the inputs at t, and its
-    route is published from t on: other updates read it at the next tick. The outputs
-    are state; no feedthrough.
+    State, every tick: ``PlannerState``. An update at t reads the inputs at t. Its route
+    is published from t on, so other updates read it in the next tick. The outputs are
+    state; no feedthrough.
 
     Args:
         parameters: ``RouteParameters``.
         known: (k, 5) known obstacles in W, see ``systems.world.geometry``.
         initial_pose: (x, y, theta) of the robot at the start, m and rad.
-        robot: Place of P.
+        robot: Position of P on the robot.
         tick_s: Period of the robot, s.
 
     Raises:
@@ -177,7 +182,7 @@ class GlobalPlanner(Block):
         self.declare(step, tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
-        """The step, with start, goal and map of the run."""
+        """Returns the step with start, goal and map of the run."""
         return self._make_step(run.initial_pose, run.goal or self._goal, run.mapped)
 
 

@@ -1,4 +1,4 @@
-"""The shortest way from cell to cell of a grid."""
+"""Search of the shortest path between two cells of a grid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DIAGONAL = math.sqrt(2.0)
 
 @njit(cache=True)
 def _bound(di: int, dj: int) -> float:  # pragma: no cover  (compiled)
-    """Octile distance: the cost where nothing is blocked."""
+    """Return the octile distance: the cost of a path if no cell is blocked."""
     i, j = abs(di), abs(dj)
     return max(i, j) + (_DIAGONAL - 1.0) * min(i, j)
 
@@ -24,7 +24,7 @@ def _bound(di: int, dj: int) -> float:  # pragma: no cover  (compiled)
 def _push(
     bounds: Any, cells: Any, count: int, bound: float, cell: int
 ) -> None:  # pragma: no cover  (compiled)
-    """Adds an entry to a binary heap of so many, least bound first."""
+    """Add an entry to a binary heap of ``count`` entries, sorted by bound."""
     k = count
     while k > 0:
         above = (k - 1) // 2
@@ -37,7 +37,7 @@ def _push(
 
 @njit(cache=True)
 def _pop(bounds: Any, cells: Any, count: int) -> int:  # pragma: no cover  (compiled)
-    """Takes the cell of least bound out of a heap of so many."""
+    """Remove the cell with the least bound from a heap of ``count`` entries."""
     least = cells[0]
     last = count - 1
     bound, cell = bounds[last], cells[last]
@@ -60,7 +60,12 @@ def _pop(bounds: Any, cells: Any, count: int) -> int:  # pragma: no cover  (comp
 def search_cells(
     blocked: Any, start: tuple[int, int], goal: tuple[int, int]
 ) -> Any:  # pragma: no cover  (compiled)
-    """A* on 8 neighbours, for compiled code; see ``find_cells``.
+    """Searches a shortest path with A* on 8 neighbors; see ``find_cells``.
+
+    The priority queue is a binary heap of cells, sorted by the cost so far plus the
+    octile distance to the goal. When a cheaper way to a cell is found, the cell enters
+    the heap again, and its older entries are skipped. This function is for compiled
+    code.
 
     Args:
         blocked: (n, m) cells that cannot be entered.
@@ -68,7 +73,7 @@ def search_cells(
         goal: Cell.
 
     Returns:
-        (k, 2) cells from start to goal, none where there is no way.
+        (k, 2) cells from start to goal, empty if there is no path.
     """
     n, m = blocked.shape
     si, sj = start
@@ -79,7 +84,8 @@ def search_cells(
     before = np.full((n, m), -1, dtype=np.int32)
     done = np.zeros((n, m), dtype=np.bool_)
     cost[si, sj] = 0.0
-    # A cell is entered anew whenever it was found to be nearer, from 8 sides at most.
+    # A cell enters the heap again when a cheaper way is found: at most once per
+    # neighbor.
     bounds, waiting = np.empty(8 * n * m + 1), np.empty(8 * n * m + 1, dtype=np.int32)
     _push(bounds, waiting, 0, 0.0, si * m + sj)
     count = 1
@@ -97,7 +103,7 @@ def search_cells(
                 a, b = i + di, j + dj
                 if a < 0 or b < 0 or a >= n or b >= m or blocked[a, b] or done[a, b]:
                     continue
-                # No corner is cut.
+                # A diagonal step must not cut the corner of a blocked cell.
                 if blocked[a, j] or blocked[i, b]:
                     continue
                 step = _DIAGONAL if di != 0 and dj != 0 else 1.0
@@ -109,6 +115,7 @@ def search_cells(
                     count += 1
     if cost[gi, gj] == np.inf:
         return np.empty((0, 2), dtype=np.int64)
+    # Count the cells of the path, then list them from the goal to the start.
     count, cell = 1, gi * m + gj
     while cell != si * m + sj:
         cell = before[cell // m, cell % m]
@@ -124,18 +131,19 @@ def search_cells(
 def find_cells(
     blocked: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]
 ) -> NDArray[np.int64] | None:
-    """A shortest way from cell to cell.
+    """Finds a shortest path between two cells.
 
-    Steps lead to the 8 neighbours; one across a corner costs sqrt(2) of a straight one,
-    and needs both cells beside it free.
+    Steps lead to the 8 neighbors. A diagonal step costs sqrt(2) times a straight one,
+    and needs both adjacent cells to be free.
 
     Args:
         blocked: (n, m) cells that cannot be entered.
         start: Cell, numbers along both axes.
-        goal: The same.
+        goal: Cell, numbers along both axes.
 
     Returns:
-        (k, 2) cells from start to goal; none where one of them is blocked or walled in.
+        (k, 2) cells from start to goal. None if one of them is blocked or enclosed by
+        blocked cells.
     """
     cells: NDArray[np.int64] = search_cells(blocked, start, goal)
     return cells if len(cells) else None

@@ -1,4 +1,4 @@
-"""Which cells of an arena a disc's centre may not be in."""
+"""A grid of the cells of an arena in which the center of a disc must not be."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from systems.framework.input_error import InputError
 from systems.routes.parameters import check_cells
 from systems.world.geometry import beyond_rectangle, rectangle_corners
 
-#: Cells of a grid at most: a search among them takes 40 MB.
+#: Largest number of cells of a grid: a search among them takes 40 MB.
 _MOST_CELLS = 1_000_000
-#: (n, 3) places and radii of discs, m; compiled code has no type for it.
+#: (n, 3) positions and radii of discs, m; compiled code has no type for it.
 Discs = Any
 
 
 class OccupancyGrid(NamedTuple):
-    """Square cells of a rectangle of floor, whose sides are those of W."""
+    """Square cells of a rectangle of the floor with sides along the axes of W."""
 
     blocked: NDArray[np.bool_]
     """(n, m) cells along x and y whose middle is too near to an obstacle."""
@@ -33,12 +33,12 @@ class OccupancyGrid(NamedTuple):
 def arena_about(
     points: ArrayLike, rectangles: ArrayLike, margin_m: float
 ) -> tuple[float, float, float, float]:
-    """The least rectangle of floor that holds all, and a margin about it.
+    """Returns the smallest rectangle of floor that contains all, plus a margin.
 
     Args:
         points: (n, 2) m.
         rectangles: (k, 5) obstacles, see ``systems.world.geometry``.
-        margin_m: m.
+        margin_m: Margin on each side, m.
 
     Returns:
         Least x and y, and greatest x and y, m.
@@ -53,18 +53,18 @@ def arena_about(
 def make_occupancy_grid(
     arena: tuple[float, float, float, float], cell_m: float, radius_m: float
 ) -> OccupancyGrid:
-    """A grid of free cells.
+    """Makes a grid of free cells.
 
     Args:
         arena: Least x and y, and greatest x and y, m.
         cell_m: Side of a cell, m.
-        radius_m: Obstacles are to be grown by it, m.
+        radius_m: Radius by which obstacles will be enlarged, m.
 
     Returns:
         The grid.
 
     Raises:
-        InputError: The cells are too many, or too coarse for the radius.
+        InputError: There are too many cells, or they are too coarse for the radius.
     """
     check_cells(cell_m, radius_m)
     low_x, low_y, high_x, high_y = arena
@@ -87,15 +87,15 @@ def make_occupancy_grid(
 def cell_of(
     grid: OccupancyGrid, x: float, y: float
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """The cell of a place.
+    """Returns the cell of a place.
 
     Args:
-        grid: Any.
+        grid: The grid.
         x: m.
         y: m.
 
     Returns:
-        Its numbers along x and y; (-1, -1) off the grid.
+        Its numbers along x and y; (-1, -1) outside the grid.
     """
     i = math.floor((x - grid.low[0]) / grid.cell_m)
     j = math.floor((y - grid.low[1]) / grid.cell_m)
@@ -107,12 +107,12 @@ def cell_of(
 def cell_middle(
     grid: OccupancyGrid, i: int, j: int
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Place of the middle of a cell.
+    """Returns the position of the middle of a cell.
 
     Args:
-        grid: Any.
+        grid: The grid.
         i: Number of the cell along x.
-        j: The same along y.
+        j: Number of the cell along y.
 
     Returns:
         (x, y) m.
@@ -125,7 +125,10 @@ def cell_middle(
 def _span(
     low: float, high: float, first: float, cell: float, count: int
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Cells whose middles may lie in an interval: the first, and one after the last."""
+    """Return the range of cells whose middles may lie in an interval.
+
+    The range is given by its first cell, and the cell after its last.
+    """
     begin = math.floor((low - first) / cell - 0.5)
     end = math.ceil((high - first) / cell - 0.5) + 1
     return max(begin, 0), min(end, count)
@@ -137,17 +140,18 @@ def block_rectangles(
 ) -> None:  # pragma: no cover  (compiled)
     """Blocks the cells whose middles are nearer to a rectangle than a radius.
 
-    Distances are exact: those of a distance transform are between middles of cells, off
-    by up to 0.7 cells, and compiled steps cannot call it.
+    The distances are exact. A distance transform measures between middles of cells, so
+    its error is up to 0.7 cells. Compiled steps cannot call it either.
 
     Args:
         grid: Changed.
         rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
-        radius: They are grown by it, m.
+        radius: Radius by which the rectangles are enlarged, m.
     """
     n, m = grid.blocked.shape
     for k in range(len(rectangles)):
         box = rectangles[k]
+        # Rectangle along the axes of W that contains the enlarged obstacle.
         c, s = abs(math.cos(box[2])), abs(math.sin(box[2]))
         half_x = 0.5 * (c * box[3] + s * box[4]) + radius
         half_y = 0.5 * (s * box[3] + c * box[4]) + radius
@@ -170,8 +174,8 @@ def block_discs(
 
     Args:
         grid: Changed.
-        discs: (n, 3) places and radii, m.
-        radius: They are grown by it, m.
+        discs: (n, 3) positions and radii, m.
+        radius: Radius by which the discs are enlarged, m.
     """
     n, m = grid.blocked.shape
     for k in range(len(discs)):

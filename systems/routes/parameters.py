@@ -16,20 +16,20 @@ from systems.framework.parameters import (
     Speed,
 )
 
-#: Cells in the radius of the disc at least: then a step between two free cells comes
-#: nearer than the radius by less than 3 % of it.
+#: Least number of cells in the radius of the disc. Then a step between two free cells
+#: comes nearer than the radius by less than 3 % of it.
 _LEAST_CELLS = 3.0
 
 
 def check_cells(cell_m: float, radius_m: float) -> None:
-    """Refuses cells that are too coarse for what obstacles are grown by.
+    """Checks that cells are fine enough for the enlargement of obstacles.
 
     Args:
         cell_m: Side of a cell, m.
-        radius_m: Obstacles are to be grown by it, m.
+        radius_m: Radius by which obstacles are enlarged, m.
 
     Raises:
-        InputError: They are.
+        InputError: The cells are too coarse.
     """
     if cell_m * _LEAST_CELLS > radius_m:
         raise InputError(
@@ -65,18 +65,19 @@ class RouteParameters(PathTargetParameters):
     cell_m: Length = 0.05
     """Side of a cell of the grid, m (our choice)."""
     arena_margin_m: Length = 2.0
-    """Margin around the smallest rectangle of start, goal and known obstacles in which
-    routes stay, m (our choice)."""
+    """Margin around the smallest rectangle that contains start, goal and known
+    obstacles, m (our choice). Routes stay within this area."""
     replan: bool = True
     """Whether a robot that stalls plans a new route, with the obstacles that it has
     seen (our choice)."""
     stall_m: Length = 0.1
-    """The robot stalls if P advances less than this along the route within
+    """The robot stalls if P advances by less than this along the route within
     ``stalled_s``, m."""
     stalled_s: Duration = 6.0
-    """See ``stall_m``, s."""
+    """Time after which a robot that has not advanced by ``stall_m`` stalls, s."""
     arrived_m: Length = 0.15
-    """Distance from the goal at which it has arrived and does not stall, m."""
+    """Distance from the goal within which the robot has arrived and does not stall,
+    m."""
 
     @model_validator(mode="after")
     def _check(self) -> RouteParameters:

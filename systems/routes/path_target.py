@@ -1,4 +1,4 @@
-"""The target that moves along a route."""
+"""A target that moves along a route."""
 
 from __future__ import annotations
 
@@ -16,22 +16,25 @@ from systems.routes.parameters import PathTargetParameters
 from systems.routes.route import ROUTE_SIZE, ROUTE_UNIT
 from systems.world.geometry import control_point
 
-#: Places in the state; of lengths along the route, m, speed in m/s.
+#: Indices of the state: position of the target along the route, m; its speed, m/s;
+#: position of P along the route, m; and first of four numbers that identify the route.
 ALONG, SPEED, REACHED, FINGERPRINT = range(4)
-#: The point nearest to P is looked for this far behind the last one, and this far
-#: ahead of the target, m: a route may come near to itself.
+#: The point nearest to P is searched from this distance behind the last one to this
+#: distance ahead of the target, m: a route may come near to itself.
 _BEHIND_M, _AHEAD_M = 1.0, 0.5
-#: Nearer to the goal than this, the target has arrived, m.
+#: The target has arrived within this distance of the goal, m.
 _THERE_M = 1e-6
 
 
 class TargetNumbers(NamedTuple):
-    """What the step of ``PathTarget`` depends on."""
+    """Constants of the step of ``PathTarget``."""
 
     speed_m_s: float
     acceleration_m_s2: float
     waits: bool
+    """Whether the target waits for the robot."""
     lead_m: float
+    """Largest lead of a waiting target, m."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     tick_s: float
@@ -41,7 +44,10 @@ class TargetNumbers(NamedTuple):
 def route_fingerprint(
     route: Any,
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Four numbers that differ where routes do: count, spacing, moments of x and y."""
+    """Computes four numbers that identify a route.
+
+    They are the count and spacing of its points, and moments of x and y.
+    """
     count, x, y = int(route[0]), 0.0, 0.0
     for k in range(count):
         x += (k + 1.0) * route[2 + 2 * k]
@@ -53,17 +59,20 @@ def route_fingerprint(
 def nearest_on_route(
     route: Any, x: float, y: float, low: float, high: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Where a place is nearest to a part of a route.
+    """Finds the point of a part of a route that is nearest to a place.
+
+    The function projects the place on each segment of the part, limited to its ends,
+    and keeps the nearest projection.
 
     Args:
         route: (ROUTE_SIZE,) numbers of ``Route``.
         x: m.
         y: m.
-        low: The part begins there along the route, m.
-        high: It ends there, m.
+        low: Start of the part along the route, m.
+        high: End of the part along the route, m.
 
     Returns:
-        Arc length, m.
+        Arc length of the nearest point, m.
     """
     count, spacing = int(route[0]), route[1]
     last = (count - 1) * spacing
@@ -78,6 +87,7 @@ def nearest_on_route(
         dx, dy = route[4 + 2 * k] - ax, route[5 + 2 * k] - ay
         squared = max(dx * dx + dy * dy, 1e-18)
         part = ((x - ax) * dx + (y - ay) * dy) / squared
+        # Limit the projection to the part and to the segment.
         least = max((low - begin) / spacing, 0.0)
         most = min((high - begin) / spacing, 1.0)
         part = min(max(part, least), most)
@@ -91,10 +101,10 @@ def nearest_on_route(
 def point_on_route(
     route: Any, along: float
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Place on a route, and its derivative by the arc length.
+    """Returns a point of a route and the derivative by arc length.
 
-    Cubic Hermite polynomials through the points (Catmull and Rom), so that the
-    direction turns without steps.
+    The route is interpolated with cubic Hermite polynomials (Catmull and Rom), so its
+    direction is continuous.
 
     Args:
         route: (ROUTE_SIZE,) numbers of ``Route``.
@@ -111,6 +121,7 @@ def point_on_route(
     for axis in range(2):
         at = 2 + axis
         p, q = route[at + 2 * k], route[at + 2 * (k + 1)]
+        # Slopes at both ends: central differences, one-sided at the ends of the route.
         m = q - route[at + 2 * (k - 1)] if k > 0 else 2.0 * (q - p)
         n = route[at + 2 * (k + 2)] - p if k < count - 2 else 2.0 * (q - p)
         m, n = 0.5 * m, 0.5 * n
@@ -124,13 +135,13 @@ def point_on_route(
 def next_speed(
     speed: float, way: float, top: float, acceleration: float, tick_s: float
 ) -> float:
-    """The largest speed after a tick from which rest is reached within a way.
+    """Returns the largest next speed that still permits a stop within a distance.
 
-    Speed changes evenly in a tick, by no more than the acceleration.
+    The speed changes uniformly within a tick, at most by the acceleration.
 
     Args:
-        speed: Now, m/s.
-        way: To go, m; below 0 it was exceeded.
+        speed: Speed now, m/s.
+        way: Remaining distance, m; negative if it is exceeded.
         top: Largest speed, m/s.
         acceleration: m/s^2.
         tick_s: s.
@@ -138,7 +149,7 @@ def next_speed(
     Returns:
         m/s, at least 0.
     """
-    # (v + v') T/2 + v'^2/(2 a) = way.
+    # Solution v' of (v + v') T/2 + v'^2/(2 a) = way.
     root = 0.25 * tick_s * tick_s + (2.0 * way - speed * tick_s) / acceleration
     braked = acceleration * (math.sqrt(max(root, 0.0)) - 0.5 * tick_s)
     change = acceleration * tick_s
@@ -149,19 +160,20 @@ def next_speed(
 def path_target_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TargetNumbers
 ) -> None:
-    """The target at one tick.
+    """Computes the target in one tick.
 
-    State: arc length, m, and speed, m/s, of the target, arc length of the point that is
-    nearest to P, m, and fingerprint of the route.
+    State: arc length, m, and speed, m/s, of the target; arc length of the point nearest
+    to P, m; and fingerprint of the route.
     """
     route, (target, progress, valid) = np.asarray(inputs[0]), outputs
     valid[0] = 1.0
     x, y = control_point(inputs[1], numbers.control_point_m)
     if route[0] < 2.0:
-        # There is no route: the target is where P is.
+        # Without a route the target is at P.
         target[0], target[1] = x, y
         return
     length = (route[0] - 1.0) * route[1]
+    # On a new route, the target begins at rest at the point nearest to P.
     known = route_fingerprint(route)
     is_new = False
     for k in range(4):
@@ -180,7 +192,8 @@ def path_target_step(
     progress[0], progress[1] = along, reached
     way = length - along
     if numbers.waits:
-        # It comes to rest within a tick, up to a T^2/8 later than even braking would.
+        # The target may come to rest within a tick. It then moves up to a T^2/8 farther
+        # than with uniform braking.
         late = 0.125 * numbers.acceleration_m_s2 * numbers.tick_s**2
         way = min(way, numbers.lead_m - late - along + reached)
     after = next_speed(
@@ -195,26 +208,26 @@ def path_target_step(
 class PathTarget(Block):
     """Moves a target along the route, from rest to rest at the goal.
 
-    ``target_state``: place and velocity in W. ``route_progress``: arc lengths of the
-    target and of the point of the route that is nearest to P; of several such points,
-    the one near the last one or between it and the target.
+    ``target_state``: position and velocity in W. ``route_progress``: arc lengths of the
+    target and of the point of the route nearest to P. If there are several such points,
+    the block takes the one near the last one, or between it and the target.
 
     With ``timing: timed`` the speed follows the clock, whatever the robot does: it
     rises, stays constant, and falls. With ``waiting`` the target brakes so that it is
-    never farther ahead than ``lead_m``, unless P goes back. On a new route the target
-    begins at rest, at the point nearest to P.
+    never farther ahead than ``lead_m``, unless P goes back. On a new route, the target
+    begins at rest at the point nearest to P.
 
     Discrete state: arc length and speed of the target, arc length of P, and four
     numbers that identify the route. Rate and latency: a function of state and present
-    inputs, at every tick; no latency.
+    inputs, in every tick; no latency.
 
     Args:
         parameters: ``PathTargetParameters``.
-        robot: Place of P.
+        robot: Position of P on the robot.
         tick_s: Period of the robot, s.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 2 has its place and velocity;
-    its timing is not printed. That it waits is ours.
+    Reference: Engelbrecht, Steyn and Djouani (2021). Their eq. 2 contains the position
+    and velocity of the target; they do not print its timing. The waiting is ours.
     """
 
     part = "tracker"

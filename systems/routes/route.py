@@ -1,4 +1,7 @@
-"""A smooth route from a place to a goal, past known rectangles and seen discs."""
+"""A smooth route from a place to a goal, past known rectangles and seen discs.
+
+``find_route`` searches a path of cells, pulls it taut, and rounds its corners.
+"""
 
 from __future__ import annotations
 
@@ -24,34 +27,36 @@ from systems.routes.occupancy_grid import (
 )
 from systems.world.geometry import beyond_rectangle, segment_clearance
 
-#: Points of a route at most, and numbers on the port ``route``: how many points there
-#: are, their spacing, and x and y of each.
+#: Largest number of points of a route, and number of values of the port ``route``:
+#: number of points, their spacing, and x and y of each.
 ROUTE_POINTS = 200
 ROUTE_SIZE = 2 + 2 * ROUTE_POINTS
-#: Units of these numbers.
+#: Units of these values.
 ROUTE_UNIT = "number of points, then in m their spacing, and x and y of each"
 
-#: Spacing at which a pulled way is rounded, m.
+#: Spacing of the points of a taut path when it is rounded, m.
 _FINE_M = 0.01
-#: Half of the window of the moving averages, in points of that spacing; shorter where
-#: the route would come too near to an obstacle.
+#: Half of the window of the moving averages, in such points. Shorter windows are tried
+#: if the route would come too near to an obstacle.
 _HALF_WINDOWS = (15, 10, 7, 5, 3, 2, 1, 0)
-#: Averages that follow one another: after two the curvature is continuous.
+#: Number of successive averages: after two the curvature is continuous.
 _AVERAGES = 2
-#: By so much a rounded route may come nearer to obstacles than was planned, m, but by
-#: no more than this share of the clearance.
+#: A rounded route may come nearer to obstacles than planned by this distance, m, and at
+#: most by this share of the clearance.
 _ROUNDING_M, _ROUNDING_SHARE = 0.015, 0.05
-#: The same of a way out, compared with where it begins. Both shares and the 3 % of
+#: A straight way out may come nearer to obstacles than its start by this distance, m,
+#: and at most by this share of the clearance. Both shares and the 3 % of
 #: ``check_cells`` leave at least 92 % of the clearance.
 _WAY_OUT_M, _WAY_OUT_SHARE = 0.01, 0.03
-#: A goal may be this much nearer to obstacles than the clearance: rounding, m.
+#: A goal may be nearer to obstacles than the clearance by this rounding error, m.
 _GRAZE_M = 1e-9
-#: Start and goal are not nearer to one another, m.
+#: Least distance between start and goal, m.
 _SHORTEST_M = 1e-3
 
 
 @njit(cache=True)
 def _length(points: Any) -> float:  # pragma: no cover  (compiled)
+    """Return the length of a line through points, m."""
     length = 0.0
     for k in range(1, len(points)):
         dx, dy = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
@@ -61,27 +66,27 @@ def _length(points: Any) -> float:  # pragma: no cover  (compiled)
 
 @dataclass(frozen=True)
 class Route:
-    """Points of equal spacing along a smooth line; the last one is the goal."""
+    """Points with equal spacing along a smooth line; the last one is the goal."""
 
     points: NDArray[np.float64]
-    """(n, 2) in W, m; read only."""
+    """(n, 2) in W, m; read-only."""
 
     def __post_init__(self) -> None:
         read_only(self.points)
 
     @property
     def spacing_m(self) -> float:
-        """From point to point along the line, m."""
+        """Distance between two points along the line, m."""
         return self.length_m / (len(self.points) - 1)
 
     @property
     def length_m(self) -> float:
-        """From the first point to the last, m."""
+        """Length from the first point to the last, m."""
         return float(_length(self.points))
 
     @property
     def numbers(self) -> NDArray[np.float64]:
-        """(ROUTE_SIZE,) what the port ``route`` carries."""
+        """(ROUTE_SIZE,) value of the port ``route``."""
         numbers: NDArray[np.float64] = np.zeros(ROUTE_SIZE)
         fill_route(numbers, self.points)
         return numbers
@@ -89,11 +94,11 @@ class Route:
 
 @njit(cache=True)
 def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compiled)
-    """Sets what the port ``route`` carries.
+    """Writes a route in the format of the port ``route``.
 
     Args:
         numbers: (ROUTE_SIZE,) changed.
-        points: (n, 2) of equal spacing, m.
+        points: (n, 2) with equal spacing, m.
     """
     for k in range(ROUTE_SIZE):
         numbers[k] = 0.0
@@ -106,9 +111,10 @@ def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compile
 def _clearance(
     a: Any, b: Any, rectangles: Any, discs: Discs, least: float, most: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance of a segment from all obstacles, ``most`` where it is larger.
+    """Return the distance of a segment from all obstacles, or ``most`` if it is larger.
 
-    Below ``least`` it is that of some obstacle.
+    If the distance is below ``least``, the function returns early with the distance of
+    some obstacle below ``least``.
     """
     best = most
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -123,7 +129,8 @@ def _clearance(
                 return best
     for k in range(len(rectangles)):
         box = rectangles[k]
-        # Far off by the circles about both there is no need to look closer.
+        # Skip the exact distance if the circles around segment and obstacle are far
+        # apart.
         x, y = box[0] - a[0] - 0.5 * dx, box[1] - a[1] - 0.5 * dy
         reach = 0.5 * (math.hypot(box[3], box[4]) + math.sqrt(squared)) + max(best, 0.0)
         if x * x + y * y < reach * reach:
@@ -137,16 +144,16 @@ def _clearance(
 def place_clearance(
     x: float, y: float, rectangles: Any, discs: Discs
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance of a place from all obstacles.
+    """Computes the distance of a place from all obstacles.
 
     Args:
         x: m.
         y: m.
         rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
-        discs: (n, 3) places and radii, m.
+        discs: (n, 3) positions and radii, m.
 
     Returns:
-        m; 0 in a rectangle, below 0 in a disc, infinite where there is none.
+        m; 0 inside a rectangle, negative inside a disc, infinite without obstacles.
     """
     best = np.inf
     for k in range(len(rectangles)):
@@ -162,7 +169,7 @@ def place_clearance(
 def _line_clearance(
     points: Any, rectangles: Any, discs: Discs, most: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance of a line through points from all obstacles, ``most`` if larger."""
+    """Return the distance of a line from all obstacles, or ``most`` if it is larger."""
     best = most
     for k in range(len(points) - 1):
         a, b = points[k], points[k + 1]
@@ -172,7 +179,7 @@ def _line_clearance(
 
 @njit(cache=True)
 def _spaced(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
-    """So many points of equal spacing along a line through points, ends included."""
+    """Return ``count`` points with equal spacing along a line, including its ends."""
     lengths = np.zeros(len(points))
     for k in range(1, len(points)):
         dx, dy = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
@@ -196,7 +203,7 @@ def _spaced(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
 def _sees(
     a: Any, b: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a segment keeps a clearance."""
+    """Return whether a segment keeps a clearance."""
     found = _clearance(a, b, rectangles, discs, clearance, clearance)
     return bool(found >= clearance)
 
@@ -205,7 +212,11 @@ def _sees(
 def _pulled(
     points: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> Any:  # pragma: no cover  (compiled)
-    """The points that are left where each sees the next; neighbours always do."""
+    """Pull a path taut: from each kept point, go straight to the last one that it sees.
+
+    The search from a point ends at the first point that it does not see. Consecutive
+    points always count as seeing each other.
+    """
     kept = np.empty_like(points)
     kept[0] = points[0]
     count, at = 1, 0
@@ -223,7 +234,10 @@ def _pulled(
 
 @njit(cache=True)
 def _averaged(points: Any, half: int) -> Any:  # pragma: no cover  (compiled)
-    """Moving average; towards the ends the window shrinks, so that they stay."""
+    """Return the moving average of points.
+
+    The window shrinks towards the ends, so that the end points do not move.
+    """
     out = np.empty_like(points)
     for k in range(len(points)):
         h = min(half, k, len(points) - 1 - k)
@@ -239,11 +253,17 @@ def _averaged(points: Any, half: int) -> Any:  # pragma: no cover  (compiled)
 def _rounded(
     pulled: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> Any:  # pragma: no cover  (compiled)
-    """Points of a route: as smooth as the clearance permits."""
+    """Round a taut path as smoothly as the clearance permits.
+
+    The function divides the path into fine points, and applies the moving averages. It
+    tries the windows from the widest to none. It stops when the route keeps the
+    clearance of the taut path, less a small allowance.
+    """
     count = max(math.ceil(_length(pulled) / _FINE_M), 1) + 1
     fine = _spaced(pulled, count)
     least = _line_clearance(pulled, rectangles, discs, clearance)
-    # An end may be much nearer to an obstacle than the clearance.
+    # An end may be much nearer to an obstacle than the clearance: limit the allowance
+    # to half of the distance there.
     least -= min(_ROUNDING_M, _ROUNDING_SHARE * clearance, 0.5 * least)
     route = pulled
     for half in _HALF_WINDOWS:
@@ -264,10 +284,13 @@ def _way_out(
     discs: Discs,
     clearance: float,
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """The nearest free cell to which a straight way leads no nearer to obstacles.
+    """Return the nearest free cell that a straight way reaches safely.
+
+    On this way, the distance from obstacles falls below that at the start by at most a
+    small allowance.
 
     Returns:
-        (-1, -1) where there is none within two clearances.
+        (-1, -1) if there is no such cell within two clearances.
     """
     here = place_clearance(end[0], end[1], rectangles, discs)
     least = min(here, clearance)
@@ -298,22 +321,25 @@ def find_route(
     discs: Discs,
     clearance: float,
 ) -> Any:  # pragma: no cover  (compiled)
-    """A route, for compiled code and where a robot plans anew.
+    """Finds a route from a start to a goal.
 
-    Ends nearer to obstacles than the clearance are left, and reached, by a straight way
-    that leads no nearer to them.
+    Start and goal may be nearer to obstacles than the clearance. A straight way that
+    leads no nearer to obstacles connects each of them with a free cell. A* then finds a
+    path of cells between these two cells. The path is pulled taut and rounded. This
+    function is for compiled code and for planning during a run.
 
     Args:
-        grid: With the cells blocked that are nearer to obstacles than the clearance.
+        grid: Grid in which the cells nearer to obstacles than the clearance are
+            blocked.
         start: (x, y) m.
         goal: (x, y) m.
         rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
-        discs: (n, 3) places and radii of others, m.
-        clearance: To be kept, m.
+        discs: (n, 3) positions and radii of other obstacles, m.
+        clearance: Distance to be kept, m.
 
     Returns:
-        (p, 2) points of equal spacing from start to goal, m, at most ``ROUTE_POINTS``;
-        none where there is no route.
+        (p, 2) points with equal spacing from start to goal, m, at most
+        ``ROUTE_POINTS``; empty if there is no route.
     """
     none = np.empty((0, 2))
     if math.hypot(goal[0] - start[0], goal[1] - start[1]) < _SHORTEST_M:
@@ -331,7 +357,7 @@ def find_route(
         points[k + 1, 0], points[k + 1, 1] = x, y
     for axis in range(2):
         points[0, axis], points[-1, axis] = start[axis], goal[axis]
-    # Once from either end: the second time corners are tauter.
+    # Pull the path taut from each end: the second pass makes corners tauter.
     pulled = _pulled(points, rectangles, discs, clearance)
     count = max(math.ceil(_length(pulled) / grid.cell_m), 1) + 1
     back = np.ascontiguousarray(_with_corners(pulled, count)[::-1])
@@ -341,7 +367,7 @@ def find_route(
 
 @njit(cache=True)
 def _with_corners(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
-    """Points along a line besides those that it is made of."""
+    """Return points along a line, including those that define it."""
     out = np.empty((count + 2 * len(points), 2))
     step, used = _length(points) / (count - 1), 0
     for k in range(len(points) - 1):
@@ -364,38 +390,41 @@ def plan_route(
     cell_m: float = 0.05,
     arena_margin_m: float = 2.0,
 ) -> Route:
-    """A short and smooth route for the centre of a disc.
+    """Plans a short and smooth route for the center of a disc.
 
-    A* on a grid of cells whose middles keep the clearance, pulled taut where straight
-    legs keep it, too, and rounded by two moving averages of 0.3 m, shorter ones where
-    these would come nearer to an obstacle than the clearance less 15 mm, or less 5 % of
-    it if that is less. The route keeps at least 92 % of the clearance from all known
-    obstacles. A route longer than 30 m may come nearer at sharp corners, where its
-    ``ROUTE_POINTS`` points are too far apart to follow the arc.
+    A* searches a grid of cells whose middles keep the clearance. The path is pulled
+    taut where straight legs keep the clearance, too. Two moving averages over 0.3 m
+    then round it. Shorter windows are used if the route would come nearer to an
+    obstacle than the clearance less 15 mm, or less 5 % of the clearance if this is
+    smaller. The route keeps at least 92 % of the clearance from all known obstacles. A
+    route longer than 30 m may come nearer at sharp corners: its ``ROUTE_POINTS`` points
+    are then too far apart to follow the arc.
 
     Args:
-        start: (x, y) in W, m. Where it is nearer to an obstacle than the clearance, the
-            route leads away from it first.
+        start: (x, y) in W, m. If it is nearer to an obstacle than the clearance, the
+            route first leads away from it.
         goal: (x, y) in W, m.
         rectangles: (k, 5) known obstacles in W, see ``systems.world.geometry``.
-        clearance_m: The route keeps at least 92 % of it from them, m.
+        clearance_m: Clearance from known obstacles, m. The route keeps at least 92 % of
+            it.
         cell_m: Side of a cell, m.
-        arena_margin_m: The route stays in the least rectangle about start, goal and
-            obstacles, and this margin, m.
+        arena_margin_m: Margin around the smallest rectangle that contains start, goal
+            and obstacles, m. The route stays within this area.
 
     Returns:
         The route.
 
     Raises:
-        InputError: Start or goal lies in an obstacle, the goal too near to one or at
-            the start, there is no way, or the grid does not serve; names the field.
+        InputError: Start or goal lies in an obstacle; the goal is too near to an
+            obstacle or to the start; there is no route; or the grid does not fit. The
+            error names the field.
 
     Reference: Engelbrecht, Steyn and Djouani (2021), sec. 2 names A* and prints no
     grid; Hart, Nilsson and Raphael (1968).
     """
     known: NDArray[np.float64] = np.array(rectangles, dtype=float).reshape(-1, 5)
     discs: NDArray[np.float64] = np.empty((0, 3))
-    # Whole numbers would be compiled anew.
+    # Integers would trigger a new compilation.
     start = float(start[0]), float(start[1])
     goal = float(goal[0]), float(goal[1])
     off = place_clearance(*goal, known, discs)

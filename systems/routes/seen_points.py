@@ -1,4 +1,4 @@
-"""What a robot remembers of the objects that it has seen, for planning anew."""
+"""Memory of the objects that a robot has seen, for planning again."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import OccupancyGrid, cell_of
 from systems.routes.route import place_clearance
 
-#: Points that are remembered at most; then the oldest are forgotten.
+#: Largest number of remembered points; further points replace the oldest.
 _MOST_POINTS = 4_000
-#: What is known to be slower rests, m/s.
+#: Objects below this speed count as at rest, m/s.
 _RESTS_M_S = 0.02
 
 
 class SeenPoints(NamedTuple):
-    """The first point that was seen in each cell; changed by ``remember_objects``."""
+    """The first point seen in each cell; changed by ``remember_objects``."""
 
     points: NDArray[np.float64]
     """(k, 2) in W, m."""
     taken: NDArray[np.bool_]
-    """(n, m) cells of the grid that have one."""
+    """(n, m) cells of the grid that have a point."""
     added: NDArray[np.int64]
-    """(1,) how many were remembered: the oldest is replaced."""
+    """(1,) number of points remembered so far; a new point replaces the oldest."""
 
 
 def make_seen_points(grid: OccupancyGrid) -> SeenPoints:
-    """An empty memory for a grid."""
+    """Returns an empty memory for a grid."""
     return SeenPoints(
         np.zeros((min(_MOST_POINTS, grid.blocked.size), 2)),
         np.zeros(grid.blocked.shape, dtype=np.bool_),
@@ -42,6 +42,7 @@ def make_seen_points(grid: OccupancyGrid) -> SeenPoints:
 
 @njit(cache=True)
 def _moves(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
+    """Return whether an object is known to move."""
     speed = math.hypot(objects[at + VX], objects[at + VY])
     return objects[at + KNOWN] > 0.5 and speed > _RESTS_M_S
 
@@ -50,15 +51,16 @@ def _moves(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
 def remember_objects(
     seen: SeenPoints, grid: OccupancyGrid, rectangles: Any, objects: Any, p_WP: Any
 ) -> None:  # pragma: no cover  (compiled)
-    """Remembers the nearest points of what is there and is not known to move.
+    """Remembers the nearest points of objects that are not known to move.
 
-    Robots move, sooner or later, and what is known need not be remembered.
+    The function ignores robots, because they will move sooner or later. It also ignores
+    points near known obstacles.
 
     Args:
         seen: Changed.
-        grid: For its cells.
+        grid: Grid whose cells get at most one point each.
         rectangles: (k, 5) known obstacles in W.
-        objects: (64,) as the port ``objects_W``.
+        objects: (64,) value of the port ``objects_W``.
         p_WP: (x, y) of P, m.
     """
     for slot in range(OBJECT_SLOTS):
@@ -73,6 +75,7 @@ def remember_objects(
             continue
         if place_clearance(x, y, rectangles, np.empty((0, 3))) < grid.cell_m:
             continue
+        # With a full memory, replace the oldest point.
         most = len(seen.points)
         k = seen.added[0] % most
         if seen.added[0] >= most:
@@ -87,15 +90,15 @@ def remember_objects(
 def discs_to_avoid(
     seen: SeenPoints, objects: Any, p_WP: Any
 ) -> Any:  # pragma: no cover  (compiled)
-    """All that a route has to keep off now: what was seen, and robots that rest.
+    """Lists all discs that a route has to avoid now: seen points, and robots at rest.
 
     Args:
-        seen: What is remembered.
-        objects: (64,) as the port ``objects_W``.
+        seen: Remembered points.
+        objects: (64,) value of the port ``objects_W``.
         p_WP: (x, y) of P, m.
 
     Returns:
-        (n, 3) places and radii of discs, m.
+        (n, 3) positions and radii of discs, m.
     """
     count = min(seen.added[0], len(seen.points))
     discs = np.zeros((count + OBJECT_SLOTS, 3))
@@ -108,7 +111,7 @@ def discs_to_avoid(
         if _moves(objects, at):
             continue
         x, y, radius = objects[at + X], objects[at + Y], objects[at + RADIUS]
-        # The disc lies behind its nearest point.
+        # The middle of the disc is behind its nearest point.
         longer = 1.0 + radius / max(math.hypot(x, y), 1e-9)
         discs[count, 0], discs[count, 1] = p_WP[0] + longer * x, p_WP[1] + longer * y
         discs[count, 2] = radius

@@ -1,1 +1,1 @@
-"""What the robot knows to be free, and the guard that keeps it there."""
+"""The memory of free space, and the guard that keeps the robot there."""

@@ -1,4 +1,4 @@
-"""Whether a command can be obeyed for a tick, and then braked to rest in free space."""
+"""Check that a robot can obey a command and then brake to rest in free space."""
 
 from __future__ import annotations
 
@@ -20,73 +20,77 @@ from systems.safety.free_space import (
 )
 from systems.safety.views import IN_PLACE_M, REST_M
 
-#: What was done with a wish.
+#: Actions of the guard.
 PASSED, SLOWED, TURNED, BRAKED, HALTED = range(5)
-#: Shares of a wish that are tried, from all of it on.
+#: Shares of the wanted wheel speeds that are tried, the largest first.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 
-#: A robot turns in its place where it is commanded no faster ahead, m/s, and where the
-#: lag leaves it no way ahead but ``IN_PLACE_M``.
+#: A robot turns on the spot if two conditions hold. Its command drives it forward no
+#: faster than this, m/s. The lag leaves it no longer way forward than ``IN_PLACE_M``.
 _IN_PLACE_M_S = 1e-6
-#: It withdraws from what is in view where it gets away by this share of its way: more,
-#: and it may not go on past what comes from behind.
+#: The robot withdraws from obstacles in view if at least this share of its motion leads
+#: away from them. With a larger share, it could not drive on past an obstacle that
+#: comes from behind.
 _WITHDRAWS = 0.2
-#: Where a robot is nearer than it should be, it may come so much nearer in a tick, m.
+#: A robot between ``least_m`` and ``keep_m`` may come nearer by this much per tick, m.
+#: It can then drive along an edge.
 _SLACK_M = 5e-4
 
 
 class BrakingNumbers(NamedTuple):
-    """How the robot moves and brakes, and how far it keeps off."""
+    """How the robot moves and brakes, and which distances it keeps."""
 
     wheel_radius_m: float
     wheel_separation_m: float
     motor_lag_s: float
     """Time constant of the wheels' speeds, s."""
     braking_m_s2: float
-    """Of the faster rim's commanded speed."""
+    """Deceleration of the commanded speed of the faster rim, m/s^2."""
     tick_s: float
     parts: int
-    """Of a tick, at whose ends places are looked at."""
+    """Number of parts of a tick. The guard compares the position with cells at the end
+    of each part."""
     part: LaggedMotion
-    """Of the wheels in such a part."""
+    """Motion of the wheels in one part."""
     top_wheel_speed: float
-    """rad/s."""
+    """Top speed of a wheel, rad/s."""
     keep_m: float
-    """Distance of the axle from what is not free, m: radius of the body, and margin."""
+    """Distance of the axle from space that is not free, m: radius of the body, and
+    margin."""
     least_m: float
-    """The same where a robot has come nearer than it should, m."""
+    """Smaller distance for a robot that has come nearer than ``keep_m``, m."""
     obstacle_speed_m_s: float
-    """Largest speed of what is in view, m/s; 0: all rests."""
+    """Largest speed of obstacles in view, m/s; 0: all obstacles are at rest."""
     slow_turn_rad_s: float
-    """A robot that turns no faster, in its place, counts as at rest."""
+    """A robot that turns on the spot no faster than this counts as at rest, rad/s."""
 
 
 class Danger(NamedTuple):
-    """What a robot has to keep off, at one tick."""
+    """Cells and views that a robot has to avoid, at one tick."""
 
     corners: NDArray[np.float64]
-    """(m, 2) of cells that are not free, ``edge_cells``, m."""
+    """(m, 2) corners of cells that are not free, from ``edge_cells``, m."""
     corner_count: int
-    """How many of them there are."""
+    """Number of these cells."""
     cell_m: float
     distance_m: float
-    """Of the axle from the nearest of them now, m."""
+    """Distance of the axle from the nearest of these cells now, m."""
     arcs: NDArray[np.float64]
-    """(sensors, points, 2) where each sensor's view ends, m."""
+    """(sensors, points, 2) points at which the view of each sensor ends, m."""
     ages: NDArray[np.float64]
-    """(sensors,) for how long that is so, s."""
+    """(sensors,) time since the view of each sensor was updated, s."""
     view_distance_m: float
-    """Of the axle from where the view ends now, m."""
+    """Distance of the axle from the end of the view now, m."""
 
 
 @register_jitable
 def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, float]:
-    """Wheel speeds after a period in which a command was held.
+    """Computes the wheel speeds after a period with a constant command.
 
     Args:
-        speeds: Of the left and the right wheel before, rad/s.
-        commanded: The same, held.
-        kept: Share of the difference that the lag leaves.
+        speeds: Speeds of the left and right wheel at the start, rad/s.
+        commanded: Commanded speeds, rad/s.
+        kept: Share of the difference that the lag leaves at the end.
 
     Returns:
         Left and right, rad/s.
@@ -100,13 +104,13 @@ def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, floa
 def roll_on(
     pose: Any, speeds: Any, commanded: Any, numbers: BrakingNumbers
 ) -> tuple[Any, Any]:  # pragma: no cover  (compiled)
-    """Pose and wheel speeds a part of a tick later, of a plant without slip.
+    """Computes pose and wheel speeds after a part of a tick, without slip.
 
     Args:
         pose: (x, y, theta), m and rad.
-        speeds: Of the left and the right wheel, rad/s.
-        commanded: The same, held.
-        numbers: The plant.
+        speeds: Speeds of the left and right wheel, rad/s.
+        commanded: Commanded speeds, rad/s, constant in this part.
+        numbers: Model of the robot.
 
     Returns:
         (x, y, theta) and the speeds.
@@ -134,14 +138,14 @@ def roll_on(
 def braked(
     commanded: Any, numbers: BrakingNumbers
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """The command of a tick later when braking: slower, along the same curve.
+    """Computes the next command when braking: slower, along the same curve.
 
     Args:
-        commanded: Left and right wheel, rad/s.
-        numbers: How it brakes.
+        commanded: Speeds of the left and right wheel, rad/s.
+        numbers: Deceleration.
 
     Returns:
-        Left and right wheel, rad/s.
+        Speeds of the left and right wheel, rad/s.
     """
     fastest = max(abs(commanded[0]), abs(commanded[1])) * numbers.wheel_radius_m
     less = numbers.braking_m_s2 * numbers.tick_s
@@ -155,7 +159,11 @@ def braked(
 def _nearest_view(
     danger: Danger, x: float, y: float, ahead_s: float, speed: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Of a place from where the view ends, less what may come nearer until then, m."""
+    """Return the distance of a place from the nearest end of a view, m.
+
+    The distance is reduced by the way that an obstacle at ``speed`` may have covered
+    since the reading, up to ``ahead_s`` from now.
+    """
     nearest = np.inf
     for sensor in range(danger.arcs.shape[0]):
         best = np.inf
@@ -173,23 +181,32 @@ def _nearest_view(
 def can_be_braked(
     pose: Any, speeds: Any, commanded: Any, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a command may be obeyed for a tick.
+    """Returns whether the robot may obey a command for a tick.
 
-    It may if on the way to rest, braking after that tick, the axle keeps off by
-    ``keep_m`` what is not free. Where it is nearer now, it may not come nearer (but for
-    ``_SLACK_M``, so that it can drive along an edge), nor below ``least_m``. Where it
-    is nearer than that, as where cells beside it are forgotten, the way has to lead
-    away, and no point of a cell so near may come nearer.
+    The function predicts this motion: the robot obeys the command for one tick, and
+    then brakes to rest. It checks the position of the axle after each part of a tick.
+    The required distance from cells that are not free depends on the distance now:
 
-    Of what is in view the same holds after each time t with ``obstacle_speed_m_s`` t
-    more; or the robot withdraws from it.
+    * The robot is at least at ``keep_m``: it has to keep ``keep_m``.
+    * It is nearer, but not below ``least_m``: it may come nearer by at most
+      ``_SLACK_M``, and never below ``least_m``.
+    * It is below ``least_m``, for example because nearby cells were forgotten. It may
+      not come nearer, and has to end farther away. No cell within ``least_m`` may come
+      nearer with any of its points.
+
+    A turn on the spot does not move the disc, so these limits do not apply to it.
+
+    If obstacles may move, the axle also has to keep ``keep_m`` from the points that an
+    obstacle may reach from the end of a view. Such an obstacle moves at
+    ``obstacle_speed_m_s`` since the reading. As an alternative, the robot may withdraw
+    from the end of the view. A slow turn on the spot counts as rest and is not checked.
 
     Args:
         pose: (x, y, theta) now, m and rad.
-        speeds: Of the left and the right wheel now, rad/s.
+        speeds: Speeds of the left and right wheel now, rad/s.
         commanded: The command, rad/s.
-        danger: What to keep off.
-        numbers: The robot.
+        danger: Cells and views to avoid.
+        numbers: Model of the robot.
 
     Returns:
         Whether it may.
@@ -198,17 +215,18 @@ def can_be_braked(
     now, keep, least = danger.distance_m, numbers.keep_m, numbers.least_m
     near = now < least
     need = now if near else max(min(keep, now - _SLACK_M), least)
-    # A robot that turns in its place stays within its disc.
+    # A robot that turns on the spot stays within its disc.
     in_place = (
         _ahead(commanded, radius) < _IN_PLACE_M_S
         and _ahead(speeds, radius) * lag < IN_PLACE_M
     )
-    if now <= 0.0 and not in_place:  # nobody knows which way leads out of there
+    if now <= 0.0 and not in_place:  # the way out is unknown
         return False
     turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
     slow = in_place and turn <= numbers.slow_turn_rad_s
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
     begin = pose
+    # Predict until the wheels are at rest, and brake after the first tick.
     part_s = numbers.tick_s / numbers.parts
     parts = 0
     while True:
@@ -221,12 +239,14 @@ def can_be_braked(
             reached < need or (near and _enters(begin, pose, danger, least))
         ):
             return False
-        # Of the axle, or of the disc's rim by the turn.
+        # Motion of the axle, or of the rim of the disc by the turn.
         moved = max(way, keep * abs(pose[2] - begin[2]))
         if moving and not _keeps_off_moving(
             (x, y), parts * part_s, moved, danger, numbers
         ):
             return False
+        # At rest: the check is complete. A motion that began too near has to end
+        # farther away.
         fastest = max(abs(speeds[0]), abs(speeds[1])) * radius
         if commanded[0] == 0.0 and commanded[1] == 0.0 and fastest * lag < REST_M:
             return in_place or not near or reached >= now + 0.05 * way
@@ -238,17 +258,18 @@ def can_be_braked(
 def _enters(
     begin: Any, pose: Any, danger: Danger, radius: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a disc has come nearer to a point of a cell that is not free.
+    """Return whether a disc has come nearer to a point of a cell that is not free.
 
-    What the disc holds at the begin is free of obstacles, whatever is remembered of it;
-    so are points farther from its middle now than then: those on one side of a line. A
-    cell is, if its corners are.
+    The disc at the start contains no obstacle, whatever the memory says about its
+    cells. A point in the disc now may have been nearer to the middle at the start. Then
+    it was in the disc at the start, too, and contains no obstacle. Such points lie on
+    one side of the bisector between both middles. A cell lies there if its corners do.
 
     Args:
-        begin: (x, y) of its middle at the begin, m.
-        pose: The same now.
-        danger: Has the cells.
-        radius: Of the disc, m.
+        begin: (x, y) of the middle at the start, m.
+        pose: (x, y, theta) now, m and rad.
+        danger: Contains the cells.
+        radius: Radius of the disc, m.
     """
     x, y, cell = pose[0], pose[1], danger.cell_m
     back_x, back_y = begin[0] - x, begin[1] - y
@@ -257,7 +278,7 @@ def _enters(
         u, v = danger.corners[k, 0] - x, danger.corners[k, 1] - y
         du, dv = max(u, 0.0, -u - cell), max(v, 0.0, -v - cell)
         if du * du + dv * dv < radius * radius:
-            # The corner that is farthest ahead.
+            # Check the corner that is farthest from the start, along the motion.
             ahead = back_x * (u + (cell if back_x < 0.0 else 0.0))
             ahead += back_y * (v + (cell if back_y < 0.0 else 0.0))
             if ahead < line - 1e-12:
@@ -267,7 +288,7 @@ def _enters(
 
 @njit(cache=True)
 def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (compiled)
-    """Speed of the axle, ahead or back, m/s."""
+    """Return the speed of the axle, forward or backward, m/s."""
     return abs(0.5 * (speeds[0] + speeds[1]) * wheel_radius_m)
 
 
@@ -275,7 +296,10 @@ def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (c
 def _keeps_off_moving(
     place: Any, ahead_s: float, moved: float, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether nothing in view can come near by then, or the robot withdraws from it."""
+    """Return whether the robot keeps away from obstacles in view that may move.
+
+    It does if no such obstacle can be near at that time, or if the robot withdraws.
+    """
     x, y = place
     speed = numbers.obstacle_speed_m_s
     if _nearest_view(danger, x, y, ahead_s, speed) >= numbers.keep_m:
@@ -288,25 +312,26 @@ def _keeps_off_moving(
 def danger_of(
     space: FreeSpace, time: float, pose: Any, reach: Any, numbers: BrakingNumbers
 ) -> Danger:  # pragma: no cover  (compiled)
-    """What a robot has to keep off.
+    """Collects the cells and views that a robot has to avoid.
 
     Args:
-        space: What it knows.
+        space: Memory of free space.
         time: s.
         pose: (x, y, theta) now, m and rad.
-        reach: How far from the axle cells are looked at, m, and for what rolled way
-            they have to stay free, m.
-        numbers: The robot.
+        reach: Distance from the axle within which cells are collected, m, and the
+            rolled way for which they have to stay free, m.
+        numbers: Model of the robot.
 
     Returns:
-        All that ``can_be_braked`` takes.
+        Input of ``can_be_braked``.
     """
-    # As many as there are cells in that square.
+    # The square contains at most this number of cells.
     corners = np.empty((int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
     until = space.facts[0, ROLLED] + reach[1]
     x, y = pose[0], pose[1]
     count = edge_cells(space, x, y, reach[0], until, corners)
     distance = nearest_cell(corners, count, space.cell_m, x, y)
+    # In a cell that is not free, the distance is 0.
     i, j = math.floor(x / space.cell_m), math.floor(y / space.cell_m)
     if not cell_is_free(space, i, j, until):
         distance = 0.0
@@ -329,21 +354,26 @@ def chosen(
     danger: Danger,
     numbers: BrakingNumbers,
 ) -> tuple[int, tuple[float, float]]:  # pragma: no cover  (compiled)
-    """What to command: a wish, as far as it can be braked, or the brake.
+    """Chooses the command: the wanted one as far as the robot can brake, or the brake.
 
-    Tried are the wish, less of it along the same curve, its turn while the way ahead is
-    braked, a slow turn, and at last braking as it was found possible before.
+    The function tries these commands in order and returns the first that passes:
+
+    1. the wanted wheel speeds, and smaller shares of them along the same curve;
+    2. the wanted turn, while the forward motion brakes;
+    3. the same turn, but slow enough to count as rest;
+    4. braking along the current curve, which was checked in the previous tick.
 
     Args:
         pose: (x, y, theta) now, m and rad.
-        speeds: Of the left and the right wheel now, rad/s.
-        wish: Left and right wheel, rad/s.
+        speeds: Speeds of the left and right wheel now, rad/s.
+        wish: Wanted speeds of the left and right wheel, rad/s.
         commanded: The last command, rad/s.
-        danger: What to keep off.
-        numbers: The robot.
+        danger: Cells and views to avoid.
+        numbers: Model of the robot.
 
     Returns:
-        What is done, ``PASSED`` to ``BRAKED``, and left and right wheel, rad/s.
+        Action, from ``PASSED`` to ``BRAKED``, and speeds of the left and right wheel,
+        rad/s.
     """
     for number in range(len(_SHARES)):
         share = _SHARES[number]
@@ -352,14 +382,15 @@ def chosen(
             return PASSED if number == 0 else SLOWED, part
     slower = braked(commanded, numbers)
     ahead, turn = 0.5 * (slower[0] + slower[1]), 0.5 * (wish[1] - wish[0])
-    # What a wheel cannot do would be less of a turn than was looked at.
+    # Limit the turn to the wheels' top speed: otherwise the robot would turn less than
+    # predicted.
     most = numbers.top_wheel_speed - abs(ahead)
     turn = min(max(turn, -most), most)
     part = ahead - turn, ahead + turn
     if can_be_braked(pose, speeds, part, danger, numbers):
         return TURNED, part
-    # Slowly enough to count as rest, it may always turn: it could never get away from
-    # what stands near by, else.
+    # A turn slow enough to count as rest is always permitted on the spot: otherwise the
+    # robot could never get away from a nearby obstacle.
     slow = numbers.slow_turn_rad_s * numbers.wheel_separation_m
     slow *= 0.5 / numbers.wheel_radius_m
     turn = min(max(turn, -slow), slow)

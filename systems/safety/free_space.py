@@ -1,4 +1,4 @@
-"""What range sensors have seen free of the floor around a robot, in square cells."""
+"""Square cells of the floor around a robot that range sensors have seen free."""
 
 from __future__ import annotations
 
@@ -14,47 +14,49 @@ from systems.safety.views import Sectors, lasting
 
 register_jitable(lasting)
 
-#: Places in ``FreeSpace.facts``.
+#: Indices of ``FreeSpace.facts``.
 FIRST_I, FIRST_J, ROLLED, TICK = range(4)
-#: A cell that was never seen free.
+#: Value of a cell that was never seen free.
 NEVER = -1.0
-#: How far the window's middle may lie behind the robot, cells, and of a small window
-#: which share.
+#: The window moves when its middle is this far from the robot, cells. In a small
+#: window, the limit is its side divided by the second number.
 _SLACK = 20
 _SLACK_SHARE = 8
-#: With a reading every so many-th row of cells is entered: the rest can wait.
+#: Each reading updates one of this many rows; the other rows follow with later
+#: readings.
 _ROWS = 4
-#: Hits of a cell at this distance count full, farther ones less: arcs are longer, m.
+#: Echoes from up to this distance count fully. Farther echoes count less, because their
+#: arcs are longer, m.
 _FULL_HIT_M = 0.6
 
 
 class FreeSpace(NamedTuple):
-    """A square window of n x n cells of the floor, which moves along with a robot.
+    """A square window of n x n cells of the floor that moves along with a robot.
 
-    Cell (i, j) of the floor covers x from i to i + 1 and y from j to j + 1 cells, in
-    the frame of the odometry, and is kept at [i % n, j % n].
+    Cell (i, j) of the floor covers x from i to i + 1 and y from j to j + 1, in cells,
+    in the frame of the odometry. Its values are stored at [i % n, j % n].
     """
 
     free_until: NDArray[np.float64]
-    """(n, n) m of the rolled way up to which a cell counts as seen free: from then on
-    its place is not known well enough. ``NEVER``: it was not seen free."""
+    """(n, n) rolled way up to which a cell counts as free, m. Beyond this way its
+    position is too uncertain. ``NEVER``: the cell was not seen free."""
     seen_s: NDArray[np.float64]
-    """(n, n) time at which it was last seen free, s; ``NEVER``."""
+    """(n, n) time at which a cell was last seen free, s, or ``NEVER``."""
     hits: NDArray[np.float64]
-    """(n, n) how often an echo came from about there since it was last seen free."""
+    """(n, n) number of echoes from about there since the cell was last seen free."""
     facts: NDArray[np.float64]
-    """(1, 4): i and j of the window's first cell, rolled way, m, tick of the last
+    """(1, 4): i and j of the first cell of the window; rolled way, m; tick of the last
     change."""
     arcs: NDArray[np.float64]
-    """(sensors, points, 2) where each sensor's view ends, at what it has last read:
-    points of an arc from its right to its left, m."""
+    """(sensors, points, 2) points of the arc at which the view of each sensor ends,
+    from its right to its left edge, m. The arc follows from the last reading."""
     arcs_s: NDArray[np.float64]
-    """(sensors, 1) when it has read that, s; ``NEVER``."""
+    """(sensors, 1) time of that reading, s, or ``NEVER``."""
     cell_m: float
     """Side of a cell, m."""
 
     def copy(self) -> FreeSpace:
-        """The same in arrays of its own."""
+        """Returns a copy with its own arrays."""
         return FreeSpace(
             np.copy(self.free_until),
             np.copy(self.seen_s),
@@ -69,16 +71,16 @@ class FreeSpace(NamedTuple):
 def make_free_space(
     cells: int, cell_m: float, sensors: int, arc_points: int
 ) -> FreeSpace:
-    """A window in which nothing was seen.
+    """Makes a window without any free cells.
 
     Args:
-        cells: Along each side.
+        cells: Number of cells along each side.
         cell_m: Side of a cell, m.
         sensors: Number of sensors.
-        arc_points: Points of each sensor's arc.
+        arc_points: Number of points of each sensor's arc.
 
     Returns:
-        The window, with the floor's origin in its middle.
+        The window, with the origin of the floor in its middle.
     """
     facts = np.array([[-(cells // 2), -(cells // 2), 0.0, NEVER]])
     return FreeSpace(
@@ -96,16 +98,16 @@ def make_free_space(
 def cell_is_free(
     space: FreeSpace, i: int, j: int, until: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a cell counts as free.
+    """Returns whether a cell counts as free.
 
     Args:
         space: The window.
-        i: Of the cell on the floor.
-        j: See i.
+        i: Number of the cell on the floor along x.
+        j: Number of the cell on the floor along y.
         until: Rolled way up to which it has to be free, m.
 
     Returns:
-        Whether it does; what is not in the window does not.
+        Whether it does. Cells outside the window are not free.
     """
     cells = space.free_until.shape[0]
     di, dj = i - space.facts[0, FIRST_I], j - space.facts[0, FIRST_J]
@@ -118,12 +120,12 @@ def cell_is_free(
 def move_window(
     space: FreeSpace, x: float, y: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the window along with the robot; what leaves it is forgotten.
+    """Moves the window along with the robot, and forgets the cells that leave it.
 
     Args:
         space: Changed.
-        x: Where the robot is, m.
-        y: See x.
+        x: Position of the robot, m.
+        y: Position of the robot, m.
     """
     cells = space.free_until.shape[0]
     slack = min(_SLACK, cells // _SLACK_SHARE)
@@ -134,8 +136,8 @@ def move_window(
         if abs(wanted - first) <= slack:
             continue
         for k in range(min(first, wanted), max(first, wanted)):
-            # Cells k leave on one side, and k + cells enter on the other, or vice
-            # versa: both are kept at the same place.
+            # Cells k leave on one side, and cells k + n enter on the other, or vice
+            # versa. Both are stored at the same index, so clearing one row is enough.
             for other in range(cells):
                 i, j = (k % cells, other) if axis == 0 else (other, k % cells)
                 space.free_until[i, j] = NEVER
@@ -148,12 +150,12 @@ def move_window(
 def clear_disc(
     space: FreeSpace, x: float, y: float, radius: float, until: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Counts the cells that lie wholly within a disc as free.
+    """Marks the cells that lie entirely within a disc as free.
 
     Args:
         space: Changed.
-        x: Centre, m.
-        y: See x.
+        x: Position of the center, m.
+        y: Position of the center, m.
         radius: m.
         until: Rolled way up to which they are free, m.
     """
@@ -177,25 +179,26 @@ def clear_disc(
 def edge_cells(
     space: FreeSpace, x: float, y: float, reach: float, until: float, out: Any
 ) -> int:  # pragma: no cover  (compiled)
-    """Cells that are not free, next to one that is, within a square around a place.
+    """Lists the cells that are not free and next to a free one, within a square.
 
-    What is not free begins with these: no other is nearer to a place that is free.
+    These cells are the edge of the space that is not free. No other cell that is not
+    free is nearer to a place in free space.
 
     Args:
         space: The window.
-        x: Middle of the square, m.
-        y: See x.
-        reach: Half of its side, m.
+        x: Position of the middle of the square, m.
+        y: Position of the middle of the square, m.
+        reach: Half of the side of the square, m.
         until: Rolled way up to which cells have to be free, m.
         out: (m, 2) filled with the corners of least x and y of the cells, m.
 
     Returns:
-        How many they are; more than m: only m of them are there.
+        Number of these cells. If it exceeds m, ``out`` contains only m of them.
     """
     cell, count = space.cell_m, 0
     low_i, low_j = math.floor((x - reach) / cell), math.floor((y - reach) / cell)
     high_i, high_j = math.floor((x + reach) / cell), math.floor((y + reach) / cell)
-    # The square with a cell more around it.
+    # The square, enlarged by one cell on each side.
     free = _free_cells(space, low_i - 1, low_j - 1, high_i + 1, high_j + 1, until)
     for a in range(1, free.shape[0] - 1):
         for b in range(1, free.shape[1] - 1):
@@ -213,7 +216,7 @@ def edge_cells(
 def _free_cells(
     space: FreeSpace, low_i: int, low_j: int, high_i: int, high_j: int, until: float
 ) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
-    """``cell_is_free`` of the cells of a rectangle."""
+    """Return ``cell_is_free`` for all cells of a rectangle."""
     cells = space.free_until.shape[0]
     first_i, first_j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
     free = np.zeros((high_i - low_i + 1, high_j - low_j + 1), dtype=np.bool_)
@@ -233,14 +236,14 @@ def _free_cells(
 def nearest_cell(
     corners: Any, count: int, cell: float, x: float, y: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance of a place from the nearest of some cells.
+    """Returns the distance of a place from the nearest of several cells.
 
     Args:
-        corners: (m, 2) of least x and y of the cells, m.
-        count: How many of them there are.
+        corners: (m, 2) corners of least x and y of the cells, m.
+        count: Number of cells in this array.
         cell: Side of a cell, m.
-        x: The place, m.
-        y: See x.
+        x: Position of the place, m.
+        y: Position of the place, m.
 
     Returns:
         m; infinite without cells.
@@ -263,30 +266,41 @@ def see(
     readings: Any,
     error: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Enters what the sensors have just read.
+    """Enters the newest readings of the sensors into the cells.
+
+    Sensors at one place form a group. For each group, the function visits the cells of
+    its sector within the greatest distance seen. The circle around a cell hides an
+    angle of the view. The cell becomes free if the group has seen all of this angle
+    free, beyond the circle. If an echo comes from the distance of the cell, in the
+    direction of its middle, the cell gets a hit. A cell that becomes free loses all
+    hits.
 
     Args:
         space: Changed.
         time: s.
-        turn: Of the rows: every fourth row of cells is entered, by turns.
+        turn: Number that selects the rows: only every fourth row of cells is updated.
         pose: (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
-        readings: (sensors, 2) of each sensor up to where it has seen free, m, 0: not
-            at all, and where its echo came from, m, infinite: from nowhere.
+        readings: (sensors, 2) distance up to which each sensor has seen free, m, and
+            distance of its echo, m. Without a new reading the first is 0. Without an
+            echo the second is infinite.
         error: ``PlaceError``.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
+    # Radius of the circle around a cell.
     half = cell * math.sqrt(0.5)
     seen = _of_sectors(sectors, readings)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
         ahead, aside = sectors.places[group]
+        # Position of the group in the frame of the odometry.
         sx, sy = pose[0] + c * ahead - s * aside, pose[1] + s * ahead + c * aside
         right, left = sectors.right[begin, 0], sectors.left[end - 1, 0]
         from_axle = math.hypot(ahead, aside)
         farthest = np.max(seen[begin:end, 2])
         box = _sector_box(sx, sy, pose[2] + right, pose[2] + left, farthest + cell)
+        # Rectangle of cells that contains the sector, within the window.
         low_i = max(math.floor(box[0] / cell), int(space.facts[0, FIRST_I]))
         low_j = max(math.floor(box[1] / cell), int(space.facts[0, FIRST_J]))
         high_i = min(
@@ -303,7 +317,7 @@ def see(
                 if squared > (farthest + half) ** 2 or squared < 4.0 * half * half:
                     continue
                 distance = math.sqrt(squared)
-                # From the right edge of the group.
+                # Bearing of the cell from the right edge of the group.
                 bearing = (math.atan2(dy, dx) - pose[2] - right) % math.tau
                 free, echo = _in_direction(
                     bearing, math.asin(half / distance), sectors, seen, begin, end
@@ -324,7 +338,12 @@ def see(
 def _of_sectors(
     sectors: Sectors, readings: Any
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Of each sector up to where it was seen free, whence an echo, the farther, m."""
+    """Combine the readings of the sensors that see each sector.
+
+    Returns:
+        (sectors, 3) distance seen free, distance of the nearest echo, and the greater
+        of both, m. Without an echo, the third is the first.
+    """
     seen = np.empty((len(sectors.right), 3))
     for k in range(len(seen)):
         free, echo = 0.0, np.inf
@@ -341,15 +360,20 @@ def _of_sectors(
 def _in_direction(
     bearing: float, hides: float, sectors: Sectors, seen: Any, begin: int, end: int
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Up to where a group has seen free what a cell hides, and the echo there, m.
+    """Return the distance seen free behind a cell, and the distance of an echo, m.
+
+    The distance seen free is the least one of all sectors that overlap the angle that
+    the cell hides. It is 0 if a part of this angle is outside the group. The echo is
+    that of the sector that contains the middle of the cell.
 
     Args:
-        bearing: Of the cell, from the right edge of the group, rad, 0 to a turn.
+        bearing: Bearing of the cell from the right edge of the group, rad, from 0 to a
+            full turn.
         hides: Half of the angle that the cell hides, rad.
-        sectors: Of all groups.
+        sectors: Sectors of all groups.
         seen: From ``_of_sectors``.
         begin: First sector of the group.
-        end: The one after its last.
+        end: One after the last sector of the group.
     """
     right = sectors.right[begin, 0]
     span = sectors.left[end - 1, 0] - right
@@ -360,6 +384,7 @@ def _in_direction(
     free, echo = np.inf, np.inf
     for k in range(begin, end):
         a, b = sectors.right[k, 0] - right, sectors.left[k, 0] - right
+        # In a full circle, the angle may overlap the sector across the right edge.
         beyond = around and (a < high - math.tau or b > low + math.tau)
         if beyond or (a < high and b > low):
             free = min(free, seen[k, 0])
@@ -378,16 +403,16 @@ def end_view(
     direction: Any,
     reach: float,
 ) -> None:  # pragma: no cover  (compiled)
-    """Enters where a sensor's view ends.
+    """Stores the arc at which the view of a sensor ends.
 
     Args:
         space: Changed.
-        sensor: Its number.
+        sensor: Number of the sensor.
         time: s.
         pose: (x, y, theta) of the robot by its odometry, m and rad.
-        place: (x, y) of the sensor from the axle in B, m.
-        direction: Its axis in B and half of its aperture, rad.
-        reach: Up to where it has seen free, m.
+        place: (x, y) of the sensor relative to the axle in B, m.
+        direction: Direction of its axis in B and half of its aperture, rad.
+        reach: Distance up to which it has seen free, m.
     """
     axis, half_angle = direction
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -404,7 +429,11 @@ def end_view(
 def _sector_box(
     x: float, y: float, right: float, left: float, reach: float
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Least and greatest x and y of a sector of a disc, m."""
+    """Return the least and greatest x and y of a sector of a disc, m.
+
+    The extremes are at the center, at the two ends of the arc, or where the arc crosses
+    a direction of an axis.
+    """
     low_x, low_y, high_x, high_y = x, y, x, y
     quarter = math.ceil(right / (math.pi / 2.0))
     angle = right

@@ -1,4 +1,4 @@
-"""The memory of space: what the range sensors have seen free, and what they echoed."""
+"""The memory of space: where range sensors have seen free floor or received echoes."""
 
 from __future__ import annotations
 
@@ -29,52 +29,52 @@ from systems.safety.free_space import (
 from systems.safety.parameters import FreeSpaceParameters
 from systems.safety.views import PlaceError, Sectors, lasting, sensor_sectors
 
-#: Points of a sensor's arc are this near to one another, seen from it, rad.
+#: Largest angle between two points of a sensor's arc, seen from the sensor, rad.
 _ARC_STEP = 0.035
 
 
 class MapNumbers(NamedTuple):
-    """What the step of ``FreeSpaceMap`` depends on."""
+    """Constants of the step of ``FreeSpaceMap``."""
 
     sectors: Sectors
     directions: NDArray[np.float64]
-    """(sensors, 2) axis of each in B, rad, and half of its aperture, rad."""
+    """(sensors, 2) direction of the axis in B and half of the aperture, rad."""
     places: NDArray[np.float64]
-    """(sensors, 2) from the axle in B, m."""
+    """(sensors, 2) position relative to the axle in B, m."""
     limits: tuple[float, float, float]
-    """Least and greatest range, m, and what ranges may be too long, m."""
+    """Least and greatest range, and largest amount by which a range is too long, m."""
     error: PlaceError
-    """Of the places of cells, by odometry."""
+    """What the position error of a cell by odometry depends on."""
     least_way: float
-    """Mean way of both rims that a tick counts for at least, m for each rad/s of the
-    faster wheel's command; 0 without pulses."""
+    """Least mean way of both rims that a tick counts for, m per rad/s of the faster
+    wheel's command; 0 without pulses."""
     radius: float
-    """Of the disc that holds the body, m."""
+    """Radius of the disc that contains the body, m."""
     bubble: float
-    """Radius of what is free at the start, m."""
+    """Radius of the disc that is free at the start, m."""
     tick_s: float
     round_ticks: int
-    """From one reading of a sensor to its next."""
+    """Number of ticks between two readings of a sensor."""
 
 
 class MapState(NamedTuple):
-    """The state of ``FreeSpaceMap``."""
+    """State of ``FreeSpaceMap``."""
 
     free_space: FreeSpace
     was_at: NDArray[np.float64]
-    """(1, 3) pose at the last tick, m and rad."""
+    """(1, 3) pose in the last tick, m and rad."""
 
 
 def map_step(
     tick: int, state: MapState, inputs: Any, outputs: Any, numbers: MapNumbers
 ) -> None:
-    """What is known at one tick; see ``systems.framework.block.Step``.
+    """Updates the memory in one tick; see ``systems.framework.block.Step``.
 
     Args:
         tick: Number of the tick.
         state: ``MapState``.
-        inputs: As the input ports.
-        outputs: None.
+        inputs: Values of the input ports.
+        outputs: Not used.
         numbers: ``MapNumbers``.
     """
     ranges, echo, ages, pose, commanded = inputs
@@ -82,6 +82,7 @@ def map_step(
     time = tick * numbers.tick_s
     low, high, margin = numbers.limits
     move_window(space, pose[0], pose[1])
+    # The first tick clears the bubble. Later ticks add the way rolled since.
     if space.facts[0, TICK] == NEVER:
         clear_disc(
             space,
@@ -98,15 +99,17 @@ def map_step(
     for k in range(3):
         was_at[0, k] = pose[k]
     space.facts[0, TICK] = tick
+    # If cells can be forgotten, the disc of the body is cleared again.
     if error.wheel_error > 0.0 or error.pulse_m > 0.0:
         until = space.facts[0, ROLLED] + lasting(numbers.radius, error)
         clear_disc(space, pose[0], pose[1], numbers.radius, until)
+    # Readings of the sensors that have fired in this tick.
     readings = np.empty((len(ranges), 2))
     for k in range(len(ranges)):
         readings[k, 0], readings[k, 1] = 0.0, np.inf
         if ages[k] > 0.5 * numbers.tick_s:
             continue
-        # What is nearer than the least range reads that range.
+        # An object nearer than the least range reads as that range: nothing is free.
         if echo[k] < 0.5:
             readings[k, 0] = high - margin
         else:
@@ -116,26 +119,28 @@ def map_step(
         place = numbers.places[k, 0], numbers.places[k, 1]
         direction = numbers.directions[k, 0], numbers.directions[k, 1]
         end_view(space, k, time, pose, place, direction, readings[k, 0])
-    # Each sensor enters other rows with each of its readings.
+    # Each reading of a sensor updates different rows.
     turn_of_rows = tick // numbers.round_ticks
     see(space, time, turn_of_rows, pose, numbers.sectors, readings, error)
 
 
 @register_jitable
 def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float:
-    """Mean way of both rims in a tick, as ``place_error`` counts it.
+    """Computes the mean way of both rims in a tick, as ``place_error`` counts it.
 
     Args:
-        was_at: Pose at the tick before, m and rad.
-        pose: The same now.
-        least: That a wheel counts for at least, m: it may have moved back and forth.
-        error: Has the wheel separation and the pulse.
+        was_at: Pose in the tick before, m and rad.
+        pose: Pose now, m and rad.
+        least: Least way that counts for each wheel, m: a wheel may have moved back and
+            forth.
+        error: Contains the wheel separation and the pulse.
 
     Returns:
-        m. By half a pulse it may be more than the encoders tell.
+        m. The result includes half a pulse, by which the way may exceed the count of
+        the encoders.
     """
     turn = pose[2] - was_at[2]
-    # The way is longer than its chord, by 1/cos(turn/2) at most; this is more.
+    # The way is longer than its chord by at most 1/cos(turn/2). This factor is larger.
     chord = math.hypot(pose[0] - was_at[0], pose[1] - was_at[1])
     way = chord * (1.0 + 0.25 * turn * turn)
     aside = 0.5 * error.wheel_separation_m * abs(turn)
@@ -144,33 +149,33 @@ def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float
 
 
 class FreeSpaceMap(Block):
-    """Remembers what range sensors have seen free, and where echoes came from.
+    """Remembers which cells range sensors have seen free, and where echoes came from.
 
-    A cell has been seen free once its circumscribed circle lay within the apertures of
-    sensors at one place, nearer than what they read, less a margin. It stays so as long
-    as its place relative to the robot is known to ``place_error_m``: encoders count
-    whole pulses, and ``wheel_error`` says how well the wheels are known. All sensors
-    that fire at a tick are entered at it.
+    The sensors at one place see a cell free if the circle around it lies within their
+    apertures. The circle also has to be nearer than their readings, less a margin. The
+    cell stays free as long as its position relative to the robot is known to
+    ``place_error_m``. The position becomes uncertain because encoders count whole
+    pulses, and because wheels are known only up to ``wheel_error``. All sensors that
+    fire in a tick are entered in this tick.
 
-    At the start the bubble counts as free. The disc that holds the body counts as free
-    at every tick, as ``MotionGuard`` keeps it so.
+    At the start, the bubble counts as free. The disc that contains the body counts as
+    free in every tick, because ``MotionGuard`` keeps it free.
 
-    Abstract state: ``FreeSpace``, and the pose at the last tick.
-    Rate and latency: a function of state and present inputs, at every tick: no
-    latency.
+    Abstract state: ``FreeSpace``, and the pose in the last tick.
+    Rate and latency: a function of state and present inputs, in every tick; no latency.
 
     Args:
         parameters: ``FreeSpaceParameters``.
         sensors: Places, apertures, ranges and noise of the sensors.
-        robot: Its body, and place of P.
+        robot: Body, and position of P.
         odometry: Pulses of the encoders.
         plant: Lag of the motors.
         tick_s: Period of the robot, s.
 
     Raises:
-        InputError: The grid does not serve the robot.
+        InputError: The grid does not fit the robot.
 
-    Reference: ours; docs/guard.md has the theorem that rests on it.
+    Reference: ours; docs/guard.md has the theorem that depends on this block.
     """
 
     part, stage = "free_space", "obstacle sensing"

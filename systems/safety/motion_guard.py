@@ -1,4 +1,4 @@
-"""A block between any law and the wheels that keeps the robot in free space."""
+"""A block between a law and the wheels that keeps the robot in free space."""
 
 from __future__ import annotations
 
@@ -29,51 +29,55 @@ from systems.safety.braking import (
 from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 from systems.safety.views import stopping_way, tick_parts
 
-#: Elements of the state: velocity of P, wheel speeds, report, modelled wheel speeds.
+#: Sizes of the parts of the state: velocity of P, wheel speeds, report, and modeled
+#: wheel speeds.
 _SIZES = 2, 2, 4, 2
 
 
 class GuardNumbers(NamedTuple):
-    """What the step of ``MotionGuard`` depends on."""
+    """Constants of the step of ``MotionGuard``."""
 
     velocity: Callable[..., Any]
-    """As of ``CommandNumbers``."""
+    """Function that turns a command into a velocity of P, as in ``CommandNumbers``."""
     robot: RobotParameters
     braking: BrakingNumbers
     kept: float
     """Share of a change of wheel speed that the lag leaves after a tick."""
     reach: tuple[float, float]
-    """How far from the axle cells are looked at, m, and for what rolled way they have
-    to stay free, m."""
+    """Distance from the axle within which cells are checked, m, and the rolled way for
+    which they have to stay free, m."""
 
 
 def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Wheel speeds of one tick; see ``systems.framework.block.Step``.
+    """Computes the wheel speeds of one tick; see ``systems.framework.block.Step``.
 
     Args:
         tick: Number of the tick.
-        state: Velocity of P, m/s, x and y; wheel speeds, rad/s, left and right; what
-            was done; modelled wheel speeds, rad/s.
-        inputs: The command of the law, the pose by the odometry, the fault of the
-            sensing, and the free space.
-        outputs: Left as they are: they are state.
+        state: Velocity of P, m/s, x and y; wheel speeds, rad/s, left and right; report,
+            four numbers; modeled wheel speeds, rad/s, left and right.
+        inputs: Command of the law, pose by the odometry, fault of the sensing, and free
+            space.
+        outputs: Not used: the outputs are state.
         numbers: ``GuardNumbers``.
     """
     command, pose, fault, space = inputs
     robot, braking = numbers.robot, numbers.braking
     theta, tick_s = pose[2], braking.tick_s
     before = state[0], state[1]
+    # Wheel speeds that the law wants; with a fault of the sensing, it has to stop.
     v_WP = numbers.velocity(before, command, theta, robot, tick_s)
     v, omega = hand_position_twist(v_WP, theta, robot.control_point_m)
     trusted = fault[0] < 0.5
     wish = limited_wheel_speeds(v, omega, robot) if trusted else (0.0, 0.0)
     here = pose[0], pose[1], pose[2]
     speeds = state[8], state[9]
+    # The part of this wish that the robot can brake from.
     danger = danger_of(space, tick * tick_s, here, numbers.reach, braking)
     done, wheels = chosen(here, speeds, wish, (state[2], state[3]), danger, braking)
     if not trusted:
         done = HALTED
     if done != PASSED:
+        # The virtual mass moves with the changed command.
         radius, separation = robot.wheel_radius_m, robot.wheel_separation_m
         v = 0.5 * radius * (wheels[0] + wheels[1])
         omega = radius * (wheels[1] - wheels[0]) / separation
@@ -81,10 +85,11 @@ def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
     after = rolled_speeds(speeds, wheels, numbers.kept)
     fastest = max(abs(wheels[0]), abs(wheels[1])) * robot.wheel_radius_m
     state[0], state[1], state[2], state[3] = v_WP[0], v_WP[1], wheels[0], wheels[1]
-    # Nothing near is as far as was looked.
+    # Without cells nearby, report the distance within which cells were checked.
     seen = min(danger.distance_m, numbers.reach[0])
     viewed = min(danger.view_distance_m, numbers.reach[0])
     state[4], state[5] = done, seen - braking.keep_m
+    # Stopping distance: braking, and the way during the motor lag and one tick.
     state[6] = fastest * fastest / (2.0 * braking.braking_m_s2)
     state[6] += fastest * (braking.motor_lag_s + tick_s)
     state[7] = viewed - braking.keep_m
@@ -92,7 +97,7 @@ def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
 
 
 def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
-    """The outputs of ``guard_step``'s state."""
+    """Copy the state of ``guard_step`` to the outputs."""
     wheel_speeds, v_WP, report = outputs
     for k in range(2):
         v_WP[k], wheel_speeds[k] = state[k], state[2 + k]
@@ -101,33 +106,34 @@ def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
 
 
 class MotionGuard(Block):
-    """Obeys a law as far as the robot can be braked to rest in free space.
+    """Obeys a law as far as the robot can brake to rest in free space.
 
-    It replaces ``WheelCommand``: it has the same input and does the same work. It
-    passes the resulting wheel speeds if the robot, one tick later, can brake to rest so
-    that the disc about the axle that holds the body stays ``margin_m`` away from
-    everything that was never seen free. Otherwise it passes lower speeds along the same
-    curve, or the turn alone, or it brakes. The virtual mass moves by what the guard
-    passes.
+    The block replaces ``WheelCommand``: it has the same input and does the same work.
+    It passes the resulting wheel speeds if the robot can still brake to rest one tick
+    later. On the way to rest, the disc around the axle that contains the body has to
+    stay ``margin_m`` away from all cells that are not known to be free. Otherwise the
+    block passes lower speeds along the same curve, or the turn alone, or it brakes. The
+    virtual mass moves with the command that the guard passes.
 
-    With ``obstacle_speed_m_s`` the same applies to everything in the sensors' view that
-    may come nearer at that speed, unless the robot withdraws from it.
+    With ``obstacle_speed_m_s``, the same applies to all obstacles in the sensors' view
+    that may come nearer at that speed, unless the robot withdraws from them.
 
-    While the sensing has a fault, the guard brakes the robot to rest, whatever the law
+    During a fault of the sensing, the guard brakes the robot to rest, whatever the law
     commands.
 
-    ``guard_report``: the action, 0 passed, 1 slowed, 2 turned, 3 braked, 4 halted
-    because of a fault of the sensing; by how much the disc is farther from what is not
-    free than it has to be; the stopping distance; and the first distance again for what
-    is in view.
+    ``guard_report`` has four numbers. The first is the action: 0 passed, 1 slowed, 2
+    turned, 3 braked, 4 halted because of a fault of the sensing. The second is the
+    distance of the disc from space that is not free, less the distance that it has to
+    keep. The third is the stopping distance. The fourth is the second number for the
+    end of the view instead.
 
     Discrete state, every tick: velocity of P, wheel speeds, report, and the wheel
-    speeds that follow by the lag of the motors. Rate and latency are those of
+    speeds that follow with the lag of the motors. Rate and latency are those of
     ``WheelCommand``.
 
     Args:
         parameters: ``GuardParameters``.
-        known: Grid of the map, and how far off the place of a cell may be.
+        known: Grid of the map, and largest position error of a cell.
         robot: Dimensions and top speed.
         plant: Lag of the motors.
         command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or

@@ -18,10 +18,10 @@ from systems.framework.parameters import (
 )
 from systems.ranging.parameters import UltrasonicParameters
 
-#: Cells of a window at most: 16 million take 0.4 GB.
+#: Largest number of cells along a side of a window: 16 million cells take 0.4 GB.
 _MOST_CELLS = 4_000
 
-#: A range's error stays below so many standard deviations of it.
+#: The error of a range is below this many standard deviations.
 _SIGMAS = 5.0
 
 
@@ -35,29 +35,29 @@ class FreeSpaceParameters(Parameters):
     start_bubble_m: Length = 1.0
     """Radius about the axle that is assumed to be free at the start, m."""
     range_margin_m: NonNegativeLength = 0.002
-    """Amount by which ranges may be too long, m, in addition to five standard
-    deviations of their noise."""
+    """Largest amount by which a range is too long, m, in addition to five standard
+    deviations of its noise."""
     wheel_error: Fraction = 0.0
-    """Unknown share of each wheel's travel, in addition to the pulses of its
+    """Relative error of each wheel's travel, in addition to the pulses of its
     encoder."""
     place_error_m: NonNegativeLength = 0.006
-    """Error of a cell's position due to encoders and ``wheel_error``, up to which the
-    cell counts as free, m; the guard keeps this distance in addition."""
+    """Largest position error of a cell that counts as free, m, due to encoders and
+    ``wheel_error``. The guard keeps this distance in addition to its margin."""
 
     @property
     def cells(self) -> int:
-        """Of the window along a side."""
+        """Number of cells along a side of the window."""
         return math.ceil(self.window_m / self.cell_m - 1e-9)
 
     def range_error(self, sensors: UltrasonicParameters) -> float:
-        """What ranges may be too long, m."""
+        """Returns the largest amount by which a range is too long, m."""
         return self.range_margin_m + _SIGMAS * sensors.noise_m
 
     def check(self, robot: RobotParameters) -> None:
-        """Refuses what cannot serve a robot.
+        """Checks that the grid fits a robot.
 
         Args:
-            robot: Its body.
+            robot: Dimensions of its body.
 
         Raises:
             InputError: The grid is too coarse, too large or too small.
@@ -89,15 +89,15 @@ class GuardParameters(Parameters):
     """How the guard keeps a robot in free space."""
 
     obstacle_speed_m_s: NonNegativeSpeed = 0.0
-    """Largest speed of bodies in view that the guard allows for, m/s; 0: all bodies are
-    at rest."""
+    """Largest speed of obstacles in view that the guard allows for, m/s; 0: all
+    obstacles are at rest."""
     braking_m_s2: Acceleration = 1.5
-    """Braking of the faster wheel's rim, m/s^2."""
+    """Deceleration of the faster wheel's rim when the guard brakes, m/s^2."""
     margin_m: NonNegativeLength = 0.006
     """Distance that the guard keeps between the disc around the body and space that is
     not free, m, in addition to ``free_space.place_error_m``."""
     least_margin_m: NonNegativeLength = 0.003
-    """The margin after models were wrong and the robot has come nearer, m."""
+    """Margin of a robot that has come nearer because a model was wrong, m."""
     slow_turn_rad_s: float = Field(default=0.3, ge=0.0, le=10.0)
     """A robot that turns on the spot no faster than this counts as at rest, rad/s."""
 

@@ -1,4 +1,4 @@
-"""A monitor of what a guard relies on: range sensors and odometry."""
+"""A monitor of range sensors and odometry, on which the guard relies."""
 
 from __future__ import annotations
 
@@ -12,60 +12,67 @@ from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
 
-#: The faults, by their numbers on the port.
+#: Names of the faults; the index is the number on the port.
 SENSING_FAULTS = "none", "odometry lost", "silent", "frozen", "noisy"
 _NONE, _LOST, _SILENT, _FROZEN, _NOISY = range(5)
 
-#: Places in the state of each sensor: its last two ranges, m, how many echoes in
-#: succession it has read, how many of them were equal, the heading at the first of
-#: these, rad, share of late readings that no motion explains, tick until which what
-#: was found counts, and what it was.
+#: Indices in the state of a sensor: its last two ranges, m; number of consecutive
+#: echoes; number of consecutive equal echoes; heading at the first of these, rad; mean
+#: share of recent readings that no motion explains; tick until which the last fault
+#: counts; and number of this fault.
 _LAST, _BEFORE, _HEARD, _EQUAL, _HEADING, _STRANGE, _UNTIL, _FOUND = range(8)
 _EACH = 8
 
-#: Places in the state before the sensors': pose, m and rad, and whether it was lost.
+#: Indices in the state before the sensors: pose, m and rad; whether odometry was lost.
 _POSE, _IS_LOST, _SENSORS = 0, 3, 4
 
-#: A pose that moves by so many times what the wheels can is lost.
+#: The odometry is lost if the pose moves farther than this multiple of what the wheels
+#: can do.
 _FASTER = 2.0
-#: A sensor that has not fired for so many of its rounds, and so long, s, is silent.
+#: A sensor is silent if it has not fired for this number of rounds and this time, s.
 _ROUNDS, _SILENT_S = 3, 0.2
-#: With noise, so many equal echoes in succession do not come by chance; without it,
-#: while the robot turns by an aperture and so much more, rad, surfaces do not keep
-#: their distance.
+#: A sensor with noise is frozen after this number of consecutive equal echoes. Any
+#: sensor is frozen if its echoes stay equal during a turn by its aperture plus the
+#: second number, rad.
 _MOST_EQUAL, _BESIDE_RAD = 12, 0.1
-#: Second differences of a range that motion makes: so much, m, and by acceleration,
-#: m/s^2; and the noise's, in standard deviations of it.
+#: Largest second difference of a range that motion and noise can cause: a constant, m;
+#: a part by acceleration, m/s^2; and a multiple of the noise's standard deviation.
 _STEP_M, _STEP_M_S2, _SIGMAS = 0.03, 2.0, 15.0
-#: Share that a reading has in the mean, and from which on that is too much.
+#: Weight of one reading in the mean share, and the share above which a sensor is noisy.
 _PART, _MOST_STRANGE = 0.1, 0.5
-#: In a faster turn, rad/s, edges of apertures run along surfaces.
+#: Largest yaw rate at which ranges are checked for noise, rad/s. In a faster turn,
+#: edges of apertures move along surfaces.
 _SLOW_RAD_S = 0.3
-#: How long after its last sign a fault of a sensor counts, s.
+#: Time for which a fault of a sensor counts after its last sign, s.
 _KEPT_S = 2.0
 
 
 class MonitorNumbers(NamedTuple):
-    """What the step of ``SensingMonitor`` depends on."""
+    """Constants of the step of ``SensingMonitor``."""
 
     limits: tuple[float, float]
-    """How far the axle, m, and the heading, rad, may come in a tick."""
+    """Largest motion of the axle, m, and of the heading, rad, in one tick."""
     ranges: tuple[float, float]
-    """Least and greatest range, m, that tell something."""
+    """Least and greatest range, m. Only ranges between them are compared."""
     silent_s: float
-    """Age of a range from which on its sensor is silent."""
+    """Age of a range from which its sensor is silent, s."""
     equal: float
-    """So many equal echoes are too many; infinite without noise."""
+    """Number of equal echoes of a frozen sensor; infinite without noise."""
     turn_rad: float
-    """In such a turn an echo does not stay equal."""
+    """Turn during which echoes cannot stay equal, rad."""
     step_m: float
-    """Second difference of a range that no motion makes."""
+    """Second difference of a range that neither motion nor noise causes, m."""
     tick_s: float
 
 
 @register_jitable
 def _judged(state, at, range_, heading, slow, numbers):  # type: ignore[no-untyped-def]
-    """What an echo tells of its sensor, whose state begins at ``at``."""
+    """Judge a new echo of the sensor whose state begins at ``at``; return the fault.
+
+    The function counts equal echoes, and remembers the heading at which they began.
+    While the robot turns slowly, it checks the second difference of the last three
+    ranges, and updates the mean share of strange readings.
+    """
     last, before, heard = state[at + _LAST], state[at + _BEFORE], state[at + _HEARD]
     low, high = numbers.ranges
     if heard > 0.5 and range_ == last and low < range_ < high:
@@ -86,9 +93,9 @@ def _judged(state, at, range_, heading, slow, numbers):  # type: ignore[no-untyp
 def monitor_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """The fault of one tick.
+    """Finds the fault of one tick.
 
-    State: pose, m and rad; whether it was lost; eight numbers of each sensor.
+    State: pose, m and rad; whether odometry was lost; eight numbers per sensor.
     """
     pose, ranges, echo, ages = inputs
     turned = pose[2] - state[_POSE + 2]
@@ -99,6 +106,7 @@ def monitor_step(
     for i in range(3):
         state[_POSE + i] = pose[i]
     kind, sensor = _NONE, 0
+    # Judge each sensor; the first one with a fault is reported.
     slow = abs(turned) <= _SLOW_RAD_S * numbers.tick_s
     for k in range(len(ranges)):
         at = _SENSORS + _EACH * k
@@ -121,30 +129,30 @@ def monitor_step(
 
 
 class SensingMonitor(Block):
-    """Finds range sensors and odometry that cannot be right, so that a guard stops.
+    """Finds faults of range sensors and odometry, so that a guard stops the robot.
 
     The faults by their numbers, ``SENSING_FAULTS``:
 
-    1. The pose of the odometry has moved farther in a tick than twice what the wheels
-       can. This fault stays for the rest of the run.
+    1. In one tick, the pose of the odometry has moved farther than twice what the
+       wheels can do. This fault stays for the rest of the run.
     2. A sensor has not fired for three rounds and 0.2 s.
-    3. The echoes of a sensor stay equal, 12 times although it has noise, or while the
-       robot turns by more than its aperture.
-    4. While the robot turns slowly, half of the late echoes of a sensor have moved by
-       more than bodies and the stated noise can move them.
+    3. The echoes of a sensor stay equal: 12 times although it has noise, or while the
+       robot turns by more than the sensor's aperture.
+    4. While the robot turns slowly, half of the recent echoes of a sensor have moved by
+       more than bodies and the specified noise can explain.
 
     Faults 2 to 4 count for 2 s after their last sign.
 
-    The monitor cannot distinguish a sensor that always reports no echo from one that
+    The monitor cannot distinguish a sensor that never reports an echo from one that
     points at empty space.
 
-    Discrete state, every tick: pose, whether it was lost, and of each sensor its last
-    two ranges, the counts, the fault found, and until when it counts. The output is a
+    Discrete state, every tick: pose; whether odometry was lost; and for each sensor its
+    last two ranges, the counts, the fault, and until when it counts. The output is a
     function of state and inputs: no latency.
 
     Args:
         sensors: The range sensors.
-        robot: How fast its wheels turn.
+        robot: Top speed of its wheels.
         tick_s: Period of control, s.
 
     Reference: ours; docs/guard.md.

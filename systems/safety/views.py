@@ -1,4 +1,4 @@
-"""What range sensors see, for how long it stays known, and how far a stop takes."""
+"""What range sensors see, how long it stays known, and how far a stop takes."""
 
 from __future__ import annotations
 
@@ -15,43 +15,47 @@ from systems.base.robot import RobotParameters, body_radius
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 
-#: Rims are at rest where their lag leaves them no longer way, m.
+#: Rims count as at rest if the lag leaves them no longer way than this, m.
 REST_M = 2e-4
-#: A robot turns in its place where its lag leaves it no longer way ahead, m.
+#: A robot turns on the spot if the lag leaves it no longer way forward than this, m.
 IN_PLACE_M = 5e-5
-#: Longest time between two places that the guard compares with cells, s.
+#: Longest time between two positions that the guard compares with cells, s.
 _PART_S = 0.025
 
 
 class Sectors(NamedTuple):
-    """Apertures of range sensors, cut where they overlap: directions from one place.
+    """Apertures of range sensors, cut into sectors where they overlap.
 
-    A group is all sensors at one place. Its sectors are next to one another, counter-
-    clockwise; where no sensor looks in between, one has none.
+    A group consists of all sensors at one place. Its sectors are adjacent and in
+    counterclockwise order. A sector between two apertures is seen by no sensor.
     """
 
     places: NDArray[np.float64]
-    """(groups, 2) from the axle in B, m."""
+    """(groups, 2) position relative to the axle in B, m."""
     first: NDArray[np.int64]
-    """(groups + 1,) first sector of each group, and the number of all."""
+    """(groups + 1,) index of the first sector of each group, then the number of
+    sectors."""
     right: NDArray[np.float64]
-    """(sectors, 1) directions in B at which they begin, rad."""
+    """(sectors, 1) direction in B at which a sector begins, rad."""
     left: NDArray[np.float64]
-    """(sectors, 1) where they end, rad."""
+    """(sectors, 1) direction in B at which a sector ends, rad."""
     seen_by: NDArray[np.bool_]
-    """(sectors, sensors) which sensors see a sector."""
+    """(sectors, sensors) whether a sensor sees a sector."""
 
 
 class PlaceError(NamedTuple):
-    """What the error of a remembered cell's place depends on, seen from the robot."""
+    """What the position error of a remembered cell depends on.
+
+    The error is that of the position relative to the robot.
+    """
 
     wheel_error: float
-    """To what share each wheel's way is known."""
+    """Relative error of each wheel's travel."""
     pulse_m: float
-    """Way of the rim for a pulse of the encoder, m; 0: angles are not rounded."""
+    """Way of the rim per pulse of the encoder, m; 0: angles are not rounded."""
     wheel_separation_m: float
     allowed_m: float
-    """A cell counts as free as long as its error is no larger, m."""
+    """Largest position error of a cell that counts as free, m."""
 
     @classmethod
     def of(
@@ -60,15 +64,15 @@ class PlaceError(NamedTuple):
         robot: RobotParameters,
         odometry: OdometryParameters,
     ) -> PlaceError:
-        """From the parameters.
+        """Collects the values from the parameters.
 
         Args:
-            known: Wheel error, and what is allowed.
-            robot: Wheels.
+            known: Wheel error, and allowed position error.
+            robot: Dimensions of the wheels.
             odometry: Pulses of the encoders.
 
         Returns:
-            What it depends on.
+            The collected values.
         """
         pulse_m = 0.0
         if odometry.rounding:
@@ -80,16 +84,17 @@ class PlaceError(NamedTuple):
 
 
 def place_error(distance: float, way: float, error: PlaceError) -> float:
-    """Largest error of a cell's place relative to the robot, m.
+    """Computes the largest position error of a cell relative to the robot, m.
 
     Args:
-        distance: Of the cell from the axle when it was seen, m.
-        way: Mean way of both rims since then, m.
-        error: What it depends on.
+        distance: Distance d of the cell from the axle when it was seen, m.
+        way: Mean way s of both rims since then, m.
+        error: Errors of wheels and encoders.
 
     Returns:
-        e s + 2 e s/L (d + s) by wheels known to a share e, and q (s + d)/L + q by
-        pulses of q at the rim, L between the wheels (docs/guard.md).
+        The sum of two errors, m. Wheels with relative error e cause e s + 2 e s/L (d +
+        s). Pulses of length q at the rim cause q (s + d)/L + q. L is the wheel
+        separation (docs/guard.md).
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     by_wheels = e * way + 2.0 * e * way / separation * (distance + way)
@@ -97,15 +102,15 @@ def place_error(distance: float, way: float, error: PlaceError) -> float:
 
 
 def lasting(distance: float, error: PlaceError) -> float:
-    """Mean way of both rims for which a cell's place stays known well enough, m.
+    """Computes the mean way of both rims after which a cell is forgotten, m.
 
     Args:
-        distance: Of the cell from the axle when it was seen, m, or more.
-        error: What its error depends on.
+        distance: Distance of the cell from the axle when it was seen, or more, m.
+        error: Errors of wheels and encoders.
 
     Returns:
-        The way at which ``place_error`` is what is allowed, m; infinite where it does
-        not grow, minus infinity where it is too large from the start.
+        The way at which ``place_error`` reaches the allowed error, m. It is infinite if
+        the error does not grow, and minus infinity if it is too large from the start.
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     a = 2.0 * e / separation
@@ -121,10 +126,10 @@ def lasting(distance: float, error: PlaceError) -> float:
 
 
 def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sectors:
-    """What a set of range sensors sees, as sectors of common places.
+    """Divides the view of range sensors into sectors.
 
     Args:
-        sensors: Any.
+        sensors: The range sensors.
         control_point_m: Distance of P ahead of the axle, m.
 
     Returns:
@@ -154,7 +159,10 @@ def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sec
 def _between(
     spans: Sequence[tuple[float, float]],
 ) -> list[tuple[float, float]]:
-    """Sectors between neighbouring edges, from right to left; at most a turn."""
+    """Return the sectors between neighboring edges, from right to left.
+
+    Edges that span more than a full turn are wrapped into one turn.
+    """
     edges = sorted(edge for span in spans for edge in span)
     if edges[-1] - edges[0] >= math.tau - 1e-9:
         begin = edges[0]
@@ -166,7 +174,9 @@ def _between(
 def stopping_way(
     own: GuardParameters, robot: RobotParameters, plant: PlantParameters, tick_s: float
 ) -> float:
-    """Way of the faster wheel from top speed to rest, after a tick of it, or more.
+    """Computes an upper bound of the way of the faster wheel until it is at rest.
+
+    The wheel begins at top speed, and brakes after one tick.
 
     Args:
         own: Braking.
@@ -183,13 +193,13 @@ def stopping_way(
 
 
 def tick_parts(tick_s: float) -> int:
-    """In how many parts of a tick the guard compares places with cells.
+    """Computes the number of parts of a tick after which positions are checked.
 
     Args:
         tick_s: Period of the command, s.
 
     Returns:
-        The number; a part lasts 25 ms at most.
+        The number. A part lasts at most 25 ms.
     """
     return math.ceil(tick_s / _PART_S - 1e-9)
 
@@ -197,15 +207,16 @@ def tick_parts(tick_s: float) -> int:
 def unseen_approach(
     robot: RobotParameters, plant: PlantParameters, tick_s: float
 ) -> float:
-    """By how much the axle may come nearer to a cell than where the guard looks, m.
+    """Computes how much nearer to a cell the axle may come than the guard checks, m.
 
-    The guard compares the axle's place with cells at the ends of a tick's parts, until
-    braking leaves the rims ``REST_M`` of way. In between the axle may
+    The guard compares the position of the axle with cells at the end of each part of a
+    tick, until braking leaves the rims ``REST_M`` of way. Meanwhile the axle may
 
-    * pass a corner: both ends of a chord d are R from a point, its middle is not;
-    * leave the chord, by a quarter of its length times the turn;
-    * go on and come back, where the wheels are reversed within the part;
-    * and coast after all that, also where it turns in its place.
+    * pass a corner: both ends of a chord d are at R from a point, but its middle is
+      nearer;
+    * deviate from the chord by a quarter of its length times the turn;
+    * go on and come back, if the wheels are reversed within the part;
+    * and coast after all that, also in a turn on the spot.
 
     Args:
         robot: Body, wheels and top speed.
@@ -213,8 +224,8 @@ def unseen_approach(
         tick_s: Period of the command, s.
 
     Returns:
-        The sum of the four, m: 1.6 mm with all defaults. ``least_margin_m`` has to hold
-        it.
+        The sum of the four, m: 1.6 mm with all defaults. ``least_margin_m`` has to be
+        at least as large.
     """
     top, lag, part_s = (
         robot.top_speed_m_s,
@@ -223,9 +234,11 @@ def unseen_approach(
     )
     radius, half = body_radius(robot), min(0.5 * top * part_s, body_radius(robot))
     corner = radius - math.sqrt(radius * radius - half * half)
-    # Of all ways to share the faster rim's speed between both.
+    # The largest bow, for any distribution of the faster rim's speed between the
+    # wheels.
     bow = 0.25 * (0.5 * top * part_s) * (top * part_s / robot.wheel_separation_m)
-    # The speed with which it comes back to where it was, reversed to full speed.
+    # Speed at the start of the part from which the axle is back at its end, if the
+    # command reverses to full speed.
     lagged_s = -lag * math.expm1(-part_s / lag)
     begin = min(top * (part_s / lagged_s - 1.0), top)
     turns_s = lag * math.log1p(begin / top)

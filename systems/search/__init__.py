@@ -1,1 +1,1 @@
-"""Searches step by step: the robot that smells, and the robots that hear it."""
+"""Searches in steps: the olfactory robot, and the robots that hear its call."""

@@ -1,4 +1,4 @@
-"""Parameters of searches."""
+"""Parameters of the searches by smell and by sound."""
 
 from __future__ import annotations
 
@@ -21,92 +21,94 @@ class SongRuleParameters(Parameters):
     """Thresholds and angles of the four phases (Song 2011, 4.2)."""
 
     initial_threshold: float = Field(default=0.95, ge=0.0, le=2.0)
-    """R_init: the robot is in the plume where all three ratios Rs/R0 are below this."""
+    """R_init. The robot is in the plume if all three ratios Rs/R0 are below this."""
     airflow_threshold: Positive = 1.0
-    """F_thresh, in the unit of ``airflow``: printed without a unit, so that
-    ``airflow_sensors.gain_s_m`` defines its meaning."""
+    """F_thresh, in the unit of the port ``airflow``. The paper prints no unit, so that
+    ``airflow_sensors.gain_s_m`` defines the meaning of this value."""
     turning_threshold: float = Field(default=0.75, ge=0.0, le=2.0)
-    """R_turning: phase 3 turns where R1 or R3 is below this."""
+    """R_turning. In phase 3, the robot turns if R1 or R3 is below this."""
     reverse_threshold: float = Field(default=0.9, ge=0.0, le=2.0)
-    """R_reverse: phase 3 turns back where R2 is the least ratio and below this. The
-    paper uses it without a value; our choice."""
+    """R_reverse. In phase 3, the robot turns back if R2 is the smallest ratio and below
+    this. The paper prints no value. The default is our choice."""
     upwind_turn_deg: float = Field(default=45.0, ge=0.0, le=180.0)
-    """Turn of phase 2, deg."""
+    """Turning angle in phase 2, deg."""
     gradient_turn_deg: float = Field(default=60.0, ge=0.0, le=180.0)
-    """Turn of phase 3, deg."""
+    """Turning angle in phase 3, deg."""
     local_turn_deg: float = Field(default=30.0, ge=0.0, le=180.0)
-    """Turn of phase 4, deg."""
+    """Turning angle in phase 4, deg."""
 
 
 class UpwindGradientParameters(Parameters):
-    """Upwind, corrected by the gradient of the smell across; our rules."""
+    """Our rules: go upwind, and turn toward the side with more gas."""
 
     gain_deg: Angle = 20.0
-    """Lean toward the front sensor that smells more, deg per e-fold between their
-    ratios Rs/R0."""
+    """Angle from upwind toward the front sensor with more gas, deg per factor e between
+    the ratios Rs/R0 of the two front sensors."""
     largest_lean_deg: float = Field(default=45.0, ge=0.0, le=90.0)
-    """Largest lean, deg."""
+    """Largest angle from upwind toward the side with more gas, deg."""
     lost_share: Fraction = 0.35
-    """The plume is lost if no sensor's 1 - Rs/R0 is this share of the largest value so
-    far."""
+    """The robot has lost the plume if 1 - Rs/R0 of all sensors is below this share of
+    the largest value so far."""
     cast_deg: float = Field(default=110.0, ge=45.0, le=180.0)
-    """Angle from upwind at which it casts to either side in turn after it lost the
-    plume, one step farther each time, deg."""
+    """Angle from upwind at which the robot searches for a lost plume, deg. It goes to
+    the two sides alternately, and each time one step farther."""
     still_air: Positive = 0.05
     """There is no wind if both airflow sensors read less than this, in their unit."""
 
 
 class PlumeSearchParameters(Parameters):
-    """Times of a step, and the rules by which it turns."""
+    """Durations of a step, rules of the turns, and end of the search by smell."""
 
     rules: Literal["song2011", "upwind_gradient"] = "upwind_gradient"
-    """The paper's four phases, or our rules."""
+    """``song2011``: the four phases of the paper. ``upwind_gradient``: our rules."""
     wait_s: Time = 15.0
-    """Rest before the sensors count, s (Song 2011, 4.2)."""
+    """Time at rest before the robot uses the readings, s (Song 2011, 4.2)."""
     sense_s: Duration = 2.0
-    """Time over which readings are averaged, without the largest and the least reading,
-    s (4.2)."""
+    """Averaging time of the readings, s (4.2). The mean excludes the largest and the
+    smallest reading."""
     move_s: Duration = 3.0
-    """Time for turning and driving, s (4.2)."""
+    """Time for turning and driving in a step, s (4.2)."""
     most_steps: int = Field(default=40, ge=1, le=1_000)
     """Number of steps after which the robot gives up the search."""
     gate: bool = True
-    """Whether an object that the robot touches must smell to count as the source; off:
-    any touch ends the search as a find, as printed."""
+    """Whether a touched object must smell to count as the source. Off: any touched
+    object counts as the source, as printed."""
     gate_share: Fraction = 0.95
-    """An object smells if the least of the three ratios since the stop before the last
-    one, both stops included, is below this share of the ratio in clean air, 1."""
+    """An object smells if the lowest gas ratio is below this. Clean air has the ratio
+    1. The mean ratios of the last two stops and all readings since the last stop
+    count."""
     address: int = Field(default=1, ge=1, le=3)
     """Address of the robot in its radio frames (Song 2011, 3.3)."""
     call_every_s: Duration = 1.0
-    """Period of its radio reports after the search has ended, s."""
+    """Period of the radio reports after the end of the search, s."""
     song2011: SongRuleParameters = SongRuleParameters()
-    """Gains of the paper's rules."""
+    """Parameters of the rules of the paper."""
     upwind_gradient: UpwindGradientParameters = UpwindGradientParameters()
-    """Gains of our rules."""
+    """Parameters of our rules."""
 
 
 class SoundSearchParameters(Parameters):
-    """Times of a step, who calls, who waits, and where the robot stops."""
+    """Durations of a step, radio addresses, and end of the search by sound."""
 
     await_call: bool = True
-    """Whether it starts when the caller reports its find by radio; off: it starts at
-    once."""
+    """Whether the robot starts only after the caller has reported by radio that it has
+    found the odor source. Off: the robot starts at once."""
     caller: int = Field(default=1, ge=1, le=3)
-    """Address of the robot that calls (Song 2011, 3.3)."""
+    """Radio address of the robot that calls (Song 2011, 3.3)."""
     address: int = Field(default=2, ge=1, le=3)
     """Address of this robot in its radio frames."""
     waits_for: int = Field(default=0, ge=0, le=3)
-    """Address of a robot that goes first: this robot holds within ``hold_within_m`` of
-    the caller until the other robot reports its result; 0: none."""
+    """Radio address of a robot that goes first. If this robot is within
+    ``hold_within_m`` of the caller, it waits until the other robot reports its result.
+    0: no robot goes first."""
     hold_within_m: Length = 1.2
-    """Distance by radio at which it holds, m."""
+    """Distance from the caller, by radio level, within which the robot waits, m."""
     hold_s: Duration = 200.0
-    """Longest time for which it holds, s."""
+    """Longest time for which the robot waits for the other robot, s."""
     call_within_s: Duration = 1800.0
-    """Time without a call after which it gives up, s."""
+    """Time without a call after which the robot gives up, s."""
     noise_s: Time = 0.5
-    """Time at the start for which it listens to the noise only, s; 0: it does not."""
+    """Time at the start in which the robot listens only to the noise, s. 0: none."""
     listen_s: Duration = 2.0
     """Listening time of a step, s (Song 2011, 4.3)."""
     compute_s: Duration = 5.0
@@ -114,19 +116,20 @@ class SoundSearchParameters(Parameters):
     move_s: Duration = 3.0
     """Time of a step for turning and driving, s (4.3)."""
     stop: Literal["range", "radio"] = "range"
-    """Whether the heard range or the radio decides on its arrival; or the radio only,
-    as printed."""
+    """Criterion for the arrival. ``range``: the heard range or the radio level.
+    ``radio``: only the radio level, as printed."""
     stop_range_m: Length = 0.52
-    """Heard range below which it has arrived, m."""
+    """Heard range below which the robot has arrived, m."""
     radio_gate_m: Length = 1.2
-    """The heard range counts only within this distance by radio, m."""
+    """Distance by radio level below which the heard range counts, m."""
     radio_stop_m: Length = 0.42
-    """Distance by radio, averaged over the listening time of a step, below which it has
-    arrived, m; printed: 0.2 (4.3), at which the robots' arms already touch."""
+    """Distance by radio level below which the robot has arrived, m. The robot averages
+    the level over the listening time of a step. The paper prints 0.2 (4.3), but at this
+    distance the arms of the robots already touch."""
     tries: int = Field(default=3, ge=1, le=100)
-    """Number of times in a row that it may hear nothing, or no direction, before it
-    gives up."""
+    """Number of consecutive steps without a unique direction of the sound after which
+    the robot gives up."""
     most_steps: int = Field(default=30, ge=1, le=1_000)
     """Number of steps after which the robot gives up the search."""
     report_every_s: Duration = 1.0
-    """Period of its radio reports after the search has ended, s."""
+    """Period of the radio reports after the end of the search, s."""

@@ -1,4 +1,4 @@
-"""The olfactory robot's search: wait, smell, decide, move, until it touches."""
+"""The search by smell: the robot waits, senses and moves until it touches an object."""
 
 from __future__ import annotations
 
@@ -34,33 +34,33 @@ from systems.search.search_state import (
 from systems.search.song_rules import song2011_turn
 from systems.search.upwind_gradient import RULE_MEMORY, upwind_gradient_turn
 
-#: Ratios and airflows that a stop averages: R1, R2, R3, F1, F2.
+#: Number of readings that a stop averages: R1, R2, R3, F1, F2.
 _SENSED = 5
 _WAIT, _SENSE, _MOVE, _OVER = range(4)
 
 
 class _Places(NamedTuple):
-    """Places in the state of what this search has of its own."""
+    """Indices in the state, for values that only this search has."""
 
     unsent: int
-    """What is still to be sent of a step: 2 all, 1 the second half, 0 nothing."""
+    """Frames of the step not sent yet: 2 all, 1 the second half, 0 none."""
     readings: int
-    """Readings in this stop."""
+    """Number of readings in this stop."""
     smelt: int
-    """Least gas ratio of the last two stops and since, by which a touch is judged."""
+    """Lowest gas ratio: means of the last two stops, and readings since then."""
     before: int
-    """Least mean gas ratio at the last stop."""
+    """Lowest mean gas ratio at the last stop."""
     sum: int
-    """Sums of the five readings in this stop; then their least and greatest values
-    and their means."""
+    """Sums of the five readings in this stop. Their smallest values, largest values and
+    means have the next three indices."""
     least: int
     most: int
     mean: int
     memory: int
-    """What the rules remember."""
+    """Memory of the rules."""
     frames: int
     size: int
-    """Of the state."""
+    """Size of the state."""
 
 
 _OWN = _Places(
@@ -70,20 +70,20 @@ _OWN = _Places(
 )
 # Numbers of frames (Song 2011, table 5).
 _FN_SET, _FN_HEADING, _FN_GAS, _FN_AIRFLOW, _FN_RESULT = 2, 5, 6, 9, 12
-# Bits of the faults.
+# Bits of the first dead gas sensor and of the first stuck switch in the faults.
 _DEAD_GAS, _STUCK = 1, 8
-#: Readings nearer to one another than this in a whole stop come from no live sensor.
+#: A sensor is dead if its readings differ by less than this during a whole stop.
 _LIFELESS = 1e-9
 
 
 class PlumeSearchNumbers(NamedTuple):
-    """What the step of ``PlumeSearch`` depends on."""
+    """Constants of the step of ``PlumeSearch``."""
 
     turn: Callable[..., tuple[float, int, int]]
-    """``turn(gas, airflow, memory, rules)``, as ``song2011_turn``."""
+    """``turn(gas, airflow, memory, rules)``, for example ``song2011_turn``."""
     rules: Any
     wait: int
-    """Ticks, as those that follow."""
+    """Duration in ticks, as the next three fields."""
     sense: int
     move: int
     repeat: int
@@ -104,7 +104,7 @@ def _begin_stop(state: Any, numbers: PlumeSearchNumbers) -> None:
 
 @register_jitable
 def _sense(state: Any, gas: Any, airflow: Any) -> None:
-    """Adds a tick's readings."""
+    """Updates the sums and the extremes with the readings of a tick."""
     first = state[_OWN.readings] < 0.5
     for k in range(_SENSED):
         value = gas[k] if k < 3 else airflow[k - 3]
@@ -116,10 +116,13 @@ def _sense(state: Any, gas: Any, airflow: Any) -> None:
 
 @register_jitable
 def _average(state: Any) -> int:
-    """Means of a stop, without extremes; a dead gas sensor smells as the others do.
+    """Computes the mean readings of a stop, and detects dead gas sensors.
+
+    The means exclude the largest and the smallest reading. A dead gas sensor gets the
+    mean of the other gas sensors.
 
     Returns:
-        How many gas sensors are alive.
+        Number of gas sensors that work.
     """
     count = state[_OWN.readings]
     for k in range(_SENSED):
@@ -129,6 +132,7 @@ def _average(state: Any) -> int:
             state[_OWN.mean + k] = total / (count - 2.0)
         else:
             state[_OWN.mean + k] = total / count
+    # A sensor that works has noise. A dead sensor repeats the same reading.
     alive, others, bits = 0, 0.0, 0.0
     for k in range(3):
         if state[_OWN.most + k] - state[_OWN.least + k] >= _LIFELESS or count < 1.5:
@@ -140,6 +144,7 @@ def _average(state: Any) -> int:
         for k in range(3):
             if (int(bits) >> k) & 1:
                 state[_OWN.mean + k] = others / alive
+    # Replaces the bits of the gas sensors, and keeps the bits of the switches.
     switches = int(state[AT.fault]) // _STUCK * _STUCK
     state[AT.fault] = switches + bits
     return alive
@@ -155,7 +160,7 @@ def _end(state: Any, ended: int) -> None:
 
 @register_jitable
 def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
-    """Where to go after a stop."""
+    """Chooses the next heading after a stop, or ends the search."""
     if _average(state) < 2:
         _end(state, NO_NOSE)
         return
@@ -175,13 +180,18 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
     state[AT.activity], state[AT.left] = _MOVE, numbers.move
     state[AT.moves] = 1.0
     state[_OWN.unsent] = 2.0
+    # Lowest ratio of this stop and of the stop before it.
     here = min(mean[0], mean[1], mean[2])
     state[_OWN.smelt], state[_OWN.before] = min(here, state[_OWN.before]), here
 
 
 @register_jitable
 def _check_switches(state: Any, contact: Any) -> bool:
-    """Whether something is touched; switches that are closed at the start are stuck."""
+    """Returns whether the robot touches an object.
+
+    A switch that is closed at the first tick is stuck, and the search ignores it. If
+    both switches are stuck, the search ends.
+    """
     if state[AT.started] < 0.5:
         state[AT.started] = 1.0
         for k in range(2):
@@ -199,7 +209,7 @@ def _check_switches(state: Any, contact: Any) -> bool:
 
 @register_jitable
 def _judge_touch(state: Any, numbers: PlumeSearchNumbers) -> None:
-    """What is touched is the source, or smells of nothing."""
+    """Ends the search: the touched object is the source, or does not smell."""
     found = not numbers.gate or state[_OWN.smelt] < numbers.gate_share
     _end(state, FOUND if found else REFUSED)
 
@@ -208,7 +218,7 @@ def _judge_touch(state: Any, numbers: PlumeSearchNumbers) -> None:
 def _add_frames(
     state: Any, tick: int, heading: float, numbers: PlumeSearchNumbers
 ) -> None:
-    """Frames of this tick: what a step has measured, and in the end its result."""
+    """Adds the frames of this tick: the readings of the step, or the final result."""
     address = numbers.address
     clear_frames(state, _OWN.frames)
     if state[AT.activity] == _OVER:
@@ -232,13 +242,18 @@ def _add_frames(
 def plume_search_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlumeSearchNumbers
 ) -> None:
-    """One tick of the search."""
+    """Computes one tick of the search.
+
+    The activities of a step are wait, sense and move. ``AT.left`` counts the ticks of
+    the present activity. A touch ends the search in any activity.
+    """
     gas, airflow, headings, contact = inputs
     heading = headings[0]
     if state[AT.started] < 0.5:
         state[AT.expected] = heading
         state[_OWN.smelt] = state[_OWN.before] = 1.0
         _begin_stop(state, numbers)
+    # Detects a touch, and judges it by the lowest gas ratio.
     touched = _check_switches(state, contact)
     state[_OWN.smelt] = min(state[_OWN.smelt], gas[0], gas[1], gas[2])
     if state[AT.activity] != _OVER:
@@ -248,6 +263,7 @@ def plume_search_step(
             state[AT.activity], state[AT.left] = _SENSE, numbers.sense
     if state[AT.activity] == _SENSE:
         _sense(state, gas, airflow)
+    # Starts the next activity at the end of the present one.
     state[AT.left] -= 1.0
     if state[AT.left] <= 0.0:
         if state[AT.activity] == _SENSE:
@@ -259,31 +275,38 @@ def plume_search_step(
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: PlumeSearchNumbers) -> None:
-    """The outputs of ``plume_search_step``'s state."""
+    """Copies the outputs from the state of ``plume_search_step``."""
     publish_search(state, outputs, _OWN.frames)
 
 
 class PlumeSearch(Block):
-    """Finds an odor source step by step: waits, smells, turns and moves.
+    """Searches for an odor source in steps.
 
-    In each step the robot rests for ``wait_s`` until the gas sensors have settled,
-    averages their readings for ``sense_s``, chooses a heading by its rules, and turns
-    and drives for ``move_s``. A touch ends the search at once: where it smells, the
-    source is found and the robot calls; elsewhere the touch is refused. The numbers of
-    endings and faults are in ``systems.search.search_ending``. A gas sensor whose
-    readings do not change during a whole stop counts as dead, and gets the mean of the
-    others. A switch that is closed at the start counts as stuck, and is ignored; the
-    block does not notice a switch that is stuck open. The phases of ``song2011`` are
-    those of the paper; in ``upwind_gradient`` 1 is upwind, 2 across.
+    Each step has three activities. First, the robot rests for ``wait_s``, until the gas
+    sensors have settled. Then it averages the readings for ``sense_s``. The rules
+    choose a heading from the averages. Finally, the robot turns and drives for
+    ``move_s``.
+
+    A touch ends the search at once. If the touched object smells, it is the odor
+    source, and the robot calls. Otherwise the robot gives up the search. The numbers of
+    the endings and faults are in ``systems.search.search_ending``.
+
+    If the readings of a gas sensor do not change during a whole stop, the sensor is
+    dead. The block then uses the mean of the other sensors instead. If a switch is
+    closed at the start, it is stuck, and the block ignores it. The block does not
+    detect a switch that is stuck open.
+
+    The phases of ``song2011`` are those of the paper. The phases of ``upwind_gradient``
+    are 1 upwind and 2 across.
 
     Discrete state, every tick: the outputs, the measurements of the stop, and the
-    memory of the rules. Latency: a tick.
+    memory of the rules. Latency: one tick.
 
     Args:
-        parameters: ``PlumeSearchParameters``.
+        parameters: Durations of a step, rules, and end of the search.
         tick_s: Period of the update, s.
 
-    Reference: Song 2011, 2.3.3 and 4.2; the gate and ``upwind_gradient`` are ours.
+    Reference: Song 2011, 2.3.3 and 4.2. The gate and ``upwind_gradient`` are ours.
     """
 
     part = "controller"

@@ -1,10 +1,10 @@
-"""How a search ends, and what a searching robot found to be broken."""
+"""The endings of a search, and the faults that a searching robot detects."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-#: Numbers of the endings; 0: the search goes on.
+#: Numbers of the endings. 0: the search continues.
 (
     UNDECIDED,
     FOUND,
@@ -20,7 +20,7 @@ from collections.abc import Mapping
     DEAF,
 ) = range(12)
 
-#: Why a search was given up, by the number of its ending.
+#: Reason why a robot gave up a search, by the number of the ending.
 SEARCH_REASONS: Mapping[int, str] = {
     REFUSED: "touched something that does not smell",
     NO_WIND: "there is no wind to follow",
@@ -34,11 +34,11 @@ SEARCH_REASONS: Mapping[int, str] = {
     DEAF: "two or more microphones are lost",
 }
 
-#: Columns of the port ``search_report``: number of the ending, what the robot is at,
-#: steps begun, and the sum of what is broken.
+#: Columns of the port ``search_report``: number of the ending, phase of the search,
+#: number of steps so far, and sum of the bits of the faults.
 REPORT_COLUMNS = ("search_ended", "search_phase", "search_steps", "search_fault")
 
-#: What each bit of the last column stands for.
+#: Faults, by the bit of the last column.
 _FAULTS = (
     "gas sensor 1 is dead",
     "gas sensor 2 is dead",
@@ -50,12 +50,12 @@ _FAULTS = (
 
 
 def fault_names(fault: float) -> list[str]:
-    """What a searching robot found to be broken, and went on without.
+    """Returns the faults that a searching robot has detected.
 
     Args:
         fault: Last column of ``search_report``.
 
     Returns:
-        A text each.
+        One text per fault.
     """
     return [text for bit, text in enumerate(_FAULTS) if int(fault) >> bit & 1]

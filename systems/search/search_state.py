@@ -1,4 +1,4 @@
-"""What the states of both searches have in common, and how it is put out."""
+"""The common part of the states of both searches, and their outputs."""
 
 from __future__ import annotations
 
@@ -12,49 +12,49 @@ from systems.search.search_ending import REPORT_COLUMNS
 
 
 class SearchPlaces(NamedTuple):
-    """Places in the state of a search, of what both searches have."""
+    """Indices in the state of a search, for values that both searches have."""
 
     activity: int
     left: int
-    """Ticks until the activity ends."""
+    """Number of ticks until the activity ends."""
     started: int
-    """0 before the first tick, then 1."""
+    """0 before the first tick, 1 after it."""
     expected: int
-    """Heading to which the robot turns, deg."""
+    """Expected heading, clockwise from north, deg."""
     moves: int
-    """Whether it moves, 0 or 1."""
+    """Whether the robot moves, 0 or 1."""
     flag: int
-    """Whether it calls, or what it listens to."""
+    """Value of the third output port: ``calling`` or ``listening``."""
     ended: int
-    """The report begins here, in the order of ``REPORT_COLUMNS``."""
+    """First index of the report, in the order of ``REPORT_COLUMNS``."""
     phase: int
     steps: int
     fault: int
 
 
-#: Places of what both searches have; each search adds places of its own behind them.
+#: Indices of the common values. Each search adds its own indices after them.
 AT = SearchPlaces(*range(10))
 
 
 def ticks_of(time_s: float, tick_s: float, least: int = 1) -> int:
-    """A time as a number of ticks.
+    """Converts a time to a number of ticks.
 
     Args:
-        time_s: s.
+        time_s: Time, s.
         tick_s: Period of a tick, s.
-        least: Smallest number that is returned.
+        least: Smallest result.
 
     Returns:
-        The nearest number.
+        The nearest number of ticks, at least ``least``.
     """
     return max(least, round(time_s / tick_s))
 
 
 def search_ports(flag: str, unit: str) -> tuple[Port, ...]:
-    """Output ports of a search.
+    """Makes the output ports of a search.
 
     Args:
-        flag: Name of the port that says whether it calls or what it listens to.
+        flag: Name of the third port, ``calling`` or ``listening``.
         unit: Unit of this port.
 
     Returns:
@@ -81,12 +81,12 @@ def search_ports(flag: str, unit: str) -> tuple[Port, ...]:
 
 @register_jitable
 def publish_search(state: Any, outputs: Any, first: int) -> None:
-    """Puts out what the state of a search says.
+    """Copies the outputs from the state of a search.
 
     Args:
-        state: Of the search.
-        outputs: Heading, move, flag, report and frames; filled.
-        first: Place of the frames in the state.
+        state: State of the search.
+        outputs: Heading, move, flag, report and frames. The function fills them.
+        first: Index of the frames in the state.
     """
     expected, move, flag, report, frames = outputs
     expected[0], move[0], flag[0] = state[AT.expected], state[AT.moves], state[AT.flag]
@@ -98,11 +98,11 @@ def publish_search(state: Any, outputs: Any, first: int) -> None:
 
 @register_jitable
 def clear_frames(state: Any, first: int) -> None:
-    """Takes the frames of the last tick away.
+    """Removes the frames of the last tick.
 
     Args:
-        state: Holds the number of frames at ``first``, and their bytes after it.
-        first: Place of that number.
+        state: State of the search. It contains the number of frames, then their bytes.
+        first: Index of the number of frames.
     """
     state[first] = 0.0
 
@@ -111,14 +111,14 @@ def clear_frames(state: Any, first: int) -> None:
 def add_frame(
     state: Any, first: int, address: int, function: int, value: float
 ) -> None:
-    """Adds a frame, if there is room.
+    """Adds a frame, unless the tick already has ``MOST_FRAMES`` frames.
 
     Args:
-        state: As of ``clear_frames``.
-        first: The same.
-        address: Of the sender.
-        function: Fn of the frame (Song 2011, table 5).
-        value: What it carries, in its unit.
+        state: State of the search. It contains the number of frames, then their bytes.
+        first: Index of the number of frames.
+        address: Radio address of the sender.
+        function: Fn, number of the function (Song 2011, table 5).
+        value: Value, in the unit of ``write_frame``.
     """
     count = int(state[first])
     if count >= MOST_FRAMES:

@@ -1,4 +1,4 @@
-"""The rules by which the olfactory robot of Song 2011 chooses its way."""
+"""The rules by which the olfactory robot of Song 2011 chooses its heading."""
 
 from __future__ import annotations
 
@@ -13,23 +13,27 @@ from systems.search.search_ending import UNDECIDED
 def song2011_turn(
     gas: Any, airflow: Any, memory: Any, rules: Any
 ) -> tuple[float, int, int]:
-    """Steering angle after a stop (Song 2011, 2.3.3 and 4.2).
+    """Computes the turning angle after a stop (Song 2011, 2.3.3 and 4.2).
 
-    Phase 4 compares R1 with R3, as phase 3 does: what 4.2 prints of point G, "output
-    of R1 was less than R2", can only be R3.
+    Phase 1 lasts until the robot is in the plume for the first time. Afterwards, the
+    airflow sensors determine the phase: 2 wind on one sensor, 3 wind on neither sensor,
+    4 wind on both sensors. Phase 4 compares R1 with R3, as phase 3 does.
+    For point G, section 4.2 prints "output of R1 was less than R2", but the text can
+    only mean R3.
 
     Args:
-        gas: (R1, R2, R3): right front, rear, left front, Rs/R0.
-        airflow: (F1, F2): left, right.
-        memory: Its first number is 1 once the robot was in the plume; changed.
+        gas: (R1, R2, R3), ratios Rs/R0: right front, rear, left front.
+        airflow: (F1, F2), left and right reading.
+        memory: The first number is 1 after the robot was in the plume, else 0. The
+            function changes it.
         rules: ``SongRuleParameters``.
 
     Returns:
-        Turn, clockwise, deg; phase, 1 to 4; and ``UNDECIDED``.
+        Turning angle, clockwise, deg; phase, 1 to 4; and ``UNDECIDED``.
     """
     right, rear, left = gas
     least = min(right, rear, left)
-    # To the side of the front sensor that smells more.
+    # The side of the front sensor with more gas: 1 right, -1 left.
     side = 0.0
     if right != left:
         side = 1.0 if right < left else -1.0

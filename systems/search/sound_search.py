@@ -1,4 +1,4 @@
-"""The hearing robots' search: wait for the call, listen, turn and move, arrive."""
+"""The search by sound: the robot waits for a call, listens and moves to the caller."""
 
 from __future__ import annotations
 
@@ -35,59 +35,60 @@ from systems.search.search_state import (
     ticks_of,
 )
 
-#: What the robot is at; ``search_phase`` in its report.
+#: Activities of the robot. ``search_phase`` in its report is the activity.
 _WAITS, _HOLDS, _LISTENS, _COMPUTES, _MOVING, _OVER = range(1, 7)
 
 
 class _Places(NamedTuple):
-    """Places in the state of what this search has of its own."""
+    """Indices in the state, for values that only this search has."""
 
     unsent: int
-    """Whether frames of a step are still to be sent, 0 or 1."""
+    """Whether the frames of the step are not sent yet, 0 or 1."""
     levels: int
-    """Sum of the radio levels in this step, dBm."""
+    """Sum of the radio levels while the robot listens in this step, dBm."""
     readings: int
-    """Number of these levels."""
+    """Number of radio levels in the sum."""
     misses: int
-    """Times in a row that the source was not located."""
+    """Number of consecutive steps in which the source was not located."""
     noise_left: int
-    """Ticks for which it still listens to the noise."""
+    """Remaining ticks in which the robot listens to the noise."""
     waited: int
-    """Ticks for which it has waited for the call."""
+    """Number of ticks that the robot has waited for the call."""
     called: int
-    """1 called, -1 the caller has found nothing, 0 neither."""
+    """Report of the caller: 1 found, -1 found nothing, 0 none yet."""
     arrived: int
-    """Whether the robot that goes first has reported its result, 0 or 1."""
+    """Whether the robot that goes first has reported a result, or ``hold_s`` are over,
+    0 or 1."""
     bearing: int
-    """Of the source, deg."""
+    """Bearing of the source, CCW, deg."""
     distance: int
-    """Of the source, m; 0 if it is not known."""
+    """Range of the source, m. 0 if it is not known."""
     away: int
-    """Distance by the radio level, m."""
+    """Distance of the caller by the radio level, m."""
     parser: int
     frames: int
     size: int
-    """Of the state."""
+    """Size of the state."""
 
 
 _OWN = _Places(*accumulate((*(1,) * 11, PARSER_SIZE, FRAMES_SIZE), initial=len(AT)))
 # Numbers of frames (Song 2011, table 5).
 _FN_HEADING, _FN_FOUND_ODOR, _FN_DIRECTION = 5, 12, 13
 _FN_DISTANCE, _FN_RADIO_DISTANCE, _FN_RESULT = 14, 15, 16
-#: Bit of the faults.
+#: Bit of a lost microphone in the faults.
 _LOST_MICROPHONE = 32
-#: What ``listening`` asks of the ears.
+#: Values of the port ``listening``.
 _NOTHING, _NOISE, _SOUND = 0.0, 1.0, 2.0
-#: A turn takes about so long, s/deg, and the motors lag by so much, s.
+#: Approximate duration of a turn, s/deg, and lag of the motors, s.
 _TURN_S_DEG, _LAG_S = 1.0 / 90.0, 0.1
-#: The last step ends at this share of the range at which it has arrived.
+#: The last step ends at this multiple of ``stop_range_m``.
 _SHORT_OF = 0.93
-#: A step is no shorter, s.
+#: Shortest duration of a move, s.
 _SHORTEST_S = 0.5
 
 
 class SoundSearchNumbers(NamedTuple):
-    """What the step of ``SoundSearch`` depends on; times in ticks."""
+    """Constants of the step of ``SoundSearch``. Durations are in ticks."""
 
     own: SoundSearchParameters
     noise: int
@@ -99,9 +100,9 @@ class SoundSearchNumbers(NamedTuple):
     repeat: int
     speed_m_s: float
     level_dbm: float
-    """Of the radio at 1 m, dBm."""
+    """Radio level at a distance of 1 m, dBm."""
     exponent: float
-    """Of its path loss."""
+    """Exponent of the path loss."""
     tick_s: float
 
 
@@ -114,7 +115,7 @@ def _end(state: Any, ended: int) -> None:
 
 @register_jitable
 def _receive(state: Any, air: Any, own: Any) -> None:
-    """Calls and results out of what is on the air."""
+    """Reads the reports of the caller and of the robot that goes first."""
     parser = state[_OWN.parser : _OWN.parser + PARSER_SIZE]
     for k in range(int(air[0])):
         good, address, function, value = parse_byte(parser, air[1 + k])
@@ -126,7 +127,7 @@ def _receive(state: Any, air: Any, own: Any) -> None:
 
 @register_jitable
 def _wait(state: Any, numbers: SoundSearchNumbers) -> None:
-    """Until it is called; first it hears the noise."""
+    """Listens to the noise, then waits for the call."""
     if state[_OWN.noise_left] > 0.0:
         state[AT.flag] = _NOISE
         state[_OWN.noise_left] -= 1.0
@@ -143,7 +144,7 @@ def _wait(state: Any, numbers: SoundSearchNumbers) -> None:
 
 @register_jitable
 def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
-    """Listens, or holds for the one that goes first."""
+    """Begins to listen, or to wait for the robot that goes first."""
     own = numbers.own
     state[AT.moves] = 0.0
     near = 0.0 < state[_OWN.away] < own.hold_within_m
@@ -157,7 +158,7 @@ def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
 
 @register_jitable
 def _missed(state: Any, ended: int, numbers: SoundSearchNumbers) -> None:
-    """Listens again, if it may."""
+    """Listens again, or ends the search after ``tries`` misses."""
     state[_OWN.misses] += 1.0
     if state[_OWN.misses] >= numbers.own.tries:
         _end(state, ended)
@@ -169,10 +170,17 @@ def _missed(state: Any, ended: int, numbers: SoundSearchNumbers) -> None:
 def _decide(
     state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
 ) -> None:
-    """Where to go by what was heard, or that it has arrived."""
+    """Decides after a step whether the robot moves, listens again or stops.
+
+    The radio level gives a distance, the ears give a bearing and perhaps a range. The
+    robot has arrived if the distance or the range is below its threshold. The range
+    counts only near the caller. Without a unique bearing, the robot listens again. Near
+    the caller, the next move is shorter than ``move_s``.
+    """
     bearing, distance, detected, ranged, ambiguous, lost = heard
     own = numbers.own
     state[AT.fault] = float(_LOST_MICROPHONE) if lost > 0.5 else 0.0
+    # Distance of the caller by the mean radio level.
     level = state[_OWN.levels] / max(state[_OWN.readings], 1.0)
     away = radio_distance(level, numbers.level_dbm, numbers.exponent)
     state[_OWN.away] = away
@@ -185,6 +193,7 @@ def _decide(
     if ambiguous > 0.5:
         _missed(state, AMBIGUOUS, numbers)
         return
+    # The bearing is unique. Checks whether the heard range ends the search.
     state[_OWN.misses] = 0.0
     state[_OWN.bearing] = math.degrees(bearing)
     state[_OWN.distance] = distance if ranged > 0.5 else 0.0
@@ -195,13 +204,15 @@ def _decide(
     if state[AT.steps] >= own.most_steps:
         _end(state, STEPS_GONE)
         return
+    # Duration of the next move.
     move = numbers.move
     if own.stop == "range" and ranged < 0.5 and away < own.radio_gate_m:
-        move = max(1, move // 2)  # near, at an unknown distance
+        move = max(1, move // 2)  # near the caller, but without a range
     if near:
         way = distance - _SHORT_OF * own.stop_range_m
         time = way / numbers.speed_m_s + _LAG_S + _TURN_S_DEG * abs(state[_OWN.bearing])
         move = min(move, int(max(time, _SHORTEST_S) / numbers.tick_s))
+    # Headings are clockwise, and bearings are counterclockwise.
     state[AT.expected] = wrapped_deg(heading - state[_OWN.bearing])
     state[AT.steps] += 1.0
     state[AT.activity], state[AT.left] = _MOVING, move
@@ -213,7 +224,7 @@ def _decide(
 def _add_frames(
     state: Any, tick: int, heading: float, numbers: SoundSearchNumbers
 ) -> None:
-    """Frames of this tick."""
+    """Adds the frames of this tick: the data of the step, or the final result."""
     address = numbers.own.address
     clear_frames(state, _OWN.frames)
     if state[AT.activity] == _OVER:
@@ -234,7 +245,7 @@ def _add_frames(
 def _end_activity(
     state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
 ) -> None:
-    """What comes after what it was at."""
+    """Starts the next activity."""
     activity = state[AT.activity]
     if activity == _LISTENS:
         state[AT.activity], state[AT.left] = _COMPUTES, numbers.compute
@@ -252,7 +263,11 @@ def _end_activity(
 def sound_search_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SoundSearchNumbers
 ) -> None:
-    """One tick of the search."""
+    """Computes one tick of the search.
+
+    The robot first waits for the call. Then each step consists of the activities
+    listen, compute and move. ``AT.left`` counts the ticks of the present activity.
+    """
     bearing, distance, detected, ranged, ambiguous, lost, levels, headings, air = inputs
     heard = bearing[0], distance[0], detected[0], ranged[0], ambiguous[0], lost[0]
     heading = headings[0]
@@ -276,34 +291,37 @@ def sound_search_step(
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: SoundSearchNumbers) -> None:
-    """The outputs of ``sound_search_step``'s state."""
+    """Copies the outputs from the state of ``sound_search_step``."""
     publish_search(state, outputs, _OWN.frames)
 
 
 class SoundSearch(Block):
-    """Finds a calling robot step by step: listens, turns and moves.
+    """Searches for a calling robot in steps.
 
-    The robot listens to the noise for ``noise_s``, then waits for the call of
-    ``caller``: a frame that says that the odor source is found. In each step the robot
-    listens for ``listen_s``, computes for ``compute_s``, and turns and drives for
-    ``move_s``, or for less when the source is near. Two robots approach one caller one
-    after the other: the robot that ``waits_for`` the other holds near the caller until
-    the other has reported its result, found or not, or ``hold_s`` are over. The robot
-    does not follow a sound that fits several directions; it listens again, and gives up
-    after ``tries``. The numbers of endings and faults are in
-    ``systems.search.search_ending``. The phase is the activity: 1 waiting, 2 holding, 3
-    listening, 4 computing, 5 moving, 6 over.
+    First, the robot listens to the noise for ``noise_s``. Then it waits for the call of
+    ``caller``: a frame with the message that the odor source is found. In each step,
+    the robot listens for ``listen_s`` and computes for ``compute_s``. Then it turns and
+    drives for ``move_s``, or for a shorter time near the source.
+
+    Two robots approach the same caller one after the other. The second robot has the
+    address of the first robot in ``waits_for``. It waits near the caller until the
+    first robot has reported its result, or until ``hold_s`` are over.
+
+    The robot does not follow a sound that fits several directions. It listens again,
+    and gives up after ``tries``. The numbers of the endings and faults are in
+    ``systems.search.search_ending``. The phase is the activity: 1 waiting for the call,
+    2 waiting for the first robot, 3 listening, 4 computing, 5 moving, 6 finished.
 
     Discrete state, every tick: the outputs, the parser of the radio, and the
-    measurements of the step. Latency: a tick.
+    measurements of the step. Latency: one tick.
 
     Args:
-        parameters: ``SoundSearchParameters``.
-        radio: Path loss, by which a level becomes a distance.
-        speed_m_s: Of the robot at full duty, m/s.
+        parameters: Durations of a step, radio addresses, and end of the search.
+        radio: Path loss, to compute a distance from a level.
+        speed_m_s: Speed of the robot at full duty, m/s.
         tick_s: Period of the update, s.
 
-    Reference: Song 2011, 3.2.3 and 4.3; the stop by range, and who waits, are ours.
+    Reference: Song 2011, 3.2.3 and 4.3. The stop by range and ``waits_for`` are ours.
     """
 
     part = "controller"

@@ -1,4 +1,4 @@
-"""Rules that go upwind and lean towards the stronger smell; ours."""
+"""Our rules for the search by smell: upwind, and toward the side with more gas."""
 
 from __future__ import annotations
 
@@ -11,41 +11,44 @@ from systems.search.search_ending import NO_WIND, UNDECIDED
 
 
 class _Places(NamedTuple):
-    """Places in the memory of the rules."""
+    """Indices in the memory of the rules."""
 
     best: int
-    """Strongest smell."""
+    """Largest value of 1 - Rs/R0 so far."""
     casts: int
-    """Casts since the plume was lost."""
+    """Number of steps since the robot lost the plume."""
     side: int
-    """Side of the last lean: 1 right, -1 left."""
+    """Side with more gas at the last stop in the plume: 1 right, -1 left."""
     calm: int
-    """Stops in a row without wind."""
+    """Number of consecutive stops without wind."""
 
 
 _AT = _Places(*range(4))
-#: Numbers that a rule may remember from stop to stop.
+#: Number of values that the rules store from stop to stop.
 RULE_MEMORY = len(_AT)
-#: A reading below this share of the other sensor's is no reading.
+#: An airflow reading below this share of the other reading counts as no wind.
 _SHADED = 0.1
-#: Where one sensor alone is blown at, the wind comes from 45 to 135 deg off.
+#: Angle of the wind if only one sensor has wind, deg. The true angle is between 45 and
+#: 135 deg.
 _ABEAM_DEG = 80.0
-#: Least ratio of a gas sensor that counts.
+#: Lower limit of the gas ratios in the logarithm.
 _LEAST = 0.01
-#: Stops in a row without any wind, a half turn between them, end the search.
+#: Number of consecutive stops without wind that ends the search. The robot turns by
+#: 180 deg between them.
 _CALM_STOPS = 3
 
 
 @register_jitable
 def upwind_angle(airflow: Any) -> float:
-    """Where the wind comes from, by two sensors 45 deg to either side.
+    """Computes the upwind direction from two sensors at 45 deg to the left and right.
 
     Args:
-        airflow: (F1, F2): left, right.
+        airflow: (F1, F2), left and right reading.
 
     Returns:
-        Angle to turn upwind, clockwise, deg; exact up to 45 deg off with sensors that
-        read the cosine of the angle, beyond that 80.
+        Turning angle to upwind, clockwise, deg. If the readings are proportional to the
+        cosine of the angle, the result is exact up to 39 deg. At larger angles, the
+        result is 80 deg to the side of the wind.
     """
     left, right = airflow
     larger = max(left, right)
@@ -58,17 +61,23 @@ def upwind_angle(airflow: Any) -> float:
 def upwind_gradient_turn(
     gas: Any, airflow: Any, memory: Any, rules: Any
 ) -> tuple[float, int, int]:
-    """Steering angle after a stop.
+    """Computes the turning angle after a stop.
+
+    In the plume, the robot goes upwind, with an angle toward the side with more gas.
+    After it has lost the plume, it crosses the wind to find the plume again: one step
+    to the side of the last angle, two steps to the other side, three steps back, and so
+    on. Without wind, it turns by 180 deg, and ends the search after ``_CALM_STOPS``
+    such stops.
 
     Args:
-        gas: (R1, R2, R3): right front, rear, left front, Rs/R0.
-        airflow: (F1, F2): left, right.
-        memory: ``RULE_MEMORY`` numbers, 0 at first; changed.
+        gas: (R1, R2, R3), ratios Rs/R0: right front, rear, left front.
+        airflow: (F1, F2), left and right reading.
+        memory: ``RULE_MEMORY`` numbers, initially 0. The function changes them.
         rules: ``UpwindGradientParameters``.
 
     Returns:
-        Turn, clockwise, deg; phase: 1 upwind, 2 across; and
-        ``NO_WIND`` where there is none to go by, else ``UNDECIDED``.
+        Turning angle, clockwise, deg; phase, 1 upwind or 2 across; and ``NO_WIND`` if
+        the search ends, else ``UNDECIDED``.
     """
     if max(airflow[0], airflow[1]) < rules.still_air:
         memory[_AT.calm] += 1.0
@@ -80,7 +89,7 @@ def upwind_gradient_turn(
     memory[_AT.best] = max(memory[_AT.best], strongest)
     if strongest < rules.lost_share * memory[_AT.best]:
         memory[_AT.casts] += 1.0
-        # One step to the side of the last lean, two to the other, three back ...
+        # Leg k, from 0, has k + 1 steps. Even legs go to the side of the last angle.
         leg = math.floor(0.5 * (math.sqrt(8.0 * memory[_AT.casts] - 7.0) - 1.0) + 1e-9)
         side = memory[_AT.side] if leg % 2 == 0 else -memory[_AT.side]
         turn = rules.cast_deg if side >= 0.0 else -rules.cast_deg

@@ -1,1 +1,1 @@
-"""From loudspeaker to counts: waveforms, propagation, rooms, microphones, converter."""
+"""The audio chain: waveforms, propagation, rooms, microphones, and converter."""

@@ -13,7 +13,7 @@ def sound_speed(temperature_c: float) -> float:
 
 
 class AcousticParameters(Parameters):
-    """The air."""
+    """Properties of the air."""
 
     sound_speed_m_s: SoundSpeed = 340.0
     """Speed of sound where no temperature is set, m/s (Han 2019, 2.1)."""
@@ -22,7 +22,7 @@ class AcousticParameters(Parameters):
 
     @property
     def c(self) -> float:
-        """Speed of sound in force, m/s."""
+        """Speed of sound, m/s; the temperature, if set, takes precedence."""
         if self.temperature_c is None:
             return self.sound_speed_m_s
         return sound_speed(self.temperature_c)

@@ -1,4 +1,4 @@
-"""From sound pressure to counts: microphone, amplifier and converter."""
+"""Conversion of sound pressure to counts: microphone, amplifier and converter."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from systems.sound.parameters import MicArrayParameters
 
 
 def check_faults(parameters: MicArrayParameters, count: int) -> None:
-    """Refuses faults of microphones that are not there.
+    """Refuses faults of microphones that do not exist.
 
     Args:
-        parameters: Have the faults.
+        parameters: Parameters with the faults.
         count: Number of microphones.
 
     Raises:
-        InputError: One is beyond the last microphone.
+        InputError: The number of a faulty microphone is above ``count``.
     """
     beyond = [f.microphone for f in parameters.faults if f.microphone > count]
     if beyond:
@@ -39,7 +39,7 @@ def _silent_counts(
     full_scale: np.float32,
     out: NDArray[np.int16],
 ) -> int:  # pragma: no cover  (compiled)
-    """As ``_counts``, without pressure."""
+    """``_counts`` without sound pressure."""
     spoiled: Any = 0
     for m in range(noise.shape[0]):
         level = np.float32(gains[m] * sigma)
@@ -60,7 +60,7 @@ def _counts(
     full_scale: np.float32,
     out: NDArray[np.int16],
 ) -> int:  # pragma: no cover  (compiled)
-    """Fills in the counts; not 0 where a value was not finite."""
+    """Fills ``out`` with counts; returns a nonzero number if a value is not finite."""
     spoiled: Any = 0
     for m in range(noise.shape[0]):
         factor, level = np.float32(gains[m] * gain), np.float32(gains[m] * sigma)
@@ -85,13 +85,14 @@ def convert(
         noise: (m, n) noise of unit variance.
         noise_pa: RMS of the noise, Pa.
         parameters: Sensitivity, gain and resolution.
-        gains: (m,) true over stated gain of each channel; 1 unless given.
+        gains: (m,) true gain over stated gain of each channel; None: 1.
 
     Returns:
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
 
     Raises:
-        ValueError: Pressure, noise or a gain is not finite; a count would not tell.
+        ValueError: Pressure, noise or a gain is not finite; the counts would not show
+            this.
     """
     if gains is None:
         gains = np.ones(len(noise))
@@ -109,7 +110,7 @@ def convert(
 
 
 def _check_parts(**parts: Any) -> None:
-    """Refuses parts of a frame that are not finite."""
+    """Refuses arrays that are not finite."""
     for name, values in parts.items():
         if values is not None:
             check_finite(f"MicArray: {name}", values)

@@ -1,4 +1,4 @@
-"""Shape of a microphone array: what it spans, and what it cannot tell apart."""
+"""Shape of a microphone array, and the ambiguities of its delays."""
 
 from __future__ import annotations
 
@@ -11,64 +11,67 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.input_error import InputError
 
-# Nearer than this, two microphones are one, m.
+# Smallest distance between two microphones, m.
 _LEAST_DISTANCE_M = 1e-3
 
-# Off a line or a plane by less than this share of the aperture is on it.
+# Microphones within this share of the aperture of a line or a plane are on it.
 _FLATNESS = 0.01
 
 _UPRIGHT = ("above", "below")
 
 
 class EqualRow(NamedTuple):
-    """Three microphones M1, M2, M3 from left to right for one who looks ahead."""
+    """Three microphones M1, M2, M3, from left to right when looking ahead."""
 
     spacing_m: float
-    """Distance between neighbours, m."""
+    """Distance between adjacent microphones, m."""
     to_delays: NDArray[np.float64]
-    """(2, 2) tau_12 and tau_13 from the delays t_k - t_0 in the array's order."""
+    """(2, 2) matrix that maps the delays t_k - t_0, in the order of the array, to
+    tau_12 and tau_13."""
     axes: NDArray[np.float64]
-    """(d, 2) ahead and left, unit vectors as columns."""
+    """(d, 2) unit vectors ahead and to the left, as columns."""
 
 
 @dataclass(frozen=True)
 class ArrayShape:
-    """Microphones about their centroid, in the array's frame A.
+    """Positions of microphones relative to their centroid, in the frame A of the array.
 
-    A has the axes in which the positions were given, and its origin at their
-    centroid. Make one by ``ArrayShape.of``.
+    The axes of A are those in which the positions were given. Its origin is the
+    centroid. Use ``ArrayShape.of`` to make a shape.
     """
 
     p_AM: NDArray[np.float64]
-    """(n, d) microphones, m; d is 2 or 3."""
+    """(n, d) positions of the microphones, m; d is 2 or 3."""
     kind: Literal["row", "plane", "space"]
     """What the microphones span: a line, a plane, or space."""
     span: NDArray[np.float64]
-    """(r, d) orthonormal vectors of A that span it. A row's points to the left
-    of one who looks along ``ahead``."""
+    """(r, d) orthonormal vectors in A that span the array. The vector of a row points
+    to the left as seen in the direction ``ahead``."""
     ahead: NDArray[np.float64] | None
-    """(d,) unit vector off the line or plane, to the side that is reported:
-    towards +x, or +y for a row along x; towards +z for a plane in space, or as
-    a row's where that plane is upright. None where nothing is ambiguous."""
+    """(d,) unit vector perpendicular to the line or plane, towards the side that is
+    reported. It points towards +x, or +y for a row along x. For a plane in space it
+    points towards +z; if the plane is upright, the rule for rows applies. None if
+    nothing is ambiguous."""
     aperture_m: float
     """Largest distance between two microphones, m."""
     side: Literal["ahead", "behind", "above", "below"] | None = None
-    """Where all sources are known to be; None: on either side."""
+    """Side on which all sources are known to be; None: both sides are possible."""
 
     @classmethod
     def of(cls, positions: ArrayLike, flat_m: float | None = None) -> ArrayShape:
-        """The shape of some microphones.
+        """Shape of the array with the given microphones.
 
         Args:
-            positions: (n, 2) or (n, 3) places in any frame, m; n at least 3.
-            flat_m: How far microphones may stand off a line or a plane that
-                counts as one, m. None: 1 % of the aperture.
+            positions: (n, 2) or (n, 3) positions in any frame, m; n is at least 3.
+            flat_m: Largest distance of a microphone from a line or a plane that it
+                belongs to, m. None: 1 % of the aperture.
 
         Returns:
-            The microphones about their centroid, and what they span.
+            The microphones relative to their centroid, and what they span.
 
         Raises:
-            InputError: Too few, coincident or unreadable positions.
+            InputError: There are too few positions, or positions that coincide or are
+                not finite.
         """
         p = np.array(positions, dtype=np.float64)
         if p.ndim != 2 or p.shape[1] not in (2, 3):
@@ -82,7 +85,8 @@ class ArrayShape:
         aperture = float(_distances(p).max())
         limit = _FLATNESS * aperture if flat_m is None else flat_m
         axes = np.linalg.svd(p, full_matrices=True)[2]
-        # A row: all distances from the longest axis; a plane: from the first two.
+        # A row: all microphones are within the limit of the longest axis. A plane: all
+        # are within the limit of the plane of the two longest axes.
         if np.linalg.norm(p @ axes[1:].T, axis=1).max() <= limit:
             ahead, left = _row_axes(axes[0])
             return cls(p, "row", left[np.newaxis], ahead, aperture)
@@ -104,10 +108,10 @@ class ArrayShape:
 
     @property
     def ambiguity(self) -> Literal["none", "front_back", "mirror"]:
-        """What fits the same delays: front and back, the mirror image, nothing.
+        """Directions with equal delays: none, front and back, or mirror images.
 
-        A row in space cannot even tell front from above: every place on a
-        circle about it fits.
+        A row in space has a larger ambiguity: all positions on a circle around the row
+        have equal delays.
         """
         if self.ahead is None or self.side is not None:
             return "none"
@@ -115,20 +119,20 @@ class ArrayShape:
 
     @property
     def unknowns(self) -> int:
-        """What delays can tell at most: angles, and the range."""
+        """Largest number of unknowns that delays determine: angles, and the range."""
         return len(self.span) + (self.ahead is not None)
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom of the delays' residuals; none if not positive."""
+        """Degrees of freedom of the residuals of the delays; none if not positive."""
         return self.count - 1 - self.unknowns
 
     @cached_property
     def angles(self) -> tuple[Literal["bearing", "elevation"], ...]:
-        """What of a direction delays can tell.
+        """Angles of a direction that the delays determine.
 
-        With a slanted row it is neither: the angle with the row is known, but no
-        azimuth and no elevation.
+        A slanted row determines neither angle. It determines the angle between the
+        direction and the row, but no azimuth and no elevation.
         """
         if self.dimension == 2:
             return ("bearing",)
@@ -150,16 +154,17 @@ class ArrayShape:
         return _distances(self.p_AM)[tuple(self.pairs.T)]
 
     def facing(self, side: Literal["ahead", "behind", "above", "below"]) -> ArrayShape:
-        """The same microphones where all sources are known to be on one side.
+        """Same array, with all sources known to be on one side.
 
         Args:
-            side: Ahead is towards +x, or +y for a row along x; above towards +z.
+            side: ``ahead`` is towards +x, or +y for a row along x; ``above`` is towards
+                +z.
 
         Returns:
-            The shape that looks there; ``ambiguity`` is then none.
+            The shape that faces this side; its ``ambiguity`` is ``none``.
 
         Raises:
-            InputError: The array cannot tell these sides, or tells all places.
+            InputError: The array does not distinguish these sides, or has no ambiguity.
         """
         level = self.ahead is None or abs(self.ahead[-1]) <= _FLATNESS
         names = ("ahead", "behind") if self.dimension == 2 or level else _UPRIGHT
@@ -182,22 +187,23 @@ class ArrayShape:
         )
 
     def max_delay(self, c: float) -> float:
-        """Longest time that sound takes from microphone to microphone, s."""
+        """Longest time that sound takes from one microphone to another, s."""
         return self.aperture_m / c
 
     @cached_property
     def equal_row(self) -> EqualRow | None:
-        """Three microphones equally spaced in a row; None for all others."""
+        """The row, if it has three equally spaced microphones; otherwise None."""
         ahead = self.ahead
         if ahead is None or self.kind != "row" or self.count != 3:
             return None
         along = self.p_AM @ self.span[0]
         right, middle, left = (int(k) for k in np.argsort(along))
         off = np.linalg.norm(self.p_AM - np.outer(along, self.span[0]), axis=1).max()
-        # The closed form is exact only for an exact row.
+        # The closed form is exact only if the row is straight and equally spaced.
         if max(off, abs(along[middle])) > 1e-9 * self.aperture_m:
             return None
-        arrivals = np.vstack((np.zeros((1, 2)), np.eye(2)))  # by the delays
+        # Row k expresses t_k - t_0 by the delays.
+        arrivals = np.vstack((np.zeros((1, 2)), np.eye(2)))
         return EqualRow(
             spacing_m=float(along[left] - along[right]) / 2.0,
             to_delays=arrivals[[middle, right]] - arrivals[left],
@@ -232,7 +238,7 @@ def _distances(p: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _upward(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The normal that points up; forward, or else left, if it is level."""
+    """Normal that points up; if it is level, it points forward, or else to the left."""
     for part in normal[::-1] if abs(normal[2]) > _FLATNESS else normal:
         if abs(part) > _FLATNESS:
             return normal * np.sign(part)
@@ -242,10 +248,10 @@ def _upward(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 def _row_axes(
     along: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Level unit vector ahead of a row, and the one along the row to its left."""
+    """Unit vector ahead of a row, and unit vector along the row to the left."""
     ahead = np.zeros(along.size)
     level = np.hypot(along[0], along[1])
-    if level < _FLATNESS:  # upright: any direction is ahead
+    if level < _FLATNESS:  # an upright row: any level direction can be ahead
         ahead[0] = 1.0
         ahead -= (ahead @ along) * along
         return ahead / np.linalg.norm(ahead), along * np.sign(along[2])

@@ -1,4 +1,4 @@
-"""What is wrong with an array that was built: places, delays and gains."""
+"""Errors of a real microphone array: positions, delays and gains."""
 
 from __future__ import annotations
 
@@ -12,35 +12,36 @@ from numpy.typing import NDArray
 
 from systems.sound.parameters import MicArrayParameters, channel_skew
 
-# Widest spacing of knots, s: even a robot that spins at 4 rad/s bends the delay by
-# less than 1e-4 sample from a cubic in that time.
+# Largest spacing of knots, s. Within this time, even for a robot that turns at 4 rad/s,
+# the delay deviates from a cubic polynomial by less than 1e-4 sample.
 _SPACING_S = 0.0025
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Errors of the n channels of one array."""
+    """Errors of the n channels of an array."""
 
     position_errors: NDArray[np.float64]
-    """(n, 2) true less stated places of the microphones, in B axes, m."""
+    """(n, 2) true less stated positions of the microphones, in B axes, m."""
     channel_delays: NDArray[np.float64]
-    """(n,) by which each channel is sampled later than stated, s."""
+    """(n,) times by which the channels are sampled later than stated, s."""
     gains: NDArray[np.float64]
-    """(n,) true over stated gain of each channel, a ratio of amplitudes."""
+    """(n,) true gain over stated gain of each channel, a ratio of amplitudes."""
 
 
 def draw_tolerances(
     parameters: MicArrayParameters, count: int, generator: Generator
 ) -> Tolerances:
-    """Errors of one array, each uniform within its tolerance of either sign.
+    """Draws the errors of one array, each uniform between minus and plus its tolerance.
 
     Args:
         parameters: The tolerances.
         count: Number of microphones n.
-        generator: Where the errors come from.
+        generator: Source of the random numbers.
 
     Returns:
-        Errors of places (n, 2), m, and of delays (n,), s, and factors (n,) of the gain.
+        Errors of positions (n, 2), m, and of delays (n,), s, and factors (n,) of the
+        gain.
     """
     places = generator.uniform(-1.0, 1.0, (count, 2))
     delays = generator.uniform(-1.0, 1.0, count)
@@ -53,14 +54,14 @@ def draw_tolerances(
 
 
 class RealArray(NamedTuple):
-    """The array and the air as they are, whatever they are thought to be."""
+    """True properties of the array and the air; they may differ from stated ones."""
 
     p_BM: NDArray[np.float64]
     """(n, 2) microphones in B, m."""
     instants: NDArray[np.float64]
-    """(n, knots) of each channel's knots from the frame's start, s."""
+    """(n, knots) times of the knots of each channel from the start of the frame, s."""
     gains: NDArray[np.float64]
-    """(n,) true over stated gain of each channel."""
+    """(n,) true gain over stated gain of each channel."""
     c: float
     """Speed of sound, m/s."""
 
@@ -71,17 +72,16 @@ def real_array(
     tolerances: Tolerances,
     c: float,
 ) -> RealArray:
-    """The array with its errors.
+    """Array with its errors.
 
     Args:
-        p_BM: (n, 2) stated places of the microphones in B, m.
+        p_BM: (n, 2) stated positions of the microphones in B, m.
         parameters: Stated skew of the channels, and length of a frame.
-        tolerances: The errors of both, and of the gains.
+        tolerances: Errors of positions, delays and gains.
         c: Speed of sound, m/s.
 
     Returns:
-        Places in B, m, instants in a frame at which each channel is sampled, s, and
-        gains.
+        True positions in B, m, instants of the knots of each channel, s, and gains.
 
     Raises:
         ValueError: The skew is given for another number of channels.

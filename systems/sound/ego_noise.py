@@ -1,4 +1,4 @@
-"""The robot's own noise, from a recording."""
+"""Noise of the robot itself, from a recording."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ FADE_S = 0.05
 
 
 def driving_share(velocity: ArrayLike, robot: RobotParameters) -> float:
-    """The faster wheel's rim speed as a share of the top speed, at most 1.
+    """Rim speed of the faster wheel as a share of the top speed, at most 1.
 
     Args:
         velocity: (3,) vx, vy in W and omega, m/s and rad/s.
-        robot: Wheels and top speed.
+        robot: Wheel separation and top speed.
 
     Returns:
-        0 to 1.
+        Share from 0 to 1.
     """
     vx, vy, omega = np.abs(velocity)
     rim = np.hypot(vx, vy) + omega * robot.wheel_separation_m / 2.0
@@ -36,20 +36,21 @@ def driving_share(velocity: ArrayLike, robot: RobotParameters) -> float:
 
 
 class EgoNoise:
-    """What the robot's motors and fans add to each channel.
+    """Noise of motors and fans that is added to each channel.
 
-    The recording is brought to the sample rate and to the band of the microphones,
-    and repeated without a seam. A channel for each microphone is played as it is,
-    coherent as it was recorded; one channel is played to all microphones from
-    places of its own, drawn from the seed, so that channels are incoherent.
+    The recording is resampled to the sample rate, limited to the band of the
+    microphones, and repeated without a seam. A recording with one channel per
+    microphone is played as it is, so that the channels stay coherent. A recording with
+    a single channel is played to all microphones. Each microphone then starts at its
+    own position, drawn from the seed, so that the channels are incoherent.
 
     Args:
-        parameters: The file and its level.
+        parameters: File and level of the noise.
         count: Number of microphones n.
-        seed: Seed of the places where the channels begin.
+        seed: Seed of the start positions.
 
     Raises:
-        InputError: The file cannot be used; names it and the remedy.
+        InputError: The file cannot be used. The message names the file and the remedy.
     """
 
     def __init__(self, parameters: MicArrayParameters, count: int, seed: int) -> None:
@@ -64,7 +65,7 @@ class EgoNoise:
         self._starts = self._drawn_starts(seed)
 
     def _drawn_starts(self, seed: int) -> NDArray[np.int64]:
-        """(n,) places of the loops where the channels begin."""
+        """(n,) positions in the recording at which the channels start."""
         count = len(self._rows)
         starts = tick_generator(seed, BEFORE_THE_RUN + 1).integers(
             self._loops.shape[1], size=count
@@ -72,17 +73,17 @@ class EgoNoise:
         return np.full(count, starts[0]) if len(self._loops) > 1 else starts
 
     def of_seed(self, seed: int) -> EgoNoise:
-        """The same recording from other places."""
+        """Same recording with other start positions."""
         other = copy(self)
         other._starts = self._drawn_starts(seed)
         return other
 
     def frame(self, number: int, share: float) -> NDArray[np.float32]:
-        """(n, samples) of a frame.
+        """Noise in one frame.
 
         Args:
-            number: Of the frame; that which ends at time zero is 0.
-            share: From ``driving_share``.
+            number: Number of the frame; frame 0 ends at time zero.
+            share: Rim speed as a share of the top speed, from ``driving_share``.
 
         Returns:
             (n, samples) pressure over the RMS pressure of the source at 1 m.
@@ -94,7 +95,7 @@ class EgoNoise:
 
 
 def _read_loops(file: str, count: int, rate_hz: float) -> NDArray[np.float32]:
-    """(1 or n, length) samples at a rate, of unit RMS over all channels."""
+    """(1 or n, length) samples at ``rate_hz``, of unit RMS over all channels."""
     field = "microphones.ego_noise_file"
     channels, rate = read_noise(file, count, field)
     centred = channels - channels.mean(axis=1, keepdims=True)
@@ -109,6 +110,7 @@ def _read_loops(file: str, count: int, rate_hz: float) -> NDArray[np.float32]:
         )
     if rate_hz != SAMPLE_RATE_HZ:
         heard = soxr.resample(heard.T, SAMPLE_RATE_HZ, rate_hz, quality="VHQ").T
+    # Fade the end into the beginning, with constant power.
     fade = round(FADE_S * rate_hz)
     angle = np.pi / 2.0 * (np.arange(fade) + 0.5) / fade
     loops = heard[:, :-fade].copy()

@@ -1,4 +1,4 @@
-"""The robot's microphones, with their converter."""
+"""The microphones of the robot, with their converter."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 def microphone_reach(
     room: RoomParameters | None, acoustics: AcousticParameters
 ) -> float:
-    """Longest way of sound that emissions must reach back for, m.
+    """Longest distance for which emissions must be stored, m.
 
     Args:
-        room: Its reflections are heard, too; none: the free field.
+        room: Room whose reflections are also heard; None for the free field.
         acoustics: Speed of sound.
 
     Returns:
-        m, at least MAXIMUM_RANGE_M.
+        Distance, m, at least MAXIMUM_RANGE_M.
     """
     if room is None:
         return MAXIMUM_RANGE_M
@@ -50,43 +50,48 @@ def microphone_reach(
 
 
 class MicArray(Block):
-    """Records the sound at the robot's microphones.
+    """Records the sound at the microphones of the robot.
 
-    A frame published at t covers [t - frame_s, t), 25 ms. Within a frame the robot
-    follows a cubic Hermite polynomial; sound travels as in
-    ``systems.sound.propagation``. A robot that has no frame behind it, or is read
-    between two frames' ends, is taken to have come at its present velocity.
+    A frame published at t covers [t - frame_s, t); ``frame_s`` is 25 ms by default.
+    Within a frame, the robot follows a cubic Hermite polynomial. Sound travels as in
+    ``systems.sound.propagation``. The state may lack the pose of one frame ago: before
+    the first frame, or if the output is evaluated between the ends of two frames. The
+    block then assumes that the robot has moved at its present velocity.
 
-    In a room the direct sound is as without one. The reflections are those of
-    robot and source at rest where they were at the last multiple of the room's
-    ``update_period_s``, so that their geometry is up to that old (and older by
-    what sound takes for the way); the frame that ends at such an instant fades
-    from the places before to those of that instant.
+    A room does not change the direct sound. For the reflections, robot and source are
+    at rest. Their positions are those at the last multiple of the room's
+    ``update_period_s``. The geometry is therefore up to this period old, plus the time
+    that the sound travels. The frame that ends at such an instant fades from the
+    previous positions to those of this instant.
 
-    Numeric parameters, by the class's constants of these names; a trial may
-    set them in its context, at the latest before the first tick:
-    ``POSITION_ERRORS`` (2 n, x and y of one microphone after the other, m),
-    ``CHANNEL_DELAYS`` (n, s) and ``GAINS`` (n, 1 is none), as in
-    ``systems.sound.array_tolerances``; ``SOUND_SPEED`` (1, m/s), of the air. Their
-    defaults are drawn from the seed, within the tolerances of the parameters.
+    A trial may set these numeric parameters in its context, at the latest before the
+    first tick. The class has constants of these names with their indices:
 
-    State: time, pose and velocity of the robot at the last frame's end; in a room
-    also time, pose of the robot and place of each source at the last update.
-    Rate and latency: a function of the state and the present inputs; no
-    latency. The state is updated every ``frame_s``.
+    - ``POSITION_ERRORS``: (2 n,) x and y of one microphone after the other, m;
+    - ``CHANNEL_DELAYS``: (n,) s;
+    - ``GAINS``: (n,) 1 is no error;
+    - ``SOUND_SPEED``: (1,) speed of sound in the air, m/s.
+
+    The first three are explained in ``systems.sound.array_tolerances``. Their defaults
+    are drawn from the seed, within the tolerances of the parameters.
+
+    State: time, pose and velocity of the robot at the end of the last frame. In a room,
+    the state also has time, pose of the robot and position of each source at the last
+    update. The state is updated every ``frame_s``. The output is a function of the
+    state and the present inputs; there is no latency.
 
     Args:
         parameters: Microphones, amplifier and converter.
-        robot: Places of the microphones.
+        robot: Positions of the microphones.
         acoustics: Speed of sound.
         room: Walls, if there are any.
         others: Names of further sources, which are not followed; each adds an input
             port ``emission_<name>`` [Emission].
-        seed: Seed of the noise and of the array's errors.
+        seed: Seed of the noise and of the errors of the array.
 
     Raises:
-        ValueError: The skew is given for another number of channels, the room
-            cannot be, or the file of the ego noise cannot be used.
+        ValueError: The skew is given for another number of channels, the room is not
+            possible, or the file of the ego noise cannot be used.
     """
 
     part, stage = "microphones", "hearing"
@@ -111,7 +116,7 @@ class MicArray(Block):
         super().__init__()
         self._parameters, self._robot = parameters, robot
         self.set_name("mic_array")
-        # Refuses a bad skew before anything runs.
+        # The recorder refuses an invalid skew before the run starts.
         self._recorder = Recorder(
             parameters,
             robot,
@@ -140,7 +145,7 @@ class MicArray(Block):
 
     def _declare_errors(self, c: float) -> None:
         drawn = self._recorder.tolerances
-        # In the order of the constants' numbers.
+        # The order is that of the constants POSITION_ERRORS to SOUND_SPEED.
         groups: Any = (
             drawn.position_errors.ravel(),
             drawn.channel_delays,
@@ -206,13 +211,14 @@ class MicArray(Block):
         output.set_value(frame)
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each frame of a compiled loop.
+        """Step that the block takes at each frame of a compiled loop.
 
         Args:
-            run: Has the emissions.
+            run: Seed and period of the run, and emissions of the sources.
 
         Returns:
-            The step; it carries the audio, which is made when a block asks for it.
+            The step. It carries the audio, which is computed only when a block reads
+            it.
         """
         recorder = self._recorder.of_seed(run.seed_of(self.get_name()))
         emitted = [run.carried[port.get_name()] for port in self._sources]
@@ -229,7 +235,7 @@ class MicArray(Block):
 
         @lru_cache(maxsize=1)
         def audio(tick: int) -> AudioFrame:
-            """The frame that ends at a tick, computed once, when it is asked for."""
+            """Frame that ends at a tick, computed once, when a block reads it."""
             emissions = [emission(tick) for emission in emitted]
             time = tick * run.tick_s
             return recorder.record(emissions, time, now, before, recorder.array)

@@ -24,12 +24,12 @@ from systems.framework.parameters import (
 )
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, whole
 
-#: What the microphones pass (Han 2019, 4.1). The filter is applied to the
-#: waveform: a linear filter common to all microphones commutes with
-#: propagation, but for a Doppler factor of a part in a thousand.
+#: Frequencies that the microphones pass, Hz (Han 2019, 4.1). The filter is applied to
+#: the waveform: a linear filter common to all microphones commutes with propagation,
+#: apart from a Doppler shift of about 0.1 %.
 MICROPHONE_BAND_HZ = (50.0, 18_000.0)
 
-#: Raised-cosine edges of every burst, s: no clicks at the gate.
+#: Length of the raised-cosine edges of every burst, s. The edges prevent clicks.
 EDGE_S = 0.004
 
 
@@ -37,24 +37,25 @@ class SoundParameters(Parameters):
     """Waveform, level and schedule of the sound (Han 2019, 4.1: 0.5 s in every 2 s)."""
 
     kind: Literal["chirp", "band_noise", "tone", "horn", "siren", "wav"] = "chirp"
-    """Waveform; ``wav`` plays ``file``."""
+    """Waveform; ``wav`` plays the sound file ``file``."""
     file: str | None = None
-    """Sound file (WAV, FLAC ...), one channel, any rate and bit depth; only for ``kind:
-    wav``."""
+    """Sound file (WAV, FLAC ...) with one channel and any sample rate and bit depth;
+    only for ``kind: wav``."""
     low_hz: Frequency = 500.0
-    """Lower end of chirp and band noise, Hz."""
+    """Lower end of the band of chirp and band noise, Hz."""
     high_hz: Frequency = 8_000.0
-    """Upper end of chirp and band noise, Hz."""
+    """Upper end of the band of chirp and band noise, Hz."""
     tone_hz: Frequency = 2_000.0
     """Frequency of the tone and fundamental of the horn, Hz."""
     level_pa: Positive = 0.05
-    """RMS pressure at 1 m while it sounds, Pa (0.05 Pa is 68 dB); lower where the peaks
-    would exceed four times this, the loudspeaker's limit."""
+    """RMS pressure at 1 m while the source sounds, Pa (0.05 Pa is 68 dB). The
+    loudspeaker limits peaks to four times this value; a sound with higher peaks is
+    played at a lower level."""
     on_s: float = Field(default=0.5, ge=2 * EDGE_S, le=60.0)
     """Length of a burst, s."""
     period_s: Duration = 2.0
-    """Time from burst to burst, s; if it equals ``on_s`` the sound is continuous, apart
-    from the edges."""
+    """Time from the start of one burst to the start of the next, s. If it equals
+    ``on_s``, the sound is continuous, apart from the edges."""
     start_s: Time = 0.0
     """Start of the first burst, s."""
 
@@ -88,76 +89,79 @@ class SoundParameters(Parameters):
         return self
 
     def sounds(self, time: Any) -> Any:
-        """Whether the gate is open at a time in s, or at each of an array of them."""
+        """Whether the source sounds at a time in s, or at each time of an array."""
         phase = time - self.start_s
         return (phase >= 0.0) & (phase % self.period_s < self.on_s)
 
 
 class MicrophoneFaultParameters(Parameters):
-    """A microphone that fails in a run, and how."""
+    """A microphone that fails during a run, and the kind of its fault."""
 
     microphone: int = Field(default=1, ge=1, le=64)
-    """Which one, from 1."""
+    """Number of the microphone, starting at 1."""
     kind: Literal["dead", "frozen"] = "dead"
     """``dead``: its counts are 0; ``frozen``: its counts stay at a quarter of full
     scale."""
     start_s: Time = 0.0
-    """When that begins, s."""
+    """Start of the fault, s."""
 
 
 class MicArrayParameters(Parameters):
     """Microphones, amplifier and converter (Han 2019, 4.1)."""
 
     sample_rate_hz: float = Field(default=100_000.0, ge=1_000.0, le=SAMPLE_RATE_HZ)
-    """Rate of the converter, Hz; at most the rate at which sound is computed.
+    """Sample rate of the converter, Hz; at most the rate at which sound is computed.
 
-    There is no filter before the converter: sound above half the rate is aliased.
+    There is no filter before the converter: sound above half the sample rate is
+    aliased.
     """
     frame_s: Period = TICK_S
-    """Length of a frame, and time from one frame to the next, s: the robot hears once
+    """Length of a frame, and time from one frame to the next, s. The robot hears once
     per frame."""
     snr_db_at_1m: float = Field(default=30.0, ge=-40.0, le=150.0)
-    """Level of the source at 1 m over the noise, dB.
+    """Level of the source at 1 m relative to the noise, dB.
 
-    The noise is white and Gaussian up to half the sample rate, of equal power in every
-    channel and independent of distance.
+    The noise is white and Gaussian up to half the sample rate. It has equal power in
+    every channel and does not depend on distance.
     """
     sensitivity_db: float = Field(default=-23.0, ge=-120.0, le=40.0)
     """Sensitivity of the microphones, dB re 1 V/Pa."""
     preamplifier_gain_db: float = Field(default=40.0, ge=-40.0, le=120.0)
     """Gain between microphone and converter, dB."""
     adc_full_scale_v: Positive = 1.65
-    """Voltage at which the converter clips, V, of either sign."""
+    """Largest positive and negative voltage before the converter clips, V."""
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
     channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
     """Time by which each channel is sampled later, s; below one sample.
 
-    One time for each microphone, or an empty list where all are sampled at once.
+    Give one time for each microphone, or an empty list if all channels are sampled at
+    once.
     """
 
     ego_noise_file: str | None = None
-    """Recording of the robot's own noise (WAV, FLAC ...), repeated forever.
+    """Recording of the noise of the robot itself (WAV, FLAC ...), repeated forever.
 
-    One channel for all microphones, or one channel for each.
+    It has one channel for all microphones, or one channel for each.
     """
     ego_noise_snr_db_at_1m: float = Field(default=20.0, ge=-40.0, le=150.0)
-    """Level of the source at 1 m over the ego noise at top speed, dB."""
+    """Level of the source at 1 m relative to the ego noise at top speed, dB."""
     ego_noise_share_at_rest: Fraction = 1.0
-    """Amplitude of the ego noise at rest over that at top speed; linear between."""
+    """Amplitude of the ego noise at rest over that at top speed. In between, the
+    amplitude is linear in the speed."""
     position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
-    """Each microphone is off its position by up to this in x and in y, m.
+    """Largest error of the position of each microphone in x and in y, m.
 
     This error and the next two are uniform, and drawn once from the seed.
     """
     delay_tolerance_s: float = Field(default=0.0, ge=0.0, le=1e-4)
-    """Each channel is sampled up to this earlier or later, s."""
+    """Largest time by which each channel is sampled earlier or later, s."""
     gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
-    """The gain of each channel, noise included, is off by up to this, dB."""
+    """Largest error of the gain of each channel, noise included, dB."""
     faults: Annotated[
         tuple[MicrophoneFaultParameters, ...], Strict(False), Field(max_length=64)
     ] = ()
-    """Microphones that fail in a run."""
+    """Microphones that fail during a run."""
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
@@ -184,7 +188,7 @@ class MicArrayParameters(Parameters):
 
     @cached_property
     def frame_samples(self) -> int:
-        """Samples a channel in a frame."""
+        """Number of samples per channel in a frame."""
         return round(self.frame_s * self.sample_rate_hz)
 
     @cached_property
@@ -194,20 +198,20 @@ class MicArrayParameters(Parameters):
 
     @cached_property
     def counts_per_pa(self) -> float:
-        """Counts for one pascal."""
+        """Number of counts per pascal."""
         gain = 10.0 ** ((self.sensitivity_db + self.preamplifier_gain_db) / 20.0)
         return gain * self.full_scale / self.adc_full_scale_v
 
 
 def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
-    """(count,) s by which each channel is sampled later.
+    """Times by which the channels are sampled later.
 
     Args:
-        parameters: Have the skew; empty: none.
+        parameters: Parameters with the skew; if it is empty, all times are 0.
         count: Number of microphones.
 
     Returns:
-        (count,) s.
+        (count,) times, s.
 
     Raises:
         InputError: The skew is given for another number of channels.
@@ -222,12 +226,12 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
     return np.array(skew) if skew else np.zeros(count)
 
 
-#: Higher orders of reflection are refused: four million images and more.
+#: Largest allowed order of reflections, with more than four million images.
 GREATEST_ORDER = 150
 
 
 class RoomParameters(Parameters):
-    """A shoebox room around the floor of W, for sound only: robots do not hit walls."""
+    """A shoebox room around the floor of W, only for sound: robots do not hit walls."""
 
     size_m: Annotated[tuple[Length, Length, Length], Strict(False)] = (
         7.0,
@@ -236,33 +240,34 @@ class RoomParameters(Parameters):
     )
     """Extents along x and y of W, and height, m."""
     corner_m: Point | None = None
-    """The corner of smallest x and y, in W, m.
+    """Corner of smallest x and y, in W, m.
 
-    Unset, the origin of W lies in the middle of the floor.
+    Unset, the origin of W is in the middle of the floor.
     """
     reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
     """Time in which sound decays by 60 dB according to Sabine's formula, s.
 
-    Image sources follow it in compact rooms that absorb little. In 7 x 7 x 3 m their
-    decay from -5 to -35 dB corresponds to 0.25, 0.45 and 0.72 s where 0.25, 0.4 and 0.6
-    s are set.
+    The simulated decay agrees with this time in compact rooms that absorb little. In 7
+    x 7 x 3 m, the decay from -5 to -35 dB corresponds to 0.25, 0.45 and 0.72 s where
+    0.25, 0.4 and 0.6 s are set.
     """
     absorption: float | None = Field(default=None, gt=0.0, le=1.0)
-    """Share of the energy that a wall absorbs.
+    """Share of the energy that the walls, floor and ceiling absorb.
 
-    When set, the reverberation time follows from it.
+    If set, the reverberation time follows from it.
     """
     maximum_order: int | None = Field(default=None, ge=1, le=GREATEST_ORDER)
-    """Greatest number of walls that a reflection meets.
+    """Largest number of reflections of one sound.
 
-    Unset, all reflections count that arrive within the reverberation time.
+    Unset, all reflections that arrive within the reverberation time count.
     """
     source_height_m: Length = 0.3
     """Height of every loudspeaker above the floor, m."""
     microphone_height_m: Length = 0.3
     """Height of the microphones above the floor, m."""
     update_period_s: float = Field(default=0.1, ge=1e-3, le=60.0)
-    """Period at which poses for reflections are updated, s; a multiple of a frame."""
+    """Period at which the poses for the reflections are updated, s; a multiple of a
+    frame."""
 
     @model_validator(mode="after")
     def _check(self) -> RoomParameters:
@@ -276,10 +281,10 @@ class RoomParameters(Parameters):
         return self
 
     def update_frames(self, frame_s: float) -> int:
-        """Frames from one update of the reflections to the next.
+        """Number of frames from one update of the reflections to the next.
 
         Raises:
-            InputError: The update's period is no multiple of a frame.
+            InputError: The period of the updates is not a multiple of a frame.
         """
         frames = self.update_period_s / frame_s
         if not whole(frames):
@@ -293,7 +298,7 @@ class RoomParameters(Parameters):
 
     @property
     def corner(self) -> NDArray[np.float64]:
-        """(2,) the corner of smallest x and y in W, m."""
+        """(2,) corner of smallest x and y in W, m."""
         if self.corner_m is None:
             return np.array(self.size_m[:2]) / -2.0
         return np.array(self.corner_m)
@@ -304,19 +309,22 @@ class RoomParameters(Parameters):
         return self.microphone_height_m - self.source_height_m
 
     def contains(self, p_W: ArrayLike) -> bool:
-        """Whether all of the points (..., 2) in W lie between the walls."""
+        """Whether all points (..., 2) in W lie between the walls."""
         inside = np.asarray(p_W) - self.corner
         return bool(np.all((inside > 0.0) & (inside < self.size_m[:2])))
 
     def walls(self, c: float) -> tuple[float, float, int]:
-        """Absorption, reverberation time in s, and order of reflections.
+        """Absorption, reverberation time, and largest order of reflections.
 
         Args:
             c: Speed of sound, m/s.
 
+        Returns:
+            Absorbed share of the energy, reverberation time, s, and largest order.
+
         Raises:
-            InputError: No walls are so dull, or so many images are needed
-                that they cannot be handled.
+            InputError: The reverberation time is too short for the size of the room, or
+                needs reflections of an order above ``GREATEST_ORDER``.
         """
         size = np.array(self.size_m)
         sabine = float(12.0 * math.log(10.0) / (c * np.sum(1.0 / size)))
@@ -329,7 +337,8 @@ class RoomParameters(Parameters):
                 f"{time} s is too short for a room of "
                 f"{self.size_m} m; {sabine:.2g} s would take walls that absorb all",
             )
-        # The farthest plane of images of one order, less a room on either side.
+        # By the Cauchy-Schwarz inequality, the sound of an image of order n travels at
+        # least (n - 3) / sqrt(sum(size^-2)).
         order = math.ceil(c * time * math.sqrt(np.sum(size**-2.0))) + 2
         order = self.maximum_order or order
         if order > GREATEST_ORDER:

@@ -1,9 +1,9 @@
 """Sound from a moving source to moving microphones in the free field.
 
-Each microphone hears what left the source at the retarded time t_e, with
-c (t - t_e) = |p_M(t) - p_S(t_e)|. Doppler shifts (Han 2019, eq. 1) come out of
-that. Sound pressure falls as 1/R; the paper's text says with the square of the
-distance, which is true of intensity.
+Each microphone hears the sound that left the source at the retarded time t_e, with c (t
+- t_e) = |p_M(t) - p_S(t_e)|. The Doppler shifts (Han 2019, eq. 1) follow from this
+equation. Sound pressure falls as 1/R. The text of the paper says that it falls with the
+square of the distance, which is true of intensity.
 """
 
 from __future__ import annotations
@@ -17,27 +17,28 @@ from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.framework.signals import Emission
 
-#: Samples that the interpolation kernel touches on either side.
+#: Number of samples that the interpolation kernel uses on either side.
 KERNEL_REACH = 6
 
-#: 1/R grows no further below this distance, m: no microphone is a point.
+#: Below this distance, 1/R no longer grows, m, because a microphone is not a point.
 MINIMUM_RANGE_M = 0.01
 
-# Rates that differ by less than this share differ by rounding alone.
+# Steps in samples that differ from a whole number by less than this are whole.
 _SAME_RATE = 1e-9
 
-# A Kaiser window of 12 taps and this beta leaves an error of 1e-5 up to 18 kHz:
-# at 100 kHz the nearest image starts at 82 kHz, so the transition is wide.
+# A Kaiser window of 12 taps with this beta has an error of 1e-5 up to 18 kHz. At
+# 100 kHz the nearest spectral image starts at 82 kHz, so the transition band is wide.
 _TAPS = 2 * KERNEL_REACH
 _BETA = 10.0
 
 
 def _interpolation_kernel() -> NDArray[np.float32]:
-    """Windowed sinc as polynomials of the fraction of a sample, right to 1e-6.
+    """Windowed sinc as polynomials of the fraction of a sample, with an error of 1e-6.
 
     Returns:
-        (pairs, 2, 4) for the taps n and 11 - n: with u = fraction - 1/2 their
-        weights are E + O and E - O, E = sum_k e_k u^2k and O = u sum_k o_k u^2k.
+        (pairs, 2, 4) coefficients of the taps n and 11 - n. With u = fraction - 1/2,
+        the weights of the two taps are E + O and E - O, where E = sum_k e_k u^2k and O
+        = u sum_k o_k u^2k.
     """
     u = np.linspace(-0.5, 0.5, 257)
     x = np.arange(_TAPS) - (KERNEL_REACH - 0.5) - u[:, None]
@@ -59,7 +60,16 @@ INTERPOLATION_KERNEL = _interpolation_kernel()
 def _hermite(
     s: float, h: float, a: float, b: float, da: float, db: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Value and derivative at s in [0, 1] of the cubic between two knots."""
+    """Value and derivative at s in [0, 1] of the cubic between two knots.
+
+    Args:
+        s: Share of the interval.
+        h: Length of the interval, s.
+        a: Value at the first knot.
+        b: Value at the second knot.
+        da: Derivative at the first knot, per second.
+        db: Derivative at the second knot, per second.
+    """
     s2, s3 = s * s, s * s * s
     value = (
         (2 * s3 - 3 * s2 + 1) * a
@@ -84,18 +94,18 @@ def microphone_paths(
     velocity_1: NDArray[np.float64],
     p_BM: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Places and velocities of the microphones of a moving robot.
+    """Positions and velocities of the microphones of a moving robot.
 
     The pose follows the cubic Hermite polynomial between two ticks.
 
     Args:
         times: (m, k) instants of each microphone, s.
         begin: Time of the first pose, s.
-        pose_0: (3,) x, y, theta in W, m and rad.
-        velocity_0: (3,) vx, vy in W and omega, m/s and rad/s.
+        pose_0: (3,) first pose x, y, theta in W, m and rad.
+        velocity_0: (3,) vx, vy in W and omega at the first pose, m/s and rad/s.
         end: Time of the second pose, s.
-        pose_1: (3,) as pose_0; theta may be wrapped.
-        velocity_1: (3,) as velocity_0.
+        pose_1: (3,) second pose, as pose_0; theta may be wrapped.
+        velocity_1: (3,) velocity at the second pose, as velocity_0.
         p_BM: (m, 2) microphones in B, m.
 
     Returns:
@@ -134,18 +144,19 @@ def retarded_delays(
     c: float,
     rise: float = 0.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Travelling times of the sound that arrives at given instants.
+    """Travel times of the sound that arrives at given instants.
 
-    Solves c d = |p_M(t) - p_S(t - d)| by Newton's method; the source is slower
-    than sound, hence the solution is unique.
+    Newton's method solves c d = |p_M(t) - p_S(t - d)|. The solution is unique because
+    the source is slower than sound. The solution at one instant is the start value for
+    the next instant.
 
     Args:
         times: (m, k) instants of arrival, s.
         p_WM: (m, k, 2) microphones at those instants, m.
-        v_WM: (m, k, 2) their velocities, m/s.
-        knot_times: (n,) knots of the source's path, ascending, s.
+        v_WM: (m, k, 2) velocities of the microphones, m/s.
+        knot_times: (n,) knots of the motion of the source, ascending, s.
         p_WS: (n, 2) source at the knots, m.
-        v_WS: (n, 2) its velocity, m/s.
+        v_WS: (n, 2) velocity of the source at the knots, m/s.
         c: Speed of sound, m/s.
         rise: Height of the microphones above the source, m.
 
@@ -159,6 +170,7 @@ def retarded_delays(
         d = 0.0
         for k in range(times.shape[1]):
             for _ in range(20):
+                # Position and velocity of the source when the sound left it.
                 t_e = times[m, k] - d
                 n = min(max(np.searchsorted(knot_times, t_e) - 1, 0), last - 1)
                 h = knot_times[n + 1] - knot_times[n]
@@ -170,12 +182,16 @@ def retarded_delays(
                     s, h, p_WS[n, 1], p_WS[n + 1, 1], v_WS[n, 1], v_WS[n + 1, 1]
                 )
                 dx, dy = p_WM[m, k, 0] - x, p_WM[m, k, 1] - y
+                # Newton step; ``away`` is the speed of the source towards the
+                # microphone.
                 r = max(math.sqrt(dx * dx + dy * dy + rise * rise), 1e-9)
                 away = (dx * vx + dy * vy) / r
                 step = (r - c * d) / (c - away)
                 d += step
                 if abs(step) < 1e-13:
                     break
+            # Rate of the delay; ``closing`` is the speed of the microphone away
+            # from the source.
             closing = (dx * v_WM[m, k, 0] + dy * v_WM[m, k, 1]) / r
             delays[m, k] = d
             rates[m, k] = (closing - away) / (c - away)
@@ -195,21 +211,21 @@ def _sample_delays(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float
 ]:  # pragma: no cover  (compiled)
-    """``retarded_delays`` as ``_interpolate`` takes them.
+    """Delays of ``retarded_delays``, in the units of ``_interpolate``.
 
     Args:
-        times: As there, and so on.
-        p_WM: m.
-        v_WM: m/s.
-        knot_times: s.
-        p_WS: m.
-        v_WS: m/s.
-        air: Speed of sound, m/s, and rise, m.
-        samples: Time of the first emitted one, s, and their rate, Hz.
+        times: (m, k) instants of arrival, s.
+        p_WM: (m, k, 2) microphones at those instants, m.
+        v_WM: (m, k, 2) velocities of the microphones, m/s.
+        knot_times: (n,) knots of the motion of the source, s.
+        p_WS: (n, 2) source at the knots, m.
+        v_WS: (n, 2) velocity of the source at the knots, m/s.
+        air: Speed of sound, m/s, and height of the microphones above the source, m.
+        samples: Time of the first emitted sample, s, and rate of the samples, Hz.
 
     Returns:
-        Places of the first instants among the samples (m,), delays in samples and
-        their rates (m, k), and the first place that is heard.
+        Positions (m,) of the first instants among the emitted samples, delays (m, k) in
+        samples, their rates (m, k), and position of the earliest sample that is heard.
     """
     delays, rates = retarded_delays(
         times, p_WM, v_WM, knot_times, p_WS, v_WS, air[0], air[1]
@@ -245,7 +261,7 @@ def _delayed(
         out[i] = total
 
 
-# Divisions that check for zero, as Python's do, would keep the loop from vectorising.
+# Python's divisions check for zero, which would prevent vectorization of the loop.
 @njit(cache=True, error_model="numpy")
 def _interpolate(
     samples: NDArray[np.float32],
@@ -256,12 +272,22 @@ def _interpolate(
     units: tuple[float, float, float],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out (m, length) with samples of the delayed sound over distance.
+    """Fills out (m, length) with the delayed sound, divided by the distance.
 
-    In units of emitted samples: first (m,) is the place among the samples of each
-    channel's first instant, delays and rates (m, k) stand at evenly spaced knots;
-    units are the time from one instant to the next, c in m per sample, and the least
-    distance in m.
+    All times are in units of emitted samples. Between two knots, the delay is a cubic
+    polynomial. The function computes the position of each output sample among the
+    emitted samples, and the amplitude 1 / (c d). It then interpolates runs of output
+    samples at once. Within a run, the positions advance by one whole sample each.
+
+    Args:
+        samples: Emitted samples.
+        kernel: ``INTERPOLATION_KERNEL``.
+        first: (m,) position of the first instant of each channel among the samples.
+        delays: (m, k) delays at evenly spaced knots.
+        rates: (m, k) rates of change of the delays.
+        units: Time from one output sample to the next; speed of sound, m per sample;
+            and smallest distance, m.
+        out: (m, length) output, where length is a multiple of k - 1.
     """
     step, c, nearest = units
     spans = delays.shape[1] - 1
@@ -274,6 +300,7 @@ def _interpolate(
         for k in range(spans):
             a, b = delays[m, k], delays[m, k + 1]
             da, db = span_samples * rates[m, k], span_samples * rates[m, k + 1]
+            # Quadratic and cubic coefficient of the delay.
             bend, curl = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
             for i in range(h):
                 s = i / h
@@ -284,7 +311,7 @@ def _interpolate(
                 begin[i] = np.int32(whole - i)
                 amplitude[i] = np.float32(1.0) / np.float32(max(c * d, nearest))
             span = out[m, k * h : (k + 1) * h]
-            # The delay passes a whole sample now and then: runs in between.
+            # A run ends where the delay passes a whole number of samples.
             i = 0
             while i < h:
                 end = i + 1
@@ -316,14 +343,14 @@ def _sampled_at(
 def sampled_at(
     sound: NDArray[np.float32], first: int, step: float, count: int
 ) -> NDArray[np.float32]:
-    """Sound at another rate, by the kernel of ``propagate``.
+    """Samples of a sound at another rate, with the kernel of ``propagate``.
 
     Args:
         sound: (m, n) samples.
-        first: Place of the first one that is wanted; at least ``KERNEL_REACH``.
-        step: From one that is wanted to the next, samples; ``KERNEL_REACH`` of them
-            must follow the last one.
-        count: Number of samples that are wanted.
+        first: Position of the first output sample; at least ``KERNEL_REACH``.
+        step: Distance from one output sample to the next, in samples. At least
+            ``KERNEL_REACH`` samples must follow the last one.
+        count: Number of output samples.
 
     Returns:
         (m, count) samples.
@@ -336,16 +363,16 @@ def sampled_at(
 def check_reach(
     emission: Emission, time: float, p_WL: NDArray[np.float64], c: float
 ) -> None:
-    """Refuses a listener for whom the emission does not reach back.
+    """Refuses a listener that is too far away for the stored emission.
 
     Args:
-        emission: What left the source, and where.
-        time: When the listening begins, s.
+        emission: Stored sound and motion of the source.
+        time: Time at which the listening begins, s.
         p_WL: (2,) listener, m.
         c: Speed of sound, m/s.
 
     Raises:
-        InputError: What left before the emission begins may be heard.
+        InputError: The listener may hear sound that left before the emission begins.
     """
     distance = math.dist(p_WL.tolist(), emission.p_WS[0].tolist())
     reach = time - emission.start_time - KERNEL_REACH / emission.sample_rate_hz
@@ -372,27 +399,27 @@ def propagate(
 ) -> NDArray[np.float32]:
     """Sound pressure at moving microphones over one frame.
 
-    The microphones' sample rate need not be that of the emission.
+    The sample rate of the microphones may differ from that of the emission.
 
-    The delay is exact at the knots and follows cubic polynomials between them.
-    With knots every 2.5 ms and the bodies of this model, delays are right to
-    1e-3 sample from 0.1 to 18 kHz, and amplitudes to 1e-4.
+    The delay is exact at the knots and follows cubic polynomials between them. With
+    knots every 2.5 ms and the bodies of this model, the errors of delays are at most
+    1e-3 sample from 0.1 to 18 kHz. The errors of amplitudes are at most 1e-4.
 
     Args:
-        emission: What left the source, and where.
-        times: (m, k) evenly spaced instants from the first sample of each
-            channel to one sample past its last, s.
+        emission: Stored sound and motion of the source.
+        times: (m, k) evenly spaced instants from the first sample of each channel to
+            one sample past its last, s.
         p_WM: (m, k, 2) microphones at those instants, m.
-        v_WM: (m, k, 2) their velocities, m/s.
-        count: Samples a channel, a multiple of k - 1.
+        v_WM: (m, k, 2) velocities of the microphones, m/s.
+        count: Number of samples per channel, a multiple of k - 1.
         c: Speed of sound, m/s.
         rise: Height of the microphones above the source, m.
 
     Returns:
-        (m, count) Pa. Nearer than 1 cm, the amplitude is that at 1 cm.
+        (m, count) sound pressure, Pa. Nearer than 1 cm, the amplitude is that at 1 cm.
 
     Raises:
-        InputError: A microphone hears what left before the emission begins.
+        InputError: A microphone hears sound that left before the emission begins.
     """
     rate = emission.sample_rate_hz
     first, delays, rates, earliest = _sample_delays(

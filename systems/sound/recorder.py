@@ -1,4 +1,4 @@
-"""What a microphone array records, frame by frame."""
+"""Recording of a microphone array, frame by frame."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from systems.sound.parameters import MicArrayParameters, RoomParameters
 from systems.sound.propagation import check_reach, microphone_paths, propagate
 from systems.sound.reverberation import Reverberation
 
-# Two instants closer than this are one tick of the clock, s.
+# Instants closer than this are the same instant, s.
 _SAME_INSTANT_S = 1e-6
 
 
@@ -36,25 +36,25 @@ def record_frame(
     reflections: Sequence[NDArray[np.float32] | None] = (),
     ego_noise: NDArray[np.float32] | None = None,
 ) -> AudioFrame:
-    """The frame that ends now.
+    """Frame that ends now.
 
     Args:
-        emissions: What has left the sources; noise refers to the first one.
-        time: Now, s.
-        before: Pose and velocity of the robot a frame ago, (3,) each.
-        now: Pose and velocity of the robot now.
-        array: From ``real_array``.
+        emissions: Sounds of the sources; the noise level refers to the first one.
+        time: Present time, s.
+        before: Pose and velocity of the robot one frame ago, (3,) each.
+        now: Present pose and velocity of the robot, (3,) each.
+        array: True array, from ``real_array``.
         parameters: Microphones, amplifier, converter and length of the frame.
         seed: Seed of the noise.
         rise: Height of the microphones above the sources, m.
-        reflections: (n, samples) Pa each, of the sources' reflections.
-        ego_noise: (n, samples) over the level of the first source at 1 m.
+        reflections: (n, samples) sound pressure of the reflections of each source, Pa.
+        ego_noise: (n, samples) ego noise over the level of the first source at 1 m.
 
     Returns:
         (n, samples) counts, with their full scale, rate and time.
 
     Raises:
-        ValueError: A source is out of the emission's reach.
+        ValueError: A source is too far away for its stored emission.
     """
     direct = _direct_sound(emissions, time, before, now, array, parameters, rise)
     pressure = _total([*direct, *reflections])
@@ -87,11 +87,11 @@ def _direct_sound(
     parameters: MicArrayParameters,
     rise: float,
 ) -> list[NDArray[np.float32]]:
-    """(n, samples) Pa of each source that sounds."""
+    """Sound pressure without reflections of each sounding source, (n, samples) Pa."""
     begin = time - parameters.frame_s
     sounding = [emission for emission in emissions if emission.sounding]
     for emission in emissions:
-        if not emission.sounding:  # the robot's place is good enough for silence
+        if not emission.sounding:  # for silence, the position of the robot suffices
             check_reach(emission, begin, before[0][:2], array.c)
     if not sounding:
         return []
@@ -104,7 +104,7 @@ def _direct_sound(
 def _total(
     pressures: Sequence[NDArray[np.float32] | None],
 ) -> NDArray[np.float32] | None:
-    """Their sum, in the place of the first; None where all are silent."""
+    """Sum of the pressures, written into the first one; None if all are silent."""
     heard = [pressure for pressure in pressures if pressure is not None]
     for pressure in heard[1:]:
         heard[0] += pressure
@@ -112,28 +112,28 @@ def _total(
 
 
 class MicMemory(NamedTuple):
-    """What a frame leaves behind for the next one."""
+    """State of a recorder between two frames."""
 
     last: NDArray[np.float64]
-    """(7,) time, pose and velocity of the robot at its end."""
+    """(7,) time, pose and velocity of the robot at the end of the last frame."""
     places: NDArray[np.float64] | None = None
-    """Time, pose of the robot and place of each source at the last update of the
-    room; none in the free field."""
+    """Time, pose of the robot and position of each source at the last update of the
+    reflections; None in the free field."""
 
 
 class Recorder:
-    """Records frame by frame: what a ``MicArray`` does, without a context.
+    """Records frame by frame, as a ``MicArray`` does, but without a context.
 
     Args:
         parameters: Microphones, amplifier and converter.
-        robot: Places of the microphones.
+        robot: Positions of the microphones.
         c: Speed of sound, m/s.
         room: Walls, if there are any.
-        sources: How many sound.
-        seed: Seed of the noise and of the array's errors.
+        sources: Number of sources.
+        seed: Seed of the noise and of the errors of the array.
 
     Raises:
-        ValueError: As ``MicArray``.
+        ValueError: See ``MicArray``.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Recorder:
         if parameters.ego_noise_file is not None:
             self._ego_noise = EgoNoise(parameters, len(robot.microphones_m), seed)
         self.blank = MicMemory(np.r_[-np.inf, np.zeros(6)], places)
-        """The memory before the first frame."""
+        """State before the first frame."""
         self._draw(seed)
 
     def _draw(self, seed: int) -> None:
@@ -169,10 +169,10 @@ class Recorder:
         self.array = real_array(
             microphones_B(self._robot), self._parameters, self.tolerances, self._c
         )
-        """The array with these errors."""
+        """Array with these errors."""
 
     def of_seed(self, seed: int) -> Recorder:
-        """The same with other noise and other errors of the array."""
+        """Same recorder with other noise and other errors of the array."""
         other = copy(self)
         if self._ego_noise is not None:
             other._ego_noise = self._ego_noise.of_seed(seed)
@@ -186,16 +186,16 @@ class Recorder:
         now: tuple[NDArray[np.float64], NDArray[np.float64]],
         memory: MicMemory,
     ) -> MicMemory:
-        """What a frame leaves for the next one.
+        """State after a frame.
 
         Args:
-            emissions: Of the sources, the followed one first.
-            time: Now, s.
-            now: Pose and velocity of the robot, (3,) each.
-            memory: What the last frame left.
+            emissions: Sounds of the sources, the followed source first.
+            time: Present time, s.
+            now: Present pose and velocity of the robot, (3,) each.
+            memory: State after the previous frame.
 
         Returns:
-            The new memory.
+            New state.
         """
         last = np.empty(7)
         last[0], last[1:4], last[4:] = time, *now
@@ -205,13 +205,13 @@ class Recorder:
         return MicMemory(last, places)
 
     def updates(self, time: float) -> bool:
-        """Whether reflections take new places at a frame's end."""
+        """Whether the reflections get new positions at the end of a frame."""
         return round(time / self._parameters.frame_s) % self._update_frames == 0
 
     def _places(
         self, pose: NDArray[np.float64], emissions: Sequence[Emission]
     ) -> NDArray[np.float64]:
-        """Pose of the robot and places of the sources, one after the other."""
+        """Pose of the robot and positions of the sources, one after the other."""
         now = [emission.p_WS[-1] for emission in emissions]
         return np.concatenate([pose, *now])
 
@@ -238,26 +238,28 @@ class Recorder:
         memory: MicMemory,
         array: RealArray,
     ) -> AudioFrame:
-        """The frame that ends now, whatever context the block is in.
+        """Frame that ends now.
 
         Args:
-            emissions: Of the sources, the followed one first.
-            time: Now, s.
-            now: Pose and velocity of the robot, (3,) each.
-            memory: What the last frame left.
-            array: The microphones with their errors.
+            emissions: Sounds of the sources, the followed source first.
+            time: Present time, s.
+            now: Present pose and velocity of the robot, (3,) each.
+            memory: State after the previous frame.
+            array: Microphones with their errors.
 
         Returns:
             Counts of all channels, see ``record_frame``.
 
         Raises:
-            InputError: A source is out of the emission's reach, or out of the room.
+            InputError: A source is too far away for its stored emission, or is outside
+                the room.
         """
         frame_s, ego_noise = self._parameters.frame_s, None
         pose, velocity = now
         if self._ego_noise is not None:
             share = driving_share(velocity, self._robot)
             ego_noise = self._ego_noise.frame(round(time / frame_s), share)
+        # Without a state from one frame ago, extrapolate the present velocity backward.
         last = memory.last
         before = last[1:4], last[4:7]
         if abs(last[0] - (time - frame_s)) > _SAME_INSTANT_S:

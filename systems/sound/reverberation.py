@@ -1,4 +1,4 @@
-"""What the walls of a room send to the microphones in one frame."""
+"""Reflections from the walls of a room, frame by frame."""
 
 from __future__ import annotations
 
@@ -17,27 +17,28 @@ from systems.sound.propagation import KERNEL_REACH, sampled_at
 from systems.sound.room import room_images, room_impulse_responses
 from systems.world.geometry import rotate
 
-# Responses kept, as spectra of half a megabyte a channel at most; two a source.
+# Number of stored responses. Each is a spectrum of at most half a megabyte per channel;
+# a source needs two at a time.
 _KEPT = 8
 
 
 def _place(places: NDArray[np.float64], source: int) -> tuple[float, ...]:
-    """x, y, theta of the robot and x, y of one source."""
+    """x, y and theta of the robot, then x and y of one source."""
     return (*places[:3], *places[3 + 2 * source : 5 + 2 * source])
 
 
 class Reverberation:
-    """Reflections of a source, frame by frame.
+    """Computes the sound of the reflections in a room.
 
-    The response of the room is that of robot and source at rest in given
-    places; sound is convolved with it, and where the places change, a frame
-    fades from the response of the old ones to that of the new ones. The last
-    responses are kept: whoever rests has one only.
+    The sound of a source is convolved with the response of the room. The response is
+    that of robot and source at rest in given positions. When the positions change, a
+    frame fades from the response of the old positions to that of the new positions. The
+    last responses are stored, so that a robot and a source at rest need only one
+    response.
 
     Args:
-        room: The room.
-        c: Speed of sound that absorption and length of the responses are
-            worked out for, m/s.
+        room: Size and walls of the room.
+        c: Speed of sound from which absorption and length of the responses follow, m/s.
         parameters: Sample rate and length of the frames.
 
     Raises:
@@ -54,7 +55,7 @@ class Reverberation:
         self.room = room
         self._c = c
         self._images = room_images(room, c)
-        # Of the sound in a frame, and what interpolation reads on either side of it.
+        # Number of samples of a frame, and margin on either side for the interpolation.
         self._frame = round(self._parameters.frame_s * SAMPLE_RATE_HZ)
         self._step = SAMPLE_RATE_HZ / self._parameters.sample_rate_hz
         self._margin = 0 if self._step == 1.0 else KERNEL_REACH
@@ -65,7 +66,7 @@ class Reverberation:
 
     @property
     def maximum_range_m(self) -> float:
-        """Longest way of a reflection that is heard, m; of the emitters, too."""
+        """Longest travel of an audible reflection, m; emissions must cover it."""
         return self._images.length / SAMPLE_RATE_HZ * self._c
 
     def frames(
@@ -79,20 +80,20 @@ class Reverberation:
         """Sound pressure of the reflections over the frame that ends now.
 
         Args:
-            emissions: What has left the k sources; they reach back as far as
-                the response is long.
-            time: Now, s.
-            old: (3 + 2 k,) pose of the robot in W, then x and y of each source,
-                at the beginning of the frame, m and rad.
-            new: The same at its end.
-            array: The array with its errors.
+            emissions: Sounds of the k sources; they must reach back by the length of
+                the response.
+            time: Present time, s.
+            old: (3 + 2 k,) pose of the robot in W, then x and y of each source, at the
+                beginning of the frame, m and rad.
+            new: (3 + 2 k,) the same quantities at the end of the frame, m and rad.
+            array: Array with its errors.
 
         Returns:
-            For each source (m, samples) Pa, or None where it is silent.
+            For each source (m, samples) Pa, or None if it is silent.
 
         Raises:
-            InputError: Somebody is outside the room, or an emission does not
-                reach back.
+            InputError: A microphone or a source is outside the room, or an emission
+                does not reach back far enough.
         """
         return [
             self._reflected(emission, time, _place(old, k), _place(new, k), array)
@@ -107,6 +108,7 @@ class Reverberation:
         new: tuple[float, ...],
         array: RealArray,
     ) -> NDArray[np.float32] | None:
+        """Reflections of one source over the frame, or None if it is silent."""
         end = round((time - emission.start_time) * SAMPLE_RATE_HZ) + self._margin
         if end < self._needed:
             raise InputError(
@@ -117,9 +119,11 @@ class Reverberation:
             )
         if not emission.sounding:
             return None
+        # Convolve the sound in the frequency domain.
         sent = fft.rfft(emission.samples[end - self._needed : end], self._size)
         heard = self._convolved(sent, new, array)
         if old != new:
+            # Fade linearly from the old to the new response.
             before = self._convolved(sent, old, array)
             share = np.arange(self._heard, dtype=np.float32) - self._margin + 0.5
             heard = before + share / self._frame * (heard - before)
@@ -134,6 +138,7 @@ class Reverberation:
         places: tuple[float, ...],
         array: RealArray,
     ) -> NDArray[np.float32]:
+        """Sound convolved with the response of the room, for the frame and margins."""
         late = array.instants[:, 0]
         key = (array.p_BM.tobytes(), late.tobytes(), array.c)
         heard = fft.irfft(sent * self._spectrum(places, *key), self._size)
@@ -142,6 +147,10 @@ class Reverberation:
     def _compute_spectrum(
         self, places: tuple[float, ...], p_BM: bytes, late: bytes, c: float
     ) -> NDArray[np.complex64]:
+        """Spectrum of the response for given positions.
+
+        Arrays are given as bytes, which can be keys of the cache.
+        """
         x, y, theta, *p_WS = places
         dx, dy = rotate(theta, *np.frombuffer(p_BM).reshape(-1, 2).T)
         p_WM = np.column_stack([x + dx, y + dy])

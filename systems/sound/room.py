@@ -1,8 +1,8 @@
-"""A shoebox room: its walls, and what they make of a click.
+"""Impulse responses of a shoebox room.
 
-Image sources (Allen and Berkley 1979) come from pyroomacoustics. All walls,
-floor and ceiling absorb the same share of the energy at every frequency, and
-none of them scatters.
+The image sources (Allen and Berkley 1979) come from pyroomacoustics. All walls, floor
+and ceiling absorb the same share of the energy at every frequency. They do not scatter
+sound.
 """
 
 from __future__ import annotations
@@ -26,29 +26,29 @@ from systems.sound.propagation import (
 
 @dataclass(frozen=True)
 class RoomImages:
-    """The images of any source: those of p stand at signs * p + offsets."""
+    """Image sources of a room. An image of a source at p is at signs * p + offsets."""
 
     signs: NDArray[np.float64]
-    """(n, 3) of the source's coordinates from the room's corner."""
+    """(n, 3) signs of the coordinates of the source from the corner of the room."""
     offsets: NDArray[np.float64]
-    """(n, 3) m."""
+    """(n, 3) offsets, m."""
     gains: NDArray[np.float64]
-    """(n,) amplitude that the walls have left."""
+    """(n,) factor of the amplitude after all reflections."""
     length: int
-    """Samples of a response: it ends at the reverberation time, or with the last
-    image."""
+    """Number of samples of a response. It ends at the reverberation time, or with the
+    last image."""
 
 
 @lru_cache(maxsize=4)
 def room_images(room: RoomParameters, c: float) -> RoomImages:
-    """Images of a room that are heard within its reverberation time.
+    """Image sources of a room that are heard within its reverberation time.
 
     Args:
-        room: The room.
-        c: Speed of sound that absorption and length are worked out for, m/s.
+        room: Size and walls of the room.
+        c: Speed of sound from which absorption and length follow, m/s.
 
     Returns:
-        Signs and offsets of k images, m, their gains, and the length of the response,
+        Signs, offsets in m and gains of k images, and the length of the response in
         samples.
 
     Raises:
@@ -61,18 +61,20 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
         room.size_m, materials=pyroomacoustics.Material(absorption), max_order=order
     )
     size = np.array(room.size_m)
+    # The signs and offsets do not depend on the source and the microphone.
     anywhere = 0.3 * size
     box.add_source(anywhere)
     box.add_microphone(0.6 * size)
     box.image_source_model()
     source = box.sources[0]
     orders = np.abs(source.orders_xyz.T).astype(float)
-    # Least distance between an image's cell and the room.
+    # Smallest and largest distance between the cell of an image and the room.
     nearest = np.linalg.norm(np.maximum(orders - 1.0, 0.0) * size, axis=1)
     farthest = np.linalg.norm((orders + 1.0) * size, axis=1)
     kept = (nearest < c * time) & (orders.sum(axis=1) > 0) & (source.damping[0] > 0)
     signs = 1.0 - 2.0 * (orders[kept] % 2.0)
-    # Single precision comes back: whole rooms, there and back, are exact.
+    # pyroomacoustics returns single precision. Rounding restores the offsets, which are
+    # multiples of twice the size of the room.
     offsets = (
         2.0 * size * np.rint((source.images.T[kept] - signs * anywhere) / 2 / size)
     )
@@ -96,10 +98,20 @@ def _add_arrivals(
     kernel: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
-    """Adds a click for each image and microphone to out (m, length).
+    """Adds the impulse of each image at each microphone to ``out``.
 
-    images: signs, offsets and gains. p_S (3,) and p_M (m, 3) from the corner,
-    m; early (m,) samples; per_m samples that sound takes for a metre.
+    The function computes the distance and the time of arrival for each pair of image
+    and microphone. It then adds the interpolation kernel, scaled by gain over distance.
+
+    Args:
+        images: Signs, offsets and gains of the images.
+        p_S: (3,) source from the corner of the room, m.
+        p_M: (m, 3) microphones from the corner of the room, m.
+        early: (m,) number of samples by which each impulse appears earlier.
+        per_m: Number of samples in which sound travels one meter.
+        nearest: Smallest distance in the amplitude, m.
+        kernel: ``INTERPOLATION_KERNEL``.
+        out: (m, length) responses, changed.
     """
     signs, offsets, gains = images
     pairs = kernel.shape[0]
@@ -114,7 +126,7 @@ def _add_arrivals(
             position = r * per_m - early[m]
             whole = math.floor(position)
             start = int(whole) - pairs + 1
-            # Too late; or within 2 cm, where nobody stands.
+            # Skip arrivals after the end, and images within about 2 cm.
             if start < 0 or start + 2 * pairs > length:
                 continue
             u = np.float32(position - whole - 0.5)
@@ -138,23 +150,23 @@ def room_impulse_responses(
     direct: bool = True,
     images: RoomImages | None = None,
 ) -> NDArray[np.float32]:
-    """What microphones at rest hear of a click of a source at rest.
+    """Impulse responses from a source at rest to microphones at rest.
 
-    Delays are exact below 18 kHz, as in ``systems.sound.propagation``; amplitudes
-    are 1/R times what the walls leave of them.
+    Delays are exact below 18 kHz, as in ``systems.sound.propagation``. Amplitudes are
+    the gain of the reflections over the distance.
 
     Args:
-        room: The room.
+        room: Size and walls of the room.
         p_WS: (2,) source in W, m.
         p_WM: (m, 2) microphones in W, m.
         c: Speed of sound, m/s.
-        late: Time by which all channels, or (m,) each, are sampled later, s.
-        direct: Whether to include the sound that meets no wall.
-        images: From ``room_images``, where they were worked out before.
+        late: Time by which all channels, or (m,) each channel, are sampled later, s.
+        direct: Whether to include the direct sound.
+        images: Result of ``room_images``, if it is already known.
 
     Returns:
-        (m, length) pressure at 100 kHz for one at 1 m; the click leaves at the
-        first sample.
+        (m, length) pressure at 100 kHz relative to that at 1 m. The source emits the
+        impulse at the first sample.
 
     Raises:
         InputError: See ``RoomParameters.walls``.

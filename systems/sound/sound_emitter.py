@@ -17,13 +17,13 @@ from systems.sound.acoustics import AcousticParameters
 from systems.sound.parameters import SoundParameters
 from systems.sound.waveforms import make_waveform
 
-#: Farthest way of sound without a room, m.
+#: Longest travel of sound without a room, m.
 MAXIMUM_RANGE_M = 30.0
 
-#: Start of what never sounds, s.
+#: Start of a loudspeaker that has not been called, s.
 _NEVER_S = 86_400.0
 
-#: Samples before and after what the delays need, for the interpolation.
+#: Additional samples at the ends of an emission, for the interpolation.
 MARGIN = 64
 
 
@@ -33,21 +33,22 @@ def emitted_samples(
     first: int,
     count: int,
 ) -> NDArray[np.float32] | None:
-    """Samples ``first`` to ``first + count`` of what the loudspeaker plays.
+    """Samples that the loudspeaker plays.
 
     Args:
         waveform: Bursts end to end, from ``make_waveform``.
-        sound: The gate.
+        sound: Schedule of the bursts.
         first: Number of the first sample; sample n is emitted at n / 100 kHz.
         count: Number of samples.
 
     Returns:
-        (count,) Pa at 1 m, a part of the waveform where it can be; None where all
-        are zero.
+        (count,) Pa at 1 m. The array is a view of the waveform if a single burst covers
+        all samples. None if all samples are zero.
     """
     burst, period, start = _gate(sound.on_s, sound.period_s, sound.start_s)
     bursts = len(waveform) // burst
     out = None
+    # Visit all bursts that overlap the samples.
     number = max(0, (first - start - burst) // period)
     while (begin := start + number * period) < first + count:
         low, high = max(begin, first), min(begin + burst, first + count)
@@ -64,7 +65,7 @@ def emitted_samples(
 
 @cache
 def _gate(on_s: float, period_s: float, start_s: float) -> tuple[int, int, int]:
-    """Samples of a burst, of a period, and before the first one."""
+    """Number of samples of a burst, of a period, and before the first burst."""
     burst, period, start = (
         round(time * SAMPLE_RATE_HZ) for time in (on_s, period_s, start_s)
     )
@@ -79,19 +80,18 @@ def make_emission(
     v_WS: NDArray[np.float64],
     tick_s: float = TICK_S,
 ) -> Emission:
-    """What has left the loudspeaker up to a time.
+    """Sound that has left the loudspeaker up to a time.
 
     Args:
-        time: Now, a multiple of 10 us, s.
+        time: Present time, a multiple of 10 us, s.
         waveform: Bursts end to end, from ``make_waveform``.
-        sound: The gate.
-        p_WS: (k, 2) source in W at the last k ticks, the last one now, m.
-        v_WS: (k, 2) its velocity, m/s.
-        tick_s: From one tick to the next, s.
+        sound: Schedule of the bursts.
+        p_WS: (k, 2) source in W at the last k ticks, the present one last, m.
+        v_WS: (k, 2) velocity of the source at these ticks, m/s.
+        tick_s: Time from one tick to the next, s.
 
     Returns:
-        Samples of sound pressure at 1 m, Pa, and where they left; its arrays cannot be
-        written to.
+        Sound pressure at 1 m, Pa, and motion of the source. The arrays are read-only.
     """
     ages, count = _history(len(p_WS), tick_s)
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
@@ -99,7 +99,7 @@ def make_emission(
     emitted = _silence(count) if samples is None else samples
     knot_times = time - ages
     read_only(emitted, knot_times, p_WS, v_WS)
-    # By position: names would cost a microsecond.
+    # Keyword arguments would take a microsecond longer.
     return Emission(
         emitted,
         first / SAMPLE_RATE_HZ,
@@ -121,20 +121,22 @@ def emissions_along(
     tick_s: float = TICK_S,
     on_since_s: Callable[[], float | None] | None = None,
 ) -> Callable[[int], Emission]:
-    """What a ``SoundEmitter`` puts out at each tick of a motion.
+    """Emissions of a ``SoundEmitter`` at each tick of a motion.
 
     Args:
-        p_WS: (ticks + n, 2) places of the source, so many ticks before the first one,
-            where it rested, and at n ticks, m. They need be known at their tick only.
-        v_WS: (ticks + n, 2) its velocity, m/s.
+        p_WS: (ticks + n, 2) positions of the source, m. The first ``ticks`` rows
+            precede the first tick, when the source is at rest. A row needs to be known
+            only from its tick on.
+        v_WS: (ticks + n, 2) velocities of the source, m/s.
         waveform: Bursts end to end, from ``make_waveform``.
-        sound: The gate.
-        ticks: How far back, from ``history_ticks``.
-        tick_s: From one tick to the next, s.
-        on_since_s: Of a loudspeaker that is called on: when it was, s, or None.
+        sound: Schedule of the bursts.
+        ticks: Number of earlier ticks, from ``history_ticks``.
+        tick_s: Time from one tick to the next, s.
+        on_since_s: Function that returns the time of the call, s, or None before the
+            call. None: the loudspeaker is not called.
 
     Returns:
-        A function of the tick, below n.
+        A function that maps a tick below n to its emission.
     """
 
     def emission(tick: int) -> Emission:
@@ -160,14 +162,14 @@ def _silence(count: int) -> NDArray[np.float32]:
 
 @cache
 def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParameters:
-    """The sound of a loudspeaker that is called on, as one that plays by the clock.
+    """Sound of a loudspeaker that is called, with a fixed start time.
 
     Args:
-        sound: What it plays; its first burst is ``start_s`` after the call.
-        on_since_s: When it was called, s; None: not yet.
+        sound: Sound of the loudspeaker; its first burst is ``start_s`` after the call.
+        on_since_s: Time of the call, s; None before the call.
 
     Returns:
-        The same with another start: a day after all runs where it is not called.
+        The sound with its start time. Before the call, the start is at one day.
     """
     since = _NEVER_S if on_since_s is None else on_since_s + sound.start_s
     return sound.model_copy(update={"start_s": since})
@@ -176,40 +178,43 @@ def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParam
 def history_ticks(
     maximum_range_m: float, c: float, frame_s: float = TICK_S, tick_s: float = TICK_S
 ) -> int:
-    """Ticks back to when sound left that arrives now from the maximum range.
+    """Number of ticks for which the motion of the source must be stored.
+
+    The first of these ticks is early enough for sound that arrives now from the maximum
+    range.
 
     Args:
-        maximum_range_m: Longest way of sound, m.
+        maximum_range_m: Longest travel of sound, m.
         c: Speed of sound, m/s.
         frame_s: Longest frame of a listener, s.
-        tick_s: From one tick to the next, s.
+        tick_s: Time from one tick to the next, s.
 
     Returns:
-        Number of ticks, the one now among them.
+        Number of ticks, the present one included.
     """
     return math.ceil((frame_s + maximum_range_m / c) / tick_s) + 1
 
 
 class SoundEmitter(Block):
-    """Plays the sound from where the source is.
+    """Plays the sound at the position of the source.
 
-    Discrete state, every tick: position and velocity of the source at the last
-    ticks, as far back as sound from the maximum range was emitted; before
-    time zero the source rests where it starts. The output is a function of
-    time, state and present input: no latency. Before time zero it is silent.
+    Discrete state, updated every tick: position and velocity of the source at the last
+    ticks, as far back as sound from the maximum range was emitted. Before time zero the
+    source is silent, and rests at its initial position. The output is a function of
+    time, state and present input; there is no latency.
 
-    With ``called`` the block has a further input port ``calling`` (0 or 1). It
-    remembers when this port was first 1 and plays from that tick on; its schedule
-    counts from there.
+    With ``called``, the block has a further input port ``calling`` (0 or 1). It stores
+    the tick at which this port is 1 for the first time, and plays from this tick on.
+    Its schedule starts at this tick.
 
     Args:
-        sound: What to play.
+        sound: Waveform, level and schedule of the sound.
         acoustics: Speed of sound.
-        maximum_range_m: Longest way to a listener, m, that of reflections included.
+        maximum_range_m: Longest travel of sound to a listener, reflections included, m.
         frame_s: Longest frame of a listener, s.
-        seed: Seed of noise-like waveforms.
+        seed: Seed of the waveforms with noise.
         tick_s: Period of the update, s.
-        called: Whether it is silent until its input ``calling`` is 1.
+        called: Whether the loudspeaker is silent until its input ``calling`` is 1.
 
     Raises:
         ValueError: The sound file cannot be played, or the range is not finite.
@@ -248,7 +253,7 @@ class SoundEmitter(Block):
         self._motion, self._calling = ports[:2], ports[2:]
         self.DeclareDiscreteState(4 * self._ticks)
         if called:
-            never: Any = np.array([-1.0])  # untyped: Drake's stubs take ndarray amiss
+            never: Any = np.array([-1.0])  # Any: Drake's stubs misread ndarray here
             self.DeclareDiscreteState(never)
         self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
         self.DeclarePeriodicDiscreteUpdateEvent(
@@ -273,7 +278,7 @@ class SoundEmitter(Block):
             discrete_state.set_value(1, np.array([context.get_time()]))
 
     def _on_since(self, context: Any) -> float | None:
-        """When it was called, s."""
+        """Time of the call, s; None before the call."""
         since = float(context.get_discrete_state(1).value()[0])
         return None if since < 0.0 else since
 

@@ -1,4 +1,4 @@
-"""Reading recorded sound, with errors that say what is wrong with the file."""
+"""Reading of sound files, with error messages that state the problem and the remedy."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from numpy.typing import NDArray
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 
-# Programs that write to a pipe cannot know the length and leave one of these.
+# Programs that write to a pipe do not know the length and write one of these numbers.
 _UNKNOWN_SIZES = (0, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 
-# What libsndfile makes of a FLAC file that does not say how long it is.
+# Number of frames that libsndfile reports for a FLAC file of unknown length.
 _UNKNOWN_FRAMES = 2**63 - 1
 
-#: Samples of all channels together, at most: 1 GB of them.
+#: Largest number of samples in all channels together; they need 1 GB.
 MOST_SAMPLES = 2**27
 
-#: A shorter loop of noise would be a tone, s.
+#: Shortest loop of noise, s. A shorter loop would sound like a tone.
 _LEAST_NOISE_S = 0.2
 
-# Of a sample, in a file.
+# Largest number of bytes of a sample in a file.
 _MOST_BYTES = 8
 
+# Smallest and largest sample rate.
 _RATES_HZ = (1_000, 400_000)
 
-# Samples of a channel that are read at once.
+# Number of samples per channel that are read at once.
 _BLOCK = 2**16
 
 
@@ -39,16 +40,16 @@ def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
     """Reads a WAV or FLAC file, of known or unknown length.
 
     Args:
-        path: The file.
+        path: Sound file.
         field: Name of the parameter that holds the path, for the messages.
 
     Returns:
         (channels, n) samples, full scale 1, and the rate in Hz.
 
     Raises:
-        InputError: The file is missing, not sound, empty, truncated, silent
-            in every channel or not finite; holds more than ``MOST_SAMPLES``; or
-            has a rate outside 1 to 400 kHz.
+        InputError: The file is missing, not a sound file, empty, truncated, silent in
+            every channel or not finite. Or it holds more than ``MOST_SAMPLES`` samples,
+            or its rate is outside 1 to 400 kHz.
     """
     path = require_file(path, field, "WAV or FLAC")
     where = repr(str(path))
@@ -76,10 +77,10 @@ def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
 def read_played(
     path: str | Path, low_hz: float, field: str
 ) -> tuple[NDArray[np.float64], int]:
-    """What a loudspeaker is to play.
+    """Reads the sound that a loudspeaker plays.
 
     Args:
-        path: The file.
+        path: Sound file.
         low_hz: Lower end of the band that is heard, Hz.
         field: Name of the parameter that holds the path, for the messages.
 
@@ -87,8 +88,8 @@ def read_played(
         (n,) samples, full scale 1, and the rate in Hz.
 
     Raises:
-        InputError: As of ``read_sound``, or it has several channels, or a rate that
-            is too low.
+        InputError: See ``read_sound``; or the file has several channels, or its rate is
+            too low.
     """
     channels, rate = read_sound(path, field)
     if len(channels) != 1:
@@ -107,10 +108,10 @@ def read_played(
 def read_noise(
     path: str | Path, count: int, field: str
 ) -> tuple[NDArray[np.float64], int]:
-    """Noise that is to be repeated at each of some microphones.
+    """Reads noise that is repeated at each of several microphones.
 
     Args:
-        path: The file.
+        path: Sound file.
         count: Number of microphones.
         field: Name of the parameter that holds the path, for the messages.
 
@@ -118,8 +119,8 @@ def read_noise(
         (1 or count, n) samples, full scale 1, and the rate in Hz.
 
     Raises:
-        InputError: As of ``read_sound``, or it has another number of channels, or is
-            too short.
+        InputError: See ``read_sound``; or the file has another number of channels, or
+            is too short.
     """
     channels, rate = read_sound(path, field)
     if len(channels) not in (1, count):
@@ -138,10 +139,11 @@ def read_noise(
 
 
 class _Stream(soundfile.SoundFile):
-    """A file that is read once from end to end.
+    """A sound file that is read once from beginning to end.
 
-    A seekable one is told its place after each block, which fails at the end of
-    a FLAC file of unknown length.
+    soundfile queries the position of a seekable file after each block. This fails at
+    the end of a FLAC file of unknown length. The file therefore states that it is not
+    seekable.
     """
 
     def seekable(self) -> bool:
@@ -207,10 +209,11 @@ def _check_samples(samples: NDArray[np.float64], field: str, where: str) -> None
 
 
 def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
-    """What libsndfile is to read.
+    """Returns the path, or a copy of the file with a repaired header, for libsndfile.
 
-    It reads what is left of a cut WAV file without a word, and nothing of one
-    whose recorder left 0 as the length.
+    libsndfile reads a truncated WAV file without an error message. It reads nothing
+    from a file whose recorder left 0 as the length of the samples. This function
+    refuses truncated files, and replaces such a 0 by the mark of an unknown length.
     """
     file_size = path.stat().st_size
     with path.open("rb") as file:
@@ -222,7 +225,8 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
         if size is None or (size not in _UNKNOWN_SIZES and begins + size > file_size):
             raise InputError(field, f"{where} is truncated; record or copy it again")
         (whole,) = struct.unpack("<I", header[4:8])
-        # Where the file is said to go on after no samples, other chunks follow.
+        # The header is complete if the length is not 0, or if other chunks follow the
+        # samples.
         if size or (whole not in _UNKNOWN_SIZES and 8 + whole > begins):
             return path
         if file_size - begins > _MOST_BYTES * MOST_SAMPLES:
@@ -234,7 +238,10 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
 
 
 def _data_size(file: BinaryIO) -> int | None:
-    """Stated bytes of a WAV file's samples, from where it then stands."""
+    """Stated number of bytes of the samples of a WAV file; None if there are none.
+
+    Afterwards, the position in the file is the beginning of the samples.
+    """
     while len(chunk := file.read(8)) == 8:
         name, size = struct.unpack("<4sI", chunk)
         if name == b"data":

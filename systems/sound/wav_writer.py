@@ -1,4 +1,4 @@
-"""Writing sound as it comes, into WAV files that can be read at any moment."""
+"""Continuous writing of sound into WAV files that can be read at any time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from systems.sound.waveforms import LARGEST_CREST
 
-#: Bytes of samples, at most: the header counts them, and itself, with 32 bits.
+#: Largest number of bytes of samples. The header states its own size and that of the
+#: samples with 32 bits.
 LARGEST_WAV_BYTES = 2**32 - 1000
 
 
@@ -22,24 +23,24 @@ def pcm_of_counts(counts: NDArray[np.int16], full_scale: int) -> NDArray[np.int1
     """Samples of 16 bits for counts of a converter.
 
     Args:
-        counts: (channels, n) from -full_scale to full_scale - 1.
+        counts: (channels, n) counts from -full_scale to full_scale - 1.
         full_scale: A power of two, up to 2^15.
 
     Returns:
-        (channels, n) the counts times a power of two: full scale stays full scale, and
-        the counts can be had back exactly.
+        (channels, n) counts multiplied by a power of two. Full scale remains full
+        scale, and the counts can be restored exactly.
     """
     return counts * np.int16(2**15 // full_scale) if full_scale < 2**15 else counts
 
 
 def loudest_pa(level_pa: float) -> float:
-    """Pressure that is full scale in a file of what a loudspeaker plays.
+    """Full-scale sound pressure of a file with the sound of a loudspeaker.
 
     Args:
-        level_pa: RMS pressure at 1 m while it sounds, Pa.
+        level_pa: RMS pressure at 1 m while the source sounds, Pa.
 
     Returns:
-        The least power of two, Pa, that the loudspeaker's peaks do not exceed.
+        Smallest power of two that the peaks of the loudspeaker do not exceed, Pa.
     """
     return 2.0 ** math.ceil(math.log2(LARGEST_CREST * level_pa))
 
@@ -51,29 +52,29 @@ def pcm_of_pressure(
 
     Args:
         pressure: (n,) Pa.
-        full_scale_pa: Pressure that is full scale, Pa.
+        full_scale_pa: Pressure that corresponds to full scale, Pa.
 
     Returns:
-        (n,) rounded to 2^-31 of full scale, and clipped.
+        (n,) samples, rounded to 2^-31 of full scale, and clipped.
     """
     scaled = np.rint(pressure.astype(np.float64) * (2**31 / full_scale_pa))
     return np.clip(scaled, -(2**31), 2**31 - 1).astype(np.int32)
 
 
 class WavWriter:
-    """A WAV file that grows.
+    """Writes a WAV file piece by piece.
 
-    After each ``write`` its header says how long it is: whatever stops the process,
-    what was written can be read.
+    After each ``write``, the header states the present length. If the process stops for
+    any reason, the samples written so far can be read.
 
     Args:
         path: A file that does not exist yet.
         channels: Number of channels.
-        rate_hz: Of each channel, Hz.
-        sample_bytes: 2 or 4, of a sample.
+        rate_hz: Sample rate of each channel, Hz.
+        sample_bytes: Number of bytes of a sample, 2 or 4.
 
     Raises:
-        OSError: The file exists, or cannot be made.
+        OSError: The file exists, or cannot be created.
     """
 
     def __init__(
@@ -94,10 +95,10 @@ class WavWriter:
         """Appends samples.
 
         Args:
-            samples: (channels, n) whole numbers of the file's size.
+            samples: (channels, n) integers that fit the sample size of the file.
 
         Raises:
-            OSError: The disk is full, or fails; names the file.
+            OSError: The disk is full or fails. The error names the file.
         """
         interleaved = np.ascontiguousarray(samples.T, dtype=self._kind)
         with self._named():
@@ -105,10 +106,10 @@ class WavWriter:
         self.samples += len(interleaved)
 
     def close(self) -> None:
-        """Ends the file.
+        """Closes the file.
 
         Raises:
-            OSError: The disk fails, and has not done so before.
+            OSError: The disk fails, and no earlier error was raised.
         """
         failed_before = self._failed
         for close in (self._wave.close, self._file.close):
@@ -116,14 +117,15 @@ class WavWriter:
                 with self._named():
                     close()
             except OSError:
-                # The buffer holds what could not be written: it was told of.
+                # The buffer holds samples that could not be written. If ``write`` has
+                # raised this error before, it is not raised again.
                 if not failed_before:
                     self._file.close()
                     raise
 
     @contextmanager
     def _named(self) -> Iterator[None]:
-        """Errors name the file."""
+        """Adds the name of the file to errors of the operating system."""
         try:
             yield
         except OSError as error:

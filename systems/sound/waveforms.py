@@ -11,28 +11,30 @@ from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.parameters import EDGE_S, MICROPHONE_BAND_HZ, SoundParameters
 from systems.sound.sound_file import read_played
 
-#: A file's beginning is cut while it is this far below its peak.
+#: The beginning of a file is cut up to the first sample above this level relative to
+#: the peak, dB.
 SILENCE_DB = -50.0
-#: Largest ratio of peak to RMS level that the loudspeaker gives.
+#: Largest ratio of the peak to the requested RMS level.
 LARGEST_CREST = 4.0
-#: Length of the noise, after which it repeats, s.
+#: Shortest length of the noise, after which the noise repeats, s.
 _NOISE_SECONDS = 2.0
 
 
 def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
-    """Sound pressure at 1 m over the sounding time, bursts end to end.
+    """Sound pressure at 1 m while the source sounds, bursts end to end.
 
     Args:
-        sound: What to play.
+        sound: Waveform, level and length of the bursts.
         seed: Seed of the noise.
 
     Returns:
-        (m n,) Pa at 100 kHz: m whole bursts of n samples, each with its
-        edges; burst k of the run plays burst k mod m. A file plays on from
-        burst to burst, and begins again at its end.
+        (m n,) Pa at 100 kHz: m whole bursts of n samples, each with its edges. Burst k
+        of the run plays burst k mod m. A file continues from burst to burst, and starts
+        again at its end.
 
     Raises:
-        InputError: The file cannot be played; names it and the remedy.
+        InputError: The file cannot be played. The message names the file and the
+            remedy.
     """
     burst = round(sound.on_s * SAMPLE_RATE_HZ)
     raw = _SYNTHESES[sound.kind](sound, seed)
@@ -46,10 +48,12 @@ def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
             f"{what} has nothing between {low:g} and {high:g} Hz, which the "
             "microphones pass; choose another sound",
         )
+    # Fill whole bursts, and scale them to the level.
     bursts = max(1, -(-len(endless) // burst))
     samples = np.resize(endless, bursts * burst)
     peak, rms = np.max(np.abs(samples)), np.sqrt(np.mean(samples**2))
     samples *= sound.level_pa * min(1.0 / rms, LARGEST_CREST / peak)
+    # Apply the edges to each burst.
     each = samples.reshape(bursts, burst)
     edge = round(EDGE_S * SAMPLE_RATE_HZ)
     ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(edge) + 0.5) / edge)
@@ -66,7 +70,7 @@ _SWEEP_S = 0.025
 
 
 def _chirp(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
-    """Sweeps so long that every frame of 25 ms holds the whole band."""
+    """Sweeps of 25 ms, so that every frame of 25 ms holds the whole band."""
     import scipy.signal
 
     time = _time(_SWEEP_S)
@@ -85,7 +89,7 @@ def _tone(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 
 
 def _horn(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
-    """Two reeds a major third apart, rich in harmonics, with a slight tremble."""
+    """Two reeds a major third apart, with many harmonics and a slight tremolo."""
     time = _time(sound.on_s)
     tremble = 0.004 / 11.0 * np.sin(2.0 * np.pi * 11.0 * time)
     total = np.zeros_like(time)
@@ -119,15 +123,15 @@ def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 def band_limited(
     samples: NDArray[np.float64], low_hz: float, high_hz: float
 ) -> NDArray[np.float64]:
-    """Zero-phase Butterworth band-pass.
+    """Samples after a zero-phase Butterworth band-pass filter.
 
     Args:
-        samples: (n,) at 100 kHz, any unit.
-        low_hz: Lower edge, Hz.
-        high_hz: Upper edge, Hz.
+        samples: (n,) samples at 100 kHz, any unit.
+        low_hz: Lower edge of the band, Hz.
+        high_hz: Upper edge of the band, Hz.
 
     Returns:
-        (n,) in the unit of the samples.
+        (n,) filtered samples, in the unit of the samples.
     """
     import scipy.signal
 

@@ -1,1 +1,1 @@
-"""The plane that robots share: geometry, paths, bodies that move on them."""
+"""The plane that the robots share: geometry, paths, and obstacles."""

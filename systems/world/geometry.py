@@ -1,7 +1,7 @@
-"""Planar geometry of points, rectangles and sensor cones.
+"""Planar geometry of points, rectangles, and sensor cones.
 
-A rectangle is (x, y, theta, length, width): centre and heading in the frame of
-the caller, extents along its own x and y axes; m and rad.
+A rectangle is (x, y, theta, length, width) in m and rad. The center and the heading are
+in the frame of the caller. The extents are along the rectangle's own x and y axes.
 """
 
 from __future__ import annotations
@@ -27,10 +27,11 @@ from systems.world.plane import (
     side_normals,
 )
 
-#: Keeps the norm's gradient finite at zero; far below any length that counts.
+#: Floor that keeps the gradient of the norm finite at zero. It is far below any length
+#: of interest.
 _NORM_FLOOR = 1e-12
 
-#: A shallower overlap may be missed between two instants, m.
+#: Largest depth of an overlap that ``first_overlap`` may miss within a step, m.
 _SHALLOW_M = 1e-4
 
 for _function in (
@@ -48,32 +49,33 @@ rectangle_clearance = njit(cache=True)(plane.rectangle_clearance)
 
 @register_jitable
 def safe_norm(x: Any, y: Any) -> Any:
-    """Length of (x, y); at zero its gradient is zero instead of NaN.
+    """Computes the length of (x, y). Its gradient at zero is zero instead of NaN.
 
-    Accepts floats and AutoDiffXd. Differs from the exact norm by at most
-    1e-12.
+    The function accepts floats and AutoDiffXd. The result differs from the exact norm
+    by at most 1e-12.
 
     Args:
         x: First component, in any unit.
-        y: Second component, in the same one.
+        y: Second component, in the same unit.
 
     Returns:
-        In that unit, above 0; AutoDiffXd where a component is.
+        Length in that unit, above 0; AutoDiffXd if a component is AutoDiffXd.
     """
     return sqrt(x * x + y * y + _NORM_FLOOR**2)
 
 
 @register_jitable
 def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[Any, Any]:
-    """Velocity v_WP of the control point of a body, m/s.
+    """Computes the velocity v_WP of the control point of a body.
 
     Args:
         theta: Heading of the body frame in W, rad; a number or an array.
-        velocity: (vx, vy, omega) of the body frame in W, m/s and rad/s, each as theta.
-        offset: Distance epsilon of P ahead of the origin, m.
+        velocity: (vx, vy, omega) of the body frame in W, m/s and rad/s, each of the
+            shape of theta.
+        offset: Distance epsilon of P ahead of the origin of the body frame, m.
 
     Returns:
-        (vx, vy) in W, m/s, of the shape of theta.
+        (vx, vy) in W, m/s, each of the shape of theta.
     """
     vx, vy, omega = velocity
     turning = omega * offset
@@ -82,14 +84,14 @@ def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[An
 
 @register_jitable
 def nearest_point_on_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
-    """Vector from a point to the nearest point of a filled rectangle.
+    """Computes the vector from a point to the nearest point of a filled rectangle.
 
     Args:
-        point: (x, y), m; floats, AutoDiffXd or arrays.
-        rectangle: (x, y, theta, length, width); each may be an array, too.
+        point: (x, y), m; floats, AutoDiffXd, or arrays.
+        rectangle: (x, y, theta, length, width), m and rad; each may be an array.
 
     Returns:
-        (dx, dy) in the frame of the arguments, m; (0, 0) inside.
+        (dx, dy) in the frame of the arguments, m; (0, 0) if the point is inside.
     """
     du, dv = beyond_rectangle(point, rectangle)
     return rotate(rectangle[2], -du, -dv)
@@ -101,7 +103,7 @@ def _outside_compiled(u: Any, half: Any) -> Any:
 
 
 def rectangle_corners(rectangle: ArrayLike) -> NDArray[np.float64]:
-    """(4, 2) corners, counter-clockwise from front left."""
+    """Returns the (4, 2) corners, counterclockwise from front left, m."""
     x, y, theta, length, width = np.asarray(rectangle, dtype=float)
     signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     local = signs * np.array([length / 2.0, width / 2.0])
@@ -128,7 +130,7 @@ def _corners(
 def _nearest_on_segment(
     ax: float, ay: float, bx: float, by: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance from the origin to the segment a-b."""
+    """Returns the distance from the origin to the segment a-b."""
     ex, ey = bx - ax, by - ay
     squared = ex * ex + ey * ey
     t = 0.0 if squared == 0.0 else -(ax * ex + ay * ey) / squared
@@ -140,20 +142,21 @@ def _nearest_on_segment(
 def cone_range(
     x: float, y: float, axis: float, half_angle: float, rectangles: NDArray[np.float64]
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance to the nearest surface inside a sensor's cone.
+    """Computes the distance to the nearest surface inside a sensor's cone.
 
-    Each edge is cut to the part inside the cone, whose nearest point is then
-    exact; nearer surfaces hide farther ones because only the nearest counts.
+    The function cuts each edge of each rectangle to the part inside the cone. Then it
+    takes the nearest point of this part, which is exact. Hidden surfaces need no
+    special case, because only the nearest surface counts.
 
     Args:
-        x: Position of the sensor, m.
-        y: Position of the sensor, m.
-        axis: Direction of the cone's axis, rad.
+        x: Position of the sensor, first component, m.
+        y: Position of the sensor, second component, m.
+        axis: Direction of the axis of the cone, rad.
         half_angle: Half of the opening angle, rad, below pi/2.
         rectangles: (n, 5) rectangles in the same frame.
 
     Returns:
-        Range in m; 0 inside a rectangle, infinity where nothing is seen.
+        Range, m; 0 if the sensor is inside a rectangle, infinity if the cone is empty.
     """
     best = np.inf
     ca, sa = math.cos(axis), math.sin(axis)
@@ -165,10 +168,12 @@ def cone_range(
             j = (i + 1) % 4
             dx, dy = corners[i, 0] - x, corners[i, 1] - y
             fx, fy = corners[j, 0] - x, corners[j, 1] - y
+            # The sensor is inside if it is to the left of all edges.
             if dx * fy - dy * fx < 0.0:
                 inside = False
             ax, ay = ca * dx + sa * dy, -sa * dx + ca * dy
             bx, by = ca * fx + sa * fy, -sa * fx + ca * fy
+            # Part of the edge, from low to high, that is within both sides of the cone.
             low, high = 0.0, 1.0
             for side in (1.0, -1.0):
                 ga = slope * ax - side * ay
@@ -199,18 +204,18 @@ def fan_ranges(
     half_angle: float,
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """``cone_range`` of each sensor of a body.
+    """Computes ``cone_range`` for each sensor of a body.
 
     Args:
-        pose_WB: (3,) x, y, theta of the body, m and rad.
+        pose_WB: (3,) x, y, theta of the body in W, m and rad.
         rectangles: (m, 5) rectangles in W.
         axes: (n,) directions of the cones in B, rad.
-        places: (n, 2) sensors from P in B axes, m.
+        places: (n, 2) positions of the sensors relative to P in the axes of B, m.
         half_angle: Half of the opening angle, rad.
         control_point_m: Distance of P ahead of the origin of B, m.
 
     Returns:
-        (n,) m; infinite where a cone is empty.
+        (n,) ranges, m; infinite for an empty cone.
     """
     x, y, theta = pose_WB
     c, s = math.cos(theta), math.sin(theta)
@@ -231,15 +236,18 @@ def fan_ranges(
 def segment_clearance(
     start: Any, end: Any, box: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance of a line segment from a filled rectangle.
+    """Computes the distance of a line segment from a filled rectangle.
+
+    The function works in the axes of the rectangle. If the segment does not meet the
+    rectangle, the nearest point is an end of the segment or a corner of the rectangle.
 
     Args:
         start: (x, y), m.
         end: (x, y), m.
-        box: (x, y, theta, length, width) in the same frame.
+        box: (x, y, theta, length, width) in the same frame, m and rad.
 
     Returns:
-        m; 0 if they meet.
+        Distance, m; 0 if they meet.
     """
     c, s = math.cos(box[2]), math.sin(box[2])
     dx, dy = start[0] - box[0], start[1] - box[1]
@@ -247,7 +255,7 @@ def segment_clearance(
     dx, dy = end[0] - start[0], end[1] - start[1]
     along_x, along_y = c * dx + s * dy, c * dy - s * dx
     half_x, half_y = box[3] / 2.0, box[4] / 2.0
-    # They meet if the segment crosses both of the box's slabs at one time.
+    # The segment meets the rectangle if it is within both slabs of it at the same time.
     enter, leave = 0.0, 1.0
     for at, along, half in ((x, along_x, half_x), (y, along_y, half_y)):
         safe = along if abs(along) >= 1e-12 else 1e-12
@@ -274,19 +282,20 @@ def segment_clearance(
 def contact_time(
     a: NDArray[np.float64], b: NDArray[np.float64], vx: float, vy: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Time until two rectangles touch, the first moving at (vx, vy), unturned.
+    """Computes the time until two rectangles touch. The first moves without turning.
 
-    Along each side's normal the shadows of both overlap during one interval of
-    time; convex shapes touch while all of these intervals do.
+    Along the normal of each side, the projections of both rectangles overlap during one
+    interval of time. Convex shapes touch as long as all projections overlap. Therefore
+    the time of contact is the start of the intersection of all intervals.
 
     Args:
-        a: (5,) rectangle.
-        b: (5,) rectangle in the same frame.
-        vx: Velocity of a relative to b, m/s.
-        vy: See vx.
+        a: (5,) first rectangle.
+        b: (5,) second rectangle in the same frame.
+        vx: Velocity of a relative to b, x component, m/s.
+        vy: Velocity of a relative to b, y component, m/s.
 
     Returns:
-        s; 0 where they overlap, infinite where they never touch.
+        Time, s; 0 if the rectangles overlap now, infinite if they never touch.
     """
     enter, leave = 0.0, np.inf
     for nx, ny, ahead, touching in side_normals(a, b):
@@ -305,37 +314,41 @@ def contact_time(
 def first_overlap(
     before: Any, now: Any, size: Any, poses: NDArray[np.float64], other_size: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """When during a step a rectangle first overlaps another, both moving.
+    """Computes when two moving rectangles first overlap during a step.
 
-    The first one goes straight and turns evenly throughout the step, the other one from
-    each of its poses to the next. An overlap at the end of such a part counts from that
-    end. Overlaps within a part are searched for by conservative advancement: as long as
-    no point can have moved farther than the clearance, nothing touches. So no overlap
-    deeper than 0.1 mm is missed, however fast both are.
+    The first rectangle moves straight and turns evenly during the whole step. The
+    second one moves in the same way in each part of the step, from one of its poses to
+    the next. An overlap at the end of a part counts from that end.
+
+    Within a part, the function uses conservative advancement. It computes the clearance
+    and the time in which no point can move farther than the clearance. Nothing touches
+    in this time, so the function advances by it and repeats. It advances by at least
+    0.1 mm of motion. Therefore it misses no overlap deeper than 0.1 mm at any speed.
 
     Args:
         before: (x, y, theta) of the first rectangle before the step, m and rad.
-        now: The same after it.
-        size: Its length and width, m.
-        poses: (n + 1, 3) x, y, theta of the other one, evenly over the step; a single
-            pose asks about the end of the step alone.
-        other_size: Its length and width, m.
+        now: (x, y, theta) of the first rectangle after the step, m and rad.
+        size: Length and width of the first rectangle, m.
+        poses: (n + 1, 3) x, y, theta of the second rectangle at even times over the
+            step, m and rad. With one pose the second rectangle is at
+            rest.
+        other_size: Length and width of the second rectangle, m.
 
     Returns:
-        Part of the step that has passed, 0 to 1; infinite where they do not overlap.
+        Elapsed share of the step, 0 to 1; infinite if the rectangles do not overlap.
     """
     a, b = np.zeros(5), np.zeros(5)
     a[3], a[4], b[3], b[4] = size[0], size[1], other_size[0], other_size[1]
     reach_a, reach_b = 0.5 * math.hypot(a[3], a[4]), 0.5 * math.hypot(b[3], b[4])
     parts, last = max(len(poses) - 1, 1), len(poses) - 1
-    # What both move in each part, and how much nearer any two points can come, m.
+    # Motion of both rectangles in each part, and the largest approach of two points, m.
     ways_a, ways_b, nearing = np.empty(3), np.zeros((parts, 3)), np.empty(parts)
     for j in range(3):
         ways_a[j] = (now[j] - before[j]) / parts
     for k in range(last):
         for j in range(3):
             ways_b[k, j] = poses[k + 1, j] - poses[k, j]
-        # Headings of paths jump by a whole turn.
+        # The heading of a path may jump by a whole turn.
         ways_b[k, 2] = (ways_b[k, 2] + math.pi) % math.tau - math.pi
     for k in range(parts):
         nearing[k] = (
@@ -343,6 +356,7 @@ def first_overlap(
             + abs(ways_a[2]) * reach_a
             + abs(ways_b[k, 2]) * reach_b
         )
+    # Rectangles that are far apart at the end cannot have touched.
     for j in range(3):
         a[j], b[j] = now[j], poses[last, j]
     if rectangle_clearance(a, b) > nearing.sum():
@@ -353,7 +367,7 @@ def first_overlap(
         if _clearance_after(1.0, a, b, ways_a, ways_b[k]) < 0.0:
             return (k + 1) / parts
         clearance, t = rectangle_clearance(a, b), 0.0
-        # What overlaps at the begin of a step has been found in the one before.
+        # An overlap at the start of a part was found at the end of the part before.
         while clearance >= 0.0 and nearing[k] > 0.0:
             t += max(clearance, _SHALLOW_M) / nearing[k]
             if t >= 1.0:
@@ -368,7 +382,7 @@ def first_overlap(
 def _clearance_after(
     part: float, a: Any, b: Any, way_a: Any, way_b: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """Clearance of two rectangles that have gone a part of their ways, m."""
+    """Returns the clearance of two rectangles after a share of their motions, m."""
     a, b = a.copy(), b.copy()
     for j in range(3):
         a[j] += part * way_a[j]

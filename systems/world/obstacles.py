@@ -1,4 +1,4 @@
-"""Static and moving boxes that the robot must not touch."""
+"""Boxes at rest and moving boxes that the robot must not touch."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from systems.world.paths import seconds
 @define_for_scalars("Obstacles_", __name__)
 def Obstacles_(T):
     class Impl(Block_[T]):
-        """Publishes where the boxes are, and how large.
+        """Publishes the poses, velocities, and sizes of the obstacles.
 
-        The ports list the obstacles one after the other. A function of time alone: no
-        state, no latency.
+        The ports list the obstacles one after the other. The outputs are functions of
+        time only, without state and without latency.
 
         Args:
             obstacles: A sequence of ``ObstacleParameters``.

@@ -20,26 +20,28 @@ from systems.world.paths import ACCELERATION_M_S2, AtEnd, WaypointPath
 
 
 class ObstacleParameters(Parameters):
-    """One box, at rest or moving along waypoints."""
+    """One box that is at rest or moves along waypoints."""
 
     name: str = Field(default="obstacle", min_length=1)
     """Name in results and pictures."""
     size_m: Size = (0.1, 0.05)
-    """Extents along its own x axis (its direction of travel) and y axis, m."""
+    """Extents along the box's own x axis (its direction of travel) and y axis, m."""
     waypoints_m: Waypoints = ((2.0, 1.0),)
-    """Waypoints of its center in W, m; one point is an obstacle at rest."""
+    """Waypoints of the center in W, m. With one waypoint the obstacle is at rest."""
     heading_deg: Angle = 0.0
     """Heading of an obstacle at rest, deg CCW from the x axis of W."""
     speed_m_s: NonNegativeSpeed = 0.3
     """Speed along the waypoints, m/s."""
     acceleration_m_s2: Acceleration = ACCELERATION_M_S2
-    """Acceleration at start and braking, m/s^2."""
+    """Acceleration when starting and braking, m/s^2."""
     start_time_s: Time = 0.0
-    """It rests at its first waypoint until then, s."""
+    """Time until which the obstacle rests at its first waypoint, s."""
     at_end: AtEnd = "stop"
-    """At the last waypoint: rest, or go back and forth."""
+    """Behavior at the last waypoint: ``stop`` rests there, ``shuttle`` goes back and
+    forth."""
     known: bool = True
-    """Whether the map for planned routes has it; only obstacles at rest count."""
+    """Whether the map for planned routes contains this obstacle. The map contains only
+    obstacles at rest."""
     corner_radius_m: Length = 0.05
     """Largest radius of the rounded corners, m."""
 
@@ -49,7 +51,7 @@ class ObstacleParameters(Parameters):
         return self
 
     def path(self) -> WaypointPath:
-        """The path of the centre as a function of time."""
+        """Returns the path of the center as a function of time."""
         return WaypointPath(
             self.waypoints_m,
             speed=self.speed_m_s,

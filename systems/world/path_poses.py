@@ -1,4 +1,4 @@
-"""Poses on a path through waypoints, compiled."""
+"""Compiled computation of poses on a path through waypoints."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from systems.framework.compiling import njit
 def poses_on(
     pieces: NDArray[np.float64], elapsed: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Poses at many times.
+    """Computes the poses at many times.
 
     Args:
-        pieces: (m, 7) begin in s, x, y, theta, curvature, speed and acceleration of
-            each piece of the path.
-        elapsed: (n,) times since the first of them began, s.
+        pieces: (m, 7) start time, x, y, theta, curvature, speed, and acceleration of
+            each piece of the path, in s, m, and rad.
+        elapsed: (n,) times since the start of the first piece, s.
 
     Returns:
-        (n, 3) m and rad.
+        (n, 3) poses in W, m and rad.
     """
     poses = np.empty((elapsed.size, 3))
     begins = np.ascontiguousarray(pieces[:, 0])
@@ -35,7 +35,7 @@ def poses_on(
         half = 0.5 * curvature * chord
         c, s = cosines[k], sines[k]
         if half != 0.0:
-            # The chord of an arc: it tends to the arc as the curvature vanishes.
+            # Chord of the arc. It approaches the arc as the curvature goes to 0.
             chord *= math.sin(half) / half
             c, s = math.cos(theta + half), math.sin(theta + half)
         poses[i, 0] = x + chord * c

@@ -1,9 +1,9 @@
-"""Path of a body that is drawn through waypoints.
+"""Path of a body that moves through waypoints.
 
-Corners are rounded by circular arcs and the speed ramps up and down with a limited
-acceleration, so that position and velocity are continuous, both in closed form.
-The yaw rate steps at the ends of an arc: such a body is drawn, not driven
-(``systems/base/carrier.py`` is).
+Circular arcs round the corners. The speed rises and falls with a limited acceleration.
+Position and velocity are continuous and have closed forms. The yaw rate jumps at the
+ends of an arc. A robot with wheels cannot do this. For such a robot see
+``systems/base/carrier.py``.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from systems.framework.input_error import InputError
 
 AtEnd = Literal["stop", "shuttle"]
 
-#: How obstacles and master robot start and brake unless told otherwise, m/s^2. Not
-#: printed, ours: a tenth of what wheels hold on a floor, and enough to be at 0.3 m/s
-#: after 45 mm, so that they run 0.15 s behind bodies that step to their speed.
+#: Default acceleration of obstacles and of the leader, m/s^2 (not printed, our choice).
+#: It is a tenth of the acceleration at which wheels slip on a floor. A body reaches
+#: 0.3 m/s after 45 mm, and is 0.15 s behind a body that starts at this speed at once.
 ACCELERATION_M_S2 = 1.0
 
-#: A body that is slower than this rests, m/s.
+#: Speed below which a body is at rest, m/s.
 _SLOWEST_M_S = 1e-9
 
 
 class _Segment(NamedTuple):
-    """A line (curvature 0) or an arc, by its start pose and length."""
+    """A line (curvature 0) or an arc, given by its start pose and length."""
 
     x: float
     y: float
@@ -44,7 +44,7 @@ class _Segment(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A part of a segment with constant acceleration, by its first instant."""
+    """A part of a segment with constant acceleration, given by its start."""
 
     begin: float
     x: float
@@ -58,25 +58,27 @@ class _Piece(NamedTuple):
 class WaypointPath:
     """Pose and velocity on a path through waypoints.
 
-    From rest to rest: the speed along the path rises and falls with the
-    acceleration and is constant in between; a short path sees a triangle.
+    The motion starts and ends at rest. The speed along the path rises and falls with
+    the acceleration and is constant in between. On a short path it has no constant
+    part.
 
     Args:
-        waypoints: Points in W, m; one point is a body at rest.
+        waypoints: Points in W, m. With one point the body is at rest.
         speed: Speed along the path, m/s, >= 0.
-        acceleration: Of the speed along the path, m/s^2, > 0.
-        corner_radius: Largest radius of the rounded corners, m, > 0; a corner
-            takes at most half of each leg beside it.
-        start_time: The body rests at the first waypoint until then, s.
-        at_end: ``stop`` rests at the last waypoint, ``shuttle`` goes back
-            and forth without turning round, at rest for an instant at either end.
-        heading: Heading where there is one waypoint, rad; else the path's
-            tangent.
-        top_yaw_rate: Corners are taken as slowly as it asks, rad/s, > 0.
+        acceleration: Acceleration along the path, m/s^2, > 0.
+        corner_radius: Largest radius of the rounded corners, m, > 0. A corner takes at
+            most half of each neighboring leg.
+        start_time: Time until which the body rests at the first waypoint, s.
+        at_end: ``stop`` rests at the last waypoint. ``shuttle`` goes back and forth
+            without turning around, with an instant of rest at each end.
+        heading: Heading if there is one waypoint, rad. Otherwise the heading is the
+            tangent of the path.
+        top_yaw_rate: Largest yaw rate in corners, rad/s, > 0. It limits the speed on
+            arcs.
 
     Raises:
-        InputError: There is no waypoint, two neighbours coincide, the path
-            doubles back on itself, or its corners are sharp.
+        InputError: There is no waypoint, two neighbors coincide, the path doubles back
+            on itself, or the corner radius is not above 0.
     """
 
     def __init__(
@@ -134,7 +136,7 @@ class WaypointPath:
         return self._moves
 
     def _find(self, time: float) -> tuple[_Piece, float, float]:
-        """Piece, distance from its start, m, and rate along the path, m/s."""
+        """Returns the piece, the distance from its start, m, and the speed, m/s."""
         elapsed, direction = max(time - self._start_time, 0.0), 1.0
         if self._shuttles:
             laps, elapsed = divmod(elapsed, self._duration)
@@ -146,12 +148,12 @@ class WaypointPath:
         return piece, distance, direction * (piece.speed + piece.acceleration * since)
 
     def pose(self, time: float) -> tuple[float, float, float]:
-        """(x, y, theta) in W at a time in s; m and rad."""
+        """Returns (x, y, theta) in W at a time in s, m and rad."""
         piece, s, _ = self._find(time)
         return _along(piece.x, piece.y, piece.theta, piece.curvature, s)
 
     def velocity(self, time: float) -> tuple[float, float, float]:
-        """(vx, vy, omega) in W at a time in s; m/s and rad/s."""
+        """Returns (vx, vy, omega) in W at a time in s, m/s and rad/s."""
         piece, s, rate = self._find(time)
         theta = piece.theta + piece.curvature * s
         return (
@@ -161,7 +163,7 @@ class WaypointPath:
         )
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
+        """Returns the (n, 3) poses in W at n times in s, m and rad; see ``pose``."""
         times = np.asarray(times, dtype=float)
         if not self._moves:
             return np.full((len(times), 3), self._pieces[0][1:4])
@@ -170,9 +172,9 @@ class WaypointPath:
         return poses_on(np.array(self._pieces), self._elapsed(times)[0])
 
     def twists(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 2) speeds ahead, negative where a shuttle goes back, and yaw rates.
+        """Returns the (n, 2) forward speeds, m/s, and yaw rates, rad/s, at n times.
 
-        In m/s and rad/s.
+        The speed is negative while a shuttle goes back.
         """
         elapsed, direction = self._elapsed(np.asarray(times, dtype=float))
         index = np.searchsorted(self._begins, elapsed, side="right") - 1
@@ -181,16 +183,16 @@ class WaypointPath:
         return np.stack([rate, rate * curvature], axis=1)
 
     def extreme_twists(self, until: float) -> NDArray[np.float64]:
-        """Speeds ahead and yaw rates at both ends of each piece of the path.
+        """Returns the speeds and yaw rates at both ends of each piece of the path.
 
-        Within a piece the curvature is constant and the speed is linear in time, so
-        that every point of the body is fastest at one of the ends.
+        Within a piece the curvature is constant and the speed is linear in time.
+        Therefore every point of the body is fastest at one of the ends.
 
         Args:
-            until: Pieces count up to this time, s.
+            until: Time up to which pieces count, s.
 
         Returns:
-            (n, 2) m/s and rad/s.
+            (n, 2) forward speeds, m/s, and yaw rates, rad/s.
         """
         rows, last = [], until - self._start_time
         for piece, end in zip(self._pieces, self._begins[1:], strict=False):
@@ -202,7 +204,7 @@ class WaypointPath:
         return np.reshape(rows, (-1, 2))
 
     def _elapsed(self, times: NDArray[np.float64]) -> tuple[Any, Any]:
-        """Times since the first instant of a lap, s, and 1, or -1 on the way back."""
+        """Returns times along the forward motion, s, and the direction, 1 or -1."""
         elapsed = np.maximum(times - self._start_time, 0.0)
         if not self._shuttles:
             return elapsed, 1.0
@@ -217,7 +219,7 @@ class WaypointPath:
 def _along(
     x: float, y: float, theta: float, curvature: float, s: float
 ) -> tuple[float, float, float]:
-    """Pose at a distance s along a line or an arc that begins at a pose."""
+    """Returns the pose at the distance s along a line or an arc."""
     if curvature == 0.0:
         return x + s * math.cos(theta), y + s * math.sin(theta), theta
     end = theta + curvature * s
@@ -231,14 +233,18 @@ def _along(
 def _pieces(
     segments: Sequence[_Segment], limits: Sequence[float], acceleration: float
 ) -> tuple[list[_Piece], float]:
-    """The fastest way along segments from rest to rest, and how long it takes.
+    """Computes the fastest motion along segments from rest to rest, and its duration.
+
+    The function works with squares of speeds, because these are linear in the distance.
+    It limits the squared speeds at the joints of segments in a forward pass (speeding
+    up) and a backward pass (braking). Then it splits each segment into up to three
+    pieces: speeding up, constant speed, and braking.
 
     Args:
-        segments: Lines and arcs end to end.
-        limits: Top speed on each, m/s.
-        acceleration: Of the speed along the path, m/s^2.
+        segments: Lines and arcs, end to end.
+        limits: Top speed on each segment, m/s.
+        acceleration: Acceleration along the path, m/s^2.
     """
-    # Squares of speeds are linear in the distance.
     tops = [limit * limit for limit in limits]
     joints = [0.0, *(min(pair) for pair in pairwise(tops)), 0.0]
     gains = [2.0 * acceleration * segment.length for segment in segments]
@@ -272,7 +278,7 @@ def _pieces(
 def _segments(
     waypoints: Sequence[tuple[float, float]], corner_radius: float
 ) -> list[_Segment]:
-    """Lines between the waypoints, joined by arcs."""
+    """Computes the lines between the waypoints and the arcs that join them."""
     legs = []
     for (x0, y0), (x1, y1) in pairwise(waypoints):
         length = math.hypot(x1 - x0, y1 - y0)
@@ -328,7 +334,7 @@ def _segments(
 def _corner(
     turn: float, radius: float, room: float
 ) -> tuple[tuple[float, float] | None, float]:
-    """((curvature, arc length), length cut off each leg) of a corner."""
+    """Returns ((curvature, arc length), length that a corner cuts off each leg)."""
     if abs(turn) < 1e-9:
         return None, 0.0
     half = math.tan(abs(turn) / 2.0)
@@ -338,6 +344,6 @@ def _corner(
 
 
 def seconds(context: Any) -> float:
-    """Time of a context as a float, whatever the context's scalar type."""
+    """Returns the time of a context as a float, for any scalar type."""
     time = context.get_time()
     return time if isinstance(time, float) else time.value()

@@ -1,9 +1,10 @@
-"""Points and rectangles in the plane: what parameters are checked by.
+"""Points and rectangles in the plane, without compiled code.
 
-Compiled code has these functions from ``systems.world.geometry``.
+The checks of parameters use these functions. ``systems.world.geometry`` provides them
+to compiled code.
 
-A rectangle is (x, y, theta, length, width): centre and heading in the frame of
-the caller, extents along its own x and y axes; m and rad.
+A rectangle is (x, y, theta, length, width) in m and rad. The center and the heading are
+in the frame of the caller. The extents are along the rectangle's own x and y axes.
 """
 
 from __future__ import annotations
@@ -18,29 +19,29 @@ from systems.framework.elementary import cos, sin
 
 
 def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
-    """Components in the outer frame of (x, y) given in a frame turned by theta.
+    """Transforms a vector from an inner frame, turned by theta, to the outer frame.
 
-    Accepts floats and AutoDiffXd. This is R = [[cos, -sin], [sin, cos]], the
-    transpose of what Han 2019, eq. 15 prints.
+    The function accepts floats and AutoDiffXd. It applies R = [[cos, -sin], [sin,
+    cos]], the transpose of the matrix that Han 2019, eq. 15 prints.
 
     Args:
-        theta: Angle of the inner frame in the outer one, rad.
-        x: First component in the inner frame.
-        y: Second component in it.
+        theta: Angle of the inner frame in the outer frame, rad.
+        x: First component in the inner frame, any unit.
+        y: Second component in the inner frame, in the same unit.
 
     Returns:
-        (x, y) in the outer frame, in the unit of the components.
+        (x, y) in the outer frame, in the same unit.
     """
     c, s = cos(theta), sin(theta)
     return c * x - s * y, s * x + c * y
 
 
 def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
-    """Position p_WP of the control point of a body, m.
+    """Computes the position p_WP of the control point of a body.
 
     Args:
-        pose: (x, y, theta) of the body frame in W; floats or AutoDiffXd.
-        offset: Distance epsilon of P ahead of the origin, m.
+        pose: (x, y, theta) of the body frame in W, m and rad; floats or AutoDiffXd.
+        offset: Distance epsilon of P ahead of the origin of the body frame, m.
 
     Returns:
         (x, y) in W, m.
@@ -50,14 +51,14 @@ def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
 
 
 def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
-    """Vector to a point from the nearest point of a filled rectangle.
+    """Computes the vector to a point from the nearest point of a filled rectangle.
 
     Args:
-        point: (x, y), m; floats, AutoDiffXd or arrays.
-        rectangle: (x, y, theta, length, width); each may be an array, too.
+        point: (x, y), m; floats, AutoDiffXd, or arrays.
+        rectangle: (x, y, theta, length, width), m and rad; each may be an array.
 
     Returns:
-        (du, dv) along the rectangle's own axes, m; (0, 0) inside.
+        (du, dv) along the rectangle's own axes, m; (0, 0) if the point is inside.
     """
     x, y, theta, length, width = rectangle
     u, v = rotate(-theta, point[0] - x, point[1] - y)
@@ -65,27 +66,29 @@ def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
 
 
 def outside(u: Any, half: Any) -> Any:
-    """``beyond``, or ``beyond_each`` of an array.
+    """Calls ``beyond`` for a number and ``beyond_each`` for an array.
 
     Args:
-        u: Float, AutoDiffXd or an array.
-        half: Half the length of the interval, in the unit of u.
+        u: Coordinate in any unit; float, AutoDiffXd, or array.
+        half: Half of the length of the interval, in the unit of u.
 
     Returns:
-        As u.
+        Distance beyond the interval, with the type and unit of u.
     """
     return beyond_each(u, half) if isinstance(u, np.ndarray) else beyond(u, half)
 
 
 def beyond(u: Any, half: Any) -> Any:
-    """How far u lies beyond the interval [-half, half].
+    """Computes the distance of u beyond the interval [-half, half].
+
+    Compiled code may call this function.
 
     Args:
-        u: Float or AutoDiffXd; compiled code may call it.
-        half: Half the length of the interval, in the unit of u.
+        u: Coordinate in any unit; float or AutoDiffXd.
+        half: Half of the length of the interval, in the unit of u.
 
     Returns:
-        In that unit, with the sign of u; 0 inside.
+        Distance in that unit, with the sign of u; 0 inside the interval.
     """
     if u > half:
         return u - half
@@ -95,30 +98,31 @@ def beyond(u: Any, half: Any) -> Any:
 
 
 def beyond_each(u: NDArray[np.float64], half: ArrayLike) -> NDArray[np.float64]:
-    """``beyond`` of the elements of an array.
+    """Computes ``beyond`` for each element of an array.
 
     Args:
-        u: (...) any unit.
-        half: (...) in the same unit; broadcast with u.
+        u: (...) coordinates in any unit.
+        half: (...) half lengths in the same unit, which broadcast with u.
 
     Returns:
-        (...) in that unit.
+        (...) distances in that unit.
     """
     return u - np.clip(u, -np.asarray(half), half)
 
 
 def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Distance between two rectangles; negative depth where they overlap.
+    """Computes the distance between two rectangles, negative if they overlap.
 
-    The depth is that of the separating-axis test: the shortest way to push
-    the rectangles apart. Of two that are apart, a corner of one is nearest.
+    The depth of an overlap comes from the separating-axis test. It is the shortest
+    motion that pushes the rectangles apart. If the rectangles do not overlap, the
+    nearest point is a corner of one of them.
 
     Args:
-        a: (5,) rectangle.
-        b: (5,) rectangle in the same frame.
+        a: (5,) first rectangle.
+        b: (5,) second rectangle in the same frame.
 
     Returns:
-        Clearance in m.
+        Clearance, m.
     """
     separation = -np.inf
     sides = side_normals(a, b)
@@ -139,15 +143,16 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
 def side_normals(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> tuple[tuple[float, float, float, float], ...]:
-    """Normals of the sides of two rectangles, of a first.
+    """Computes the four normals of the sides of two rectangles, first those of a.
 
     Args:
-        a: (5,) rectangle.
-        b: (5,) rectangle in the same frame.
+        a: (5,) first rectangle.
+        b: (5,) second rectangle in the same frame.
 
     Returns:
-        Of each its components, how far along it the centre of b is ahead of that of
-        a, and how far the centres are apart where the shadows of both just touch, m.
+        (x, y, ahead, touching) per normal. (x, y) are its components. ``ahead`` is the
+        distance from the center of a to the center of b along the normal, m. At the
+        distance ``touching`` the projections of both rectangles just touch, m.
     """
     ca, sa, cb, sb = math.cos(a[2]), math.sin(a[2]), math.cos(b[2]), math.sin(b[2])
     c, s = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)
@@ -164,18 +169,18 @@ def side_normals(
 def nearest_corner(
     u: float, v: float, c: float, s: float, corner: Any, half: Any
 ) -> float:
-    """Square of the least distance of a rectangle's corners from a box.
+    """Computes the squared least distance of a rectangle's corners from a box.
 
     Args:
-        u: Centre of the rectangle in the box's axes, m.
-        v: See u.
-        c: Cosine of the angle of the rectangle in the box's axes.
-        s: Sine of it.
-        corner: Half of the rectangle's extents, m.
-        half: Half of the box's, m.
+        u: Center of the rectangle in the axes of the box, first component, m.
+        v: Center of the rectangle in the axes of the box, second component, m.
+        c: Cosine of the angle of the rectangle in the axes of the box.
+        s: Sine of this angle.
+        corner: Half of the extents of the rectangle, m.
+        half: Half of the extents of the box, m.
 
     Returns:
-        m^2.
+        Squared distance, m^2.
     """
     best = np.inf
     for ahead in (corner[0], -corner[0]):

@@ -1,1 +1,1 @@
-"""Blocks of each kind of robot: that follows a sound, drives on a route, searches."""
+"""The blocks of robots that follow a sound, drive on a route, or search."""

@@ -1,4 +1,4 @@
-"""The blocks of a robot that follows a sound: ears, tracker, range sensors."""
+"""The blocks of a robot that follows a sound: hearing, tracker, range sensors."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ def following_blocks(
     others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    """What a robot that follows a sound senses by.
+    """Makes the sensing blocks of a robot that follows a sound.
 
     Args:
-        scenario: Of this robot alone, see ``Scenario.of_robot``.
-        controller: Its law's block.
+        scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
+        controller: The block of its law.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        others: Names of the sources that are not followed.
-        seed_of: Seed of a block by its name.
+        others: Names of the sources that the robot does not follow.
+        seed_of: Returns the seed of a block, by its name.
 
     Returns:
         Blocks, not yet in a diagram.
 
     Raises:
-        InputError: The law reads ranges where there are none.
+        InputError: The law reads ranges, but the robot has no range sensors.
     """
     _check_sensing(scenario, controller)
     mapped = scenario.own_guard is not None or "free_space" in _inputs(controller)
@@ -85,9 +85,11 @@ def _hearing(
 
 
 def _tracker(scenario: Scenario) -> Any:
-    """An ideal estimate is a tick old, one from audio half a frame more.
+    """Makes the tracker for the kind of hearing.
 
-    It also is what its covariance says, and tells front from back.
+    An ideal estimate is one tick old; an estimate from audio is older by half a frame.
+    The tracker of ideal estimates uses their exact covariance, and need not resolve
+    front and back.
     """
     tick, frame = scenario.tick_s, scenario.microphones.frame_s
     tracker, age = scenario.tracker, tick + 0.5 * frame
@@ -105,12 +107,12 @@ def _tracker(scenario: Scenario) -> Any:
     )
 
 
-#: What only range sensors give.
+#: Ports that only range sensors provide.
 _OF_RANGES = {"ranges", "echo", "range_ages", "free_space"}
 
 
 def _check_sensing(scenario: Scenario, controller: Any) -> None:
-    """Refuses a law that reads ranges where there are none."""
+    """Refuses a law that reads ranges if the robot has no range sensors."""
     wanted = _OF_RANGES.intersection(_inputs(controller))
     if wanted and scenario.obstacle_sensing != "ultrasonic" and not scenario.blocks:
         raise InputError(

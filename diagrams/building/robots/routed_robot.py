@@ -1,4 +1,4 @@
-"""The blocks of a robot that drives to a goal on a planned way."""
+"""The blocks of a robot that drives to a goal on a planned route."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ def _gains(scenario: Scenario) -> Any:
 
 
 def _adapting(scenario: Scenario) -> AdaptiveTrajectoryParameters | None:
-    """Its law, if something adapts."""
+    """Parameters of the law if it adapts its gains; otherwise None."""
     own = _gains(scenario)
     adaptive = isinstance(own, AdaptiveTrajectoryParameters)
     return own if adaptive and own.adaptation.rule != "none" else None
 
 
 def make_trajectory_controller(scenario: Scenario) -> Any:
-    """The block of the law of a robot that has a route.
+    """Makes the controller of a robot with a route.
 
     Args:
-        scenario: Of this robot alone.
+        scenario: Scenario of this robot alone.
 
     Returns:
         The block.
@@ -52,13 +52,13 @@ def make_trajectory_controller(scenario: Scenario) -> Any:
 
 
 def trajectory_command(scenario: Scenario) -> Any | None:
-    """Its safety filter, which drives the wheels; none where it has none.
+    """Makes the safety filter of a robot with a route, which drives its wheels.
 
     Args:
-        scenario: Of this robot alone.
+        scenario: Scenario of this robot alone.
 
     Returns:
-        The block.
+        The block; None if the law has no safety filter.
     """
     own = _gains(scenario)
     filtered = AdaptiveTrajectoryParameters, FilteredTrajectoryParameters
@@ -76,19 +76,19 @@ def routed_blocks(
     robots: Sequence[int],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    """All but plant, odometry, law and wheel command.
+    """Makes all blocks of the robot except plant, odometry, law and wheel command.
 
     Args:
-        scenario: Of this robot alone, see ``Scenario.of_robot``.
+        scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Which of them are robots.
-        seed_of: Seed of a block by its name.
+        robots: Numbers of those bodies that are robots.
+        seed_of: Returns the seed of a block, by its name.
 
     Returns:
         Blocks, not yet in a diagram.
 
     Raises:
-        InputError: There is no way to its goal.
+        InputError: No route leads to the goal.
     """
     assert scenario.route is not None
     robot, tick_s = scenario.robot, scenario.tick_s

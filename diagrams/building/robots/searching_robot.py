@@ -1,4 +1,4 @@
-"""The blocks of robots that search step by step: by smell, or by ear."""
+"""The blocks of robots that search step by step for an odor or a sound."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from systems import (
 
 
 def search_controller(scenario: Scenario) -> Any:
-    """The block of the search.
+    """Makes the block of the search.
 
     Args:
-        scenario: Of this robot alone; it searches.
+        scenario: Scenario of this robot alone, which searches.
 
     Returns:
         The block.
@@ -41,10 +41,10 @@ def search_controller(scenario: Scenario) -> Any:
 
 
 def search_command(scenario: Scenario) -> Any:
-    """What drives its wheels.
+    """Makes the block that drives the wheels of a searching robot.
 
     Args:
-        scenario: Of this robot alone.
+        scenario: Scenario of this robot alone.
 
     Returns:
         The block.
@@ -61,13 +61,13 @@ def searching_blocks(
     others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    """All but plant, odometry, the search itself and the motors.
+    """Makes all blocks of the robot except plant, odometry, search and motors.
 
     Args:
-        scenario: Of this robot alone, see ``Scenario.of_robot``.
+        scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        others: Names of the sounds that it does not search for.
-        seed_of: Seed of a block by its name.
+        others: Names of the sounds that the robot does not search for.
+        seed_of: Returns the seed of a block, by its name.
 
     Returns:
         Blocks, not yet in a diagram.

@@ -1,1 +1,1 @@
-"""Saving what is heard and played in a run, as files of sound."""
+"""Saving the sound of a run in files."""

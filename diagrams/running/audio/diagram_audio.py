@@ -1,4 +1,4 @@
-"""Saves the sound of a run that Drake carries out."""
+"""Saves the sound of a run in Drake's simulator."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from systems.hearing.audio_port import read_audio
 
 
 class DiagramAudio:
-    """Reads what a diagram's microphones hear and loudspeakers play, at every tick.
+    """Reads the sound at the microphones and loudspeakers of a diagram at every tick.
 
-    It is called by the simulator's monitor, before the ticks' updates: what it reads is
-    what the updates read, worked out once for both. It stands beside the diagram, which
-    is the same with and without it.
+    The monitor of the simulator calls this object before the updates of a tick. It
+    therefore reads the same values as the updates, and Drake computes them only once.
+    The diagram itself does not change.
 
     Args:
         follower: The diagram.
-        audio: Where the sound goes.
+        audio: Open files for the sound.
 
     Raises:
         InputError: A robot that listens has no block with a port ``audio``.
@@ -41,10 +41,13 @@ class DiagramAudio:
         }
 
     def __call__(self, context: Any) -> None:
-        """Called after every step of the simulator, which may be finer than ticks.
+        """Saves the sound. The simulator calls this after every step.
+
+        Steps may be shorter than ticks; this method ignores the instants between ticks.
 
         Raises:
-            InputError: What a port carries is no frame of these microphones.
+            InputError: A port carries something other than a frame of these
+                microphones.
             OSError: The disk is full, or fails.
         """
         time = context.get_time()
@@ -61,7 +64,7 @@ class DiagramAudio:
 
 
 class _Ears:
-    """What a robot hears by."""
+    """Reads the audio frames of one robot."""
 
     def __init__(self, name: str, frame_ticks: int, blocks: Mapping[str, Any]) -> None:
         self.frame_ticks = frame_ticks
@@ -77,7 +80,7 @@ class _Ears:
         self._asking = [(block, block.GetOutputPort(LISTENING)) for block in having]
 
     def frame(self, context: Any) -> Any:
-        """The frame that ends now; None while nobody listens."""
+        """The frame that ends now; None while the robot does not listen."""
         for block, port in self._asking:
             if port.Eval(block.GetMyContextFromRoot(context))[0] < 0.5:
                 return None

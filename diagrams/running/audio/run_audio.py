@@ -1,4 +1,4 @@
-"""What robots hear and loudspeakers play in a run, on its way to files."""
+"""Writes the sound of a run to files: at the microphones and at the loudspeakers."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from systems.sound.wav_writer import (
     pcm_of_pressure,
 )
 
-#: Port by which a block says whether it listens; without one, robots always do.
+#: Port by which a block reports whether the robot listens. Without it, it always does.
 LISTENING = "listening"
 
 
 def played_in_a_tick(emission: Emission, tick_s: float) -> NDArray[np.float32]:
-    """What left a loudspeaker from one tick to the next.
+    """Returns the sound that a loudspeaker emitted between two ticks.
 
     Args:
-        emission: At the second one.
-        tick_s: Between the two, s.
+        emission: The emission at the second tick.
+        tick_s: Time between the ticks, s.
 
     Returns:
         (n,) sound pressure at 1 m, Pa.
@@ -45,40 +45,41 @@ def played_in_a_tick(emission: Emission, tick_s: float) -> NDArray[np.float32]:
 
 
 class _Heard(NamedTuple):
-    """Of a robot that listens."""
+    """Files of a robot that listens."""
 
     writer: WavWriter
     geometry: str
-    """Name of its geometry file."""
+    """Name of the geometry file."""
     microphones: MicArrayParameters
     channels: int
 
 
 class _Played(NamedTuple):
-    """Of a loudspeaker."""
+    """File of a loudspeaker."""
 
     writer: WavWriter
     full_scale_pa: float
 
 
 class RunAudio:
-    """Files of what is heard and played in one run, which grow while it goes on.
+    """Files with the sound of one run; they grow during the run.
 
-    ``heard.wav`` has a channel for each microphone, at the converter's rate and as its
-    counts times a power of two; ``array.yaml`` says where the microphones are;
-    ``played.wav`` is what the loudspeaker emits, at 100 kHz. Where there are several,
-    the robot's or source's name and a dot stand in front. Time in the files is time in
-    the run: what nobody asked the microphones for is silence.
+    ``heard.wav`` has one channel per microphone. It has the sample rate of the
+    converter, and holds its counts times a power of two. ``array.yaml`` contains the
+    positions of the microphones. ``played.wav`` contains the sound of the loudspeaker,
+    at 100 kHz. If there are several robots or loudspeakers, file names begin with the
+    name of the robot or source and a dot. Time in the files is time in the run: frames
+    are silent while a robot does not listen.
 
-    A context manager: it closes the files, and removes them if nothing has been
-    written. ``simulate`` fills them.
+    This class is a context manager. On exit it closes the files, and removes them if
+    nothing was written. ``simulate`` fills them.
 
     Args:
-        scenario: What is to be run.
-        directory: Where they go; made if need be.
+        scenario: The scenario to run.
+        directory: Directory of the files; created if necessary.
 
     Raises:
-        InputError: As ``check_audible``, or a file is there already, or cannot be
+        InputError: See ``check_audible``; or a file exists already, or cannot be
             written.
     """
 
@@ -86,7 +87,7 @@ class RunAudio:
         check_audible(scenario)
         self.scenario, self.directory = scenario, Path(directory)
         self.until_s = 0.0
-        """How far the files go, s."""
+        """Length of the files, s."""
         self._tick_s = scenario.tick_s
         self._made: list[Path] = []
         self._writers: list[WavWriter] = []
@@ -145,7 +146,7 @@ class RunAudio:
         self.close()
 
     def close(self) -> None:
-        """Ends the files.
+        """Closes the files, and removes them if nothing was written.
 
         Raises:
             OSError: The disk fails.
@@ -158,13 +159,13 @@ class RunAudio:
                 path.unlink(missing_ok=True)
 
     def check_unused(self, scenario: Scenario) -> None:
-        """Refuses a run of another scenario, or a second one.
+        """Refuses a run of another scenario, or a second run.
 
         Args:
-            scenario: What is to be run.
+            scenario: The scenario to run.
 
         Raises:
-            InputError: It is another one, or something was written.
+            InputError: The scenario is another one, or something was written.
         """
         if scenario != self.scenario or self.until_s > 0.0:
             raise InputError(
@@ -175,7 +176,7 @@ class RunAudio:
 
     @property
     def frame_ticks(self) -> dict[str, int]:
-        """Of each robot that listens, ticks from frame to frame."""
+        """Number of ticks per audio frame, by robot that listens."""
         return {
             name: round(heard.microphones.frame_s / self._tick_s)
             for name, heard in self._heard.items()
@@ -183,24 +184,26 @@ class RunAudio:
 
     @property
     def loudspeakers(self) -> list[str]:
-        """Names of what plays."""
+        """Names of the sources and robots that play a sound."""
         return [*self._played]
 
     @property
     def first_heard(self) -> Path:
-        """The file of the first robot that listens."""
+        """The recording of the first robot that listens."""
         return next(iter(self._heard.values())).writer.path
 
     def hear(self, robot: str, tick: int, frame: AudioFrame | None) -> None:
         """Appends the frame that ends at a tick.
 
         Args:
-            robot: Its name.
-            tick: The frame's last one; at 0 it is of the time before the run.
-            frame: From the robot's microphones; None while nobody listens.
+            robot: Name of the robot.
+            tick: Last tick of the frame; the frame at tick 0 precedes the run and is
+                ignored.
+            frame: Frame of the robot's microphones; None while the robot does not
+                listen.
 
         Raises:
-            InputError: The frame is none of this array.
+            InputError: The frame does not fit these microphones.
             OSError: The disk is full, or fails.
         """
         if tick == 0:
@@ -220,12 +223,12 @@ class RunAudio:
         writer.write(pcm_of_counts(frame.counts, frame.full_scale))
 
     def play(self, name: str, tick: int, emission: Emission) -> None:
-        """Appends what a loudspeaker has played since the last tick.
+        """Appends the sound that a loudspeaker has played since the last tick.
 
         Args:
-            name: Of the source, or of the robot that carries it.
-            tick: Now.
-            emission: What has left it until now.
+            name: Name of the source, or of the robot that carries the loudspeaker.
+            tick: The present tick.
+            emission: The emission at this tick.
 
         Raises:
             OSError: The disk is full, or fails.
@@ -238,7 +241,7 @@ class RunAudio:
         self.until_s = tick * self._tick_s
 
     def facts(self) -> Mapping[str, Any]:
-        """What stands in which file, as plain values; names are without directory."""
+        """Returns the contents of each file as plain values; names lack directories."""
         heard = {
             name: {
                 "file": own.writer.path.name,

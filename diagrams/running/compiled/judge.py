@@ -1,4 +1,4 @@
-"""How compiled loops end: the stop rules of all robots, tick by tick."""
+"""The stop rules of all robots in compiled loops."""
 
 from __future__ import annotations
 
@@ -20,42 +20,44 @@ from diagrams.running.stop_rules import (
 from systems.framework.compiling import njit
 from systems.world.geometry import first_overlap
 
-#: Place of the pose at the tick before among what is watched.
+#: Index of the pose at the previous tick in ``watched``.
 BEFORE = 8
 
 
 class Contacts(NamedTuple):
-    """What a robot's ticks are judged by."""
+    """Data by which a compiled loop judges one robot."""
 
     rules: RuleNumbers
     size: tuple[float, float]
     """Length and width of the robot, m."""
     sizes: NDArray[np.float64]
-    """(n, 2) of the bodies, m."""
+    """(n, 2) length and width of the bodies, m."""
     reach: NDArray[np.float64]
-    """(n,) m: with centres farther apart a body does not touch the robot."""
+    """(n,) the robot and a body cannot touch if their centers are farther apart, m."""
     steps: NDArray[np.float64]
-    """(n,) the most that each moves in a tick on a path of its own, m."""
+    """(n,) upper bounds of the distances that the bodies move in a tick on their own
+    paths, m."""
     robots: NDArray[np.int64]
-    """(n,) numbers of those bodies that are robots, else -1."""
+    """(n,) number of the robot that the body is; -1 for other bodies."""
     parts: int
-    """Into which ticks are cut."""
+    """Number of parts per tick."""
     poses: NDArray[np.float64]
-    """(n, parts ticks + 1, 3) of the other bodies, at ticks and in between."""
+    """(n, parts ticks + 1, 3) poses of the bodies that are not robots, at the ticks and
+    at the parts between them."""
 
 
 def contacts_of(
     rules: RobotRules, robots: Sequence[str], times: NDArray[np.float64]
 ) -> Contacts:
-    """What a robot can touch in a run.
+    """Returns the data by which a compiled loop judges one robot.
 
     Args:
-        rules: Of the robot.
+        rules: Stop rules of the robot.
         robots: Names of all robots.
-        times: (ticks + 1,) s.
+        times: (ticks + 1,) times of the ticks, s.
 
     Returns:
-        All that a compiled loop needs of it.
+        The bodies that the robot can touch, and the numbers of the stop rules.
     """
     instants = instants_of(times, rules.parts)
     numbers = [robots.index(b.name) if b.name in robots else -1 for b in rules.near]
@@ -90,19 +92,25 @@ def judge_all(
     ended: Any,
     parts: Any,
 ) -> bool:  # pragma: no cover  (compiled)
-    """Judges all robots at a tick, as ``RunRules`` does.
+    """Judges all robots at a tick, in the same way as ``RunRules``.
+
+    For each robot, a contact comes first. It does not count if a contact switch is
+    closed by a body. A robot without a contact and without a cause is then judged by
+    ``judge_search`` or ``judge_tick``. If the run continues, the present poses become
+    the poses at the previous tick.
 
     Args:
-        tick: Its number.
-        tick_s: s.
-        watched: Of each robot its pose, velocity, what it follows, whether it has a
-            target, whether its law gives up, how its search ended, what its switches
-            feel and which body that is, and its pose at the tick before.
-        contacts: ``Contacts`` of each.
-        judged: (robots, 8) states of ``judge_tick``, changed.
-        ended: (robots, 2) what that has returned, and 1 more than the number of the
-            first body that is touched, 0 for none; changed.
-        parts: (robots,) part of the tick that had passed by then; changed.
+        tick: Number of the tick.
+        tick_s: Control period, s.
+        watched: For each robot: pose, velocity, pose of the target, whether the target
+            is valid, whether the law gives up, report of the search, contact switches,
+            touched body, and pose at the previous tick.
+        contacts: ``Contacts`` of each robot.
+        judged: (robots, 8) states of ``judge_tick``; changed in place.
+        ended: (robots, 2) index of the cause, and 1 plus the number of the first body
+            that is touched (0 for none); changed in place.
+        parts: (robots,) elapsed part of the tick at the contact (0 to 1); changed in
+            place.
 
     Returns:
         Whether the run is over.
@@ -144,16 +152,20 @@ def judge_all(
 def _first_touched(
     tick: int, number: int, watched: Any, contacts: Contacts
 ) -> tuple[int, float]:  # pragma: no cover  (compiled)
-    """The first body that a robot has touched since the last tick.
+    """Returns the first body that a robot has touched since the last tick.
+
+    Bodies that cannot have come near enough are skipped. The poses of other robots
+    between the ticks are interpolated; those of other bodies are known in advance.
 
     Returns:
-        Its number, -1 for none, and the part of the tick that had passed.
+        Number of the body (-1 for none), and the elapsed part of the tick (0 to 1).
     """
     pose, before = watched[number][0], watched[number][BEFORE]
     gone = math.hypot(pose[0] - before[0], pose[1] - before[1])
     parts, at = contacts.parts, contacts.parts * tick
     touched, first = -1, np.inf
     for body in range(len(contacts.reach)):
+        # Present position of the body, and the distance that it has moved.
         robot, step = contacts.robots[body], contacts.steps[body]
         if robot >= 0:
             now, then = watched[robot][0], watched[robot][BEFORE]
@@ -161,9 +173,11 @@ def _first_touched(
             step = math.hypot(x - then[0], y - then[1])
         else:
             x, y = contacts.poses[body, at, 0], contacts.poses[body, at, 1]
+        # Skip a body that is too far away for a contact during the tick.
         near = contacts.reach[body] + gone + step
         if math.hypot(x - pose[0], y - pose[1]) > near:
             continue
+        # Poses of the body at the parts of the tick.
         if robot >= 0:
             poses = np.empty((parts + 1, 3))
             for k in range(parts + 1):

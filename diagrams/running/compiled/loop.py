@@ -1,13 +1,19 @@
-"""A scenario's blocks in one compiled loop over ticks.
+"""The blocks of a scenario in one compiled loop over ticks.
 
-Drake's diagram stays the model. The loop calls the same functions, the ``Step`` of each
-block, in the order that the names of their ports give, with the same integrator and the
-same random numbers; what it logs is what the diagram logs.
+Drake's diagram remains the model. The loop calls the same functions, which are the
+``Step`` of each block. Names of ports determine their order. The integrator and the
+random numbers are the same, and the loop logs the same columns.
 
-In a tick, as Drake has it: blocks whose outputs are state have published them; all
-others do their steps, each after those whose outputs it reads; the stop rules judge;
-then the blocks with state outputs do theirs and publish them; the row is logged, in
-which all that was done at the tick is; and the plants move on by a tick.
+Each tick has the following order, which is the same as in Drake:
+
+1. The outputs that are part of a state are already published.
+2. The blocks with other outputs do their steps. Each follows the blocks whose outputs
+   it reads.
+3. The stop rules judge.
+4. The blocks with state outputs do their steps, except plants, and publish their
+   outputs.
+5. The loop logs one row, which contains the results of this tick.
+6. The plants move on by one tick.
 """
 
 from __future__ import annotations
@@ -33,49 +39,50 @@ from systems.framework.input_error import InputError, shortened
 
 @dataclass
 class CompiledLoop:
-    """A run that goes on tick by tick, in compiled code."""
+    """A run in compiled code that advances tick by tick."""
 
     log: NDArray[np.float64]
-    """(ticks + 1, columns) what all robots log, as far as the run has come."""
+    """(ticks + 1, columns) logged values of all robots; rows from ``done`` on are not
+    yet filled."""
     tick_s: float
     rules: RunRules
-    """Know why it ended, once it has."""
+    """Stop rules; they know why the run ended."""
     columns: Mapping[str, Mapping[str, int]]
-    """Of each robot its columns of the log, by name."""
+    """Numbers of the columns in the log by name, for each robot and the world."""
     plan: LoopPlan
-    """What is done in a tick."""
+    """The parts of a tick."""
     over: bool = False
     """Whether the run has ended."""
     done: int = 0
-    """Ticks that are logged."""
+    """Number of logged ticks."""
 
     @property
     def time_s(self) -> float:
-        """Of the last tick that is logged, s."""
+        """Time of the last logged tick, s."""
         return (self.done - 1) * self.tick_s
 
     def logged(self, robot: str) -> dict[str, NDArray[np.float64]]:
-        """A robot's columns, and the time.
+        """Returns the columns of a robot, and the time.
 
         Args:
-            robot: Its name.
+            robot: Name of the robot, or of the world.
 
         Returns:
-            (ticks,) each, by name.
+            (ticks,) arrays, by name.
         """
         log = np.ascontiguousarray(self.log[: self.done].T)
         times: NDArray[np.float64] = np.arange(float(self.done)) * self.tick_s
         return {"t": times, **{n: log[k] for n, k in self.columns[robot].items()}}
 
     def prepare(self) -> None:
-        """Compiles the blocks or loads them, where the process has not done so.
+        """Compiles or loads the blocks, unless this process has done so.
 
         Raises:
-            InputError: numba cannot compile a law or a block of a user's own.
+            InputError: numba cannot compile a user's own law or block.
         """
         try:
             self._call(1, 1)
-        # What numba raises depends on what it does not know.
+        # numba raises different errors for different unsupported features.
         except (NumbaError, NotImplementedError, ValueError) as error:
             own = [
                 text
@@ -101,7 +108,7 @@ class CompiledLoop:
         return done
 
     def advance(self, ticks: int) -> None:
-        """Goes on for so many ticks, to the end of the run at most.
+        """Advances the run by a number of ticks, at most to its end.
 
         Raises:
             InputError: A value became NaN or infinite.
@@ -133,18 +140,18 @@ class CompiledLoop:
             self.plan.judged[number].tolist(),
             found,
             (touched - 1, float(self.plan.touched_at[number])) if touched else None,
-            # The judge has seen what the search had published the tick before.
+            # The stop rules see the report that the search published one tick before.
             self._value(columns, "search_ended", last - 1),
         )
 
     def _value(self, columns: Mapping[str, int], name: str, row: int) -> float:
-        """Of a column in a row; 0 where it is none."""
+        """Value of a column in a row; 0 if there is no such column or row."""
         known = name in columns and row >= 0
         return float(self.log[row, columns[name]]) if known else 0.0
 
 
 def _complaint(error: Exception) -> str:
-    """What numba complains of, without the way there."""
+    """Returns the message of a numba error without its context lines."""
     lines = (line.strip() for line in str(error).splitlines())
     around = "During", "raised", "Failed in"
     known = (line for line in lines if line and not line.startswith(around))
@@ -158,21 +165,20 @@ def compile_loop(
     shared: LoopBlocks | None = None,
     audio: RunAudio | None = None,
 ) -> CompiledLoop:
-    """The loop of a scenario that has one.
+    """Assembles the compiled loop of a scenario.
 
     Args:
-        scenario: What to run.
-        blocks: Of each robot; they may be made for another start or seed.
-        rules: When the run ends.
-        shared: What all robots share, if they share anything.
-        audio: Where its sound goes, if it is saved.
+        scenario: The scenario to run.
+        blocks: Blocks of each robot; they may have been made for another start or seed.
+        rules: Stop rules of the run.
+        shared: Blocks that all robots share, if any.
+        audio: Open files for the sound, if it is saved.
 
     Returns:
-        The loop, before its first tick.
+        The loop before its first tick.
 
     Raises:
-        InputError: A block of a user's own has no step, or a sound file cannot be
-            played.
+        InputError: A user's own block has no step, or a sound file cannot be played.
     """
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s

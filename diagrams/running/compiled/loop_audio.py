@@ -1,4 +1,4 @@
-"""Saves the sound of a run that a compiled loop carries out."""
+"""Saves the sound of a run in a compiled loop."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from systems.framework.signals import AudioFrame, Emission
 def save_sounds(
     plan: LoopPlan, robots: Mapping[str, LoopRobot], sounds: Sounds, audio: RunAudio
 ) -> None:
-    """Lets a loop write what is heard and played, when its blocks have done a tick.
+    """Makes a loop write the sound at the microphones and loudspeakers at every tick.
 
     Args:
-        plan: Of the loop, with its robots in it.
-        robots: By name.
-        sounds: What sounds in the run.
-        audio: Where it goes.
+        plan: Plan of the loop, which contains the robots.
+        robots: Robots by name.
+        sounds: Sounds of the run.
+        audio: Open files for the sound.
 
     Raises:
-        InputError: A robot that listens has no microphones that compiled loops know.
+        InputError: A robot that listens has no microphones that a compiled loop
+            supports.
     """
     for name, ticks in audio.frame_ticks.items():
         robot = robots[name]

@@ -1,4 +1,4 @@
-"""A robot's blocks for compiled loops, made once for runs that differ in layout."""
+"""Blocks of robots for compiled loops, shared by runs that differ only in layout."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step
 from systems.framework.input_error import InputError
 
-#: What blocks take from elsewhere: robots from the world, and it from them.
+#: Inputs from outside: those of a robot from the world, and of the world from robots.
 _WORLD = *OUTSIDE, "frames"
-#: Fields of a scenario that no block is made from, but for what ``RunFacts`` tell.
+#: Fields of a scenario that do not affect how blocks are made. ``RunFacts`` provides
+#: the values of a run that blocks need.
 _NO_BLOCKS = {
     "name",
     "description",
@@ -40,32 +41,32 @@ _NO_BLOCKS = {
     "wind",
     "odor",
 }
-#: Blocks by what they were made from, the last used ones last.
+#: Shared blocks by the values that they were made from; the last used ones are last.
 _SHARED: dict[str, LoopBlocks] = {}
 _MOST_SHARED = 64
 
 
 class LoopBlocks:
-    """Blocks of a robot by part, and how their ports are joined."""
+    """The blocks of a robot by part, and the connections of their ports."""
 
     def __init__(self, blocks: Mapping[str, Any]) -> None:
-        """Takes blocks that are in a diagram or in none.
+        """Reads the ports of blocks, which need not be in a diagram.
 
         Raises:
-            InputError: Not every input is published by one block or by the world.
+            InputError: An input is not published by exactly one block or by the world.
         """
         require_published(blocks.values(), _WORLD)
         self.blocks = blocks
         self.sizes: dict[str, int] = {}
-        """Of all that the ports carry, by name."""
+        """Number of elements of each port, by name."""
         self.objects: set[str] = set()
         """Names of the ports that carry objects instead of numbers."""
         self.inputs = {part: self._names(b, "input") for part, b in blocks.items()}
-        """Names of each part's input ports."""
+        """Names of the input ports of each part."""
         self.outputs = {part: self._names(b, "output") for part, b in blocks.items()}
-        """Names of each part's output ports."""
+        """Names of the output ports of each part."""
         self.columns = columns_of(blocks)
-        """What the log holds, in order: the columns of each (part, port)."""
+        """Columns of the log, in order, by (part, port)."""
 
     def _names(self, block: Any, kind: str) -> list[str]:
         port: Callable[[int], Any] = getattr(block, f"get_{kind}_port")
@@ -80,25 +81,25 @@ class LoopBlocks:
 
     @cached_property
     def outside(self) -> set[str]:
-        """Names of what comes from the world."""
+        """Names of the inputs that come from the world."""
         return {*self.sizes}.difference(*self.outputs.values())
 
     def steps(
         self, run: RunFacts
     ) -> tuple[dict[str, Step], Mapping[str, Callable[[int], Any]]]:
-        """What each part does in a run.
+        """Returns the step of each part in a run.
 
         Args:
-            run: The run.
+            run: Facts about the run.
 
         Returns:
-            The steps by part, and what the ports that carry objects have at a tick,
-            those from outside among them.
+            The steps by part; and functions from the tick to the object that a port
+            carries, by port, including ports from outside.
 
         Raises:
-            InputError: A block of a user's own has no step.
+            InputError: A user's own block has no step.
         """
-        # A block that publishes an object comes before those that read it.
+        # A block that publishes an object precedes the blocks that read it.
         carried, found = {**run.carried}, dict[str, Step]()
         run = run._replace(carried=carried)
         waiting = [*self.blocks]
@@ -116,7 +117,12 @@ class LoopBlocks:
         return {part: found[part] for part in self.blocks}, carried
 
     def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
-        """Parts as they do their steps: before the log, or with state outputs after."""
+        """Orders the parts for a tick.
+
+        The first list has the parts without state outputs, each after the parts whose
+        outputs it reads. The second list has the parts whose outputs are part of their
+        state.
+        """
         late = [part for part, step in steps.items() if step.publish is not None]
         known = self.outside.union(*(self.outputs[part] for part in late))
         waiting, early = [part for part in self.blocks if part not in late], []
@@ -140,19 +146,19 @@ def _step_for(block: Any, run: RunFacts) -> Step:
 
 
 def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
-    """Blocks for a compiled loop, those of an earlier scenario where they serve.
+    """Returns blocks for a compiled loop, and reuses those of earlier scenarios.
 
-    They do where scenarios differ in layout, start and seed alone: Drake never frees
-    blocks written in Python.
+    Blocks are reused if the scenarios differ only in layout, start and seed. Reuse
+    matters because Drake never frees blocks written in Python.
 
     Args:
-        scenario: What to run.
+        scenario: The scenario to run.
 
     Returns:
-        Of each robot.
+        Blocks of each robot.
 
     Raises:
-        InputError: As ``robot_blocks``.
+        InputError: See ``robot_blocks``.
     """
     blocks = {}
     for name in scenario.all_robots:
@@ -164,7 +170,7 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
         made = partial(
             robot_blocks, own, name, bodies=bodies, robots=robots, others=others
         )
-        if own.blocks:  # they may ask for the whole scenario
+        if own.blocks:  # a user's block may depend on the whole scenario
             blocks[name] = LoopBlocks(made())
             continue
         made_from = _without_goal(own).model_dump_json(exclude=_NO_BLOCKS)
@@ -176,13 +182,13 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
 
 
 def shared_world(scenario: Scenario) -> LoopBlocks | None:
-    """What all robots share, as ``shared_blocks`` has what each of them has.
+    """Returns the blocks that all robots share; like ``shared_blocks``, it reuses them.
 
     Args:
-        scenario: What to run.
+        scenario: The scenario to run.
 
     Returns:
-        None where no robot searches.
+        The blocks; None if no robot searches.
     """
     nodes = radio_nodes(scenario)
     if not nodes:
@@ -203,7 +209,7 @@ def _shared(key: str, made: Callable[[], Mapping[str, Any]]) -> LoopBlocks:
 
 
 def _without_goal(own: Scenario) -> Scenario:
-    """Goals are the run's, see ``RunFacts``."""
+    """Sets the goal to a fixed value; ``RunFacts`` has the goal of the run."""
     if own.route is None:
         return own
     route = own.route.model_copy(update={"goal_m": (0.0, 0.0)})

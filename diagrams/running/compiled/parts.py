@@ -1,9 +1,11 @@
 """Compiled functions that a loop calls by their addresses.
 
-A loop that is compiled with all that it calls takes numba long, and has to be compiled
-anew for every set of blocks. Called by address, each block is compiled by itself, and
-the loop once for all: `run_parts`. A part takes the tick and the address of its words:
-whole numbers, and addresses of arrays, which stay where they are.
+Compiling a loop together with all functions that it calls takes numba long, and has to
+be repeated for every set of blocks. With calls by address, numba compiles each block
+separately, and the loop ``run_parts`` only once.
+
+A part is a function of the tick and of the address of its words. The words are whole
+numbers and addresses of arrays. These arrays must not move in memory.
 """
 
 from __future__ import annotations
@@ -19,15 +21,15 @@ from numba.extending import intrinsic, register_jitable
 
 from systems.framework.compiling import njit
 
-# numba's stubs leave it out.
+# The type stubs of numba lack carray.
 carray: Any = numba.carray  # type: ignore[attr-defined]
 
-#: A part that is called with this for the tick publishes what its state says.
+#: A part that is called with this value as the tick publishes its state outputs.
 PUBLISH = -1
 
 
 def _pointing_at(kind: Any) -> Any:
-    """What makes a pointer to numbers of a kind of an address."""
+    """Makes a numba function that converts an address to a pointer to numbers."""
 
     @intrinsic
     def pointer(_, address):  # type: ignore[no-untyped-def]
@@ -78,7 +80,7 @@ def _flag_array(address: int, shape: Any) -> Any:
     return carray(_flag_pointer(address), shape)
 
 
-#: For each type of number what makes an array of an address and a shape.
+#: Functions that make an array from an address and a shape, by type of number.
 ARRAYS: dict[Any, Callable[[int, Any], Any]] = {
     np.dtype(np.float64): _float_array,
     np.dtype(np.float32): _single_array,
@@ -90,7 +92,7 @@ ARRAYS: dict[Any, Callable[[int, Any], Any]] = {
 
 
 def _define_called(_, address, tick, words):  # type: ignore[no-untyped-def]
-    """What a part returns; what it raises is raised."""
+    """Calls a part at an address and returns its result; exceptions are passed on."""
     whole, arguments = types.int64, (types.int64, types.int64)
 
     def codegen(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
@@ -119,21 +121,25 @@ def run_parts(
     parts: Any,
     plan: Any,
 ) -> tuple[int, bool]:  # pragma: no cover  (compiled)
-    """Goes through ticks.
+    """Runs ticks of a compiled loop.
+
+    At the start of the run it publishes the state outputs. Each tick then runs the
+    first parts, the judge, and the parts before the log. It logs one row. Unless the
+    run is over, it runs the parts after the log.
 
     Args:
         begin: First tick.
-        end: The one after the last.
-        log: (ticks, columns) rows to be filled.
-        logged: (n, 2) addresses of what is logged, and how many numbers each is.
+        end: One after the last tick.
+        log: (ticks, columns) rows to fill.
+        logged: (n, 2) addresses of the logged values, and their numbers of elements.
         parts: (m, 2) addresses of functions and of their words.
-        plan: Numbers of the parts that are called at the begin of the run, to publish;
-            first in a tick; the one that judges whether the run is over; and (k, 2)
-            those before the log and (m, 2) those after it, and whether each is to
-            publish.
+        plan: Numbers of parts, in five entries: those that publish at the start of the
+            run; those that come first in a tick; the judge; (k, 2) those before the
+            log; and (m, 2) those after it. The second column states whether the part
+            publishes.
 
     Returns:
-        The tick after the last one that was logged, and whether the run is over.
+        The tick after the last logged one, and whether the run is over.
     """
     begins, first, judge, before, after = plan
     if begin == 0:

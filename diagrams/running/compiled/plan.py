@@ -1,4 +1,4 @@
-"""What is done in a tick of a compiled loop: parts, and the order of their calls."""
+"""The parts of a tick in a compiled loop, and the order of their calls."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ from systems.framework.block import RunFacts, Step, has_arrays
 from systems.framework.compiling import njit
 from systems.framework.host_step import HostCall, HostFunction, host_step
 
-#: What a robot is judged by, and sizes of what not every robot has.
+#: Ports that the stop rules and the loudspeakers read, with sizes; a robot may lack
+#: some of them.
 _WATCHED = {
     "pose_WB": 3,
     "velocity_WB": 3,
@@ -40,12 +41,12 @@ _WATCHED = {
     TOUCHED: 1,
     "calling": 1,
 }
-#: Of these, what it is judged by.
+#: The ports that the stop rules read.
 _JUDGED = [name for name in _WATCHED if name != "calling"]
 
 
 class LoopWorld:
-    """What all robots of a run share: its blocks' steps, and what their ports carry."""
+    """Steps of the blocks that all robots share, and the values of their ports."""
 
     def __init__(self, scenario: Scenario, made: LoopBlocks, ticks: int) -> None:
         run = RunFacts(
@@ -61,12 +62,12 @@ class LoopWorld:
         self._views = {port: np.zeros(size) for port, size in made.sizes.items()}
 
     def view(self, port: str) -> NDArray[np.float64]:
-        """What a port carries."""
+        """The values of a port."""
         return self._views[port]
 
 
 class LoopRobot:
-    """One robot of a run: its blocks' steps, and what their ports carry."""
+    """Steps of the blocks of one robot in a run, and the values of their ports."""
 
     def __init__(
         self,
@@ -99,16 +100,16 @@ class LoopRobot:
                 self._views["frames"] = world.view(f"frames_{name}")
 
     def view(self, port: str) -> NDArray[np.float64]:
-        """What a port carries."""
+        """The values of a port."""
         return self._views[port]
 
 
 class LoopPlan:
-    """The parts of a loop, and when each is called.
+    """The parts of a loop, and the order of their calls in a tick.
 
     Args:
-        robots: Of the run, by name.
-        times: (n,) of the ticks, s.
+        robots: Robots of the run, by name.
+        times: (n,) times of the ticks, s.
     """
 
     def __init__(
@@ -116,16 +117,16 @@ class LoopPlan:
     ) -> None:
         self._robots, self._times = robots, times
         self.logged: list[NDArray[np.float64]] = []
-        """What a row of the log holds."""
+        """Values that a row of the log contains."""
         self.hosts: list[HostCall] = []
-        """What is called in Python."""
+        """Functions that the loop calls in Python."""
         self.ended = np.zeros((len(robots), 2), dtype=np.int64)
-        """Of each robot what its judge said, and 1 more than the number of the body
-        that it has touched."""
+        """(robots, 2) index of the cause, and 1 plus the number of the touched body (0
+        for none)."""
         self.touched_at = np.zeros(len(robots))
-        """Of each robot the part of the tick that had passed by then."""
+        """(robots,) elapsed part of the tick at the contact (0 to 1)."""
         self.judged = np.tile(np.array(UNJUDGED), (len(robots), 1))
-        """Of each robot the judge's state."""
+        """(robots, 8) states of ``judge_tick``."""
         self._parts: list[tuple[LoopPart, str]] = []
         self._judge = 0
         self._filled: list[int] = []
@@ -134,7 +135,7 @@ class LoopPlan:
         self._plants: list[int] = []
 
     def add(self, robot: LoopRobot | LoopWorld) -> None:
-        """The blocks of a robot, or what robots share."""
+        """Adds the blocks of a robot or of the world."""
         early, late = robot.made.order(robot.steps)
         for part in (*early, *late):
             step, made = robot.steps[part], robot.made
@@ -156,11 +157,11 @@ class LoopPlan:
                 (self._plants if part == "plant" else self._late).append(number)
 
     def remember(self, name: str, function: HostFunction) -> None:
-        """Shows a robot's motion to a Python function at the begin of every tick.
+        """Passes a robot's motion to a Python function at the start of every tick.
 
         Args:
-            name: Of the robot.
-            function: Takes its pose and velocity, and whether it calls.
+            name: Name of the robot.
+            function: Takes the pose and velocity of the robot, and whether it calls.
         """
         ports = "pose_WB", "velocity_WB", "calling"
         motion = tuple(map(self._robots[name].view, ports))
@@ -170,12 +171,12 @@ class LoopPlan:
     def show(
         self, view: NDArray[np.float64], function: HostFunction, period_ticks: int
     ) -> None:
-        """Shows numbers to a Python function, as they are when the robots are judged.
+        """Passes values to a Python function, after the steps before the stop rules.
 
         Args:
-            view: (n,) what a port carries.
-            function: Takes them.
-            period_ticks: From one time to the next, ticks.
+            view: (n,) values of a port.
+            function: Takes the values.
+            period_ticks: Period of the calls, ticks.
         """
         step = host_step(function, len(view), 0, period_ticks)
         self._early.append(self._step(step, (view,), ()))
@@ -183,7 +184,12 @@ class LoopPlan:
     def _step(
         self, step: Step, inputs: tuple[Any, ...], outputs: tuple[Any, ...]
     ) -> int:
-        """The part of a block."""
+        """Adds the part of a block, as generated source, and returns its number.
+
+        A part of a block with state outputs does either its step or, when called with
+        ``PUBLISH``, the publication. The part of any other block sets its outputs to
+        zero before the step fills them.
+        """
         if step.host is not None:
             self.hosts.append(step.host)
         part, state = LoopPart(), step.state
@@ -201,11 +207,14 @@ class LoopPlan:
         return self._add(part, lines)
 
     def surround(self, name: str, around: Surroundings) -> None:
-        """What a robot takes from the world in every tick.
+        """Fills the inputs of a robot that come from the world, at every tick.
+
+        Poses of bodies on known paths are tabulated for all ticks. Poses of other
+        robots are copied from their ports. Sizes never change and are set once.
 
         Args:
-            name: Of the robot.
-            around: All that it can see and hit.
+            name: Name of the robot.
+            around: The bodies that the robot can see and hit.
         """
         robot, robots, times = self._robots[name], self._robots, self._times
         everything = {**around.bodies, around.target: around.followed}
@@ -213,6 +222,7 @@ class LoopPlan:
         for port, bodies in wanted.items():
             if port == "pose_WS" or port in robot.made.outside:
                 into = robot.view(port)
+                # Bodies on known paths, by the index of their pose in the port.
                 known = {3 * k: b for k, b in enumerate(bodies) if b not in robots}
                 paths = [everything[body].path for body in known.values()]
                 at = times if any(path.moves for path in paths) else times[:1]
@@ -227,18 +237,18 @@ class LoopPlan:
             robot.view("sizes")[:] = np.ravel(sizes)
 
     def _fill_by(self, function: Any, *values: Any) -> None:
-        """Fills a port by a function of values and the tick."""
+        """Adds a part that fills a port by a function of values and the tick."""
         part = LoopPart()
         arguments = ", ".join(map(part.expression, values))
         line = f"{part.name(function)}({arguments}, tick)"
         self._filled.append(self._add(part, [line]))
 
     def judge(self, rules: RunRules, tick_s: float) -> None:
-        """Judges all robots at the end of a tick.
+        """Adds the part that judges all robots in a tick.
 
         Args:
-            rules: When the run ends.
-            tick_s: s.
+            rules: Stop rules of the run.
+            tick_s: Control period, s.
         """
         robots = self._robots
         watched = tuple(
@@ -260,7 +270,7 @@ class LoopPlan:
 
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
-        """What ``run_parts`` takes after the log; compiles the parts."""
+        """The arguments of ``run_parts`` after the log; this compiles the parts."""
         self._kept = [
             (compiled_part(text, part.names), part.words())
             for part, text in self._parts
@@ -293,7 +303,7 @@ def _table(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
 def _fill(
     out: Any, places: Any, poses: Any, tick: int
 ) -> None:  # pragma: no cover  (compiled)
-    """From the row of a tick; where all rest there is but one."""
+    """Copies poses from the row of a tick; bodies at rest have only one row."""
     row = min(tick, poses.shape[1] - 1)
     for body in range(len(places)):
         for k in range(3):

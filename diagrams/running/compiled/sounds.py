@@ -1,4 +1,4 @@
-"""What sounds in a compiled run: functions of the tick."""
+"""The sounds in a compiled run, as functions of the tick."""
 
 from __future__ import annotations
 
@@ -19,25 +19,28 @@ from systems.sound.waveforms import make_waveform
 
 
 class Sounds(NamedTuple):
-    """What robots hear in a run."""
+    """The sounds of a run."""
 
     heard: dict[str, dict[str, Callable[[int], Emission]]]
-    """Of each robot, by its input port, the emission at a tick; nothing where it hears
-    no waves."""
+    """Emission at a tick, by robot and input port; empty for a robot that hears no
+    sound waves."""
     carried: dict[str, HostFunction]
-    """Of each robot with a loudspeaker, what has to see its pose and velocity at every
-    tick before anybody hears it."""
+    """For each robot with a loudspeaker: a function that records its pose and velocity.
+    The loop calls it at every tick before any robot hears the loudspeaker."""
     played: dict[str, Callable[[int], Emission]]
-    """Of each source and loudspeaker, the emission at a tick; empty where nobody hears
-    waves."""
+    """Emission at a tick, by source or robot with a loudspeaker; empty if no robot
+    hears sound waves."""
 
 
 def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
-    """What robots hear: sources, on which nothing acts back, and loudspeakers.
+    """Returns the sounds of all sources and loudspeakers in a run.
+
+    The motion of a source is known in advance. The motion of a robot with a loudspeaker
+    is recorded during the run.
 
     Args:
-        scenario: What is run.
-        times: (n,) of the ticks, s.
+        scenario: The scenario to run.
+        times: (n,) times of the ticks, s.
 
     Returns:
         Functions of ticks below n.
@@ -82,13 +85,13 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
 
 
 class CalledOn:
-    """When a loudspeaker was called on."""
+    """The time at which a loudspeaker was called on."""
 
     def __init__(self) -> None:
         self.time_s: float | None = None
 
     def since(self) -> float | None:
-        """s; None: not yet."""
+        """The time, s; None if there was no call yet."""
         return self.time_s
 
 
@@ -98,7 +101,7 @@ def _remembering(
     calls: CalledOn,
     tick_s: float,
 ) -> HostFunction:
-    """Writes a robot's places and velocities, and when it first called."""
+    """Makes a function that records the motion of a robot, and its first call."""
 
     def remember(tick: int, motion: Any, _: Any) -> None:
         p_WS[tick], v_WS[tick] = motion[:2], motion[3:5]

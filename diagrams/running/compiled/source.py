@@ -1,9 +1,10 @@
-"""Generated source of parts of a loop, compiled by numba once for all processes.
+"""Generated source of the parts of a loop, compiled by numba once for all processes.
 
-numba keeps compiled code for functions of files, by the types of their arguments. So
-the source is written into a file beside that code, whose name tells all that the code
-depends on; and what numbers cannot be, functions and named tuples, stands in it as
-names, while all numbers come by the address of a few arrays.
+numba keeps compiled code for functions in files, by the types of their arguments. The
+source is therefore written to a file in the cache folder. Its file name is a hash of
+everything that the code depends on. Functions and named tuples appear in the source as
+names. All numbers are read from a few arrays by address, so that the source does not
+depend on their values.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from systems.framework.compiling import cache_folder, njit, source_digest
 from systems.framework.input_error import InputError, shortened
 from systems.framework.parameters import Parameters
 
-#: Generated files that were not used for so long are removed, s.
+#: Generated files that were not used for this time are removed, s.
 _KEPT_S = 30 * 86_400.0
 
 _LOGGER = logging.getLogger("phonotaxis")
@@ -41,9 +42,9 @@ _COUNT = count()
 
 
 class LoopPart:
-    """A function of the tick, as source and the values that it takes.
+    """The source of a function of the tick, and the values that it uses.
 
-    Values get into the source by ``expression``, names by ``name``.
+    ``expression`` adds a value to the source, and ``name`` adds a function.
     """
 
     def __init__(self) -> None:
@@ -55,10 +56,12 @@ class LoopPart:
         self._kept: list[Any] = []
 
     def source(self, lines: Sequence[str]) -> str:
-        """The source of a function of ``tick``, which returns 0 if it returns nothing.
+        """Returns the source of a function of ``tick``.
+
+        The function returns 0 unless the lines return another value.
 
         Args:
-            lines: Of the function.
+            lines: Lines of the function.
         """
         words = f"{self.name(ARRAYS[np.dtype(np.int64)])}(address, (1,))"
         floats = f"{self.name(ARRAYS[np.dtype(np.float64)])}(words[0], (words[1],))"
@@ -66,23 +69,23 @@ class LoopPart:
         return "\n".join(["def part(tick, address):", *_indented(body), ""])
 
     def words(self) -> NDArray[np.int64]:
-        """What the function is called with the address of; to be kept with the part."""
+        """The words of the part; the caller keeps them and passes their address."""
         floats = np.array(self._floats)
         self._kept.append(floats)
         self._words[:2] = floats.ctypes.data, floats.size
         return np.array(self._words, dtype=np.int64)
 
     def expression(self, value: Any) -> str:
-        """A value as source text.
+        """Returns a value as source text.
 
         Args:
-            value: A number, text, an array, a function, a tuple of values, or
-                parameters, which become a named tuple of their fields and of what they
-                derive from them; lists become arrays (an empty one is of pairs), what
-                is unset becomes 0.
+            value: A number, text, array, function, tuple of values, or parameters.
+                Parameters become a named tuple of their fields and cached properties.
+                Lists become arrays; an empty list becomes an array of pairs. None
+                becomes 0.
 
         Raises:
-            InputError: It is, or holds, anything else.
+            InputError: The value is, or contains, something else.
         """
         if isinstance(value, Parameters):
             kind = _tuple_type(type(value))
@@ -100,13 +103,13 @@ class LoopPart:
         return self._array(value)
 
     def name(self, function: Any) -> str:
-        """Name of a function or class; a function is compiled for the part."""
+        """Returns the name of a function or class; a function is made compilable."""
         plain = getattr(function, "py_func", function)
         known = _compilable(plain) if isinstance(plain, FunctionType) else plain
         for name, value in self.names.items():
             if value is known:
                 return name
-        # A lambda's name stands in brackets.
+        # The name of a lambda has angle brackets.
         name = f"{known.__name__.strip('<>')}_{len(self.names)}"
         self.names[name] = known
         return name
@@ -120,9 +123,12 @@ class LoopPart:
         return f"words[{len(self._words) - 1}]"
 
     def _array(self, value: Any) -> str:
-        """By its address; its shape is no part of the source: it serves all layouts."""
+        """Returns an array as source text.
+
+        Address and shape are words. The source therefore serves all layouts.
+        """
         if id(value) not in self._arrays:
-            # An empty list is one of pairs; scalars become arrays of one number.
+            # An empty list becomes an array of pairs; a scalar, an array of one number.
             empty = isinstance(value, list) and not value
             whole = np.ascontiguousarray(np.empty((0, 2)) if empty else value)
             if whole.dtype not in ARRAYS:
@@ -158,11 +164,11 @@ def _tuple_type(model: type[Parameters]) -> Any:
 
 @cache
 def _compilable(function: FunctionType) -> Any:
-    """A function for compiled code, without what checks it for Drake's sake.
+    """Makes a function callable from compiled code, without the checks that wrap it.
 
-    Known to numba by its type alone: a compiled function within a named tuple would
-    be a pointer, and code with pointers is not kept. The plain functions of a user's
-    own modules that it calls are made known, too.
+    numba knows the function by its type alone. A compiled function in a named tuple
+    would be a pointer, and numba does not cache code with pointers. The plain functions
+    in a user's own modules that it calls are registered, too.
     """
     plain = inspect.unwrap(function)
     for called in _users_helpers(plain, set()):
@@ -173,7 +179,7 @@ def _compilable(function: FunctionType) -> Any:
 def _users_helpers(
     function: FunctionType, known: set[FunctionType]
 ) -> set[FunctionType]:
-    """The plain functions of a user's own modules that a function of theirs calls."""
+    """The plain functions in a user's own modules that a function of the user calls."""
     if _is_ours(function):
         return set()
     for name in function.__code__.co_names:
@@ -187,14 +193,14 @@ def _users_helpers(
 
 
 def compiled_part(source: str, names: Mapping[str, Any]) -> Any:
-    """The function ``part`` of generated source, compiled or loaded.
+    """Compiles or loads the function ``part`` of generated source.
 
     Args:
-        source: Of ``LoopPart.source``.
-        names: What its names stand for.
+        source: Source from ``LoopPart.source``.
+        names: Objects by their names in the source.
 
     Returns:
-        The function; the same one for the same source and names.
+        The function; the same source and names give the same function.
     """
     return _loaded(source, tuple(names.items()))
 
@@ -204,7 +210,7 @@ def _loaded(source: str, named: tuple[tuple[str, Any], ...]) -> Any:
     file = _file(source, dict(named))
     if file is None or not any((file.parent / "__pycache__").glob(f"{file.stem}.*")):
         _say_that_it_takes_time()
-    # numba asks for the module of what it loads; parts without a file are not one.
+    # numba needs the module of a cached function. Other parts get unique names.
     name = file.stem if file else f"part_{next(_COUNT)}"
     module = ModuleType(f"phonotaxis.{name}")
     sys.modules[module.__name__] = module
@@ -219,13 +225,13 @@ def _say_that_it_takes_time() -> None:
 
 
 def address_of(part: Any) -> int:
-    """Where the code of a compiled part stands.
+    """Returns the address of the code of a compiled part.
 
     Args:
-        part: Of ``compiled_part``.
+        part: A function from ``compiled_part``.
 
     Returns:
-        By which ``run_parts`` calls it, as long as the part is kept.
+        The address by which ``run_parts`` calls the part; valid while the part is kept.
     """
     (found,) = part.overloads.values()
     address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
@@ -233,9 +239,10 @@ def address_of(part: Any) -> int:
 
 
 def _file(source: str, names: Mapping[str, Any]) -> Path | None:
-    """A file of the source; none where its names do not tell what it does.
+    """Returns a file with the source; None if the code cannot be cached.
 
-    Its own name is a hash of all that compiled code depends on.
+    Code is not cached if the names do not determine what it does, or if the file cannot
+    be written. The file name is a hash of all that the compiled code depends on.
     """
     origins = (
         [*map(str, _origins(names))] if all(map(_is_known, names.values())) else []
@@ -260,13 +267,13 @@ def _file(source: str, names: Mapping[str, Any]) -> Path | None:
 
 
 def _is_known(value: Any) -> bool:
-    """Whether the files that define a function decide what it does."""
+    """Whether the files that define a function determine what it does."""
     function = getattr(value, "py_func", value)
     module = sys.modules.get(function.__module__)
     if module is None:
         return False
     if isinstance(function, FunctionType):
-        # A user's module that was loaded anew is not that of an older function.
+        # A user's module that was loaded again differs from that of an older function.
         stale = function.__globals__ is not vars(module)
         if function.__closure__ or stale:
             return False
@@ -274,12 +281,12 @@ def _is_known(value: Any) -> bool:
 
 
 def _is_ours(function: Any) -> bool:
-    """Whether the digest of the package tells what a function does."""
+    """Whether the digest of the package determines what a function does."""
     return str(function.__module__).partition(".")[0] in ("diagrams", "systems")
 
 
 def _origins(names: Mapping[str, Any]) -> Iterator[str]:
-    """Where each name comes from, and the content of all files that it depends on."""
+    """Yields the origin of each name, and digests of all files that it depends on."""
     files = {Path(__file__)}
     for name, value in names.items():
         function = getattr(value, "py_func", value)
@@ -298,7 +305,7 @@ def _origins(names: Mapping[str, Any]) -> Iterator[str]:
 def _remove_unused(folder: Path) -> None:
     oldest = time.time() - _KEPT_S
     for file in folder.glob("part_*.source"):
-        with suppress(OSError):  # another process removes it, too
+        with suppress(OSError):  # another process may remove it at the same time
             if file.stat().st_mtime < oldest:
                 for code in (folder / "__pycache__").glob(f"{file.stem}.*"):
                     code.unlink()

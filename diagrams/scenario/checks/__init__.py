@@ -1,1 +1,1 @@
-"""What a scenario must have, asked before anything runs."""
+"""Checks of a scenario before a run."""

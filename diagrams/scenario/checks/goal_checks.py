@@ -1,4 +1,4 @@
-"""Whether robots with routes can get to their goals, as far as places tell."""
+"""Checks whether robots with routes can reach their goals, judged by positions."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from systems.world.plane import control_point
 
 
 def check_goals(robots: Mapping[str, FollowerParameters], farthest_m: float) -> None:
-    """Refuses goals that cannot be reached, and guards that would not be heeded.
+    """Refuses unreachable goals, and guards that would have no effect.
 
     Args:
-        robots: By what their fields begin with in a message.
+        robots: Robots by the prefix of their fields in messages.
         farthest_m: ``stop.diverged_range_m``, m.
 
     Raises:
-        InputError: A goal is as far from the start as a run counts as diverged, two
-            bodies would have to stand in one another, or a guard is set.
+        InputError: A goal is so far from the start that the run counts as diverged, the
+            bodies of two robots would overlap at their goals, or a guard is set.
     """
     routed = {prefix: robot for prefix, robot in robots.items() if robot.route}
     for prefix, robot in routed.items():

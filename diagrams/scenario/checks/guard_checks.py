@@ -1,4 +1,4 @@
-"""Whether a guard can keep what it promises, asked before anything runs."""
+"""Checks whether a guard can keep its guarantees, before a run."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from systems.world.plane import beyond_rectangle
 def check_guard(
     prefix: str, robot: FollowerParameters, bodies: Mapping[str, Body], tick_s: float
 ) -> None:
-    """Refuses a guarded robot that could never start, or not drive ahead.
+    """Refuses a guarded robot that could never start, or never drive ahead.
 
     Args:
-        prefix: What the robot's fields begin with in a message.
-        robot: The robot; without a guard nothing is asked.
-        bodies: All that it could touch, by name.
-        tick_s: Period of control, s.
+        prefix: Prefix of the robot's fields in messages.
+        robot: The robot; without a guard there is no check.
+        bodies: All bodies that the robot could touch, by name.
+        tick_s: Control period, s.
 
     Raises:
-        InputError: Its sensors do not serve, its grid does not, or something stands
-            in its bubble.
+        InputError: The sensors or the grid are unsuitable, or a body is within the
+            start bubble.
     """
     if robot.own_guard is None:
         return
@@ -79,7 +79,12 @@ def _check_view(prefix: str, robot: FollowerParameters) -> None:
 def _check_memory(
     prefix: str, robot: FollowerParameters, guard: GuardParameters, tick_s: float
 ) -> None:
-    """What is a braking ahead has to stay known until the robot has stopped."""
+    """Refuses a place error that is too small for the braking distance.
+
+    A body that is a braking distance ahead must stay on the map until the robot has
+    stopped. Meanwhile odometry adds an error to its position, which ``place_error_m``
+    must cover.
+    """
     known, body = robot.free_space, robot.robot
     stopping = stopping_way(guard, body, robot.plant, tick_s)
     error = PlaceError.of(known, body, robot.odometry)

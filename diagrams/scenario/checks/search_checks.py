@@ -1,4 +1,4 @@
-"""What robots that search need of their scenario."""
+"""Checks of robots that search."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from systems.framework.input_error import InputError
 
 
 def address_of_robot(robot: FollowerParameters) -> int:
-    """Address of a searching robot in its radio frames.
+    """Returns the address of a searching robot in its radio frames.
 
     Args:
-        robot: That searches.
+        robot: A robot that searches.
 
     Returns:
         1 to 3.
@@ -25,11 +25,11 @@ def address_of_robot(robot: FollowerParameters) -> int:
 def check_searches(
     robots: Mapping[str, tuple[str, FollowerParameters]], run: RunParameters
 ) -> None:
-    """Refuses searches for what is not there, or by what cannot serve.
+    """Refuses searches without a source, or without the necessary sensors.
 
     Args:
-        robots: By name, with what their fields begin with in a message.
-        run: What the run has beside them.
+        robots: Robots by name, each with the prefix of its fields in messages.
+        run: Fields of the run.
 
     Raises:
         InputError: Names the field and the remedy.

@@ -1,1 +1,1 @@
-"""What fields a scenario has: their list, what is most like a name, faults."""
+"""The fields of a scenario: their list, similar names, and faults."""

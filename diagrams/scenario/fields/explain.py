@@ -1,4 +1,4 @@
-"""What pydantic finds wrong, as one line of our own for each fault."""
+"""Turns validation errors of pydantic into messages, one line per fault."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 
 def explain(error: ValidationError, schema: Mapping[str, Any], what: str) -> InputError:
-    """All complaints, each as field, value and remedy on one line.
+    """Converts all faults, each into one line with field, value and remedy.
 
     Args:
-        error: What pydantic found.
-        schema: JSON Schema of what it validated.
-        what: What that is to a user, as 'a scenario'.
+        error: Error from pydantic.
+        schema: JSON Schema of the validated data.
+        what: Name of the data for users, for example 'a scenario'.
 
     Returns:
-        The error, to be raised.
+        The error to raise.
     """
     found = error.errors(include_url=False)
     return InputError.joined(
@@ -38,18 +38,19 @@ def single_faults(
     schema: Mapping[str, Any],
     place: tuple[str, str],
 ) -> list[InputError]:
-    """What is wrong with single fields of some changes.
+    """Returns the faults of single fields among some changes.
 
-    What takes several fields to judge is not: the others are not known here.
+    Faults that concern several fields are ignored, because the other fields are not
+    known here.
 
     Args:
-        model: Of what is changed.
+        model: Model of the changed group.
         data: Changed fields.
         schema: JSON Schema of a scenario.
-        place: Where in it they are: group and name.
+        place: Group and name of the changes in the scenario.
 
     Returns:
-        A fault each, whose field begins with the name.
+        Faults; the field of each begins with the name.
     """
     try:
         model.model_validate(data)
@@ -58,7 +59,7 @@ def single_faults(
         single = [
             each
             for each in found
-            # Of a validator of several fields the input is all of them.
+            # A validator of several fields has a mapping of all fields as its input.
             if each["type"] != "value_error" or not isinstance(each["input"], Mapping)
         ]
         return [
@@ -75,7 +76,7 @@ def _faults(
     what: str,
     above: tuple[str, ...] = (),
 ) -> Iterator[InputError]:
-    """The faults; fields begin below the first part of what is ``above`` them."""
+    """Yields the faults; ``above`` is the place of the data, without its group."""
     below = [str(part) for part in details["loc"] if part != "[key]"]
     place = [*above, *below]
     field, kind = ".".join([*above[1:], *below]), details["type"]
@@ -84,13 +85,13 @@ def _faults(
         near = near_field(schema, place)
         yield InputError(field, f"is not a field of {what}; remove it{near}")
     elif kind == "value_error":
-        # A validator of several fields names the one to mend.
+        # A validator of several fields names the field to correct.
         inner = details["ctx"]["error"]
         if not isinstance(inner, InputError):
             inner = InputError("", str(inner))
         yield InputError.joined([inner], below=field)
     else:
-        # Words of YAML for words of Python.
+        # Replace words of Python by words of YAML.
         message = re.sub(r"dictionary( or instance of \w+)?", "mapping", message)
         message = message.replace("valid tuple", "valid list")
         value = shortened(repr(details["input"]), 80)

@@ -1,4 +1,4 @@
-"""Every field of a scenario, with unit, default, range and meaning."""
+"""The list of all fields of a scenario, with unit, default, range and meaning."""
 
 from __future__ import annotations
 
@@ -26,44 +26,45 @@ class Field:
     """A field of a scenario."""
 
     path: str
-    """Dotted, as ``--set`` takes it; 0 for any element of a list, NAME for any name."""
+    """Dotted path, as for ``--set``; 0 stands for any element of a list, and NAME for
+    any name."""
     kind: str
-    """What its values are, in words."""
+    """Type of the values, in words."""
     unit: str
-    """Of a number; empty: it has none."""
+    """Unit of a number; empty: none."""
     default: Any
-    """A plain value; None, too, where the field is a group that is always there."""
+    """A plain value; also None for a group that is always present."""
     range: str
-    """Which values are legal; empty: all of the kind."""
+    """Legal values; empty: all values of the kind."""
     meaning: str
-    """What it is."""
+    """Description of the field."""
 
 
 def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
-    """All fields, groups before what is in them.
+    """Lists all fields, each group before its fields.
 
     Args:
         schema: JSON Schema of a scenario.
 
     Yields:
-        Each field.
+        The fields.
     """
     yield from _fields(schema, schema, "", None)
 
 
 def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
-    """Fields whose path or meaning a pattern matches, those by their path first.
+    """Finds fields by their path or meaning; matches of the path come first.
 
     Args:
         schema: JSON Schema of a scenario.
-        pattern: A part of it, or with ``*``, ``?`` and ``[...]`` all of a path; of
-            upper or lower case. Empty: all.
+        pattern: A part of the path or meaning; with ``*``, ``?`` or ``[...]`` a pattern
+            for the whole path. Upper and lower case are equal. Empty: all fields.
 
     Returns:
-        One or more.
+        One or more fields.
 
     Raises:
-        InputError: None does.
+        InputError: No field matches.
     """
     every, wanted = list(list_fields(schema)), pattern.casefold()
     if any(each in wanted for each in "*?["):
@@ -90,7 +91,7 @@ def _fields(
     schema: Mapping[str, Any], node: Mapping[str, Any], above: str, defaults: Any
 ) -> Iterator[Field]:
     for name, field in node.get("properties", {}).items():
-        # A group may have other defaults than its model.
+        # A group may override the defaults of its model.
         default = field.get("default")
         if isinstance(defaults, Mapping) and name in defaults:
             default = defaults[name]
@@ -123,7 +124,7 @@ def _field(
 
 
 def _meaning(schema: Mapping[str, Any], node: Mapping[str, Any]) -> str:
-    """That of what it is made of."""
+    """The first description among the options of a node and their list elements."""
     found = ""
     for each in options(schema, node):
         element = resolved(schema, each.get("items", {}))

@@ -1,4 +1,4 @@
-"""Changes to a tree of plain values."""
+"""Applies changes to a tree of plain values."""
 
 from __future__ import annotations
 
@@ -7,27 +7,28 @@ from typing import Any
 
 
 def begins_anew(changes: Mapping[str, Any]) -> bool:
-    """Whether changes to a group choose its preset, so that the rest is forgotten.
+    """Whether changes to a group choose a preset, which clears the other fields.
 
     Args:
         changes: Plain values by field.
 
     Returns:
-        False of a group of robots or sources one of which bears that name.
+        True if ``preset`` is a text. A robot or source with the name ``preset`` is a
+        mapping, so it does not count.
     """
     return isinstance(changes.get("preset"), str)
 
 
 def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A tree of plain values, with some of its leaves changed.
+    """Returns a tree of plain values with changes applied.
 
     Args:
         base: The tree.
-        changes: A tree of the leaves to change, or to add; a group that chooses a
-            preset is that of the changes alone.
+        changes: A tree of the leaves to change or add. A group that chooses a preset
+            replaces the whole group.
 
     Returns:
-        A new tree; neither argument is changed.
+        A new tree; the arguments stay unchanged.
     """
     result = {} if begins_anew(changes) else dict(base)
     for key, value in changes.items():

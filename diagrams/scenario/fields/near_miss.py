@@ -1,4 +1,4 @@
-"""What a mistyped name is most like."""
+"""Suggests names that are similar to a mistyped name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from diagrams.scenario.fields.schema_walk import at_place, leaf_paths
 from systems.framework.input_error import InputError
 
-#: Words for one thing, which letters do not show: scenarios call it by one of them.
+#: Groups of synonyms with different letters; scenarios use one word of each group.
 _SAME_THING = (
     ("position", "location", "place", "pose", "centre", "center", "xy", "waypoints"),
     ("size", "dimensions", "extent", "extents"),
@@ -19,15 +19,15 @@ _SAME_THING = (
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """The end of a message that names what is most like a name.
+    """Returns the end of a message that suggests similar names.
 
     Args:
-        name: What was given.
-        known: What could be.
-        most: So many are named at most.
+        name: The mistyped name.
+        known: The valid names.
+        most: Greatest number of suggestions.
 
     Returns:
-        Empty where nothing is like it.
+        The text; empty if no name is similar.
     """
     by_folded = {each.casefold(): each for each in known}
     near = get_close_matches(name.casefold(), by_folded, n=most)
@@ -37,15 +37,16 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
 
 
 def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
-    """``did_you_mean`` of a field that is none.
+    """Suggests a field for an unknown one, see ``did_you_mean``.
 
     Args:
-        schema: JSON Schema of the whole.
-        place: Parts of its path.
+        schema: JSON Schema of the whole data.
+        place: Parts of the path of the unknown field.
 
     Returns:
-        A field at the same place, by its letters or by what it tells; without one, a
-        field of that name below that place, or else anywhere.
+        A field at the same place with similar letters or the same meaning. Otherwise a
+        field with the same name below that place, or else anywhere. The text is empty
+        if there is none.
     """
     *parents, last = place
     siblings = at_place(schema, parents)
@@ -57,24 +58,24 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
 
 
 def unknown_law(name: str, known: Collection[str]) -> InputError:
-    """The error of a law that there is not.
+    """Returns the error for an unknown law.
 
     Args:
-        name: What was given.
-        known: What could be.
+        name: The unknown name.
+        known: Names of the laws.
 
     Returns:
-        The error, to be raised.
+        The error to raise.
     """
     near = did_you_mean(name, known)
     return InputError(
-        "",  # the model that has the field knows where it is
+        "",  # the model with the field adds the path
         f"{name!r} is not known; use {', '.join(known)}, or file.py:Name{near}",
     )
 
 
 def _of_that_meaning(name: str, siblings: Iterable[str]) -> str:
-    """A sibling that tells the same in another word: the unit is no part of it."""
+    """Suggests a sibling with the same meaning; units are ignored."""
 
     def told(field: str) -> str:
         return field.casefold().partition("_")[0]
@@ -85,7 +86,7 @@ def _of_that_meaning(name: str, siblings: Iterable[str]) -> str:
 
 
 def _elsewhere(schema: Mapping[str, Any], place: Sequence[str]) -> str:
-    """One of that name, or of that name and a unit: those are often left out."""
+    """Suggests a field elsewhere with this name, or with this name and a unit."""
     *parents, name = place
     below = ((*parents, *path) for path in leaf_paths(schema, parents))
     for paths in (list(below), list(leaf_paths(schema))):

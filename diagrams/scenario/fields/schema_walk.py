@@ -1,4 +1,4 @@
-"""Ways through the JSON Schema of a tree of parameters."""
+"""Navigates the JSON Schema of a tree of parameters."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ def resolved(schema: Schema, node: Schema) -> Schema:
     """Follows the reference of a node.
 
     Args:
-        schema: The whole.
+        schema: The whole schema.
         node: A part of it.
 
     Returns:
-        What it refers to, with what it says itself; without a reference the node.
+        The referenced node, with the entries of the node itself; without a reference
+        the node.
     """
     if "$ref" not in node:
         return node
@@ -24,14 +25,14 @@ def resolved(schema: Schema, node: Schema) -> Schema:
 
 
 def options(schema: Schema, node: Schema) -> list[Schema]:
-    """What a node may be.
+    """Returns the alternatives of a node.
 
     Args:
-        schema: The whole.
+        schema: The whole schema.
         node: A part of it.
 
     Returns:
-        Each but null, references resolved.
+        All alternatives except null, with references resolved.
     """
     node = resolved(schema, node)
     several = node.get("anyOf", [node]) if "type" not in node else [node]
@@ -39,14 +40,14 @@ def options(schema: Schema, node: Schema) -> list[Schema]:
 
 
 def at_place(schema: Schema, place: Sequence[str]) -> Schema:
-    """Fields below a place.
+    """Returns the fields below a place.
 
     Args:
-        schema: The whole.
-        place: Names of fields, numbers of a list's elements, names of participants.
+        schema: The whole schema.
+        place: Names of fields, indices of list elements, names of robots and sources.
 
     Returns:
-        Their schemas by name; empty where there are none.
+        Schemas of the fields by name; empty if there are none.
     """
     node: Schema = schema
     for part in place:
@@ -70,14 +71,14 @@ def _below(node: Schema, part: str) -> Iterator[Schema]:
 
 
 def leaf_paths(schema: Schema, place: Sequence[str] = ()) -> Iterator[tuple[str, ...]]:
-    """Paths of all fields, groups included, of lists those of the first element.
+    """Yields the paths of all fields and groups; lists count as one element.
 
     Args:
-        schema: The whole.
-        place: Below which, as of ``at_place``; none: below the top.
+        schema: The whole schema.
+        place: Start of the walk, see ``at_place``; empty: the top.
 
     Yields:
-        Each from there.
+        Paths relative to the place.
     """
     yield from _leaf_paths(schema, {"properties": at_place(schema, place)}, ())
 

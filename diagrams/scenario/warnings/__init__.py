@@ -1,1 +1,1 @@
-"""What a user must know of a scenario that is run all the same."""
+"""Warnings about scenarios that can still be run."""

@@ -1,4 +1,4 @@
-"""How fast the corners of bodies move: those of a bar that turns outrun its middle."""
+"""Speeds of the corners of bodies; corners of a turning body are the fastest points."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from systems.world.paths import WaypointPath
 
 
 def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
-    """The greatest speed of a corner of each body that a robot could touch.
+    """Returns the greatest corner speed of each body that a robot could touch.
 
     Args:
-        scenario: Any.
+        scenario: Any scenario.
         robot: Name of a robot in it.
 
     Returns:
-        m/s by name, until the end of the run; of another robot what its wheels can do.
+        Speeds by name until the end of the run, m/s. For another robot it is the
+        greatest speed that its wheels allow.
     """
     until = scenario.duration_s
     speeds = {
@@ -39,7 +40,7 @@ def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
 def _corner_speed(
     path: WaypointPath | DrivenPath, size: tuple[float, float], until: float
 ) -> float:
-    """Of the fastest corner of a rectangle on a path up to a time in s, m/s."""
+    """Greatest corner speed of a rectangle on a path up to a time in s, m/s."""
     length, width = size
     ahead, turn = np.abs(path.extreme_twists(until)).T
     corners = np.hypot(ahead + 0.5 * width * turn, 0.5 * length * turn)
@@ -47,7 +48,10 @@ def _corner_speed(
 
 
 def _reachable_speed(robot: FollowerParameters) -> float:
-    """The greatest that a corner can have, m/s: both wheels ahead, or one back."""
+    """Greatest possible speed of a corner of a robot, m/s.
+
+    Either both wheels run ahead, or one wheel runs ahead and the other back.
+    """
     body, faster = robot.robot, 1.0 + max(map(abs, robot.plant.slip))
     lever = 2.0 * body_radius(body) / body.wheel_separation_m
     return body.top_speed_m_s * faster * max(lever, 1.0)

@@ -1,6 +1,6 @@
 """Which theorem of the guard holds in a scenario, and with which margins.
 
-The stability report and the warnings of a run read the same list of assumptions.
+The stability report and the warnings of a run use the same list of assumptions.
 """
 
 from __future__ import annotations
@@ -28,35 +28,36 @@ from systems.safety.views import (
 )
 from systems.world.plane import beyond_rectangle
 
-#: What the rims still move after the commanded speed is 0, in lags.
+#: Time that the wheels take to stop after the command is 0, in motor lags.
 _LAGS = 6.0
-#: Directions in which the view is looked at, deg apart.
+#: Spacing of the directions that sample the view, deg.
 _STEP_DEG = 0.25
-#: A view that lacks less is one all round, deg.
+#: Largest gap of a view that counts as a view in all directions, deg.
 _GAP_DEG = 1.0
-#: What sums of floats may be off, in the units of the values.
+#: Tolerance for rounding errors, in the units of the values.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Assumption:
-    """What a theorem takes for granted, in numbers."""
+    """An assumption of a theorem, as a value and its limit."""
 
     name: str
-    """As in docs/guard.md."""
+    """Name in docs/guard.md."""
     text: str
-    """What is assumed of the value, in words."""
+    """The value in words."""
     value: float
     limit: float
-    """The greatest value with which it holds; for ``at_least`` the least."""
+    """Greatest value with which the assumption holds; the least value with
+    ``at_least``."""
     unit: str
     at_least: bool = False
     field: str = "guard"
-    """Of the robot, to be changed where this does not hold."""
+    """Field of the robot to change if the assumption does not hold."""
 
     @property
     def margin(self) -> float:
-        """How far the value is on the right side of the limit; negative: it is not."""
+        """Distance of the value from the limit; negative if the assumption fails."""
         least, most = self.limit, self.value
         if not self.at_least:
             least, most = most, least
@@ -64,12 +65,12 @@ class Assumption:
 
     @property
     def holds(self) -> bool:
-        """Whether the scenario keeps it, but for rounding."""
+        """Whether the scenario satisfies the assumption, apart from rounding."""
         return self.margin >= -_ROUNDING
 
     @property
     def complaint(self) -> str:
-        """That it does not hold, in words, with the value and the limit."""
+        """Message that the assumption does not hold, with value and limit."""
         value, limit = _told_apart(self.value, self.limit)
         unit = "" if self.unit == "of 1" else f" {self.unit}".rstrip()
         return (
@@ -81,21 +82,21 @@ class Assumption:
 
 @dataclass(frozen=True)
 class Guarantees:
-    """What a guard promises in a scenario."""
+    """The guarantees of a guard in a scenario."""
 
     obstacle_speed_m_s: float
-    """Up to which bodies may move, m/s; 0: all has to rest."""
+    """Greatest speed of bodies, m/s; 0: all bodies must be at rest."""
     seen_angle_deg: float
-    """Of the round, in view of the sensors, deg."""
+    """Angle that the sensors see in total, of 360 deg."""
     seen_way_m: float
-    """How far ahead of the axle floor can be seen free, m."""
+    """Distance ahead of the axle up to which the floor can be seen as free, m."""
     needed_way_m: float
-    """How far ahead of the axle it has to be so at top speed, m."""
+    """Free distance ahead of the axle that top speed needs, m."""
     assumptions: tuple[Assumption, ...]
 
     @property
     def promise(self) -> str:
-        """The theorem that holds, in words; what is broken, where none does."""
+        """The theorem that holds, in words, or the assumptions that fail."""
         broken = [each.name for each in self.assumptions if not each.holds]
         if broken:
             return (
@@ -114,16 +115,20 @@ class Guarantees:
 
 
 def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
-    """How far ahead of the axle floor has to be clear so that a command passes.
+    """Returns the clear distance ahead of the axle that the guard needs for a speed.
+
+    It contains the body radius with margin and place error, and the range error. It
+    also contains the motion of two ticks, of the lag, and of braking. For bodies at
+    rest it adds the diagonal of a cell and the motion during four rounds of readings.
+    For moving bodies it adds their approach until the robot has stopped.
 
     Args:
-        scenario: Of one robot; its guard gives braking and margin.
-        speed: Of the robot, m/s.
-        body_speed: Up to which it is guarded against bodies, m/s.
+        scenario: Scenario of one robot; its guard defines braking and margin.
+        speed: Speed of the robot, m/s.
+        body_speed: Greatest speed of bodies, m/s; 0: bodies are at rest.
 
     Returns:
-        m: the disc and its margin, the way of a tick and of braking with the lag, the
-        error of ranges, and what bodies come nearer by meanwhile.
+        The distance, m.
 
     Raises:
         InputError: The robot has no guard.
@@ -136,11 +141,11 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
     known, tick_s = scenario.free_space, scenario.tick_s
     keep = body_radius(scenario.robot) + known.place_error_m + guard.margin_m
     error, lag = known.range_error(scenario.ultrasonic), scenario.plant.motor_lag_s
-    # A sensor's reading is so old at most, and its rows of cells come by turns.
+    # A reading of a sensor is at most one round of readings old.
     age = scenario.ultrasonic.round_ticks(tick_s) * tick_s
     way = speed**2 / (2.0 * guard.braking_m_s2) + speed * (lag + 2.0 * tick_s)
     if body_speed == 0.0:
-        # A cell counts as a whole, and rows of cells are entered by turns.
+        # A cell counts as a whole, and a reading updates only every fourth row.
         cells = math.sqrt(2.0) * known.cell_m + 4.0 * age * speed
         return keep + way + error + cells
     time = speed / guard.braking_m_s2 + 2.0 * tick_s + _LAGS * lag
@@ -148,14 +153,14 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
 
 
 def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> float:
-    """How much of the round range sensors see.
+    """Returns the total angle that range sensors see.
 
     Args:
-        sensors: Any.
+        sensors: The range sensors.
         control_point_m: Distance of P ahead of the axle, m.
 
     Returns:
-        deg, of 360.
+        The angle, deg, 0 to 360.
     """
     sectors = sensor_sectors(sensors, control_point_m)
     turns = np.arange(-180.0, 180.0, _STEP_DEG) + 0.5 * _STEP_DEG
@@ -168,13 +173,13 @@ def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> flo
 
 
 def guarantees(scenario: Scenario) -> Guarantees:
-    """What the guard of a scenario's robot promises.
+    """Returns the guarantees of the guard of a scenario's only robot.
 
     Args:
-        scenario: Of one robot.
+        scenario: Scenario of one robot.
 
     Returns:
-        The promise, and each assumption with its margin.
+        The guarantees, with each assumption and its margin.
 
     Raises:
         InputError: The robot has no guard.
@@ -193,14 +198,14 @@ def guarantees(scenario: Scenario) -> Guarantees:
 
 
 def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
-    """What the theorems of a robot's guard take for granted.
+    """Returns the assumptions of the theorems about a robot's guard.
 
     Args:
-        scenario: Any.
+        scenario: Any scenario.
         robot: Name of a robot in it.
 
     Returns:
-        Each assumption, whether it holds or not.
+        All assumptions, whether they hold or not.
 
     Raises:
         InputError: The robot has no guard.
@@ -230,7 +235,7 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
 
 
 def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
-    """A1: bodies rest, or are no faster than is reckoned with."""
+    """A1: no body is faster than the guard expects."""
     text, fastest = "speed of the fastest body", 0.0
     if speeds:
         name = max(speeds, key=speeds.__getitem__)
@@ -241,7 +246,7 @@ def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
 
 
 def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
-    """A3: nothing stands in the bubble."""
+    """A3: no body is within the start bubble."""
     place = scenario.start.position_m
     nearest = min(
         (math.hypot(*beyond_rectangle(place, body.rectangle(0.0))) for body in bodies),
@@ -254,7 +259,7 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A2: nothing is nearer than a reading, less the margin and the noise."""
+    """A2: no body is nearer than a range reading, less the margin."""
     sensors, c = scenario.ultrasonic, scenario.acoustics.c
     stretch = (sensors.assumed_sound_speed_m_s or c) / c
     excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m
@@ -284,7 +289,7 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
 
 
 def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A4 and A5: places and wheels as believed, and tyres that hold."""
+    """A4 and A5: errors of position and wheels are bounded, and the tires grip."""
     guard, plant = scenario.own_guard, scenario.plant
     assert guard is not None
     robot, known, tick_s = scenario.robot, scenario.free_space, scenario.tick_s
@@ -342,6 +347,6 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
 
 
 def _told_apart(value: float, limit: float) -> tuple[str, str]:
-    """Two numbers with as many digits as they need to be seen to differ."""
+    """Formats two numbers with enough digits to show that they differ."""
     pairs = [(f"{value:.{k}g}", f"{limit:.{k}g}") for k in (3, 6, 12)]
     return next((pair for pair in pairs if pair[0] != pair[1]), pairs[-1])

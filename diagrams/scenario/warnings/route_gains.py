@@ -1,4 +1,4 @@
-"""Whether a robot on a route comes to rest, and keeps away from obstacles."""
+"""Checks whether the gains let a robot on a route come to rest, clear of obstacles."""
 
 from __future__ import annotations
 
@@ -25,22 +25,23 @@ from systems.laws.trajectory.sampled_bounds import (
 from systems.ranging.parameters import OBJECT_SLOTS
 from systems.world.plane import beyond_rectangle, rotate
 
-#: Steps towards the place of rest, and the least one, m.
+#: Greatest number of steps toward the equilibrium, and the step length that ends
+#: the iteration, m.
 _STEPS, _STEP_M = 2_000, 1e-6
 
 
 def route_warnings(
     prefix: str, robot: FollowerParameters, tick_s: float
 ) -> list[ScenarioWarning]:
-    """Gains with which a robot does not come to rest, or comes too near to obstacles.
+    """Warns of gains with which a robot does not come to rest, or can hit obstacles.
 
     Args:
-        prefix: What the robot's fields begin with in a message.
+        prefix: Prefix of the robot's fields in messages.
         robot: A robot on a route.
-        tick_s: Period of control, s.
+        tick_s: Control period, s.
 
     Returns:
-        One for each of them; it names the bound.
+        One warning for each violated bound; its message states the bound.
     """
     law = LAWS.get(robot.law)
     if law is None or not law.on_route:
@@ -67,7 +68,7 @@ def route_warnings(
 
 
 def _of_safety(field: str, own: AdaptationParameters) -> list[ScenarioWarning]:
-    """Whether what adapts does so without the safety term of eq. 27."""
+    """Warns if an adaptive law lacks the safety term of eq. 27."""
     if own.rule == "lyapunov" and own.penalty > 0.0:
         message = (
             f"is {own.penalty:g}, but rule lyapunov has no safety term and ignores it; "
@@ -156,21 +157,22 @@ def goal_warnings(
     resting: Mapping[str, NDArray[np.float64]],
     margin_m: float,
 ) -> list[ScenarioWarning]:
-    """A goal that is so near to obstacles at rest that the robot does not arrive.
+    """Warns of a goal that obstacles at rest keep the robot from.
 
-    P rests where the pull to the goal and the pushes balance,
-    K (p_d - p) + sum of K_e (S - d_j) n_j = 0. Beside one wall at b from the goal that
-    is (S - b) K_e/(K + K_e) off it. The place is found by following the force from the
-    goal; gains that adapt count as they begin.
+    P comes to rest where the pull to the goal and the pushes of obstacles balance: K
+    (p_d - p) + sum of K_e (S - d_j) n_j = 0. For a goal at distance b from one wall, P
+    rests (S - b) K_e/(K + K_e) off the goal. An iteration starts at the goal and
+    follows the force until its steps are tiny. Adaptive gains have their initial
+    values.
 
     Args:
-        prefix: What the robot's fields begin with in a message.
+        prefix: Prefix of the robot's fields in messages.
         robot: A robot on a route.
-        resting: (5,) rectangle in W of each obstacle that rests, by name.
+        resting: (5,) rectangle in W of each obstacle at rest, by name.
         margin_m: ``stop.goal_margin_m``, m.
 
     Returns:
-        One where P comes to rest farther than that from its goal; else none.
+        A warning if P comes to rest farther than the margin from the goal.
     """
     law = LAWS.get(robot.law)
     if robot.route is None or law is None or not law.on_route:
@@ -178,7 +180,7 @@ def goal_warnings(
     own = getattr(robot.repulsion, robot.law)
     if own.reading != "restored":
         return []
-    # Compiled code: when it is used.
+    # Import compiled code only when it is used.
     from systems.laws.trajectory.trajectory_impedance import contact_numbers
 
     contact, goal = contact_numbers(own), robot.route.goal_m
@@ -186,6 +188,7 @@ def goal_warnings(
     pull, push = own.stiffness_n_m, own.contact_stiffness_n_m
     pushing: list[str] = []
     for _ in range(_STEPS):
+        # Force on P, and the obstacles that push it.
         force, pushing = pull * (goal - p), []
         for name, each in resting.items():
             away = np.array(rotate(each[2], *beyond_rectangle(p, each)))
@@ -193,6 +196,7 @@ def goal_warnings(
             if 0.0 < distance < contact.begins_m:
                 force += push * (contact.rest_m - distance) / distance * away
                 pushing.append(name)
+        # Step to the equilibrium for the present directions of the pushes.
         step = force / (pull + push * len(pushing))
         p += step
         if math.hypot(*step) < _STEP_M:
@@ -200,6 +204,7 @@ def goal_warnings(
     off = math.dist(p, goal)
     if off <= margin_m:
         return []
+    # Distance of the goal from one wall at which the offset equals the margin.
     room = contact.rest_m - margin_m * (pull + push) / push
     names = ", ".join(map(repr, pushing))
     message = (

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ScenarioWarning:
-    """What a user must know of a scenario that is run all the same."""
+    """A problem of a scenario that can still be run."""
 
     field: str
-    """Dotted path of the field to change; runs are counted by it."""
+    """Dotted path of the field to change; reports count runs by this field."""
     message: str
-    """What is wrong with its value, and what follows."""
+    """The problem of its value, and the consequence."""
 
     def __str__(self) -> str:
         return f"{self.field}: {self.message}"

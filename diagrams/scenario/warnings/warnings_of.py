@@ -1,4 +1,4 @@
-"""All warnings about a scenario; this is the only place where they are made."""
+"""Collects all warnings about a scenario; no other module creates them."""
 
 from __future__ import annotations
 
@@ -18,17 +18,20 @@ from systems.world.plane import beyond_rectangle, control_point
 
 
 def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
-    """What a user must know of a scenario, although it can be run.
+    """Returns the warnings about a scenario that can still be run.
 
-    Of each robot: every assumption of its guard's theorems that the scenario breaks,
-    a start within the clearance of its route, gains with which it does not come to
-    rest, and a goal that obstacles keep it from.
+    The warnings about each robot concern:
+
+    - assumptions of its guard's theorems that the scenario violates;
+    - a start within the clearance of its route;
+    - gains with which it does not come to rest;
+    - a goal that obstacles keep it from.
 
     Args:
-        scenario: Any.
+        scenario: Any scenario.
 
     Returns:
-        The warnings, robot by robot; empty where there are none.
+        The warnings, robot by robot; empty if there are none.
     """
     found: list[ScenarioWarning] = []
     robots = zip(scenario.all_robots, scenario.robot_fields(), strict=True)
@@ -48,7 +51,7 @@ def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
 
 
 def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
-    """Rectangles in W of the obstacles that rest, by name."""
+    """Rectangles in W of the obstacles at rest, by name."""
     return {
         each.name: Body(each.path(), each.size_m).rectangle(0.0)
         for each in scenario.obstacles
@@ -59,7 +62,10 @@ def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
 def _of_the_start(
     prefix: str, robot: FollowerParameters, known: NDArray[np.float64]
 ) -> Iterator[ScenarioWarning]:
-    """Whether P starts within the clearance of (k, 5) obstacles on its map, in W."""
+    """Warns if P starts within the clearance of an obstacle on its map.
+
+    ``known`` holds (k, 5) rectangles of the obstacles in W.
+    """
     assert robot.route is not None
     place = control_point(robot.start.pose, robot.robot.control_point_m)
     off = (math.hypot(*beyond_rectangle(place, each)) for each in known)

@@ -1,1 +1,1 @@
-"""From fixes to a target: the filter, its model, the block."""
+"""Tracking of the source: the filter, its model, the block."""

@@ -1,4 +1,4 @@
-"""Estimates where the source is, from the estimates that are heard of it."""
+"""Tracks the source from the estimates of its position."""
 
 from __future__ import annotations
 
@@ -17,43 +17,45 @@ from systems.hearing.tracking.tracker_model import (
     tracker_numbers,
 )
 
-#: An older estimate would be placed by a pose that is not remembered, s.
+#: Largest age of an estimate on arrival, s. The number of stored poses grows with it.
 _OLDEST_S = 2.0
 
 
 @define_for_scalars("SourceTracker_", __name__)
 def SourceTracker_(T):
     class Impl(Block_[T]):
-        """Estimates where the source is, from the estimates that are heard of it.
+        """Tracks the source from the estimates of its position.
 
-        A Kalman filter in W (``systems.hearing.tracking.target_filter``). A new
-        estimate is placed by the odometry pose of the moment it was measured,
-        ``measurement_age_s`` ago; one without range counts across its bearing
-        alone. An estimate that no source can have reached is dropped, unless
-        several in a row agree. Between bursts the target rests in W, moves with
-        the robot, or goes on with its velocity, as ``hold`` says; the
-        covariance counts where it would be expected instead. Nothing heard yet,
-        or a target older than ``maximum_age_s``: ``target_valid`` is 0, and the
-        controllers stop the robot.
+        The block contains a Kalman filter in W
+        (``systems.hearing.tracking.target_filter``). It converts a new estimate to W
+        with the odometry pose at the moment of the measurement, ``measurement_age_s``
+        ago. An estimate without range is used only across its bearing. An estimate that
+        no source can have reached is rejected unless several in a row agree.
 
-        Discrete state, every tick: past poses and the tracks, see ``track_step``.
-        The outputs continue it by the present estimate: no latency. If hearing is
-        slower than the tick, an estimate counts once, at the tick after the one at
-        which its frame ends.
+        Between bursts, the target stays at its place in W, moves with the robot, or
+        moves on with its velocity. ``hold`` selects the rule. The covariance includes
+        the distance between this target and the expected position of the source.
+        ``target_valid`` is 0 if nothing was heard yet, or not for longer than
+        ``maximum_age_s``. The controllers then stop the robot.
+
+        Discrete state, updated every tick: past poses and the tracks, see
+        ``track_step``. The outputs include the present estimate, so there is no
+        latency. If the period of the estimates is longer than the tick, each estimate
+        is used once, one tick after the end of its frame.
 
         Args:
-            robot: Place of P, and microphones.
+            robot: Position of P, and microphones.
             tracker: ``TrackerParameters``.
-            measurement_age_s: From the moment an estimate is valid for to its
-                arrival, s, at most 2 s: a tick for the ideal sensor, a tick
-                and half a frame for the audio chain.
+            measurement_age_s: Time from the moment of a measurement to the arrival of
+                its estimate, s, at most 2 s. It is one tick for the ideal sensor. It is
+                one tick and half a frame for the audio chain.
             frame_s: Period of the estimates, s.
             initial_pose: (x, y, theta) before time zero, m and rad.
             tick_s: Period of the robot, s.
 
         Raises:
-            InputError: The age cannot be, or the estimates' period is no multiple of
-                the tick.
+            InputError: The age is out of range, or the period of the estimates is no
+                multiple of the tick.
         """
 
         part = "tracker"
@@ -105,7 +107,7 @@ def SourceTracker_(T):
             self.declare(Step(track_step, numbers, state), tick_s=tick_s, arrays=True)
 
         def step_for(self, run: RunFacts) -> Step:
-            """The step, with the initial pose of the run."""
+            """Returns the step with the initial pose of the run."""
             state = blank_track(self.step.numbers, run.initial_pose).tolist()
             return super().step_for(run)._replace(state=state)
 

@@ -1,32 +1,33 @@
 """Kalman filter of a moving source, with front and back as two hypotheses.
 
-A source moves at a velocity that fades and is driven by white acceleration
-(an Ornstein-Uhlenbeck process): the same law at every speed that a source can
-have, with a standard deviation that stays bounded however long it is silent.
+The velocity of the source fades and is driven by white acceleration (an
+Ornstein-Uhlenbeck process). The same model holds at every speed of the source. The
+standard deviation of the velocity stays bounded however long the source is silent.
 
 A row of microphones gives two candidates, the one ahead and its mirror image.
-Hypothesis 0 says that the source is ahead now, hypothesis 1 that it is behind;
-each keeps the best of the two histories that lead to it (the Viterbi
-recursion). A cost is half the sum of the squared normalised innovations and of
-the logarithms of their covariances' determinants: minus a log-likelihood. When
-the robot moves, the image runs, which no source does for nothing.
+Hypothesis 0 says that the source is ahead now, hypothesis 1 that it is behind. Each
+hypothesis keeps the better of the two histories that lead to it (the Viterbi
+recursion). The cost of a hypothesis is a negative log-likelihood. It is half the sum of
+the squared normalized innovations and of the logarithms of the determinants of their
+covariances. When the robot moves, the mirror image moves too, which is unlikely for
+a source.
 
-All of it is written for flat arrays and numbers alone, so that numba compiles
-it for floats, and ``fold.py_func`` and ``expected.py_func`` run it on
-AutoDiffXd. The functions change their first argument.
+All functions use only flat arrays and numbers. numba therefore compiles them for
+floats, and ``fold.py_func`` and ``expected.py_func`` run them with AutoDiffXd. The
+functions change their first argument.
 
 Layouts (m, s, in W):
-- track, 16: age of its last estimate; position (2), velocity (2), covariance of
-  the position (xx, xy, yy), of position and velocity (xx, xy, yx, yy), of the
-  velocity (xx, xy, yy), all at the moment of that estimate; and the factor by
-  which sightings scatter more than their covariances say, in variance
-- hypothesis, 34: cost, number of outliers in a row that agree, track, and the
-  track of these outliers
-- memory: index of the chosen hypothesis, then one hypothesis, or two where
-  front and back are open
-- sighting, 10: position of the source (or, where there is no range, the unit
-  vector to it), its covariance (xx, xy, yy), centre of the microphones (2), the
-  normal of their row, ahead (2), and 1 where there is a range
+- track, 16: age of its last estimate; position (2), velocity (2), covariance of the
+  position (xx, xy, yy), of position and velocity (xx, xy, yx, yy), of the velocity (xx,
+  xy, yy), all at the moment of that estimate; and the scatter, the factor between the
+  actual variance of sightings and their covariances
+- hypothesis, 34: cost, number of consecutive outliers that agree, track, and the track
+  of these outliers
+- memory: index of the chosen hypothesis, then one hypothesis, or two if front and back
+  are to be distinguished
+- sighting, 10: position of the source (or the unit vector to it, if there is no range),
+  its covariance (xx, xy, yy), center of the microphones (2), the normal of their row,
+  ahead (2), and 1 if there is a range
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-#: Names of a track's elements.
+#: Names of the elements of a track.
 TRACK_NAMES = (
     *("age", "x", "y", "vx", "vy"),
     *("Axx", "Axy", "Ayy", "Cxx", "Cxy", "Cyx", "Cyy", "Vxx", "Vxy", "Vyy"),
@@ -48,55 +49,56 @@ TRACK_NAMES = (
 TRACK = len(TRACK_NAMES)
 HYPOTHESIS = 2 + 2 * TRACK
 
-#: Age of a track that was never fed, s: finite, and beyond every limit.
+#: Age of a track that never had a sighting, s. It is finite and exceeds every limit.
 NEVER_HEARD_S = 1e6
-#: Squared normalised innovation of two dimensions that chance exceeds in 1 %.
+#: Squared normalized innovation in two dimensions that chance exceeds in 1 % of the
+#: cases.
 GATE = 9.21
-#: Innovations are taken for what the covariances say up to this ratio, in
-#: variance; above it ...
+#: Innovations agree with the covariances up to this ratio of variances. Above it,
 SCATTER_MARGIN = 1.5
-#: ... this share of the excess is learnt from a sighting: a burst has 20.
+#: this share of the excess raises the scatter with each sighting. A burst has 20
+#: sightings.
 SCATTER_RATE = 0.05
-#: Nepers by which one sighting can speak against a hypothesis: a frame that is
-#: off says little, whatever its covariance.
+#: Most that one sighting can add to the cost of a hypothesis, nepers. A single wrong
+#: frame says little, whatever its covariance.
 LARGEST_STEP = 1.0
-#: The same for the first sighting after a silence of so many seconds, which owes
-#: nothing to the ones before.
+#: The same limit for the first sighting after a silence of more than ``SILENCE_S``, s.
+#: That sighting is independent of the previous ones.
 LARGEST_FRESH_STEP = 4.0
 SILENCE_S = 0.5
-#: Nepers by which the other hypothesis must lead before the choice turns over.
+#: Lead in cost, in nepers, that the other hypothesis needs before the choice changes.
 SWITCH_MARGIN = 3.0
-#: Nepers beyond which a hypothesis becomes no less probable: what the model
-#: gets wrong must not close the question for ever.
+#: Largest cost of a hypothesis, nepers. Errors of the model then cannot exclude a
+#: hypothesis for ever.
 LARGEST_COST = 12.0
 
 
 class FilterSettings(NamedTuple):
-    """What is believed of sources and of estimates."""
+    """Assumptions about sources and estimates."""
 
     speed_std: float
     """Standard deviation of each component of the velocity, m/s."""
     velocity_fade: float
     """Time constant with which a velocity is forgotten, s."""
     floor: float
-    """Standard deviation of what an estimate's covariance leaves out, m."""
+    """Standard deviation of errors that are not in the covariance of an estimate, m."""
     gate_floor: float
-    """Standard deviation that the gate allows for in addition to the covariances, m."""
+    """Standard deviation that the gate adds to the covariances, m."""
     believed_outliers: int
-    """Number of outliers in a row after which they are accepted, if they agree."""
+    """Number of consecutive outliers after which they are accepted if they agree."""
     assumed_range: float
-    """Range of a target of which only the bearing is known, m."""
+    """Assumed range of a target of which only the bearing is known, m."""
     measurement_age: float
-    """From the moment a sighting is valid for to its arrival, s."""
+    """Time from the moment of a sighting to its arrival, s."""
 
 
 def blank_memory(hypotheses: int) -> NDArray[np.float64]:
-    """Nothing heard yet, for one or two hypotheses."""
+    """Returns the memory before anything is heard, for one or two hypotheses."""
     return NEVER_HEARD_S * ages(hypotheses)
 
 
 def ages(hypotheses: int) -> NDArray[np.float64]:
-    """A memory of zeros, but for ones where the tracks have their ages."""
+    """Returns a memory of zeros, with ones as the ages of the tracks."""
     marks = np.zeros(1 + hypotheses * HYPOTHESIS)
     marks[3::HYPOTHESIS] = marks[3 + TRACK :: HYPOTHESIS] = 1.0
     return marks
@@ -104,39 +106,39 @@ def ages(hypotheses: int) -> NDArray[np.float64]:
 
 @register_jitable
 def chosen_track(memory: NDArray[Any]) -> NDArray[Any]:
-    """The track that is believed, a view."""
+    """Returns the track of the chosen hypothesis, a view."""
     start = 3 if memory[0] <= 0.0 else 3 + HYPOTHESIS
     return memory[start : start + TRACK]
 
 
 @register_jitable
 def _hypothesis(memory: NDArray[Any], index: int) -> NDArray[Any]:
-    """Hypothesis 0 (ahead) or 1 (behind), a view."""
+    """Returns hypothesis 0 (ahead) or 1 (behind), a view."""
     return memory[1 + index * HYPOTHESIS : 1 + (index + 1) * HYPOTHESIS]
 
 
 @register_jitable
 def _track(hypothesis: NDArray[Any]) -> NDArray[Any]:
-    """The track of a hypothesis, a view."""
+    """Returns the track of a hypothesis, a view."""
     return hypothesis[2 : 2 + TRACK]
 
 
 @register_jitable
 def _outliers(hypothesis: NDArray[Any]) -> NDArray[Any]:
-    """The track of a hypothesis' outliers, a view."""
+    """Returns the track of the outliers of a hypothesis, a view."""
     return hypothesis[2 + TRACK :]
 
 
 @register_jitable
 def _copy(values: NDArray[Any], out: NDArray[Any]) -> None:
-    """An assignment to a slice compiles words about shapes too: seconds of it."""
+    """Copies values in a loop, because a slice takes seconds to compile."""
     for k in range(len(out)):
         out[k] = values[k]
 
 
 @register_jitable
 def _predict(track: NDArray[Any], seconds: Any, fade: float, speed_std: float) -> None:
-    """Moves a track on in time; its age stays."""
+    """Predicts a track some seconds ahead; its age stays unchanged."""
     variance = speed_std**2
     kept = np.exp(-seconds / fade)
     lost = 1.0 - kept
@@ -164,20 +166,23 @@ def _predict(track: NDArray[Any], seconds: Any, fade: float, speed_std: float) -
 def _innovation(
     track: NDArray[Any], sighting: NDArray[Any], floor: float, scale: Any, extra: float
 ) -> tuple[Any, ...]:
-    """What a sighting says that the track did not.
+    """Compares a sighting with a track.
+
+    With a range, the innovation is the difference of the positions. Without a range, it
+    is the distance of the track from the line of the bearing.
 
     Args:
-        track: At the sighting's moment.
+        track: Track at the moment of the sighting.
         sighting: The sighting.
-        floor: Standard deviation added to the sighting's, m.
-        scale: Factor of the sighting's covariance.
-        extra: Variance added to the innovation's, m^2.
+        floor: Standard deviation added to that of the sighting, m.
+        scale: Factor of the covariance of the sighting.
+        extra: Variance added to that of the innovation, m^2.
 
     Returns:
-        Innovation (2); the inverse of its covariance (xx, xy, yy), which has
-        rank one where there is no range; its normalised square, infinite where
-        the track lies opposite to a bearing; the logarithm of the covariance's
-        determinant.
+        Innovation (2); the inverse of its covariance (xx, xy, yy), which has rank one
+        without a range; the squared normalized innovation, infinite if the track is in
+        the opposite direction of a bearing; and the logarithm of the determinant of the
+        covariance.
     """
     zx, zy, rxx, rxy, ryy, ox, oy, _, _, ranged = sighting
     _, x, y, _, _, axx, axy, ayy = track[:8]
@@ -206,15 +211,15 @@ def _innovation(
 def _robust_innovation(
     track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> tuple[bool, Any, tuple[Any, ...]]:
-    """The innovation as the filter uses it.
+    """Computes the innovation that the filter uses.
 
-    One that chance would exceed in 1 % of the cases is not what the model
-    says: its sighting counts less, so that its pull stays bounded (Huber's
-    weight). Outside the gate that ``gate_floor`` widens it does not count.
+    An innovation above ``GATE`` does not agree with the model. Its sighting gets a
+    larger covariance, so that its effect stays bounded (Huber's weight). Outside the
+    gate that ``gate_floor`` widens, the sighting is rejected.
 
     Returns:
-        Whether it counts; its normalised square before the sighting's weight;
-        the innovation.
+        Whether the sighting is accepted; the squared normalized innovation before the
+        covariance was enlarged; and the innovation.
     """
     floor, scale = settings.floor, track[15]
     found = _innovation(track, sighting, floor, scale, 0.0)
@@ -230,11 +235,11 @@ def _robust_innovation(
 
 @register_jitable
 def _learn_scatter(track: NDArray[Any], squared: Any, dimensions: Any) -> None:
-    """Matches the sightings' covariance to their innovations.
+    """Adapts the scatter of a track to the innovations.
 
-    Reflections scatter estimates far beyond what noise does. Innovations that
-    exceed their covariance by ``SCATTER_MARGIN`` raise the factor, others lower
-    it, within some ``1 / SCATTER_RATE`` sightings.
+    Reflections scatter estimates far more than noise does. Innovations above
+    ``SCATTER_MARGIN`` times their covariance raise the scatter, others lower it. The
+    scatter follows within about ``1 / SCATTER_RATE`` sightings.
     """
     excess = min(squared, GATE) / (dimensions * SCATTER_MARGIN)
     track[15] = max(1.0, track[15] * (1.0 + SCATTER_RATE * (excess - 1.0)))
@@ -242,7 +247,7 @@ def _learn_scatter(track: NDArray[Any], squared: Any, dimensions: Any) -> None:
 
 @register_jitable
 def _correct(track: NDArray[Any], found: tuple[Any, ...]) -> None:
-    """The Kalman correction by an innovation."""
+    """Applies the Kalman correction of an innovation."""
     ex, ey, wxx, wxy, wyy, _, _ = found
     axx, axy, ayy, cxx, cxy, cyx, cyy = track[5:12]
     # Gains: A W for the position, C^T W for the velocity.
@@ -270,7 +275,7 @@ def _correct(track: NDArray[Any], found: tuple[Any, ...]) -> None:
 def _begin(
     track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> None:
-    """Makes a track of a source that is heard for the first time."""
+    """Starts a track with the first sighting of a source."""
     zx, zy, rxx, rxy, ryy, ox, oy, _, _, ranged = sighting
     track[:] = 0.0
     track[0] = settings.measurement_age
@@ -278,7 +283,7 @@ def _begin(
         track[1], track[2] = zx, zy
         track[5], track[6], track[7] = rxx, rxy, ryy
     else:
-        # From nothing to twice as far is within two standard deviations.
+        # The range 0 and twice the assumed range are two standard deviations away.
         distance, along = settings.assumed_range, settings.assumed_range**2 / 4.0
         track[1], track[2] = ox + distance * zx, oy + distance * zy
         track[5] = distance**2 * rxx + along * zx * zx
@@ -294,7 +299,12 @@ def _begin(
 def _follow(
     track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> tuple[bool, Any]:
-    """Feeds one track; whether the sighting can belong to it (else: no change)."""
+    """Updates one track with a sighting, if it is accepted.
+
+    Returns:
+        Whether the sighting is accepted (else the track is unchanged), and the cost
+        that it adds.
+    """
     moved = track.copy()
     seconds = track[0] - settings.measurement_age
     _predict(moved, seconds, settings.velocity_fade, settings.speed_std)
@@ -309,7 +319,7 @@ def _follow(
 
 @register_jitable
 def _mirrored(sighting: NDArray[Any]) -> NDArray[Any]:
-    """The sighting behind the row that gives the same delays."""
+    """Returns the sighting on the other side of the row, which has the same delays."""
     zx, zy, rxx, rxy, ryy, ox, oy, nx, ny, ranged = sighting
     image = sighting.copy()
     ahead = nx * (zx - ranged * ox) + ny * (zy - ranged * oy)
@@ -331,18 +341,22 @@ def _inherit(
     candidate: NDArray[Any],
     settings: FilterSettings,
 ) -> tuple[Any, Any, int]:
-    """Continues the likelier of the histories that a hypothesis can have.
+    """Continues the likelier of the histories that can lead to a hypothesis.
+
+    If a sighting is an outlier to every history, it updates the track of the outliers.
+    Once there are enough consecutive outliers that agree, their track replaces that of
+    the hypothesis.
 
     Args:
-        memory: Changed: the hypothesis.
-        before: A copy of the memory of before.
-        index: Of the hypothesis.
-        candidate: The sighting as the hypothesis reads it.
+        memory: Memory; its hypothesis ``index`` is changed.
+        before: Copy of the memory before the sighting.
+        index: Index of the hypothesis.
+        candidate: The sighting for this hypothesis: as it is, or mirrored.
         settings: ``FilterSettings``.
 
     Returns:
-        Cost of the history, what the sighting adds to it (infinity where it is
-        an outlier to every history), and the index of the history.
+        Cost of the history; cost that the sighting adds, infinite if it is an outlier
+        to every history; and the index of the history.
     """
     child = _hypothesis(memory, index)
     cost, step, history = child[0], np.inf, index
@@ -375,13 +389,16 @@ def _choose(
     back: tuple[Any, Any, int],
     largest: float,
 ) -> None:
-    """Updates costs and choice from what ``_inherit`` says of both hypotheses.
+    """Updates the costs and the choice from the results of ``_inherit``.
+
+    The lead is the cost of hypothesis 0 less that of hypothesis 1. The choice changes
+    if the lead exceeds ``SWITCH_MARGIN`` against the chosen hypothesis.
 
     Args:
-        memory: Changed.
-        front: Cost, step and history of hypothesis 0.
-        back: The same of hypothesis 1.
-        largest: By how much this sighting can speak against one of them, nepers.
+        memory: Memory, changed.
+        front: Cost, added cost and history of hypothesis 0.
+        back: Cost, added cost and history of hypothesis 1.
+        largest: Most that this sighting can add to the cost of one hypothesis, nepers.
     """
     lead = front[0] - back[0]
     least = min(front[1], back[1])
@@ -389,13 +406,14 @@ def _choose(
         lead += min(front[1] - least, largest)
         lead -= min(back[1] - least, largest)
     elif _hypothesis(memory, 0)[1] <= 0.0:
-        lead = 0.0  # a target that jumped may have jumped over
+        lead = 0.0  # after a jump, the side is unknown
     _hypothesis(memory, 0)[0] = min(max(lead, 0.0), LARGEST_COST)
     _hypothesis(memory, 1)[0] = min(max(-lead, 0.0), LARGEST_COST)
     behind = memory[0] > 0.0
     own, other = (back, front) if behind else (front, back)
     if own[1] == np.inf and other[1] < np.inf and other[2] == int(behind):
-        # The other candidate alone continues the target: it crossed the line.
+        # Only the other candidate continues the target, which therefore crossed the
+        # line.
         memory[0] = 1.0 - memory[0]
     else:
         margin = -SWITCH_MARGIN if behind else SWITCH_MARGIN
@@ -406,16 +424,16 @@ def _choose(
 def fold(
     memory: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> bool:
-    """Folds a sighting into the memory.
+    """Updates the memory with a sighting.
 
     Args:
-        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,), changed; its ages are those
-            of the moment the sighting arrives.
-        sighting: (10,) see the module's docstring.
+        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,), changed. Its ages are those at
+            the arrival of the sighting.
+        sighting: (10,) sighting, see the docstring of the module.
         settings: ``FilterSettings``.
 
     Returns:
-        Whether the chosen track has taken it up.
+        Whether the chosen track has accepted the sighting.
     """
     both = len(memory) > 1 + HYPOTHESIS
     image = _mirrored(sighting)
@@ -438,16 +456,16 @@ def fold(
 def expected(
     memory: NDArray[Any], velocity_fade: float, speed_std: float
 ) -> NDArray[Any]:
-    """A copy of the chosen track as it is expected to be now.
+    """Returns a copy of the chosen track, predicted to the present.
 
     Args:
-        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,); its ages are those of now.
-        velocity_fade: See ``FilterSettings``, s.
-        speed_std: The same, m/s.
+        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) with present ages.
+        velocity_fade: Time constant with which a velocity is forgotten, s.
+        speed_std: Standard deviation of each component of the velocity, m/s.
 
     Returns:
-        (TRACK,) elements as in TRACK_NAMES; of a track that never heard anything a
-        mere copy.
+        (TRACK,) elements as in TRACK_NAMES. A track without any sighting is copied
+        without prediction.
     """
     track = chosen_track(memory).copy()
     if track[0] < NEVER_HEARD_S:

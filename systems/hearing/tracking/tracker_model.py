@@ -1,4 +1,4 @@
-"""The target from burst to burst: estimates into W, and what is held between."""
+"""Converts estimates to W, and holds the target between bursts."""
 
 from __future__ import annotations
 
@@ -27,41 +27,41 @@ from systems.hearing.tracking.target_filter import (
 from systems.sound.array_shape import ArrayShape
 from systems.world.geometry import rotate
 
-#: Rules for what the target does between bursts.
+#: Rules for the target between bursts.
 _HOLDS = "motion", "world", "robot"
 
 
 class _Microphones(NamedTuple):
-    """Where they are on the robot, m."""
+    """Positions of the microphones on the robot, m."""
 
     control_point: float
     """Distance of P ahead of the origin of B."""
     centre_x: float
-    """Their centroid from P in B axes."""
+    """x of their centroid from P in B axes."""
     centre_y: float
-    """See centre_x."""
+    """y of their centroid from P in B axes."""
     ahead_x: float
-    """Normal of their row in B; anything where they are in no row."""
+    """x of the normal of their row in B; without a row it has no effect."""
     ahead_y: float
-    """See ahead_x."""
+    """y of the normal of their row in B."""
 
 
 class TrackerNumbers(NamedTuple):
-    """What the step of ``SourceTracker`` depends on."""
+    """Data of the step of ``SourceTracker``."""
 
     hold: int
-    """Place of the rule in ``_HOLDS``."""
+    """Index of the rule in ``_HOLDS``."""
     maximum_age_s: float
     past_ticks: int
-    """Number of past poses that are remembered."""
+    """Number of past poses that are stored."""
     age_ticks: float
-    """Of an estimate when it arrives."""
+    """Age of an estimate when it arrives, ticks."""
     frame_ticks: int
-    """Ticks from one estimate to the next."""
+    """Ticks between two estimates."""
     microphones: _Microphones
     settings: FilterSettings
     older: NDArray[np.float64]
-    """By what the filter's memory grows in a tick."""
+    """(n,) what each tick adds to the memory of the filter: a tick to each age, s."""
 
 
 def tracker_numbers(
@@ -72,18 +72,18 @@ def tracker_numbers(
     frame_s: float = TICK_S,
     tick_s: float = TICK_S,
 ) -> TrackerNumbers:
-    """The numbers of a tracker for one robot and one kind of hearing.
+    """Returns the data of the step for one robot and one kind of hearing.
 
     Args:
         tracker: Parameters.
-        robot: Place of P, and microphones.
-        measurement_age_s: From the moment an estimate is valid for to its
-            arrival, s.
+        robot: Position of P, and microphones.
+        measurement_age_s: Time from the moment of a measurement to the arrival of its
+            estimate, s.
         frame_s: Period of the estimates, s, a multiple of the tick.
         tick_s: Period of the robot, s.
 
     Returns:
-        For ``track_step``.
+        Data for ``track_step``.
     """
     centre_P = np.mean(robot.microphones_m, axis=0).tolist()
     ahead = ArrayShape.of(robot.microphones_m).ahead
@@ -111,10 +111,10 @@ def tracker_numbers(
 
 
 def blank_track(numbers: TrackerNumbers, pose: Sequence[float]) -> NDArray[np.float64]:
-    """The state of ``track_step`` before anything is heard.
+    """Returns the state of ``track_step`` before anything is heard.
 
     Args:
-        numbers: Of the tracker.
+        numbers: Data of the tracker.
         pose: (3,) odometry pose of the robot now and before, m and rad.
 
     Returns:
@@ -125,7 +125,7 @@ def blank_track(numbers: TrackerNumbers, pose: Sequence[float]) -> NDArray[np.fl
 
 
 def track_names(numbers: TrackerNumbers) -> tuple[str, ...]:
-    """Names of the elements of the state of ``track_step``."""
+    """Returns the names of the state elements of ``track_step``."""
     poses = (
         f"{pose}_{axis}"
         for pose in (
@@ -152,7 +152,7 @@ def _hypotheses(numbers: TrackerNumbers) -> int:
 
 
 def _for_scalars(function: Any) -> Any:
-    """A compiled function that Python runs as it is written for AutoDiffXd."""
+    """Makes a compiled function also accept AutoDiffXd, which Python then computes."""
 
     def call(*arguments: Any) -> Any:
         differentiated = arguments[0].dtype.hasobject
@@ -167,12 +167,12 @@ def _for_scalars(function: Any) -> Any:
 
 @register_jitable
 def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
-    """Odometry pose so many ticks ago, between ticks by a line.
+    """Returns the odometry pose some ticks ago, with linear interpolation.
 
     Args:
-        pose: (3,) x, y, theta in W now, m and rad; floats or AutoDiffXd.
-        past: (3 n,) the same at the last n ticks, the last one first.
-        ticks: 0 to n, not whole.
+        pose: (3,) present x, y, theta in W, m and rad; floats or AutoDiffXd.
+        past: (3 n,) x, y, theta at the last n ticks, the last one first.
+        ticks: Number of ticks, 0 to n, not necessarily whole.
 
     Returns:
         x, y, theta in W, m and rad.
@@ -191,7 +191,7 @@ def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
 
 @register_jitable
 def _turned(c: Any, s: Any, x: Any, y: Any) -> tuple[Any, Any]:
-    """(x, y) turned by the angle of cosine c and sine s."""
+    """Rotates (x, y) by the angle with cosine c and sine s."""
     return c * x - s * y, s * x + c * y
 
 
@@ -203,14 +203,16 @@ def _sighting(
     pose: tuple[Any, Any, Any],
     microphones: _Microphones,
 ) -> NDArray[Any]:
-    """An estimate as the filter takes it; ``.py_func`` takes AutoDiffXd.
+    """Converts an estimate to a sighting of the filter.
+
+    ``_sighting.py_func`` accepts AutoDiffXd.
 
     Args:
-        p_PS_B: (2,) source from P, m; a unit vector where only the bearing is known.
-        covariance: (4,) of p_PS_B, row by row, m^2.
-        ranged: 1 where the range is known, or 0.
-        pose: Of the robot at the moment that the estimate is valid for, m and rad.
-        microphones: Where they are.
+        p_PS_B: (2,) source from P, m; a unit vector if only the bearing is known.
+        covariance: (4,) covariance of p_PS_B, row by row, m^2.
+        ranged: 1 if the range is known, otherwise 0.
+        pose: Pose of the robot at the moment of the measurement, m and rad.
+        microphones: Positions of the microphones.
 
     Returns:
         (10,) sighting of ``systems.hearing.tracking.target_filter``.
@@ -240,14 +242,14 @@ _expected = _for_scalars(expected)
 def _held_position(
     hold: int, chosen: Any, likely: Any, pose_heard: Any, pose: Any
 ) -> tuple[Any, Any]:
-    """x and y of the target in W, by the rule of ``hold``.
+    """Returns x and y of the target in W, by the rule of ``hold``.
 
     Args:
-        hold: Place of the rule in ``_HOLDS``.
-        chosen: The chosen track, as it was when last heard.
-        likely: The same as it is expected to be now.
-        pose_heard: Of the robot at the moment of the last estimate.
-        pose: Of the robot now.
+        hold: Index of the rule in ``_HOLDS``.
+        chosen: Chosen track at the moment of its last estimate.
+        likely: Chosen track, predicted to the present.
+        pose_heard: Pose of the robot at the moment of the last estimate.
+        pose: Present pose of the robot.
     """
     if hold == 0:
         return likely[1], likely[2]
@@ -262,16 +264,19 @@ def _held_position(
 def track_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrackerNumbers
 ) -> None:
-    """The target at one tick.
+    """Updates the target in one tick.
 
-    The state has the odometry poses at the last ticks, the last one first, the pose at
-    the moment of the last estimate that counted, and the filter's memory.
+    A new estimate is converted to W and updates the filter. The outputs follow from the
+    chosen track and the rule of ``hold``. The state then shifts by one tick.
+
+    The state contains the odometry poses at the last ticks, the last one first; the
+    pose at the moment of the last accepted estimate; and the memory of the filter.
     """
     p_PS_B, covariance, detected, range_valid, pose = inputs
     position, velocity, covariance_W, age, valid = outputs
     past, start = 3 * numbers.past_ticks, 3 * numbers.past_ticks + 3
     pose_heard, memory = state[past:start], state[start:]
-    # An estimate counts once, at the tick after its frame's end.
+    # An estimate is used once, one tick after the end of its frame.
     is_new = (tick - 1) % numbers.frame_ticks == 0
     if detected[0] > 0.5 and is_new:
         then = past_pose(pose, state[:past], numbers.age_ticks)
@@ -279,7 +284,7 @@ def track_step(
         microphones = numbers.microphones
         sighting = _sighting_of(p_PS_B, covariance, ranged, then, microphones)
         if _fold(memory, sighting, numbers.settings):
-            # Element by element: slices would compile words about their shapes.
+            # A loop, because assignment to a slice takes long to compile.
             for k in range(3):
                 pose_heard[k] = then[k]
     settings = numbers.settings
@@ -288,14 +293,15 @@ def track_step(
     x, y = _held_position(numbers.hold, chosen, likely, pose_heard, pose)
     position[0], position[1] = x, y
     velocity[0], velocity[1] = likely[3], likely[4]
-    # A target that is held elsewhere than the source is expected is off by that.
+    # The covariance includes the offset between the held target and the expected
+    # position.
     dx, dy = x - likely[1], y - likely[2]
     mixed = likely[6] + dx * dy
     covariance_W[0], covariance_W[1] = likely[5] + dx * dx, mixed
     covariance_W[2], covariance_W[3] = mixed, likely[7] + dy * dy
     age[0] = chosen[0]
     is_known = 1.0 if chosen[0] <= numbers.maximum_age_s else 0.0
-    # A sum, as AutoDiffXd takes no float in its place.
+    # A sum, because AutoDiffXd elements accept no float.
     valid[0] = 0.0 * chosen[0] + is_known
     for k in range(past - 1, 2, -1):
         state[k] = state[k - 3]

@@ -1,1 +1,1 @@
-"""Laws that people would try first, after their sources, to compare with."""
+"""Baseline laws for comparison: the laws that an engineer would try first."""

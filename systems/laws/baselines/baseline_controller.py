@@ -1,4 +1,4 @@
-"""What the blocks of all baselines have in common."""
+"""The ports and helper functions that the blocks of all baselines share."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from systems.planning.parameters import FollowingParameters
 
 
 class BaselineController(Block):
-    """The ports of every baseline: target and pose in, a twist out."""
+    """The ports of every baseline: target and pose as inputs, a twist as output."""
 
     inputs: Sequence[Port] = (
         Port("p_WS_estimated", 2, "m"),
@@ -22,10 +22,10 @@ class BaselineController(Block):
 
 
 def half_size(robot: RobotParameters) -> tuple[float, float]:
-    """Half of a body's length and width, m."""
+    """Returns half of the body's length and width, m."""
     return 0.5 * robot.length_m, 0.5 * robot.width_m
 
 
 def speed_limits(own: FollowingParameters) -> tuple[float, float, float]:
-    """Least and largest speed, m/s, and largest yaw rate, rad/s."""
+    """Returns the least and largest speed, m/s, and the largest yaw rate, rad/s."""
     return -own.back_speed_m_s, own.cruise_speed_m_s, own.turn_rate_rad_s

@@ -26,19 +26,19 @@ from systems.planning.occupied import list_occupied
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import wrapped
 
-#: Speeds and yaw rates that are tried in a window.
+#: Numbers of speeds and of yaw rates in the grid over a window.
 _SPEEDS, _TURNS = 9, 17
-#: Places farther off are not looked at, m.
+#: Half side of the square around the robot in which cells count, m.
 _REACH_M = 2.5
 
 
 class WindowNumbers(NamedTuple):
-    """What a choice depends on; see ``DynamicWindowParameters``."""
+    """Constants of a choice in the window; see ``DynamicWindowParameters``."""
 
     gains: tuple[float, float, float]
-    """Of heading, distance and speed."""
+    """Weights of heading, distance, and speed."""
     accelerations: tuple[float, float]
-    """Ahead, m/s^2, and of the turn, rad/s^2."""
+    """Forward acceleration, m/s^2, and yaw acceleration, rad/s^2."""
     limits: tuple[float, float, float]
     """Least and largest speed, m/s, and largest yaw rate, rad/s."""
     period_s: float
@@ -46,11 +46,11 @@ class WindowNumbers(NamedTuple):
     half_size: tuple[float, float]
     """Half of the body's length and width, m."""
     clearance_m: float
-    """Kept off, m."""
+    """Distance that the body keeps from cells with echoes, m."""
 
 
 class DynamicWindowNumbers(NamedTuple):
-    """What the step of ``DynamicWindowController`` depends on."""
+    """Constants of the step of ``DynamicWindowController``."""
 
     own: DynamicWindowParameters
     window: WindowNumbers
@@ -62,15 +62,20 @@ class DynamicWindowNumbers(NamedTuple):
 def time_to_contact(
     places: Any, motion: tuple[float, float], half: tuple[float, float]
 ) -> float:  # pragma: no cover  (compiled)
-    """When a body that goes on along its arc covers a place.
+    """Computes when a body that continues on its arc first covers a point.
+
+    The computation is in the frame of the body. In this frame the points move: straight
+    back if the yaw rate is zero, otherwise on circles around the center of the arc. A
+    circle that does not meet the rectangle of the body is skipped.
 
     Args:
-        places: (n, 2) of what must not be covered, in the body's axes from the axle, m.
+        places: (n, 2) points that the body must not cover, in B, m.
         motion: Speed, m/s, and yaw rate, rad/s.
         half: Half of the body's length and width, m.
 
     Returns:
-        s; infinite: never. Places that are covered already do not count.
+        Time, s; infinite if there is no contact. Points that the body already covers
+        do not count.
     """
     v, w = motion
     a, b = half
@@ -81,7 +86,7 @@ def time_to_contact(
             if v != 0.0 and gap > 0.0 and abs(places[n, 1]) <= b:
                 best = min(best, gap / abs(v))
         return best
-    # About the centre of the arc, (0, turn), the places go round the body.
+    # Center of the arc: (0, turn). Only radii from least to most meet the body.
     turn = v / w
     least, most = max(abs(turn) - b, 0.0), math.hypot(a, abs(turn) + b)
     for n in range(len(places)):
@@ -98,20 +103,23 @@ def time_to_contact(
 def _angle_to_contact(
     x: float, y: float, far: float, turn: float, half: tuple[float, float], sign: float
 ) -> float:  # pragma: no cover  (compiled)
-    """How far a place goes round (0, 0), to the side of the sign, until it is within.
+    """Computes the angle by which a point turns about (0, 0) until it meets the body.
 
-    Within the rectangle about (0, -turn), that is.
+    The body is a rectangle around (0, -turn). The function intersects the circle of
+    radius ``far`` with all four sides, and takes the first crossing. The point turns
+    counterclockwise if ``sign`` is positive, else clockwise.
     """
     a, b = half
     begin, best = math.atan2(y, x), np.inf
     for side in (1.0, -1.0):
         for other in (1.0, -1.0):
-            # Across the front or the back, and across a side.
+            # Crossing of the front or rear side.
             if far >= a:
                 ey = other * math.sqrt(far * far - a * a)
                 if abs(ey + turn) <= b:
                     off = math.atan2(ey, side * a) - begin
                     best = min(best, math.copysign(1.0, sign) * off % math.tau)
+            # Crossing of the left or right side.
             ey = side * b - turn
             if far >= abs(ey):
                 ex = other * math.sqrt(far * far - ey * ey)
@@ -125,7 +133,7 @@ def _angle_to_contact(
 def _in_body_axes(
     places: Any, pose: Any, half: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Places in the body's axes, m: those beyond a rectangle, and those within."""
+    """Returns points in B, m: first those outside the rectangle, then those inside."""
     found, beyond, within = np.empty((len(places), 2)), 0, len(places)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for n in range(len(places)):
@@ -149,19 +157,26 @@ def choose_in_window(
     bearing: float,
     numbers: WindowNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """The admissible motion in the window that the objective likes best (eqs 13-15).
+    """Chooses the admissible motion with the largest objective (eqs 13-15).
+
+    The window contains the speeds and yaw rates that the robot can reach in one period.
+    The function tries a grid of motions in the window. A motion is admissible if the
+    robot can brake to rest before it covers a cell with echoes. The function then
+    maximizes a weighted sum of heading, distance, and speed.
 
     Args:
-        places: (n, 3) of what must not be covered, m.
-        pose: (x, y, theta) of the axle, m and rad.
-        now: Speed, m/s, and yaw rate, rad/s.
-        wanted: Speed towards the target, m/s.
-        bearing: Of the target in W, rad.
+        places: (n, 3) cells that the body must not cover: x and y in W, m; certainty.
+        pose: (x, y, theta) of the axle in W, m and rad.
+        now: Present speed, m/s, and yaw rate, rad/s.
+        wanted: Wanted speed towards the target, m/s.
+        bearing: Direction of the target in W, rad.
         numbers: Weights and limits.
 
     Returns:
-        Speed, m/s, and yaw rate, rad/s; where nothing is admissible the slowest ones.
+        Speed, m/s, and yaw rate, rad/s. If no motion is admissible, the lowest speed of
+        the window and the yaw rate nearest to zero.
     """
+    # The window.
     heading_gain, distance_gain, speed_gain = numbers.gains
     braking, turn_braking = numbers.accelerations
     least, most, turn = numbers.limits
@@ -169,6 +184,7 @@ def choose_in_window(
     low = max(now[0] - dv, least if wanted < 0.0 else 0.0)
     high = max(min(now[0] + dv, most), low)
     right, left = max(now[1] - dw, -turn), min(now[1] + dw, turn)
+    # The slowest motion is the fallback.
     slower = min(max(0.0, now[1] - dw), now[1] + dw)
     found, best = (low, slower), -np.inf
     body, kept = numbers.half_size, numbers.clearance_m
@@ -178,17 +194,18 @@ def choose_in_window(
         v = low + (high - low) * i / (_SPEEDS - 1)
         for j in range(_TURNS):
             w = right + (left - right) * j / (_TURNS - 1)
-            # What is nearer than is kept off already must not be touched.
+            # Points outside the clearance must stay outside it. Points already inside
+            # the clearance must stay outside the body.
             contact = time_to_contact(around, (v, w), wide)
             contact = min(contact, time_to_contact(near, (v, w), body))
-            # v <= sqrt(2 dist a) with dist = v t, and the same of the turn.
+            # The paper's v <= sqrt(2 dist a) with dist = v t, likewise for the turn.
             stops = max(abs(v) / braking, abs(w) / turn_braking)
             if contact < 0.5 * stops:
                 continue
             distance = numbers.farthest_m
             if contact < np.inf:
                 distance = min(abs(v) * contact, distance)
-            # Where it heads after the period, and braking the turn.
+            # The heading when the robot has stopped its turn after this period.
             theta = pose[2] + w * numbers.period_s + 0.5 * w * abs(w) / turn_braking
             heading = 1.0 - abs(wrapped(bearing - theta)) / math.pi
             value = heading_gain * heading
@@ -203,7 +220,7 @@ def choose_in_window(
 def dynamic_window_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DynamicWindowNumbers
 ) -> None:
-    """Computes the twist. The state is the speed and yaw rate that were chosen last."""
+    """Computes the twist. The state is the last choice of speed and yaw rate."""
     target, pose, own = inputs[0], inputs[3], numbers.own
     if tick % numbers.period_ticks == 0:
         wanted, bearing = approach(inputs, numbers.follow)
@@ -217,22 +234,24 @@ def dynamic_window_step(
 
 
 class DynamicWindowController(BaselineController):
-    """Chooses among the motions that it can reach and stop from in time.
+    """Chooses a motion that the robot can reach, and from which it can stop in time.
 
-    Each ``period_s`` it takes, of speeds and yaw rates that its accelerations let it
-    reach, those from which it can brake before its rectangle covers a place that has
-    echoed, and of these the one of the largest weighted sum of heading, distance and
-    speed. In the place of the paper's speed stands how near it is to the wanted speed:
-    a robot that follows must not arrive at full speed. In the place of its lines of
-    obstacles stand cells that echoed since they were last seen free.
+    Every ``period_s`` the block considers the speeds and yaw rates that the robot can
+    reach with its accelerations. It keeps those from which the robot can brake before
+    its rectangle covers a cell with echoes. Of these it chooses the motion with the
+    largest weighted sum of heading, distance, and speed.
 
-    Discrete state: the last motion. No latency.
+    The block differs from the paper in two points. The speed term is the nearness to
+    the wanted speed, because a follower must not arrive at full speed. The obstacles
+    are cells with echoes that were not seen free since, instead of lines.
+
+    Discrete state: the last motion. There is no latency.
 
     Args:
-        robot: Its body, and place of P.
-        attraction: The follow distance.
+        robot: Size of the body, and position of P.
+        attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``dwa``.
-        following: How fast it drives and turns.
+        following: Speeds and gains of driving and turning.
         tick_s: Period of the controller, s.
 
     Reference: Fox, Burgard and Thrun, The dynamic window approach to collision

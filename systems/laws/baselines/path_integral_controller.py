@@ -29,50 +29,50 @@ from systems.planning.turning import wrapped
 from systems.planning.way import Way, find_way, make_way
 from systems.safety.parameters import FreeSpaceParameters
 
-#: Half of the window of the distances, m; it holds what a horizon reaches.
+#: Half side of the window of the distance field, m. A sequence stays within it.
 _WINDOW_M = 2.5
-#: Rounds for which random numbers are drawn; then they come again.
+#: Number of plans with different random numbers. Then the numbers repeat.
 _ROUNDS = 16
-#: Discs that cover the body from side to side.
+#: Number of discs that cover the body from side to side.
 _DISCS = 3
-#: A way no longer than so many times the straight line is straight; of another one
-#: places up to so far away are headed for, m.
+#: A route that is longer than the straight line by more than this factor is a detour.
+#: On a detour the robot heads for a point of the route up to this distance away, m.
 _DETOUR, _LOOK_AHEAD_M = 1.15, 1.5
-#: Of a step between cells across a corner.
+#: Length of a step to a diagonal neighbor, in cells.
 _ACROSS = math.sqrt(2.0)
 
 
 class RollNumbers(NamedTuple):
-    """What a sequence and its cost depend on; see ``PathIntegralParameters``."""
+    """Constants of the sequences and costs; see ``PathIntegralParameters``."""
 
     samples: int
     step_s: float
     spread: tuple[float, float]
-    """Of speeds, m/s, and yaw rates, rad/s."""
+    """Standard deviations of the speeds, m/s, and the yaw rates, rad/s."""
     limits: tuple[float, float, float]
     """Least and largest speed, m/s, and largest yaw rate, rad/s."""
     temperature: float
     control_gain: float
     gains: tuple[float, float, float, float, float]
-    """Of goal, angle, forward, obstacle and collision."""
+    """Gains of the goal, angle, forward, obstacle, and collision costs."""
     inflation_m: float
     discs: tuple[float, float]
-    """Distance of the outer discs from the axle's middle, and their radius with what
-    is kept off, m."""
+    """Distance of the outer discs from the middle of the axle, and radius of all discs
+    including the clearance, m."""
     control_point_m: float
 
 
 class PathIntegralNumbers(NamedTuple):
-    """What the step of ``PathIntegralController`` depends on."""
+    """Constants of the step of ``PathIntegralController``."""
 
     own: PathIntegralParameters
     roll: RollNumbers
     follow: FollowNumbers
     radius_m: float
-    """Of the disc for which ways are sought, m."""
+    """Radius of the disc for which routes are planned, m."""
     period_ticks: int
     noise: NDArray[np.float64]
-    """(sequences, steps, 2) of standard deviation 1."""
+    """(sequences, steps, 2) normal random numbers of standard deviation 1."""
 
 
 class PathIntegralState(NamedTuple):
@@ -81,24 +81,28 @@ class PathIntegralState(NamedTuple):
     plan: NDArray[np.float64]
     """(steps, 2) speed, m/s, and yaw rate, rad/s, of each step."""
     way: Way
-    """Room for the way, which is sought anew each time."""
+    """Memory for the route, which is planned anew each time."""
 
 
 @njit(cache=True)
 def distance_field(
     places: Any, x: float, y: float, half: float, cell: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Distances of cells around a place from the nearest of some others.
+    """Computes the distance of each cell in a window from the nearest occupied cell.
+
+    The function sweeps the window twice, forward and backward. Each sweep passes the
+    distance on to the four neighbors that come later in its order.
 
     Args:
-        places: (n, 3) middles of these, m.
-        x: Middle of the window, m.
-        y: See x.
-        half: Half of its side, m.
+        places: (n, 3) occupied cells: x and y of the center in W, m; certainty.
+        x: Center of the window, x in W, m.
+        y: Center of the window, y in W, m.
+        half: Half side of the window, m.
         cell: Side of a cell, m.
 
     Returns:
-        (m, m) m, along steps to neighbours: up to 8 % more than straight.
+        (m, m) distances, m, along steps between neighbors. They are at most 8 % longer
+        than straight lines. Without occupied cells they are 1e6.
     """
     size = 2 * math.ceil(half / cell) + 1
     field = np.full((size, size), 1e6)
@@ -135,23 +139,26 @@ def roll_out(
     cell: float,
     numbers: RollNumbers,
 ) -> None:  # pragma: no cover  (compiled)
-    """Replaces a sequence of motions by the mean of many, weighted by their costs.
+    """Replaces a sequence by the mean of noisy sequences, weighted by their costs.
+
+    The weight of a sequence is exp(-cost/temperature).
 
     Args:
-        controls: (steps, 2) speed, m/s, and yaw rate, rad/s; changed.
-        noise: As of ``PathIntegralNumbers``.
-        first: Sequence of noise with which to begin.
-        pose: (x, y, theta) of the axle, m and rad.
-        goal: Where P should be, m, and how fast that moves, m/s: x, y, vx, vy.
-        field: From ``distance_field`` around the axle, m.
-        cell: Of the field, m.
-        numbers: Spreads, limits and costs.
+        controls: (steps, 2) speed, m/s, and yaw rate, rad/s. The function changes it.
+        noise: Random numbers, see ``PathIntegralNumbers``.
+        first: Index of the first sequence of noise.
+        pose: (x, y, theta) of the axle in W, m and rad.
+        goal: (x, y, vx, vy): wanted position of P and its velocity in W, m and m/s.
+        field: Result of ``distance_field`` around the axle, m.
+        cell: Side of a cell of the field, m.
+        numbers: Spreads, limits, and costs.
     """
     samples, steps = numbers.samples, len(controls)
     costs, tried = np.empty(samples), np.empty((samples, steps, 2))
     for n in range(samples):
         row = noise[(first + n) % len(noise)]
         costs[n] = _cost(controls, row, tried[n], pose, goal, field, cell, numbers)
+    # Weights relative to the least cost do not underflow.
     least, total = np.min(costs), 0.0
     mean = np.zeros((steps, 2))
     for n in range(samples):
@@ -175,7 +182,14 @@ def _cost(
     cell: float,
     numbers: RollNumbers,
 ) -> float:  # pragma: no cover  (compiled)
-    """Fills the sequence that is tried, and says what it costs."""
+    """Computes one noisy sequence (``tried``) and returns its cost.
+
+    Each step adds noise to the planned motion, limits it, and integrates the pose. A
+    step costs more if it drives backward, if a disc of the body is near an occupied
+    cell, or if P is far from the moving goal or turned away from it. The sum also has
+    the control cost of the deviation from the plan. Positions x and y are relative to
+    the axle at the start, in the axes of W.
+    """
     least, most, turn = numbers.limits
     to_goal, to_angle, forward, obstacle, collision = numbers.gains
     aside, radius = numbers.discs
@@ -186,12 +200,15 @@ def _cost(
         w = controls[k, 1] + numbers.spread[1] * noise[k, 1]
         v, w = min(max(v, least), most), min(max(w, -turn), turn)
         tried[k, 0], tried[k, 1] = v, w
+        # Control cost of the deviation from the plan.
         off = controls[k, 0] * (v - controls[k, 0]) / numbers.spread[0] ** 2
         off += controls[k, 1] * (w - controls[k, 1]) / numbers.spread[1] ** 2
         total += numbers.control_gain * off
+        # Motion along the mean heading of the step.
         theta += 0.5 * w * dt
         c, s = math.cos(theta), math.sin(theta)
         x, y, theta = x + v * dt * c, y + v * dt * s, theta + 0.5 * w * dt
+        # Clearance of the discs. Cells outside the window count as free.
         nearest = np.inf
         for d in range(_DISCS):
             at = aside * (d - 1)
@@ -203,6 +220,7 @@ def _cost(
         if nearest < 0.0:
             cost += collision
         cost += obstacle * math.exp(-max(nearest, 0.0) / numbers.inflation_m)
+        # Distance and direction from P to the goal at this time.
         time, ahead = (k + 1) * dt, numbers.control_point_m
         gx = goal[0] + goal[2] * time - pose[0] - x - ahead * c
         gy = goal[1] + goal[3] * time - pose[1] - y - ahead * s
@@ -228,7 +246,7 @@ def path_integral_step(
     steps = len(plan)
     if tick % numbers.period_ticks == 0:
         controls = np.zeros((steps, 2))
-        # What is left of the last plan, and its last motion once more.
+        # Start from the rest of the last plan, with its last motion repeated.
         for k in range(steps):
             last = min(k + 1, steps - 1)
             controls[k, 0], controls[k, 1] = plan[last, 0], plan[last, 1]
@@ -248,7 +266,12 @@ def path_integral_step(
 
 @register_jitable
 def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-untyped-def]
-    """Where P should be, m, and how fast that moves, m/s."""
+    """Computes the wanted position of P, m, and its velocity, m/s, both in W.
+
+    The function plans a route to the target. It heads straight for the target, or for a
+    point of the route if the route is a detour. The goal lies in this direction. Its
+    distance and speed are chosen so that P approaches it with the wanted speed.
+    """
     ahead = numbers.follow.control_point_m
     px, py = at[0] + ahead * math.cos(at[2]), at[1] + ahead * math.sin(at[2])
     if not valid:
@@ -274,23 +297,26 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
 
 
 class PathIntegralController(BaselineController):
-    """Tries many sequences of motions and takes their mean, weighted by cost.
+    """Tries many motion sequences and drives their mean, weighted by cost.
 
-    Each ``step_s`` it seeks the way to the target on the map (``find_way``, as the
-    guarded law), and along it a goal that moves with the target; draws ``samples``
-    sequences around the last plan, each costed by distance from the goal, angle,
-    driving back and what is near on the map; and takes their mean with weights
-    exp(-cost/temperature). The body is covered by three discs.
+    Every ``step_s`` the block makes a new plan:
 
-    State: the plan, and the room for the way. No latency.
+    1. It plans a route to the target on the map with ``find_way``, like the guarded
+       law. On this route it places a goal that moves with the target.
+    2. It draws ``samples`` sequences around the last plan. The cost of a sequence
+       depends on the distance and angle to the goal, on driving backward, and on
+       occupied cells near the body. Three discs cover the body.
+    3. The new plan is the mean of the sequences with weights exp(-cost/temperature).
+
+    State: the plan, and the memory for the route. There is no latency.
 
     Args:
-        robot: Its body, and place of P.
-        attraction: The follow distance.
+        robot: Size of the body, and position of P.
+        attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``mppi``.
-        following: How fast it drives and turns.
-        known: Grid of the map.
-        seed: Of the sequences that are tried.
+        following: Speeds and gains of driving and turning.
+        known: Parameters of the map.
+        seed: Seed of the random sequences.
         tick_s: Period of the controller, s.
 
     Reference: Williams et al., Information theoretic model predictive control, IEEE
@@ -327,7 +353,7 @@ class PathIntegralController(BaselineController):
         self.declare(Step(path_integral_step, numbers, state), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
-        """The step, with a state of its own and the noise of the run."""
+        """Returns the step with its own state and with the noise of the run."""
         step = super().step_for(run)
         noise = _noise(step.numbers.own, run.seed_of("controller"))
         return step._replace(numbers=step.numbers._replace(noise=noise))

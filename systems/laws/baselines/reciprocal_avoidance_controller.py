@@ -1,4 +1,4 @@
-"""Baseline: optimal collision avoidance with perfect knowledge of all bodies (ORCA)."""
+"""Baseline: optimal reciprocal collision avoidance (ORCA) with perfect knowledge."""
 
 from __future__ import annotations
 
@@ -24,20 +24,21 @@ from systems.planning.half_planes import nearest_velocity
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards, wrapped
 
-#: A velocity that does not lead out of a contact at once does so in this time, s.
+#: Time within which the robot must leave a contact, s.
 _OUT_S = 0.1
-#: Slower rests, and by less a velocity is not changed, m/s.
+#: Speed below which the robot is at rest, and difference below which two velocities
+#: are equal, m/s.
 _RESTS_M_S, _UNCHANGED_M_S = 0.05, 1e-6
 
 
 class AvoidanceNumbers(NamedTuple):
-    """What the step of ``ReciprocalAvoidanceController`` depends on."""
+    """Constants of the step of ``ReciprocalAvoidanceController``."""
 
     own: ReciprocalAvoidanceParameters
     follow: FollowNumbers
     radius_m: float
-    """Of the disc about the point ``offset_m`` ahead that holds the body, with what is
-    kept off, m."""
+    """Radius of the disc around the point ``offset_m`` ahead of the axle, m. The disc
+    contains the body and the clearance."""
     tick_s: float
 
 
@@ -45,7 +46,7 @@ class AvoidanceNumbers(NamedTuple):
 def _beyond(
     u: float, w: float, a: float, b: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """From the nearest place of a rectangle about the origin to (u, w)."""
+    """Returns the vector to (u, w) from the nearest point of a centered rectangle."""
     return u - min(max(u, -a), a), w - min(max(w, -b), b)
 
 
@@ -53,23 +54,26 @@ def _beyond(
 def avoid_body(
     relative: Any, half: Any, radius: float, velocity: Any, horizon: float
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """The half plane of relative velocities that ORCA permits (van den Berg, eq. 3).
+    """Computes the half plane of velocities that ORCA permits (van den Berg, eq. 3).
 
-    The velocity obstacle is the set of velocities that lead to a contact of a disc with
-    a rectangle within the horizon: a cone, cut off by the rounded rectangle divided by
-    the horizon. The plane touches it where it is nearest to the present velocity.
+    The velocity obstacle is the set of relative velocities that lead to a contact of a
+    disc with a rectangle within the horizon. It is a cone with two legs. Its tip is cut
+    off by the rounded rectangle, divided by the horizon. The function finds the point
+    of its border that is nearest to the present relative velocity. The border of the
+    half plane is the tangent at this point.
 
     Args:
-        relative: Place of the body from the disc's centre, m, and its direction, rad.
-        half: Half of its length and width, m.
-        radius: Of the disc, m.
-        velocity: Of the disc relative to the body, m/s.
-        horizon: s.
+        relative: Position of the body from the center of the disc, m, and heading, rad.
+        half: Half of the body's length and width, m.
+        radius: Radius of the disc, m.
+        velocity: Velocity of the disc relative to the body, m/s.
+        horizon: Time for which contacts are avoided, s.
 
     Returns:
-        Unit normal (x, y) and offset, m/s, of n . v >= offset.
+        Unit normal n (x, y) and offset, m/s. Permitted relative velocities v have
+        n . v >= offset.
     """
-    # In the axes of the rectangle, which is about (px, py).
+    # In the axes of the rectangle. Its center is at (px, py), the disc at (0, 0).
     c, s = math.cos(relative[2]), math.sin(relative[2])
     px = c * relative[0] + s * relative[1]
     py = c * relative[1] - s * relative[0]
@@ -79,14 +83,14 @@ def avoid_body(
     gap = math.hypot(gx, gy)
     inside = gap <= radius
     time = _OUT_S if inside else horizon
-    # The cut-off: nearest place of its rim to the velocity.
+    # The cut-off: the point of its rim that is nearest to the velocity.
     fx, fy = _beyond(vx * time - px, vy * time - py, a, b)
     far = math.hypot(fx, fy)
     if far > 1e-9:
         nx, ny = fx / far, fy / far
         signed = (far - radius) / time
     else:
-        # The middle of the disc would be in the rectangle: the nearest side out.
+        # The center of the disc would be in the rectangle: leave by the nearest side.
         dx, dy = vx * time - px, vy * time - py
         left_x, left_y = a - abs(dx), b - abs(dy)
         nx, ny = (
@@ -115,17 +119,20 @@ def _legs(
     horizon: float,
     front: tuple[float, float, float],
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Of the cut-off and the legs of the cone, what a velocity is nearest to.
+    """Finds the part of the border that is nearest to a velocity.
+
+    The parts are the cut-off (``front``) and both legs of the cone. A leg counts only
+    for velocities beyond its point of contact with the cut-off.
 
     Returns:
-        Signed distance, m/s, negative inside, and unit normal.
+        Signed distance from the border, m/s, negative inside, and unit normal.
     """
     (px, py), (vx, vy) = place, velocity
     middle = math.atan2(py, px)
     best, found = np.inf, front
     on_leg = False
     for side in (1.0, -1.0):
-        # The corner that reaches farthest to this side, and the tangent past its round.
+        # The leg is the tangent to the disc around the outermost corner on this side.
         widest, tangent = -np.inf, 0.0
         for k in range(4):
             cx = px + (half[0] if k % 2 else -half[0])
@@ -139,12 +146,12 @@ def _legs(
         direction = middle + side * widest
         dx, dy = math.cos(direction), math.sin(direction)
         along = vx * dx + vy * dy
-        # Away from the cone.
+        # The normal points away from the cone.
         nx, ny = -side * dy, side * dx
         signed = vx * nx + vy * ny
         if along >= tangent / horizon and abs(signed) < best:
             best, found, on_leg = abs(signed), (signed, nx, ny), True
-    # The rim of the cut-off counts where it faces the robot.
+    # The rim of the cut-off counts only where its normal points to zero velocity.
     rim_x = vx - front[0] * front[1]
     rim_y = vy - front[0] * front[2]
     faces = rim_x * front[1] + rim_y * front[2] < 0.0
@@ -159,7 +166,11 @@ def reciprocal_avoidance_step(
 ) -> None:
     """Computes the twist.
 
-    The state is the velocity of the point, m/s, and the poses of the bodies a tick ago.
+    The state is the velocity of the point in W, m/s, and the poses of the bodies one
+    tick ago. The step estimates the velocity of each body from its last two poses and
+    makes one half plane per near body. It takes the velocity in all half planes that is
+    nearest to the preferred velocity. The point ahead of the axle then determines the
+    twist.
     """
     own, pose, poses, sizes = numbers.own, inputs[4], inputs[5], inputs[6]
     twist, count = outputs[0], len(inputs[6]) // 2
@@ -183,7 +194,7 @@ def reciprocal_avoidance_step(
         nx, ny, offset = avoid_body(
             relative, half, numbers.radius_m, velocity, own.horizon_s
         )
-        # All of the change is the robot's: the bodies do not look.
+        # The bodies do not avoid the robot. Therefore it makes the whole change.
         planes[used, 0], planes[used, 1] = nx, ny
         planes[used, 2] = offset + nx * ux + ny * uy
         used += 1
@@ -200,8 +211,8 @@ def reciprocal_avoidance_step(
     turn = (c * vy - s * vx) / own.offset_m
     limit = numbers.follow.own.turn_rate_rad_s
     twist[0], twist[1] = c * vx + s * vy, min(max(turn, -limit), limit)
-    # At rest, and where it backs off with nothing in the way, it faces the target. The
-    # twist above would turn it away, until it rests and turns back: it would chatter.
+    # The robot turns to the target if it is at rest, or if it backs off freely. The
+    # twist above would turn it away until it rests. Then it would turn back, and so on.
     changed = math.hypot(vx - preferred[0], vy - preferred[1])
     backs = wanted < 0.0 and changed < _UNCHANGED_M_S
     if inputs[2][0] > 0.5 and (backs or math.hypot(vx, vy) < _RESTS_M_S):
@@ -209,22 +220,23 @@ def reciprocal_avoidance_step(
 
 
 class ReciprocalAvoidanceController(BaselineController):
-    """Takes the velocity nearest to the wanted one that hits nobody for a while.
+    """Drives the velocity nearest to the wanted one that avoids contacts for a time.
 
-    It knows places, sizes and velocities of all bodies but that of the target: what a
-    robot can do that sees everything, but plans no way. Bodies are rectangles, and all
-    of a change of velocity is the robot's (the paper's non-cooperative agents). A point
-    ahead of the axle moves as the velocity says; the disc about it holds the body. With
-    no room the velocity that breaks the constraints by least.
+    The block knows the positions, sizes, and velocities of all bodies except that of
+    the target. It shows what a robot can do that sees everything but plans no route.
+    Bodies are rectangles. They do not avoid the robot, so the robot makes the whole
+    change of velocity (the paper's non-cooperative agents). The velocity is that of a
+    point ahead of the axle. A disc around this point contains the body. If no velocity
+    obeys all constraints, the block takes the velocity with the least violation.
 
-    Discrete state: the point's velocity and the poses of the bodies a tick ago, for
-    their velocities. No latency.
+    Discrete state: the velocity of the point, and the poses of the bodies one tick ago.
+    There is no latency.
 
     Args:
-        robot: Its body, and place of P.
-        attraction: The follow distance.
+        robot: Size of the body, and position of P.
+        attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``orca``.
-        following: How fast it drives and turns.
+        following: Speeds and gains of driving and turning.
         bodies: Number of bodies.
         tick_s: Period of the controller, s.
 

@@ -1,4 +1,4 @@
-"""Baseline: go to the sound, and stop while something is near."""
+"""Baseline: drive to the sound, and stop while an echo is near."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from systems.ranging.parameters import UltrasonicParameters
 
 
 class StopNumbers(NamedTuple):
-    """What the step of ``StopWhenNearController`` depends on."""
+    """Constants of the step of ``StopWhenNearController``."""
 
     own: StopWhenNearParameters
     follow: FollowNumbers
@@ -32,7 +32,7 @@ class StopNumbers(NamedTuple):
 def stop_when_near_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: StopNumbers
 ) -> None:
-    """Computes the twist."""
+    """Computes the twist. An echo nearer than ``stop_m`` forbids to drive forward."""
     own, twist = numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
     ranges, echo = inputs[4], inputs[5]
@@ -43,16 +43,16 @@ def stop_when_near_step(
 
 
 class StopWhenNearController(BaselineController):
-    """Turns to the target and drives; stops while an echo is near.
+    """Turns to the target and drives. Does not drive forward while an echo is near.
 
-    What everybody tries first. No state; no latency.
+    This is the simplest law. It has no state and no latency.
 
     Args:
-        robot: Place of P.
-        attraction: The follow distance.
+        robot: Robot, for the position of P.
+        attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``stop_when_near``.
-        following: How fast it drives and turns.
-        sensors: The range sensors.
+        following: Speeds and gains of driving and turning.
+        sensors: Range sensors; uses their number.
         tick_s: Period of the controller, s.
 
     Reference: ours; docs/results_laws.md.

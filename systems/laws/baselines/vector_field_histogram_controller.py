@@ -24,26 +24,27 @@ from systems.planning.occupied import list_occupied
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards, wrapped
 
-#: Sectors of 5 deg (the paper's), and from how many on a valley is wide.
+#: Number of sectors (5 deg each, as in the paper). Valleys of more sectors than the
+#: second number are wide.
 _SECTORS, _WIDE = 72, 16
-#: No direction was chosen before.
+#: Direction that means that no direction was chosen.
 _NONE = -1.0
 
 
 class HistogramNumbers(NamedTuple):
-    """What a choice depends on; see ``VectorFieldHistogramParameters``."""
+    """Constants of a choice; see ``VectorFieldHistogramParameters``."""
 
     window_m: float
     radius_m: float
-    """Of the robot, with what is kept off, m."""
+    """Radius of the robot, including the clearance, m."""
     thresholds: tuple[float, float]
-    """The low and the high one."""
+    """Low and high threshold of the density."""
     gains: tuple[float, float, float]
-    """Of target, heading and direction chosen before."""
+    """Weights of target, heading, and previous direction."""
 
 
 class VectorFieldHistogramNumbers(NamedTuple):
-    """What the step of ``VectorFieldHistogramController`` depends on."""
+    """Constants of the step of ``VectorFieldHistogramController``."""
 
     own: VectorFieldHistogramParameters
     histogram: HistogramNumbers
@@ -52,7 +53,7 @@ class VectorFieldHistogramNumbers(NamedTuple):
 
 @njit(cache=True)
 def _apart(one: float, other: float) -> float:  # pragma: no cover  (compiled)
-    """Between two directions, sectors."""
+    """Returns the angle between two directions, in sectors."""
     apart = abs(one - other) % _SECTORS
     return min(apart, _SECTORS - apart)
 
@@ -61,16 +62,19 @@ def _apart(one: float, other: float) -> float:  # pragma: no cover  (compiled)
 def polar_histogram(
     places: Any, x: float, y: float, numbers: HistogramNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """The primary polar histogram: how much stands in each direction (eqs 1-6).
+    """Computes the primary polar histogram, the obstacle density (eqs 1-6).
+
+    Each occupied cell is enlarged by the radius of the robot. It adds its magnitude to
+    all sectors that it then covers. Near cells and certain cells add more.
 
     Args:
-        places: (n, 3) of occupied cells, m, and how certain they are, 0 to 1.
-        x: Where the robot is, m.
-        y: See x.
+        places: (n, 3) occupied cells: x and y in W, m; certainty from 0 to 1.
+        x: Position of the robot, x in W, m.
+        y: Position of the robot, y in W, m.
         numbers: Window and radius.
 
     Returns:
-        (72,) of sectors of 5 deg, counter-clockwise from the x axis of W.
+        (72,) density of each sector of 5 deg, counterclockwise from the x axis of W.
     """
     density = np.zeros(_SECTORS)
     width = math.tau / _SECTORS
@@ -79,9 +83,10 @@ def polar_histogram(
         distance = math.hypot(dx, dy)
         if distance > numbers.window_m:
             continue
-        # a - b d^2 with a - b of the window's edge = 1 and a = 10: near counts more.
+        # a - b d^2 falls from a = 10 at the robot to 1 at the edge of the window.
         near = 10.0 - 9.0 * (distance / numbers.window_m) ** 2
         magnitude = places[n, 2] ** 2 * near
+        # Half angle of the enlarged cell.
         wide = math.pi / 2.0
         if distance > numbers.radius_m:
             wide = math.asin(numbers.radius_m / distance)
@@ -96,7 +101,11 @@ def polar_histogram(
 def _mask(
     blocked: Any, places: Any, pose: Any, circle: float, numbers: HistogramNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Blocks directions that the robot cannot turn to while it moves (eqs 8-13)."""
+    """Blocks the directions to which the robot cannot turn while it moves (eqs 8-13).
+
+    The robot turns on two circles of radius ``circle``, one on each side. A cell that
+    meets such a circle blocks all directions beyond the cell on this side.
+    """
     x, y, theta = pose
     left = right = math.pi
     for n in range(len(places)):
@@ -104,7 +113,7 @@ def _mask(
         if math.hypot(dx, dy) > numbers.window_m:
             continue
         off = wrapped(math.atan2(dy, dx) - theta)
-        # Centres of the circles to the left and to the right.
+        # The centers of the circles are to the left and to the right of the robot.
         for side in (1.0, -1.0):
             cx = -side * circle * math.sin(theta)
             cy = side * circle * math.cos(theta)
@@ -127,17 +136,21 @@ def choose_direction(
     previous: float,
     gains: tuple[float, float, float],
 ) -> float:  # pragma: no cover  (compiled)
-    """The candidate direction of least cost (eqs 14-18).
+    """Chooses the candidate direction of least cost (eqs 14-18).
+
+    A valley is a run of free sectors. A narrow valley has one candidate, its middle. A
+    wide valley has one candidate near each edge; the target direction is a third one if
+    it lies between these. Without blocked sectors the target is the only candidate.
 
     Args:
-        blocked: (72,) which sectors are.
-        target: Direction, sectors.
-        heading: Of the robot, sectors.
-        previous: Direction that was chosen before, sectors; negative: none.
-        gains: Weights of the three.
+        blocked: (72,) whether each sector is blocked.
+        target: Direction of the target, sectors.
+        heading: Heading of the robot, sectors.
+        previous: Direction that was chosen before, sectors; negative if there is none.
+        gains: Weights of the angles to the target, heading, and previous direction.
 
     Returns:
-        Direction, sectors; negative: all is blocked.
+        Chosen direction, sectors; negative if all sectors are blocked.
     """
     anywhere = not blocked.any()
     begin = 0
@@ -146,6 +159,7 @@ def choose_direction(
     candidates, count = np.empty(3 * _SECTORS), 0
     if anywhere:
         candidates[0], count = target, 1
+    # One turn from a blocked sector, valley by valley.
     k = begin + 1
     while not anywhere and k < begin + _SECTORS:
         if blocked[k % _SECTORS]:
@@ -166,6 +180,7 @@ def choose_direction(
         if within <= last - first - _WIDE:
             candidates[count] = target
             count += 1
+    # Candidate of least cost.
     best, found = np.inf, _NONE
     for n in range(count):
         cost = gains[0] * _apart(candidates[n], target)
@@ -186,7 +201,10 @@ def _steer(
     circle: float,
     numbers: HistogramNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Direction, rad, and the density there; NaN: all is blocked."""
+    """Returns the direction, rad in W, and its density; NaN if all is blocked.
+
+    Updates the state: the blocked sectors by the two thresholds, and the direction.
+    """
     density = polar_histogram(places, pose[0], pose[1], numbers)
     blocked = np.empty(_SECTORS, dtype=np.bool_)
     for k in range(_SECTORS):
@@ -216,8 +234,8 @@ def vector_field_histogram_step(
 ) -> None:
     """Computes the twist.
 
-    The state is which sectors are blocked, the last direction, sectors, and the last
-    speed, m/s.
+    The state is whether each sector is blocked (0 or 1), the last direction in sectors,
+    and the last speed, m/s.
     """
     target, pose, own, twist = inputs[0], inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
@@ -230,7 +248,7 @@ def vector_field_histogram_step(
     circle = abs(memory[_SECTORS + 1]) / numbers.follow.own.turn_rate_rad_s
     direction, density = _steer(memory, places, at, bearing, circle, numbers.histogram)
     if math.isnan(direction):
-        # Nowhere to go: it stands, and turns to the target.
+        # All directions are blocked: the robot stops and turns to the target.
         wanted, direction = min(wanted, 0.0), bearing
     elif wanted > 0.0:
         wanted *= max(1.0 - density / own.slow_density, 0.0)
@@ -241,22 +259,30 @@ def vector_field_histogram_step(
 
 
 class VectorFieldHistogramController(BaselineController):
-    """Steers into the valley of a polar histogram that lies best.
+    """Steers into the best valley of a polar histogram of obstacles.
 
-    Of the cells that echoed since they were last seen free it makes the four histograms
-    of the paper at every tick: the primary one, in which each cell is as wide as the
-    robot; the binary one, by two thresholds; the masked one, without directions that it
-    cannot turn to at its speed; and takes the candidate of least cost. Speed as in the
-    first paper (Borenstein and Koren 1991): less, the more stands in that direction.
-    Where all is blocked it stands and turns to the target.
+    The obstacles are cells with echoes that were not seen free since. At every tick the
+    block follows the stages of the paper:
 
-    Discrete state: which sectors are blocked, last direction and speed. No latency.
+    1. The primary histogram has the density of each direction. Each cell is enlarged by
+       the radius of the robot.
+    2. The binary histogram marks blocked directions by two thresholds.
+    3. The masked histogram also blocks directions to which the robot cannot turn at its
+       speed.
+    4. The block chooses the candidate direction of least cost.
+
+    The speed falls with the density in this direction, as in the first paper
+    (Borenstein and Koren 1991). If all directions are blocked, the robot stops and
+    turns to the target.
+
+    Discrete state: blocked sectors, last direction, and last speed. There is no
+    latency.
 
     Args:
-        robot: Its body, and place of P.
-        attraction: The follow distance.
+        robot: Size of the body, and position of P.
+        attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``vfh_plus``.
-        following: How fast it drives and turns.
+        following: Speeds and gains of driving and turning.
         tick_s: Period of the controller, s.
 
     Reference: Ulrich and Borenstein, VFH+: reliable obstacle avoidance for fast mobile

@@ -1,1 +1,1 @@
-"""Impedance to a target that moves along a planned way (Engelbrecht et al. 2021)."""
+"""Impedance to a target that moves along a route (Engelbrecht et al. 2021)."""

@@ -1,4 +1,4 @@
-"""Stiffness and damping that adapt so that P moves as the reference does."""
+"""Adaptation of stiffness and damping so that P moves like a reference model."""
 
 from __future__ import annotations
 
@@ -28,33 +28,38 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
-#: Places in the state: what adapts, and sensitivities to each, four numbers.
+#: First indices in the state: the three gains, and four sensitivities for each gain.
 _GAINS, _SENSITIVITIES = 0, 3
-#: Names of what adapts.
+#: Names of the gains that adapt.
 _ADAPTED = "stiffness", "damping", "contact_stiffness"
 
 
 class AdaptationNumbers(NamedTuple):
-    """What the step of ``ImpedanceAdaptation`` depends on."""
+    """Constants of the step of ``ImpedanceAdaptation``."""
 
     lyapunov: bool
+    """Whether the rule is ``lyapunov``; otherwise it is ``sensitivity``."""
     rates: tuple[float, float, float]
-    """Of K, D and K_e."""
+    """Rates gamma of K, D, and K_e."""
     velocity_weight: float
-    """tau_v^2, s^2."""
+    """Weight tau_v^2 of velocity errors, s^2."""
     penalty: tuple[float, float]
-    """lambda, and d_sec, m."""
+    """Weight lambda and distance d_sec of the safety term, 1 and m."""
     normalised: bool
     least_square: float
-    """m_0."""
+    """Constant m_0 of the normalization."""
     low: tuple[float, float, float]
+    """Least K, D, and K_e."""
     high: tuple[float, float, float]
+    """Greatest K, D, and K_e."""
     nominal: tuple[float, float, float]
+    """Nominal K, D, and K_e."""
     leakage: float
+    """Rate sigma of the return to the nominal gains, 1/s."""
     freezes: bool
     contacts: ContactNumbers
     contact_damping: float
-    """D_e, N s/m."""
+    """Contact damping D_e, N s/m."""
     mass: float
     control_point_m: float
     tick_s: float
@@ -64,9 +69,15 @@ class AdaptationNumbers(NamedTuple):
 def adaptation_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: AdaptationNumbers
 ) -> None:
-    """Adapts K, D and K_e by one tick.
+    """Adapts K, D, and K_e by one tick.
 
-    The state is K, D and K_e; then for each of them dp/dq and dv/dq, x and y each.
+    The state has K, D, and K_e. Then it has the sensitivities dp/dq and dv/dq (x and y
+    each) for each of these gains q.
+
+    For each gain the step computes the gradient of the error, either by the Lyapunov
+    rule or from the sensitivities. It divides the gradient by the normalization. Then
+    it moves the gain against the gradient and toward its nominal value, and limits it.
+    The outputs have the gains from before this change.
     """
     target, reference, pose, v_WP, objects = inputs
     for k in range(3):
@@ -81,6 +92,7 @@ def adaptation_step(
         numbers.mass,
         numbers.tick_s,
     )
+    # Errors against the reference, and gradient of the safety term.
     ex, ey = p_WP[0] - reference[0], p_WP[1] - reference[1]
     evx, evy = v_WP[0] - reference[2], v_WP[1] - reference[3]
     penalty, security_m = numbers.penalty
@@ -98,7 +110,8 @@ def adaptation_step(
             gradient += numbers.velocity_weight * (
                 evx * state[at + 2] + evy * state[at + 3]
             )
-            # A power of Python's raises where it overflows; this the next block names.
+            # Products instead of powers: a power in Python raises on overflow. Here the
+            # overflow reaches the next block, whose error message names it.
             square = state[at] * state[at] + state[at + 1] * state[at + 1]
             square += numbers.velocity_weight * (
                 state[at + 2] * state[at + 2] + state[at + 3] * state[at + 3]
@@ -108,6 +121,7 @@ def adaptation_step(
             gradient = 0.0
         if numbers.normalised:
             gradient = gradient / (numbers.least_square + square)
+        # One step of the gain with leakage, then the limits.
         value = state[_GAINS + k] - numbers.tick_s * (
             numbers.rates[k] * gradient
             + numbers.leakage * (state[_GAINS + k] - numbers.nominal[k])
@@ -116,22 +130,24 @@ def adaptation_step(
 
 
 class ImpedanceAdaptation(Block):
-    """Adapts stiffness and damping of a robot on a route.
+    """Adapts the stiffness and damping of a robot on a route.
 
-    ``lyapunov``: K' = (gamma/M) e_v . (p - p_d), D' = (gamma/M) e_v . (v - v_d), with
-    e_v = v - v_ref: what eq. 40 to 42 are as printed, for which a Lyapunov function
-    falls where there is no contact. ``sensitivity``: q' = -gamma dJ/dq, with J of eq.
-    27 (velocities weighed by tau_v, its penalty a hinge) and the sensitivities of eq.
-    34, whose left side is a derivative.
+    There are two rules. The rule ``lyapunov`` is K' = (gamma/M) e_v . (p - p_d) and
+    D' = (gamma/M) e_v . (v - v_d) with e_v = v - v_ref. The printed eq. 40 to 42 amount
+    to this rule. Without contacts a Lyapunov function falls under it.
 
-    Discrete state, every tick: K, D, K_e, and their sensitivities, four numbers each.
-    ``impedance`` is state; a gradient at a tick changes it from the next tick on.
+    The rule ``sensitivity`` is q' = -gamma dJ/dq for each gain q. J is that of eq. 27,
+    with velocities weighted by tau_v and with a hinge as its penalty. The sensitivities
+    are those of eq. 34, with the left side read as a time derivative.
+
+    Discrete state, every tick: K, D, K_e, and four sensitivities of each. The output
+    ``impedance`` is state, so a gradient changes it from the next tick on. The output
     ``adaptation_active`` depends on the present input.
 
     Args:
         parameters: ``AdaptationParameters``.
-        impedance: ``TrajectoryImpedanceParameters``: nominal values, and contacts.
-        robot: Mass and place of P.
+        impedance: ``TrajectoryImpedanceParameters``: nominal gains, and contacts.
+        robot: Mass, and position of P.
         tick_s: Period, s.
 
     Reference: Engelbrecht, Steyn and Djouani (2021), eq. 27 to 42; docs/routes.md
@@ -180,16 +196,16 @@ def adaptation_numbers(
     robot: RobotParameters,
     tick_s: float,
 ) -> AdaptationNumbers:
-    """What the step depends on.
+    """Computes the constants of the step.
 
     Args:
-        own: Rule, rates and cures.
-        law: Nominal values, and contacts.
-        robot: Mass and place of P.
+        own: Rule, rates, and limits of the adaptation.
+        law: Nominal gains, and contacts.
+        robot: Mass, and position of P.
         tick_s: Period, s.
 
     Returns:
-        The numbers.
+        The constants.
     """
     boxes = own.stiffness_box_n_m, own.damping_box_n_s_m, own.contact_box_n_m
     wide = (-1e9, 1e9)

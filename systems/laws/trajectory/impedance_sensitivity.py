@@ -1,4 +1,4 @@
-"""How the motion of P depends on its impedance: eq. 28 to 41, with time."""
+"""Sensitivity of the motion of P to its impedance over time (eq. 28 to 41)."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from systems.laws.trajectory.trajectory_impedance import ContactNumbers
 
 
 class Impedance(NamedTuple):
-    """What may adapt."""
+    """The gains that may adapt."""
 
     stiffness: Any
-    """K, N/m."""
+    """Stiffness K to the target, N/m."""
     damping: Any
-    """D, N s/m."""
+    """Damping D to the target, N s/m."""
     contact_stiffness: Any
-    """K_e, N/m."""
+    """Stiffness K_e to contacts, N/m."""
 
 
 class Sensitivities(NamedTuple):
-    """Accelerations per unit of K, D and K_e, all else equal; (x, y) each."""
+    """Partial derivatives of the acceleration by K, D, and K_e; (x, y) each."""
 
     stiffness: tuple[Any, Any]
     damping: tuple[Any, Any]
@@ -32,17 +32,17 @@ class Sensitivities(NamedTuple):
 def sensitivity_sources(
     p_WP: Any, v_WP: Any, target: Any, contacts: Any, mass: Any
 ) -> Any:
-    """The last terms of eq. 34: what dA/dp X + dB/dp u are (eq. 35 to 41).
+    """Computes the source terms dA/dp X + dB/dp u of eq. 34 (eq. 35 to 41).
 
     Args:
-        p_WP: (x, y) m.
-        v_WP: (x, y) m/s.
-        target: p_d and v_d, four numbers, m and m/s.
-        contacts: From ``contacts_of_objects``.
-        mass: M, kg.
+        p_WP: Position (x, y) of P in W, m.
+        v_WP: Velocity (x, y) of P in W, m/s.
+        target: p_d and v_d, four numbers in W, m and m/s.
+        contacts: Result of ``contacts_of_objects``.
+        mass: Virtual mass M, kg.
 
     Returns:
-        ``Sensitivities``: -(p - p_d)/M, -(v - v_d)/M and the sum of (S - d) n/M.
+        ``Sensitivities``: -(p - p_d)/M, -(v - v_d)/M, and the sum of (S - d) n/M.
     """
     ex = ey = 0.0
     for contact in contacts:
@@ -56,14 +56,14 @@ def sensitivity_sources(
 
 
 class SensitivityNumbers(NamedTuple):
-    """The loop whose sensitivities are wanted, at one tick."""
+    """Gains and constants of the loop at one tick."""
 
     impedance: Impedance
     contact_damping: float
-    """D_e, N s/m."""
+    """Contact damping D_e, N s/m."""
     contacts: ContactNumbers
     mass: float
-    """M, kg."""
+    """Virtual mass M, kg."""
     tick_s: float
 
 
@@ -71,24 +71,31 @@ class SensitivityNumbers(NamedTuple):
 def advance_sensitivity(
     state: Any, begin: Any, source: Any, contacts: Any, loop: Any
 ) -> None:
-    """A tick of d/dt S = A S + source (eq. 34 with its left side and A S restored).
+    """Advances the sensitivities by one tick of d/dt X_q = A X_q + source.
 
-    A is that of the exact linearisation: a contact with a point is stiff by K_e along n
-    and by -K_e (S - d)/d across, and damping that fades with the distance adds
-    -(D_e/S) (v - v_j) n'. Velocity first, then place, as the virtual mass moves.
+    This is eq. 34 with its left side and its term A X_q restored. X_q has dp/dq and
+    dv/dq of one gain q. A is the exact linearization of the loop. A contact with a
+    point has the stiffness K_e along n and -K_e (S - d)/d across n. If the damping
+    fades with the distance d, the matrix -(D_e/S) (v - v_j) n' adds to this stiffness.
+
+    The function updates the velocity first, and then the position with the new
+    velocity. The virtual mass moves in the same order.
 
     Args:
-        state: Changed from ``begin`` on: dp/dq, x and y, and dv/dq, x and y.
-        begin: First place.
+        state: State of the block. The function changes four numbers from ``begin`` on:
+            dp/dq (x and y) and dv/dq (x and y).
+        begin: Index of the first number.
         source: (x, y) of ``sensitivity_sources``.
-        contacts: From ``contacts_of_objects``.
+        contacts: Result of ``contacts_of_objects``.
         loop: ``SensitivityNumbers``.
     """
     impedance, tick_s = loop.impedance, loop.tick_s
     px, py = state[begin], state[begin + 1]
     vx, vy = state[begin + 2], state[begin + 3]
+    # Spring and damper to the target.
     fx = -impedance.stiffness * px - impedance.damping * vx
     fy = -impedance.stiffness * py - impedance.damping * vy
+    # Spring and damper of each contact.
     for contact in contacts:
         nx, ny = contact.n
         along = nx * px + ny * py
@@ -101,6 +108,7 @@ def advance_sensitivity(
             slope = loop.contact_damping / loop.contacts.begins_m * along
             fx = fx + slope * contact.v_relative[0]
             fy = fy + slope * contact.v_relative[1]
+    # Velocity, then position.
     vx = vx + tick_s * (fx / loop.mass + source[0])
     vy = vy + tick_s * (fy / loop.mass + source[1])
     state[begin], state[begin + 1] = px + tick_s * vx, py + tick_s * vy
@@ -109,17 +117,18 @@ def advance_sensitivity(
 
 @register_jitable
 def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
-    """-sum of lambda h(d) n, the gradient of lambda/2 h(d)^2, h = max(0, d_sec - d).
+    """Computes the gradient of the penalty lambda/2 h(d)^2 with h = max(0, d_sec - d).
 
-    The hinge stands for the safety term of eq. 27, lambda/2 (d_sec^2 - d^2).
+    The gradient is the sum of -lambda h(d) n over all contacts. The hinge h replaces
+    the safety term of eq. 27, lambda/2 (d_sec^2 - d^2).
 
     Args:
-        contacts: From ``contacts_of_objects``.
-        security_m: d_sec, m.
-        penalty: lambda.
+        contacts: Result of ``contacts_of_objects``.
+        security_m: Distance d_sec, m.
+        penalty: Weight lambda.
 
     Returns:
-        (x, y): the derivative of the penalty by the place of P, m.
+        (x, y): derivative of the penalty by the position of P, m.
     """
     gx = gy = 0.0
     for contact in contacts:

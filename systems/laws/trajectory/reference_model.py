@@ -1,4 +1,4 @@
-"""The motion that adaptation wants: a second-order model behind the target."""
+"""The reference motion of the adaptation: a second-order model after the target."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from systems.framework.signals import TICK_S
 
 
 class ReferenceNumbers(NamedTuple):
-    """Of x+ = A x + B u: rows of A, then of B."""
+    """Matrices of x+ = A x + B u for one axis, with the rows one after the other."""
 
     a: tuple[float, float, float, float]
     b: tuple[float, float, float, float]
@@ -23,15 +23,15 @@ class ReferenceNumbers(NamedTuple):
 
 @lru_cache(maxsize=64)
 def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNumbers:
-    """Eq. 20 to 26 over a tick in which the target's state is held: exact.
+    """Computes the exact discretization of eq. 20 to 26 for a target held over a tick.
 
     Args:
-        frequency: w_n, rad/s.
-        ratio: xi.
-        tick_s: s.
+        frequency: Natural frequency w_n, rad/s.
+        ratio: Damping ratio xi.
+        tick_s: Period, s.
 
     Returns:
-        Rows one after the other.
+        The matrices A and B.
     """
     stiff, damp = frequency**2, 2.0 * ratio * frequency
     whole = np.zeros((4, 4))
@@ -61,21 +61,21 @@ def reference_step(
 
 
 class ReferenceModel(Block):
-    """Moves as P should, after the target.
+    """Computes the motion that P should have after the target.
 
-    It begins where the target is at the first tick. It does not know contacts: the
-    motion of P away from an obstacle counts as an error.
+    At the first tick the model starts at the target. The model has no contacts.
+    Therefore the motion of P away from an obstacle counts as an error.
 
-    Discrete state, every tick: place and velocity, exact for a target that is held over
-    the tick. A target counts from the next tick on.
+    Discrete state, every tick: position and velocity, exact for a target held over the
+    tick. A target acts from the next tick on.
 
     Args:
-        frequency: w_n, rad/s.
-        ratio: xi.
+        frequency: Natural frequency w_n, rad/s.
+        ratio: Damping ratio xi.
         tick_s: Period, s.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 19 to 26 with the dots of eq.
-    19 where they belong.
+    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 19 to 26, with the dots of eq.
+    19 in their correct places.
     """
 
     part = "reference_model"

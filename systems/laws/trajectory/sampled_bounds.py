@@ -1,4 +1,4 @@
-"""How stiff, damped and quick to adapt a sampled robot on a route may be."""
+"""Stability bounds of stiffness, damping, and adaptation rate of a sampled robot."""
 
 from __future__ import annotations
 
@@ -11,47 +11,47 @@ from numpy.typing import NDArray
 
 from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 
-#: gamma (a T/M)^2 of each rule below which K and D do not run away, with a the
-#: amplitude of P's target, m: rounded down from what ``critical_rate`` of
-#: ``analysis.trajectory.adaptation_stability`` measures for ticks of 25 to 100 ms and a
-#: reference with the nominal gains; another reference has less.
+#: Bounds of gamma (a T/M)^2 by rule, where a is the amplitude of P's target, m. Below
+#: the bound K and D do not run away. The values are rounded down from the results of
+#: ``critical_rate`` in ``analysis.trajectory.adaptation_stability`` for ticks of 25 to
+#: 100 ms and a reference with the nominal gains. Other references have lower bounds.
 RATE_BOUNDS = {"lyapunov": 1.0, "sensitivity": 0.5}
-#: Stiffer springs are not looked for, N/m.
+#: Largest stiffness in the search for the bound, N/m.
 _STIFFEST_N_M = 1e7
-#: Halvings of an interval of stiffness.
+#: Number of bisections.
 _HALVINGS = 60
 
 
 class SampledMass(NamedTuple):
-    """The virtual mass and the motors, on the way from the law to the place of P."""
+    """Virtual mass and motors, between the force of the law and the position of P."""
 
     mass_kg: float
-    """M."""
+    """Virtual mass M, kg."""
     motor_lag_s: float
-    """Of each wheel, first order."""
+    """Time constant of the first-order lag of each wheel, s."""
     tick_s: float
     late_ticks: int = 0
-    """Age of the place that springs act on."""
+    """Age of the position that the springs use, ticks."""
 
 
 def sampled_matrix(
     stiffness: float, damping: float, of: SampledMass
 ) -> NDArray[np.float64]:
-    """x+ = A x of one axis: what a spring to rest and a damper make of a tick.
+    """Computes A of x+ = A x for one axis with a fixed spring and a damper over a tick.
 
-    The velocity v of the virtual mass, damped as it is, commands the wheels, whose
-    speed w moves P::
+    The velocity v of the virtual mass commands the wheels. The damper acts on v at
+    once. The wheel speed w moves P::
 
         v+ = v - T/M (K p + D v),  w+ = a w + (1 - a) v+,  a = exp(-T/lag)
         p+ = p + lag (1 - a) w + (T - lag (1 - a)) v+
 
     Args:
-        stiffness: All springs together, N/m.
-        damping: All dampers together, N s/m.
-        of: Mass, lag and tick.
+        stiffness: Sum of all springs, N/m.
+        damping: Sum of all dampers, N s/m.
+        of: Mass, lag, and tick.
 
     Returns:
-        (3 + late_ticks, 3 + late_ticks); states p, w, v, then earlier p.
+        (3 + late_ticks, 3 + late_ticks) matrix. The states are p, w, v, then earlier p.
     """
     size, tick_s = 3 + of.late_ticks, of.tick_s
     kept = math.exp(-tick_s / of.motor_lag_s)
@@ -73,16 +73,16 @@ def sampled_matrix(
 
 @lru_cache(maxsize=64)
 def stiffness_bound(damping: float, of: SampledMass) -> float:
-    """The stiffness at which an axis stops coming to rest, by bisection.
+    """Computes by bisection the stiffness above which an axis is unstable.
 
-    The runs of a sweep ask for the same ones.
+    The cache serves the runs of a sweep, which use the same arguments.
 
     Args:
-        damping: All dampers together, N s/m.
-        of: Mass, lag and tick.
+        damping: Sum of all dampers, N s/m.
+        of: Mass, lag, and tick.
 
     Returns:
-        N/m; 0 where no spring comes to rest with this damping.
+        Stiffness, N/m; 0 if every stiffness is unstable with this damping.
     """
 
     def rests(stiffness: float) -> bool:
@@ -101,32 +101,44 @@ def stiffness_bound(damping: float, of: SampledMass) -> float:
 
 
 def damping_bound(of: SampledMass) -> float:
-    """2 M/T: with more, the velocity changes sign at every tick and grows, N s/m."""
+    """Returns the largest stable damping 2 M/T, N s/m.
+
+    With more damping, the velocity changes sign at every tick and grows.
+
+    Args:
+        of: Mass and tick.
+
+    Returns:
+        Damping, N s/m.
+    """
     return 2.0 * of.mass_kg / of.tick_s
 
 
 def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
-    """Lag K_e S/K at which the target pulls P through a contact; 1 m without one.
+    """Computes the lag K_e S/K at which the target pulls P through a contact.
 
     Args:
-        own: The law's parameters.
+        own: Parameters of the law.
 
     Returns:
-        m.
+        Lag, m; 1 m if K_e is 0.
     """
     lag = own.contact_stiffness_n_m * own.security_zone_m / own.stiffness_n_m
     return lag or 1.0
 
 
 def rate_bound(rule: str, amplitude_m: float, of: SampledMass) -> float:
-    """gamma from which K and D may run away where nothing bounds or normalises them.
+    """Computes the rate gamma above which K and D may run away.
+
+    The bound applies to adaptation without limits of the gains and without
+    normalization.
 
     Args:
         rule: ``lyapunov`` or ``sensitivity``.
-        amplitude_m: a: how far the target swings, or is ahead of P, m.
+        amplitude_m: Amplitude a of the target, or its lead over P, m.
         of: Mass and tick.
 
     Returns:
-        (N/m)^2/(m^2 s); it falls with a^2.
+        Rate, (N/m)^2/(m^2 s), proportional to 1/a^2.
     """
     return RATE_BOUNDS[rule] * (of.mass_kg / (amplitude_m * of.tick_s)) ** 2

@@ -1,4 +1,4 @@
-"""Impedance of P to a moving target, and to what is near it."""
+"""Impedance of P to a moving target and to objects near P."""
 
 from __future__ import annotations
 
@@ -15,40 +15,41 @@ from systems.world.geometry import safe_norm
 
 
 class ContactNumbers(NamedTuple):
-    """What the force of a contact depends on."""
+    """Constants of the contact force."""
 
     begins_m: float
-    """Distance at which it begins, m."""
+    """Distance at which a contact begins, m."""
     rest_m: float
-    """Distance at which its spring has no force, m."""
+    """Distance at which the spring of a contact has no force, m."""
     fades: bool
+    """Whether the damping grows from 0 at the distance ``begins_m``."""
     spring_sign: float
     damper_sign: float
 
 
 class Contact(NamedTuple):
-    """An object that pushes, at one instant; axes of W."""
+    """An object that pushes P at one instant. Vectors have the axes of W."""
 
     n: tuple[Any, Any]
-    """Unit vector from it to P."""
+    """Unit vector from the object to P."""
     distance_m: Any
-    """Of P from it, m."""
+    """Distance of P from the object, m."""
     overlap_m: Any
-    """Of its spring, m."""
+    """Compression of the spring, m."""
     v_relative: tuple[Any, Any]
-    """Velocity of P less its own, m/s."""
+    """Velocity of P relative to the object, m/s."""
     share: Any
-    """Of the damping that is felt, 0 to 1."""
+    """Share of the damping that acts, 0 to 1."""
 
 
 def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
-    """How contacts are read.
+    """Computes the constants of the contact force from the parameters.
 
     Args:
-        own: The law's parameters.
+        own: Parameters of the law.
 
     Returns:
-        The numbers.
+        The constants.
     """
     security, horizon = own.security_zone_m, own.horizon_m
     begins, rest = {
@@ -69,17 +70,17 @@ def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
 def target_force(
     p_WP: Any, v_WP: Any, target: Any, stiffness: Any, damping: Any
 ) -> Any:
-    """U = -K (p - p_d) - D (v - v_d), eq. 2.
+    """Computes the force to the target, U = -K (p - p_d) - D (v - v_d) (eq. 2).
 
     Args:
-        p_WP: (x, y) m; floats or AutoDiffXd.
-        v_WP: (x, y) m/s.
+        p_WP: Position (x, y) of P in W, m; floats or AutoDiffXd.
+        v_WP: Velocity (x, y) of P in W, m/s.
         target: p_d and v_d, four numbers in W, m and m/s.
-        stiffness: K, N/m.
-        damping: D, N s/m.
+        stiffness: Stiffness K, N/m.
+        damping: Damping D, N s/m.
 
     Returns:
-        (x, y) N.
+        (Ux, Uy) in W, N.
     """
     return (
         stiffness * (target[0] - p_WP[0]) + damping * (target[2] - v_WP[0]),
@@ -89,15 +90,15 @@ def target_force(
 
 @register_jitable
 def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
-    """The objects whose zone P is in.
+    """Lists the contacts: the objects that have P in their zone.
 
     Args:
-        objects: As of the port ``objects_W``.
-        v_WP: (x, y) m/s; floats or AutoDiffXd.
+        objects: Vector of the port ``objects_W``. Positions are relative to P.
+        v_WP: Velocity (x, y) of P in W, m/s; floats or AutoDiffXd.
         numbers: ``ContactNumbers``.
 
     Returns:
-        ``Contact`` of each.
+        List of ``Contact``.
     """
     found = []
     for slot in range(OBJECT_SLOTS):
@@ -113,7 +114,7 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
         if numbers.fades:
             share = 1.0 - distance / numbers.begins_m
         n = -x / distance, -y / distance
-        # Eq. 10 has the obstacle itself in the place of the envelope point.
+        # Eq. 10 has the obstacle itself instead of the envelope point.
         attracts = numbers.spring_sign < 0.0
         overlap = distance if attracts else numbers.rest_m - distance
         found.append(Contact(n, distance, overlap, v_relative, share))
@@ -122,16 +123,18 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
 
 @register_jitable
 def contact_force(contacts: Any, stiffness: Any, damping: Any, numbers: Any) -> Any:
-    """V = sum of K_e overlap n - D_e (v - v_j), eq. 4 and 5 with the signs restored.
+    """Computes the force of all contacts, V = sum of K_e overlap n - D_e (v - v_j).
+
+    These are eq. 4 and 5 with restored signs, unless ``numbers`` has other signs.
 
     Args:
-        contacts: From ``contacts_of_objects``.
-        stiffness: K_e, N/m.
-        damping: D_e, N s/m.
+        contacts: Result of ``contacts_of_objects``.
+        stiffness: Stiffness K_e, N/m.
+        damping: Damping D_e, N s/m.
         numbers: ``ContactNumbers``.
 
     Returns:
-        (x, y) N.
+        (Vx, Vy) in W, N.
     """
     fx = fy = 0.0
     for contact in contacts:
@@ -144,20 +147,21 @@ def contact_force(contacts: Any, stiffness: Any, damping: Any, numbers: Any) -> 
 
 @register_jitable
 def step_is_blocked(objects: Any, step: Any, block_m: Any) -> Any:
-    """Whether eq. 6 refuses a step of P.
+    """Returns whether eq. 6 refuses a step of P.
 
-    Eq. 6 allows a new position if its distance d from every object is greater than
-    L_block, and leaves the robot where it is otherwise. A step that ends within
-    L_block but leads away from the object is allowed here: a robot with momentum
-    comes to rest up to v (T + motor lag) farther on, and would stay there for ever.
+    Eq. 6 allows a new position if its distance from every object is greater than
+    L_block. Otherwise the robot stays at its position. This function also allows a step
+    that ends within L_block but leads away from the object. A robot with momentum comes
+    to rest up to v (T + motor lag) farther on. Without this exception it could never
+    leave such a position.
 
     Args:
-        objects: As of the port ``objects_W``.
-        step: (x, y) from P to its next position, m; floats or AutoDiffXd.
-        block_m: L_block, m.
+        objects: Vector of the port ``objects_W``, with the present positions.
+        step: Vector (x, y) from P to its next position in W, m; floats or AutoDiffXd.
+        block_m: Distance L_block, m.
 
     Returns:
-        True where it is refused. Objects count where they are now.
+        True if the step is refused.
     """
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE
@@ -175,18 +179,19 @@ def state_matrices(
     target: tuple[float, float],
     contacts: list[tuple[float, float]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.float64]]]:
-    """A, B1 and B2j of eq. 11 to 14, for one axis, signs restored.
+    """Computes A, B1, and B2j of eq. 11 to 14 for one axis with restored signs.
 
-    The state is (p, v); u_d = (p_d, v_d), and X_j = (x_e, v_e) is the envelope point
-    of object j, S before it, and its velocity.
+    The state is (p, v). The inputs are u_d = (p_d, v_d) and X_j = (x_e, v_e) of each
+    object j. x_e is the envelope point at the distance S from the object, v_e its
+    velocity.
 
     Args:
-        mass: M, kg.
-        target: K, N/m, and D, N s/m.
-        contacts: K_e and D_e of each object.
+        mass: Virtual mass M, kg.
+        target: Stiffness K, N/m, and damping D, N s/m, to the target.
+        contacts: Stiffness K_e, N/m, and damping D_e, N s/m, of each object.
 
     Returns:
-        (2, 2) each.
+        A and B1, (2, 2) each, and the list of all B2j, (2, 2) each.
     """
     sums = np.sum([target, *contacts], axis=0)
     a = np.array([[0.0, 1.0], [-sums[0] / mass, -sums[1] / mass]])

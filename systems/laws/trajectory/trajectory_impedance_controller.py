@@ -1,4 +1,4 @@
-"""The law of a robot on a route: impedance to its target and to what is near it."""
+"""The law of a robot on a route: impedance to its target and to near objects."""
 
 from __future__ import annotations
 
@@ -28,26 +28,27 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
-#: A target that moves straight back faster than this drives P a little aside, m/s.
+#: If a target moves straight back faster than this, its velocity turns aside, m/s.
 _BACK_M_S = 0.05
 
 
 class TrajectoryNumbers(NamedTuple):
-    """What the step of ``TrajectoryImpedanceController`` depends on."""
+    """Constants of the step of ``TrajectoryImpedanceController``."""
 
     impedance: tuple[float, float, float]
-    """K, D and K_e, where nothing adapts."""
+    """K, N/m, D, N s/m, and K_e, N/m, without adaptation."""
     contact_damping: float
-    """D_e, N s/m."""
+    """Contact damping D_e, N s/m."""
     contacts: ContactNumbers
     mass: float
+    """Virtual mass M, kg."""
     acceleration_limit: float
-    """m/s^2."""
+    """Largest acceleration of the virtual mass, m/s^2."""
     control_point_m: float
     block_m: float
-    """L_block, m; 0: eq. 6 is off."""
+    """Distance L_block, m; 0: eq. 6 is off."""
     top_speed: float
-    """Of P, m/s."""
+    """Top speed of P, m/s."""
     tick_s: float
 
 
@@ -70,9 +71,9 @@ def _command(
         T = numbers.tick_s
         vx, vy = integrate_velocity(v_WP, (ax, ay), T, numbers.top_speed)
         if step_is_blocked(objects, (T * vx, T * vy), numbers.block_m):
-            # The wheel command integrates this to a velocity of zero. The limit of
-            # acceleration is not kept: P has to stay, and the motors' lag is limit
-            # enough.
+            # The wheel command integrates this acceleration to a velocity of zero. It
+            # may exceed the acceleration limit, because P has to stop at once. The lag
+            # of the motors still smooths the motion.
             ax, ay = -v_WP[0] / T, -v_WP[1] / T
     outputs[0][0], outputs[0][1] = ax, ay
     outputs[1][0], outputs[1][1] = ux, uy
@@ -83,7 +84,7 @@ def _command(
 def trajectory_impedance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
 ) -> None:
-    """Computes acceleration and forces with K, D and K_e of the parameters."""
+    """Computes acceleration and forces with K, D, and K_e of the parameters."""
     _command(inputs, numbers.impedance, outputs, numbers)
 
 
@@ -91,35 +92,37 @@ def trajectory_impedance_step(
 def adapted_impedance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
 ) -> None:
-    """Computes acceleration and forces with K, D and K_e of the last input."""
+    """Computes acceleration and forces with K, D, and K_e of the port ``impedance``."""
     _command(inputs, inputs[4], outputs, numbers)
 
 
 @define_for_scalars("TrajectoryImpedanceController_", __name__)
 def TrajectoryImpedanceController_(T):
     class Impl(Block_[T]):
-        """Pulls P to a moving target, and off robots and obstacles.
+        """Pulls P to a moving target and pushes it off robots and obstacles.
 
-        M p'' = -K (p - p_d) - D (v - v_d) + sum of K_e (S - d) n - D_e (v - v_j), with
-        n from object j to P, where it is nearer than S. With ``adapts`` there is an
-        input port ``impedance``, whose K, D and K_e replace those of the parameters. A
-        function of the present input: no state, no latency.
+        M p'' = -K (p - p_d) - D (v - v_d) + sum of K_e (S - d) n - D_e (v - v_j). The
+        sum is over the objects j that are nearer to P than S. n is the unit vector from
+        object j to P. With ``adapts`` there is an input port ``impedance``. Its K, D,
+        and K_e replace those of the parameters. The outputs are functions of the
+        present input. There is no state and no latency.
 
-        With ``block_distance_m`` (eq. 6) the acceleration is -v/T, which stops the
-        virtual mass at once, where its next step would end within that distance of an
-        object and would not lead away from it.
+        ``block_distance_m`` switches eq. 6 on. It applies if the next step would end
+        within this distance of an object and would not lead away from the object. Then
+        the acceleration is -v/T, which stops the virtual mass at once.
 
-        At most eight objects count. With D_e summed over contacts beyond 2M/T (80 N s/m
-        for 1 kg) the sampled loop is unstable: a scan is reduced to objects first.
+        At most eight objects count. The sampled loop is unstable if the sum of D_e over
+        all contacts exceeds 2M/T (80 N s/m for 1 kg). Therefore the robot reduces a
+        scan to objects first.
 
         Args:
             parameters: ``TrajectoryImpedanceParameters``.
-            robot: Mass and place of P.
-            adapts: Whether there is the port ``impedance``.
+            robot: Mass, top speed, and position of P.
+            adapts: Whether there is an input port ``impedance``.
             tick_s: Period, s.
 
         Reference: Engelbrecht, Steyn and Djouani (2021), eq. 1 to 6, with the signs
-        that their text asks for; docs/errata.md lists the differences.
+        that their text requires. docs/errata.md lists the differences.
         """
 
         inputs = (

@@ -1,4 +1,4 @@
-"""The laws of robots on routes: one controller, with adaptation or with a filter."""
+"""The laws of robots on routes: one controller, also with adaptation or a filter."""
 
 from __future__ import annotations
 

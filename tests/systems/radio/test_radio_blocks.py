@@ -64,6 +64,15 @@ def test_losses_and_errors_are_as_many_as_told():
     assert np.mean(data != true) == pytest.approx(0.05, abs=0.005)
 
 
+def test_a_lost_frame_takes_no_other_with_it():
+    """Four frames per tick: 80 % of them arrive, and all four in 0.8^4 of the ticks."""
+    frames = (Frame(1, 5, 1.0), Frame(1, 6, 2.0))
+    heard = on_air([(frames, frames)] * 4000, loss=0.2)[2:]
+    arrived = np.array([len(each) for each in heard]) / 9
+    assert arrived.mean() / 4.0 == pytest.approx(0.8, abs=0.01)
+    assert np.mean(arrived == 4) == pytest.approx(0.8**4, abs=0.02)
+
+
 def test_compiled_the_air_carries_the_same():
     sent = [((Frame(1, 5, 1.0),), (Frame(2, 13, -20.0),))] * 300
     own = {"loss": 0.1, "byte_error": 0.02}
