@@ -124,4 +124,6 @@ def test_files_that_overload_functions_of_others_are_part_of_every_digest():
         for file in (ROOT / package).rglob("*.py")
         if "@overload(" in file.read_text("utf-8")
     }
-    assert found == {*OVERLOADS}
+    # The tracker overloads functions of its own file alone.
+    own = ROOT / "systems" / "hearing" / "tracking" / "tracker_model.py"
+    assert found == {*OVERLOADS, own}
