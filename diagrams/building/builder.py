@@ -34,9 +34,10 @@ class SoundFollower:
     diagram: Diagram
     scenario: Scenario
     robots: Mapping[str, Parts]
-    """Blocks of each robot: plant, odometry, hearing, tracker, collision, controller,
-    command; with audio also microphones; with ultrasonic sensing also ultrasonic; with
-    a loudspeaker also emitter."""
+    """Blocks of each robot. A robot that follows a sound has plant, odometry, hearing,
+    tracker, collision, controller and command. Robots that hear audio also have
+    microphones. Robots with ultrasonic sensing also have ultrasonic. Robots with a
+    loudspeaker also have emitter."""
     sources: Mapping[str, Parts]
     """Blocks of each source: source, and with audio also emitter."""
     obstacles: Obstacles
@@ -61,7 +62,7 @@ class SoundFollower:
 
     @cached_property
     def blocks(self) -> dict[str, Any]:
-        """Blocks by part: of the only robot, of its source, and ``obstacles``."""
+        """Blocks of the only robot and of its source, and ``obstacles``, by part."""
         robot = self.only
         target = self.scenario.target(next(iter(self.robots)))
         sources = self.sources[target].blocks if target in self.sources else {}
@@ -171,9 +172,8 @@ class _World:
     def surround(self, name: str) -> None:
         """Connects all inputs of a robot.
 
-        A robot has only those inputs that its blocks need. The poses and sizes of
-        bodies are those of the obstacles, followed by those of other robots and
-        sources.
+        A robot has only the inputs that its blocks need. ``poses_WO`` and ``sizes``
+        contain the obstacles first, and then the other robots and the sources.
         """
         around, target = self.scenario.surroundings(name), self.scenario.target(name)
         if self.shared is not None:

@@ -27,16 +27,18 @@ _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
 def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> Any:
     """Builds the controller that ``scenario.law`` names.
 
-    A user's own law is ``package.module:Name`` or ``path/to/file.py:Name``; Python also
-    searches the working directory. It is either a function or a class:
+    The name of a user's own law is ``package.module:Name`` or
+    ``path/to/file.py:Name``; Python also searches the working directory. The law is
+    either a function or a class.
 
-    A function ``law(c, s, repulsion)`` returns the force away from an obstacle, N. It
-    is called at a few distances and speeds as a test.
+    A function ``law(c, s, repulsion)`` returns the force away from an obstacle, N. c is
+    the distance of the obstacle, m, and s is its speed, m/s. ``make_controller`` calls
+    the law at a few distances and speeds as a test.
 
     A class derives from LeafSystem. Its arguments may be ``robot``, ``attraction``,
     ``repulsion``, ``sensors``, ``tick_s``, ``following``, ``known``, ``bodies`` and
-    ``seed``. Its inputs have the names of output ports in the diagram. It has exactly
-    one of the outputs that ``make_command`` accepts.
+    ``seed``. Each of its inputs has the name of an output port in the diagram. The
+    class has exactly one of the outputs that ``make_command`` accepts.
 
     Args:
         scenario: Scenario with the law and the parameters of its block.
@@ -80,8 +82,9 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         return controller(**parts)
     law = import_own(name, "law")
     if inspect.isclass(law):
-        # Pass only those of ``more`` that the signature names: a law that takes any
-        # keyword may pass all of them on to a law of the package, which rejects some.
+        # Pass only those arguments of ``more`` that the signature names. A law that
+        # accepts any keyword may pass all arguments on to a law of the package, which
+        # rejects some of them.
         named = inspect.signature(getattr(law, "_construct", law)).parameters
         wanted = {key: value for key, value in more.items() if key in named}
         return _own_block(name, law, {**parts, **wanted})
@@ -124,7 +127,7 @@ def make_command(
         tick_s: Period of the command, s.
 
     Returns:
-        The block, with an input of the same name.
+        The block. Its input has the same name as that output of the controller.
 
     Raises:
         InputError: The controller has none of these outputs, or several.

@@ -18,10 +18,10 @@ def with_own_blocks(
 
     Args:
         blocks: Blocks of the package by part.
-        names: Names of the user's blocks, ``package.module:Name`` or
-            ``path/to/file.py:Name``. A block of the user replaces the block with the
-            same part.
-        parts: Available arguments for their ``__init__``, by name.
+        names: Names of the user's blocks, as ``package.module:Name`` or
+            ``path/to/file.py:Name``. A block of the user replaces the block of the
+            package with the same part.
+        parts: Available arguments for ``__init__`` of the user's blocks, by name.
 
     Returns:
         A new mapping of blocks by part.

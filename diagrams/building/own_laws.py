@@ -23,8 +23,8 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
         law: ``law(c, s, repulsion)``; returns a force, N.
 
     Returns:
-        A function with the same arguments. It returns a finite float or AutoDiffXd, N,
-        or raises InputError.
+        A function with the same arguments. It returns a finite force, N, as a float or
+        AutoDiffXd, or raises InputError.
     """
 
     @functools.wraps(law)

@@ -36,7 +36,8 @@ from systems.laws.impedance_controller import LAW_COLUMNS
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import SoundParameters
 
-#: Inputs of a robot that come from the world; ``emission`` includes all emissions.
+#: Inputs of a robot that come from the world; ``emission`` also represents all inputs
+#: ``emission_<name>``.
 OUTSIDE = "pose_WS", "poses_WO", "sizes", "emission", "wind", "plume", "air"
 
 
@@ -48,7 +49,7 @@ class Parts:
     blocks: Mapping[str, Any]
     """Blocks by part, for example ``plant``."""
     log: VectorLogSink | None = None
-    """Log of the logged ports, one after the other; None if the diagram has no log."""
+    """Log with the values of all logged ports; None if the diagram has no log."""
     logged: Mapping[tuple[str, str], tuple[str, ...]] = field(default_factory=dict)
     """Columns of the log by (part, port), in order."""
 
@@ -95,7 +96,7 @@ def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ..
 
 
 def publishes_state(block: Any, port: str) -> bool:
-    """Whether an output of a block is part of the state, computed by the last update.
+    """Whether an output of a block is a part of its state, set by the last update.
 
     Args:
         block: A block of a robot or of the world.
@@ -130,12 +131,12 @@ def block_seed(seed: int, name: str) -> int:
 def seed_of(scenario: Scenario, block: str, owner: str) -> int:
     """Returns the seed of a block of a robot or source.
 
-    The names of the only robot and of the only source do not affect the seed.
+    The default names ``robot`` and ``source`` do not affect the seed.
 
     Args:
         scenario: The scenario that is run.
         block: Name of the block.
-        owner: Name of the robot or source that has it.
+        owner: Name of the robot or source that has the block.
 
     Returns:
         A seed, see ``block_seed``.
@@ -168,8 +169,8 @@ def robot_blocks(
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         name: Name of the robot; its random numbers depend on the name.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Numbers of those bodies that are robots.
-        others: Names of the sources that the robot does not follow.
+        robots: Indices of the bodies that are robots.
+        others: Names of the sources and loudspeakers that the robot does not follow.
 
     Returns:
         Blocks by part, not yet in a diagram.
@@ -241,23 +242,23 @@ def make_robot(
 
     The same function builds all levels of detail: ``hearing`` and ``obstacle_sensing``
     select blocks with the same ports. Each input connects to the only output with the
-    same name (see docs/model.md). With both ideal and ``odometry.rounding`` off, the
-    diagram converts to AutoDiffXd.
+    same name (see docs/model.md). If both are ``ideal`` and ``odometry.rounding`` is
+    off, the diagram can be converted to AutoDiffXd.
 
-    The diagram has those of the following inputs that its blocks need: ``pose_WS`` and
-    ``emission`` of the target, ``poses_WO`` and ``sizes`` of the other bodies,
-    ``emission_<name>`` of each other source, and ``wind``, ``plume`` and ``air`` of the
-    world. Its outputs are ``pose_WB`` and ``velocity_WB``, with a loudspeaker
-    ``own_emission``, and for a searching robot ``frames``.
+    The diagram has only the inputs that its blocks need. The possible inputs are
+    ``pose_WS`` and ``emission`` of the target, ``poses_WO`` and ``sizes`` of the other
+    bodies, ``emission_<name>`` of each other source, and ``wind``, ``plume`` and
+    ``air`` of the world. Its outputs are ``pose_WB`` and ``velocity_WB``. A robot with
+    a loudspeaker also has ``own_emission``, and a searching robot has ``frames``.
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         name: Name of the robot; its random numbers depend on the name.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Numbers of those bodies that are robots.
-        others: Names of the sources that the robot does not follow.
-        listeners_frame_s: Longest audio frame of the robots that hear its loudspeaker,
-            s.
+        robots: Indices of the bodies that are robots.
+        others: Names of the sources and loudspeakers that the robot does not follow.
+        listeners_frame_s: Longest audio frame, s, of the robots that hear the
+            loudspeaker.
         log: Whether to log the columns of its blocks at every tick.
 
     Returns:
@@ -295,8 +296,8 @@ def make_robot(
 def make_world(scenario: Scenario, *, log: bool = False) -> Diagram | None:
     """Builds the diagram of the blocks that all robots share.
 
-    Its inputs are ``frames_<name>`` of each searching robot. Its outputs are those of
-    its blocks that robots need, for example ``air``.
+    Its inputs are ``frames_<name>`` of each searching robot. Its outputs are the ports
+    of its blocks that robots need, for example ``air``.
 
     Args:
         scenario: The scenario that is run.
@@ -329,7 +330,7 @@ def make_source(
 ) -> Diagram:
     """Builds the diagram of a source, which moves along its waypoints.
 
-    Its outputs are ``pose_WS``, ``v_WS``, and ``emission`` if it is audible.
+    Its outputs are ``pose_WS`` and ``v_WS``. An audible source also has ``emission``.
 
     Args:
         scenario: Scenario with the seed, the air and the room.
@@ -466,8 +467,8 @@ def connect_by_name(
             begin with one of these and an underscore also count.
 
     Raises:
-        InputError: Several blocks publish a needed quantity, or none does and it does
-            not come from outside.
+        InputError: Several blocks publish a quantity that a block needs; or no block
+            publishes it, and it does not come from outside.
     """
     outputs = require_published(blocks, outside)
     entries: dict[str, Any] = {}
@@ -491,10 +492,11 @@ def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str
         outside: Quantities from outside, see ``connect_by_name``.
 
     Returns:
-        Their output ports by name.
+        All output ports of the blocks, by name.
 
     Raises:
-        InputError: Names the block and the input that it needs.
+        InputError: An input is not published exactly once. The error names the input
+            and its block.
     """
     blocks, outputs, counts = list(blocks), {}, Counter[str]()
     for block in blocks:
@@ -516,10 +518,10 @@ def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str
 
 
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:
-    """Columns of a block's output ports, by port.
+    """Returns the columns of a block's output ports, by port.
 
-    A user's own block without columns has those of ``LAW_COLUMNS`` for which it has a
-    port of the right size.
+    A user's own block without the attribute ``columns`` uses ``LAW_COLUMNS``. Names of
+    columns apply only if the block has a port of the right size.
     """
     columns = getattr(block, "columns", None) or LAW_COLUMNS
     ports = {
@@ -532,7 +534,10 @@ def _columns(block: Any) -> dict[str, tuple[str, ...]]:
 
 
 def _add_log(builder: DiagramBuilder, blocks: Sequence[Any], tick_s: float) -> None:
-    """Adds one log behind a multiplexer: a third cheaper than a log per port."""
+    """Adds one log for all ports, behind a multiplexer.
+
+    It takes a third less time than one log per port.
+    """
     ports = [block.GetOutputPort(name) for block in blocks for name in _columns(block)]
     joined = multiplexed(builder, "log_multiplexer", ports)
     LogVectorOutput(joined, builder, publish_period=tick_s).set_name("log")

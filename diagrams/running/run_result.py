@@ -28,13 +28,13 @@ class RunResult:
     """What a robot did at every tick, and why its run ended.
 
     For a run of several robots, ``robots`` has one result per robot. Column names then
-    begin with the name of the robot and a dot. ``cause`` is that of the decisive robot,
-    see ``decisive_robot``.
+    begin with the name of the robot and a dot. ``cause`` is then the cause of one
+    robot, see ``decisive_robot``.
     """
 
     scenario: Scenario
-    """The scenario that was run. For one of several robots: the scenario of that robot
-    alone (``Scenario.of_robot``)."""
+    """The scenario that was run. In the result of one of several robots, it is the
+    scenario of that robot alone (``Scenario.of_robot``)."""
     cause: str
     """One of reached, completed, found, unsettled, timeout, astray, collision, stuck,
     no way found, false find, lost, diverged, interrupted; docs/model.md defines
@@ -55,12 +55,13 @@ class RunResult:
     others: Surroundings | None = None
     """Surroundings of this robot, including the recorded paths of the other robots."""
     whole: Scenario | None = None
-    """The whole scenario, if it has more than ``scenario``."""
+    """The whole scenario; None if ``scenario`` is the whole scenario."""
     ended: float = 0.0
     """Number of the ending of a search, see ``systems.search.search_ending``."""
     world: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """What the sink of a search heard from each robot. The columns of each robot have
-    it, too: ``robot.frames`` here is ``sink_frames`` there."""
+    """Columns with the data that the sink of a search heard from each robot. The
+    results of each robot contain these data, too: ``robot.frames`` in ``world`` is the
+    same as ``sink_frames`` in ``columns`` of ``robot``."""
 
     @property
     def full_scenario(self) -> Scenario:
@@ -79,7 +80,7 @@ class RunResult:
 
     @cached_property
     def surroundings(self) -> Surroundings:
-        """The bodies that the robot could hit, and the one that it followed."""
+        """The bodies that the robot could hit, and its target."""
         return self.others or self.scenario.surroundings()
 
     @property
@@ -101,7 +102,7 @@ class RunResult:
 
     @property
     def goal_radius_m(self) -> float:
-        """P is in the goal within this distance of the target, m."""
+        """Greatest distance of P from the target with which P is in the goal, m."""
         return self.scenario.goal_radius(moves=self.target_moves)
 
     @property
@@ -150,8 +151,8 @@ def gather_result(
         world: Columns of the blocks that all robots share.
 
     Returns:
-        The result of the only robot; or one result for all robots, with those of the
-        robots in ``several``.
+        The result of the only robot. If there are several robots, one result for all
+        robots together; its field ``several`` contains the result of each robot.
     """
     paths = {
         name: RecordedPath(log["t"], np.column_stack([log[key] for key in _POSE]))
@@ -232,7 +233,11 @@ def logged_columns(
 def _completed(
     columns: dict[str, NDArray[np.float64]], scenario: Scenario, around: Surroundings
 ) -> dict[str, NDArray[np.float64]]:
-    """Adds columns that the log implies: P, true and measured source position."""
+    """Adds columns that follow from the log.
+
+    They contain the position of P, the true pose of the source, and the true and
+    measured range and bearing of the source.
+    """
     offset, theta = scenario.robot.control_point_m, columns["theta_WB"]
     c, s = np.cos(theta), np.sin(theta)
     x_P = columns["p_WB_x"] + offset * c

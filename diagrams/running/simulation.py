@@ -24,7 +24,8 @@ from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import WORLD, Scenario
 from systems.framework.input_error import InputError
 
-# Within this time a robot has heard a source that sounds from the start, and follows.
+# After this time, s, a robot has heard a source that sounds from the start, and
+# follows it.
 _FIRST_TICKS_S = 0.15
 # Kinds of scenarios whose compiled code this process has loaded.
 _LOADED: set[tuple[object, ...]] = set()
@@ -58,13 +59,14 @@ def simulate(
 
     Args:
         scenario: The scenario to run.
-        follower: A diagram of the same scenario, built with ``log=True``, to use again.
-            Drake never frees blocks written in Python, so many runs in one process
-            should share one diagram. Compiled runs share blocks automatically.
+        follower: Existing diagram of the same scenario, built with ``log=True``. Drake
+            never frees blocks written in Python, so many runs in one process should
+            share one diagram. Compiled runs share blocks automatically.
         progress: Called with the simulated time, s, once per simulated second.
         engine: ``drake``, or ``compiled``, which runs the same blocks in one compiled
-            loop. Their first use compiles the blocks for up to 15 s; the code stays on
-            the disk. None: the engine of the scenario; ``auto`` means Drake.
+            loop. The first compiled run takes up to 15 s to compile the blocks; the
+            code stays on the disk. None: the engine of the scenario, where ``auto``
+            means ``drake``.
         audio: Open files for the sound of the run; None: no sound is saved.
 
     Returns:
@@ -231,10 +233,11 @@ def _python_views(follower: SoundFollower, context: Any) -> list[Any]:
 def load_compiled_code(follower: SoundFollower) -> None:
     """Compiles or loads the numba code that a diagram needs, by running a few ticks.
 
-    A process does so once for each kind of diagram. numba compiles the code, or loads
-    the code that an earlier process compiled. Loading takes a tenth of the time of a
-    run of 40 s; compiling takes many times that. Neither counts as simulation time.
-    ``simulate`` calls this function; a process that forks calls it before it forks.
+    Each process needs to do this only once for each kind of diagram. numba compiles the
+    code, or loads the code that an earlier process compiled. Loading takes about a
+    tenth of the computing time of a run of 40 s; compiling takes many times longer.
+    Neither counts as simulation time. ``simulate`` calls this function. A process that
+    forks should call it before the fork.
 
     Raises:
         InputError: See ``simulate``.

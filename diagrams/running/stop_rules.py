@@ -1,4 +1,4 @@
-"""When a run ends: exactly one cause, checked at every tick."""
+"""The stop rules: they decide at every tick whether a run ends, and for which cause."""
 
 from __future__ import annotations
 
@@ -32,15 +32,16 @@ INTERRUPTED = "interrupted"
 
 #: Tolerance for rounded tick times, s: a rest of exactly ``stop.rest_time_s`` counts.
 ROUNDING_S = 1e-9
-#: Least number of parts per tick for contacts, and the greatest distance that a body
-#: on its own path may move in one part, m. Faster bodies cut the ticks into more parts.
+#: The rules check for contacts at the ends of equal parts of a tick. These are the
+#: least number of parts, and the greatest distance that a body on its own path may move
+#: in one part, m. If a body is faster, ticks have more parts.
 BETWEEN_TICKS, _PART_M = 5, 0.02
 
 #: Port by which a law reports that no route leads to the target, 0 or 1.
 GIVES_UP = "gives_up"
 #: Port by which a search reports how it ended.
 SEARCH_REPORT = "search_report"
-#: Ports of the contact switches of a searching robot, and of the body they touch.
+#: Ports of the contact switches of a searching robot, and of the body that they touch.
 CONTACT, TOUCHED = "contact", "touched"
 
 _Places = Mapping[str, tuple[float, float, float]]
@@ -54,9 +55,10 @@ class Collision:
     object: str
     """Name of the body that the robot touched."""
     fault: str
-    """``robot`` or ``obstacle``: the one that came nearer since the last tick, if the
-    other one had stood still. Turning counts as motion. A body at rest is never at
-    fault."""
+    """Which one is at fault, ``robot`` or ``obstacle``. The rule compares the motion of
+    the robot alone since the last tick with that of the body alone. The motion that
+    brings the two nearer to each other decides. Turning counts as motion. A body at
+    rest is never at fault."""
     time: float
     """Time of the first contact, s, with a resolution of a fifth of a tick or
     better."""
@@ -68,8 +70,7 @@ class NearBody(NamedTuple):
     name: str
     body: Body
     reach_m: float
-    """The robot and the body cannot touch if their centers are farther apart than this,
-    m."""
+    """Distance of the centers, m, beyond which the robot and the body cannot touch."""
     step_m: float
     """Upper bound of the distance that the body moves in a tick on its own path, m; 0
     for another robot."""
@@ -78,8 +79,9 @@ class NearBody(NamedTuple):
 def decisive_robot(robots: Mapping[str, RobotRules]) -> str:
     """Returns the name of the robot whose cause is the cause of the whole run.
 
-    It is the first robot that collided or diverged. Without one, it is the first robot
-    that did not do what it should; otherwise the first robot.
+    It is the first robot that collided or diverged. If there is none, it is the first
+    robot that was neither successful nor interrupted. If there is no such robot either,
+    it is the first robot.
 
     Args:
         robots: Stop rules of the robots, by name.
@@ -116,7 +118,7 @@ class RunRules:
     """When a run of one or several robots ends.
 
     The run ends when every robot has a cause, or when a robot collides or diverges. A
-    robot that has ended for another reason keeps moving with the others.
+    robot with any other cause keeps moving until the run ends.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -188,7 +190,7 @@ class StopRules(RunRules):
         self._tick = -1
 
     def __call__(self, context: Any) -> EventStatus:
-        """Judges the run. The simulator calls this after every step.
+        """Judges the run; the simulator calls this method after every step.
 
         Steps may be shorter than ticks; this method ignores the instants between ticks.
         """
@@ -243,7 +245,7 @@ def instants_of(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
         parts: Number of parts per tick.
 
     Returns:
-        (n parts + 1,) instants, s; the ticks are among them.
+        (n * parts + 1,) instants, s, including the ticks.
     """
     shares = np.arange(1, parts + 1) / parts
     between = times[:-1, None] + shares * np.diff(times)[:, None]
@@ -277,10 +279,10 @@ FOUND = (
 DIVERGED = FOUND.index("diverged")
 
 #: State of ``judge_tick`` before the first tick. Its entries are:
-#: 0 to 2: start time, s, and position of P, m, of the present stay in one place;
-#: 3: time of the last valid target, s; 4: time since which P rests in the goal, s;
+#: 0 to 2: time, s, and position of P, m, when P began to stay in its present place;
+#: 3: time of the last valid target, s; 4: time at which P came to rest in the goal, s;
 #: 5: whether P has been in the goal; 6: number of ticks since the first detection;
-#: 7: number of those ticks in which P followed the target.
+#: 7: number of ticks since the first detection in which P followed the target.
 UNJUDGED = (0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
 
 
@@ -297,9 +299,10 @@ def judge_tick(
     """Decides whether a run ends at a tick, and why, apart from contacts.
 
     The rules apply in this order: diverged, reached, lost, stuck or no way found.
-    ``state`` holds the start of each condition that must last for some time. It also
-    counts the ticks since the first detection, and those of them in which P follows the
-    target. ``RobotRules.final_cause`` evaluates these counts when the time is over.
+    ``state`` holds the start time of each condition that must last for some time. It
+    also counts the ticks since the first detection, and among them the ticks in which P
+    follows the target. If the run reaches its time limit, ``RobotRules.final_cause``
+    evaluates these counts.
 
     Args:
         time: Time of the tick, s.
@@ -321,7 +324,7 @@ def judge_tick(
     if not distance <= stop.diverged_range_m:
         return 1
     in_goal = distance <= numbers.goal_radius_m
-    # Data for the cause at the end of the time.
+    # Data for the cause of a run that reaches its time limit.
     if in_goal:
         state[5] = 1.0
     if valid or state[6] > 0.0:
@@ -355,9 +358,9 @@ def judge_tick(
 def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> int:
     """Decides whether the run of a search ends at a tick, and why, apart from contacts.
 
-    A search that ended successfully counts as found only near the source; otherwise it
-    is a false find. A search for an odor must also end with the source ahead. A search
-    that was given up counts as lost.
+    A search that ended successfully counts as found if it ended near the source. A
+    search for an odor must also end with the source ahead. Otherwise it counts as a
+    false find. A search that was given up counts as lost.
 
     Args:
         ended: Number of the ending, see ``systems.search.search_ending``.
@@ -402,7 +405,7 @@ class JudgedTick(NamedTuple):
     """Index of the cause in ``FOUND`` that was found at this tick or before."""
     touched: tuple[int, float] | None
     """Number of the first body that was touched since the previous tick, and the
-    elapsed part of the tick at that time (0 to 1)."""
+    elapsed part of the tick at the contact (0 to 1); None: no contact."""
     ended: float = 0.0
     """Number of the ending of a search."""
 
@@ -441,8 +444,8 @@ class RobotRules:
     def _near_bodies(self) -> tuple[int, list[NearBody]]:
         """Returns the number of parts per tick, and the bodies that can be touched.
 
-        A fast body cuts the ticks into more parts, so that it moves at most ``_PART_M``
-        per part.
+        If a body is fast, ticks have more parts, so that the body moves at most
+        ``_PART_M`` per part.
         """
         size, tick_s = self.scenario.size, self.scenario.tick_s
         times = tick_s * np.arange(int(self.scenario.duration_s / tick_s + 1e-9) + 1.0)
@@ -461,8 +464,8 @@ class RobotRules:
     def judge(self, time: float, seen: Seen) -> None:
         """Applies the stop rules at a tick.
 
-        An earlier cause remains. However, a robot that has reached its goal beside
-        other robots can still collide.
+        A robot keeps the cause that it has already. However, it can still collide
+        while other robots continue; its cause is then collision.
 
         Args:
             time: Time of the tick, s.
@@ -534,9 +537,10 @@ class RobotRules:
     ) -> Collision | None:
         """Returns the first contact since the last tick, if there is one.
 
-        A body is skipped if it cannot have touched the robot: the distance of the
-        centers exceeds their reach plus both motions. ``first_overlap`` checks the
-        other bodies at the parts of the tick.
+        The function skips a body if its center is too far away for a contact. This is
+        so if the distance of the centers exceeds ``reach_m`` plus the motions of the
+        robot and the body since the last tick. ``first_overlap`` checks all other
+        bodies at the ends of the parts of the tick.
         """
         first = math.inf
         touched: NearBody | None = None
@@ -562,7 +566,7 @@ class RobotRules:
     def _collide(
         self, near: NearBody, part: float, time: float, pose: Sequence[float]
     ) -> Collision:
-        """Returns the collision with a body after a part of the tick (0 to 1)."""
+        """Returns a collision after the elapsed part ``part`` (0 to 1) of the tick."""
         instant = self._time + part * (time - self._time)
         fault = self._fault(instant, time, pose, near.body)
         return Collision(near.name, fault, instant)
@@ -572,9 +576,9 @@ class RobotRules:
     ) -> str:
         """Returns who is at fault for a contact, ``robot`` or ``obstacle``.
 
-        It compares two clearances: of the moved robot from the body at the last tick,
-        and of the moved body from the robot at the last tick. The smaller clearance
-        decides.
+        The function compares two clearances. The first is the clearance if only the
+        robot had moved since the last tick. The second is the clearance if only the
+        body had moved. The smaller clearance decides.
         """
         robot_then = self._footprint(self._time, time, pose)
         robot_now = self._footprint(instant, time, pose)

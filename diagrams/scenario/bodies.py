@@ -62,7 +62,7 @@ class LivePath:
         self._then = self._now = 0.0, pose
 
     def move(self, time: float, pose: Sequence[float]) -> None:
-        """Sets the pose at the next tick.
+        """Adds the pose at a new tick; only the last two ticks are kept.
 
         Args:
             time: Time of the tick, s.
@@ -77,7 +77,7 @@ class LivePath:
         return math.dist(self._then[1][:2], self._now[1][:2])
 
     def pose(self, time: float) -> tuple[float, float, float]:
-        """(x, y, theta) at a time in s, interpolated since the previous tick."""
+        """(x, y, theta) at a time in s, interpolated between the last two ticks."""
         (begin, then), (end, now) = self._then, self._now
         if time >= end or end <= begin:
             return now
@@ -112,12 +112,12 @@ class Surroundings:
     """The bodies that one robot can hit, and its target."""
 
     bodies: Mapping[str, Body]
-    """Bodies by name: obstacles, other robots, other sources, and finally the
-    target."""
+    """Bodies by name: obstacles, other robots, other sources, and finally the target
+    unless it is a goal."""
     target: str
     """Name of the target: the source, the leader, or the goal."""
     goal: Path | None = None
-    """A goal to drive to, instead of a body to follow."""
+    """Path of the goal, if the robot drives to a goal; None: the target is a body."""
 
     @property
     def followed(self) -> Body:

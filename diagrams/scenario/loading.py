@@ -37,11 +37,11 @@ def load_scenario(
     Args:
         source: A name from the library (``phonotaxis scenarios``), or the path of a
             file.
-        overrides: ``key=value`` with a dotted key, for example
-            ``source.speed_m_s=0.2``, ``obstacles.cart.size_m=[0.2, 0.1]`` for the
-            obstacle of that name, or ``obstacles.0.size_m=[0.2, 0.1]``; values are
-            YAML. A mapping of dotted keys to values also works, for example
-            ``{"source.speed_m_s": 0.2}``.
+        overrides: Texts ``key=value`` with a dotted key and a value in YAML, for
+            example ``source.speed_m_s=0.2``. An obstacle is given by its name or by its
+            index: ``obstacles.cart.size_m=[0.2, 0.1]`` or
+            ``obstacles.0.size_m=[0.2, 0.1]``. A mapping of dotted keys to values also
+            works, for example ``{"source.speed_m_s": 0.2}``.
 
     Returns:
         The validated scenario.
@@ -102,7 +102,8 @@ def dump_scenario(scenario: Scenario) -> str:
 def write_scenario(scenario: Scenario, directory: Path) -> None:
     """Writes the whole scenario and a copy of its schema, which helps editors.
 
-    The copy makes the directory independent of the machine and of its place.
+    With the copy, editors find the schema even if the directory is moved to another
+    place or machine.
 
     Args:
         scenario: The scenario, for ``scenario.yaml``.
@@ -158,7 +159,8 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
 
     Args:
         data: Fields of a scenario, changed in place.
-        folder: Folder of the file with the fields, or the working directory.
+        folder: Folder to which the paths are relative: that of the scenario file, or
+            the working directory.
     """
     for place in [
         data,
@@ -196,10 +198,11 @@ def parse_setting(text: str) -> tuple[str, Any]:
 
 
 def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
-    """Sets fields of a mapping, presets first, so that other fields override them.
+    """Sets fields of a mapping.
 
-    If a group already has a preset, a new preset clears the group. Missing groups on
-    the path to a field are created.
+    The function sets presets first, so that all other fields override them. If a group
+    already has a preset, a new preset clears the group. Missing groups on the path to a
+    field are created.
 
     Args:
         data: Fields of a scenario, changed in place.
@@ -209,7 +212,7 @@ def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
 
     Raises:
         InputError: A path leads into a plain value or past the end of a list, or a
-            list has no entry, or several entries, of a name.
+            name in it is the name of no entry or of several entries of a list.
     """
     for key, value in sorted(fields, key=lambda field: not _is_preset(*field)):
         _set_field(data, key, value)
@@ -238,7 +241,7 @@ def _descend(node: Any, part: str, key: str) -> Any:
     if isinstance(node, list):
         return node[_index(node, part, key)]
     if isinstance(node, dict):
-        if node.get(part) is None:  # also if a whole group is null, for example room
+        if node.get(part) is None:  # missing, or null, for example room
             node[part] = {}
         return node[part]
     raise InputError(key, "leads into a plain value; shorten the key")

@@ -31,7 +31,7 @@ OURS = ("analysis", "diagrams", "phonotaxis", "systems")
 
 #: Loaded modules of users and the SHA-256 of their files, by name of the module.
 _LOADED: dict[str, tuple[ModuleType, str]] = {}
-#: Whether changed modules are not loaded again, see ``code_of_sweep``.
+#: Whether loaded modules remain in use after a change, see ``code_of_sweep``.
 _KEEPS = False
 
 
@@ -39,8 +39,8 @@ def import_own(name: str, field: str) -> Any:
     """Imports the function or class that a name denotes.
 
     The result always corresponds to the present files. If the file of the module has
-    changed since it was loaded, the module is loaded again. The same applies to the
-    user's other modules that it uses.
+    changed since it was loaded, the module is loaded again. The same applies to those
+    other modules of the user that this module uses.
 
     Args:
         name: ``package.module:Name`` or ``path/to/file.py:Name``; Python also searches
@@ -51,7 +51,8 @@ def import_own(name: str, field: str) -> Any:
         The function or class.
 
     Raises:
-        InputError: It does not exist, or its module cannot be imported.
+        InputError: The function or class does not exist, or its module cannot be
+            imported.
     """
     module_name, _, attribute = name.rpartition(":")
     if not module_name or not attribute:
@@ -109,7 +110,7 @@ def _module_of(name: str) -> ModuleType:
 
 
 def _has_changed(module: ModuleType) -> bool:
-    """Whether a module's file differs from the loaded one; records a new module."""
+    """Whether a module's file has changed since loading; records a new module."""
     digest = _digest(Path(_file_of(module)))
     known, loaded = _LOADED.get(module.__name__, (None, ""))
     if known is not module:
@@ -147,11 +148,11 @@ def loaded_digests(scenario: Scenario) -> dict[str, str]:
     """Returns digests of a user's laws and blocks, which identify their versions.
 
     Args:
-        scenario: Any scenario; laws and blocks of the package have no files here.
+        scenario: Any scenario. Its laws and blocks from the package are ignored.
 
     Returns:
-        SHA-256 of each file of the user that the robots use, by absolute path. The
-        digests are those of the loaded code.
+        SHA-256 of each file of the user that the robots use, by absolute path. If a
+        file has changed since it was loaded, the digest is that of the loaded version.
 
     Raises:
         InputError: See ``import_own``.
@@ -170,12 +171,11 @@ def loaded_digests(scenario: Scenario) -> dict[str, str]:
 def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[None]:
     """Within this context, a scenario runs with the code of the start of its sweep.
 
-    Loaded code remains in use, even if its file changes, provided it is the wanted
-    code.
+    If all loaded code is the wanted code, it remains in use even if its files change.
 
     Args:
         scenario: The scenario to run.
-        wanted: SHA-256 of files by absolute path.
+        wanted: SHA-256 of each file at the start of the sweep, by absolute path.
 
     Yields:
         Nothing.
@@ -203,7 +203,7 @@ def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[Non
 
 
 def own_files(name: str, field: str) -> tuple[Path, ...]:
-    """Returns the source files of a user's module, and of the user's modules it uses.
+    """Returns the files of a user's module and of the user's modules that it uses.
 
     Args:
         name: Name of a law or a block.
@@ -226,8 +226,8 @@ def digests_of(module: ModuleType) -> dict[str, str]:
         module: An imported module.
 
     Returns:
-        SHA-256 of each file, as loaded, by absolute path; empty for a module without a
-        file.
+        SHA-256 of the loaded version of each file, by absolute path; empty for a module
+        without a file.
     """
     digests: dict[str, str] = {}
     for each in _users_modules(module):
@@ -263,7 +263,7 @@ def _file_of(module: ModuleType) -> str:
 
 
 def _users_modules(module: ModuleType) -> list[ModuleType]:
-    """A module and the modules that it uses, as far as they are files of the user."""
+    """Returns a module and all modules that it uses, if they are files of the user."""
     found: dict[str, ModuleType] = {}
     waiting = [module]
     while waiting:
@@ -272,7 +272,7 @@ def _users_modules(module: ModuleType) -> list[ModuleType]:
         if module.__name__ in found or file is None or not _is_users(module, file):
             continue
         found[module.__name__] = module
-        # Modules that it uses: those that it imports, and the origins of its objects.
+        # The module uses the modules that it imports or that define its objects.
         names = _imports(Path(file), module.__package__ or "")
         for value in list(vars(module).values()):
             of = "__name__" if isinstance(value, ModuleType) else "__module__"
@@ -328,7 +328,7 @@ def asked_for(maker: Callable[..., Any], parts: Mapping[str, Any]) -> dict[str, 
 
 
 def _is_users(module: ModuleType, file: str) -> bool:
-    """Whether a module is the user's, so that package versions do not determine it."""
+    """Whether a module belongs to the user, and not to an installed package."""
     # The running script cannot be loaded again.
     if module.__name__.partition(".")[0] in (*OURS, "__main__"):
         return False
@@ -339,11 +339,12 @@ def _is_users(module: ModuleType, file: str) -> bool:
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Whether Ctrl-C may have raised an exception, rather than a user's own code.
+    """Whether an exception comes from Ctrl-C, and not from a user's own code.
 
-    The handler of the command line raises its own class on Ctrl-C. With this handler, a
-    plain KeyboardInterrupt comes from the user's code. Python's default handler raises
-    a plain KeyboardInterrupt on Ctrl-C; with that handler, it counts as Ctrl-C.
+    On Ctrl-C, the handler of the command line raises a subclass of KeyboardInterrupt.
+    With this handler, a plain KeyboardInterrupt therefore comes from the user's code.
+    Python's default handler raises a plain KeyboardInterrupt on Ctrl-C. With the
+    default handler, a plain KeyboardInterrupt therefore counts as Ctrl-C.
 
     Args:
         error: An exception raised while a user's code ran.

@@ -59,20 +59,20 @@ class FollowerParameters(Parameters):
     """One robot: its law, hearing, sensors and body."""
 
     law: str = Field(default="active", min_length=1)
-    """A name that ``phonotaxis laws`` lists, ``package.module:Name``, or
-    ``path/to/file.py:Name``."""
+    """Name of a law in the list of ``phonotaxis laws``; or a user's own law, as
+    ``package.module:Name`` or ``path/to/file.py:Name``."""
     hearing: Literal["audio", "ideal"] = "audio"
     """``audio``: sound waves and microphones; ``ideal``: exact positions."""
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
     """``ultrasonic``: sensors with cones; ``ideal``: exact nearest points."""
     blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
-    """A user's own blocks, ``package.module:Name`` or ``path/to/file.py:Name``. A block
-    replaces the robot's block with the same part; otherwise it is added."""
+    """A user's own blocks, as ``package.module:Name`` or ``path/to/file.py:Name``. Each
+    replaces the robot's block with the same part; a block with a new part is added."""
     follows: str = ""
     """Name of the source or the leader to follow; empty: the first source."""
     loudspeaker: SoundParameters | None = None
-    """Sound that the robot itself plays at the origin of B, so that others can follow
-    it."""
+    """Sound that the robot itself plays at the origin of B, so that other robots can
+    follow it."""
     start: StartParameters = StartParameters()
     microphones: MicArrayParameters = MicArrayParameters()
     tdoa: TDOAParameters = TDOAParameters()
@@ -87,12 +87,13 @@ class FollowerParameters(Parameters):
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
     route: RouteParameters | None = None
-    """A goal to drive to on a planned route, instead of a sound to follow."""
+    """Goal and planner of a robot that drives on a planned route; null: the robot does
+    not drive on a route."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
     detector: ObjectDetectorParameters = ObjectDetectorParameters()
     guard: GuardParameters | None = None
-    """The guard keeps the robot in space that its sensors have seen as free, with any
-    law; null: no guard, unless the law is ``guarded``."""
+    """The guard works with any law and keeps the robot in space that its sensors have
+    seen as free; null: no guard, unless the law is ``guarded``."""
     free_space: FreeSpaceParameters = FreeSpaceParameters()
     search: PlumeSearchParameters = PlumeSearchParameters()
     gas_sensors: GasSensorParameters = GasSensorParameters()
@@ -118,7 +119,7 @@ class FollowerParameters(Parameters):
 
     @property
     def own_guard(self) -> GuardParameters | None:
-        """The guard of the robot; guarded laws always have one. None: no guard."""
+        """The guard of the robot, or None. A guarded law always has a guard."""
         if self.guard is None and self.law in LAWS and LAWS[self.law].guarded:
             return GuardParameters(obstacle_speed_m_s=0.6)
         return self.guard
@@ -155,5 +156,5 @@ class SourceParameters(SourceRobotParameters):
     sound: SoundParameters = SoundParameters()
     """The sound of the source."""
     body: bool = True
-    """Whether the source has a body that robots can hit and see; off: a loudspeaker in
-    the air."""
+    """Whether the source has a body that robots can hit and see; false: the source is
+    only a sound."""

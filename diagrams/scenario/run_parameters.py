@@ -27,10 +27,10 @@ from systems.world.parameters import ObstacleParameters
 #: The engine that simulates a run.
 Engine = Literal["drake", "compiled"]
 
-#: From this number of runs on, ``auto`` compiles.
+#: Number of runs from which ``auto`` selects the compiled engine.
 MANY_RUNS = 100
 
-#: Names of robots and sources, which are also names of files.
+#: Names of robots and sources, which also appear in names of files.
 _Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=64)]
 _Participants = Annotated[dict[_Name, dict[str, Any]], Field(max_length=16)]
 
@@ -39,34 +39,37 @@ class StopParameters(Parameters):
     """When a run ends, and what counts as following."""
 
     goal_margin_m: Length = 0.3
-    """Goal at a source at rest: P is within the follow distance plus this, m."""
+    """Margin of the goal at a source at rest, m. P is in the goal if its distance from
+    the source is at most the follow distance plus this margin."""
     rest_speed_m_s: Speed = 0.05
-    """At rest: P is slower than this, m/s."""
+    """Speed below which P is at rest, m/s."""
     rest_time_s: Duration = 1.0
-    """Reached: P is in the goal and at rest for this time without a break, s."""
+    """Time for which P must be at rest in the goal without a break, s. Then the run
+    ends as reached."""
     following_band_m: Length = 0.8
-    """Following: the distance from P to the source differs from the follow distance by
-    at most this, m."""
+    """Greatest deviation from the follow distance, m. P follows if its distance from
+    the source deviates from the follow distance by at most this value."""
     following_share: Fraction = 0.5
-    """Completed: P follows in at least this share of the time since the first
-    detection."""
+    """Least share of the time since the first detection in which P must follow, so that
+    the run counts as completed."""
     stuck_after_s: Duration = 10.0
-    """Stuck: P stays within ``stuck_radius_m`` outside of its goal for this time, s."""
+    """Time after which the run ends as stuck, s: P has stayed in one place (within
+    ``stuck_radius_m``) outside of its goal for this time."""
     stuck_radius_m: Length = 0.1
-    """Radius for ``stuck_after_s``, m."""
+    """Greatest distance, m, that P can move and still count as in one place."""
     lost_after_s: Duration = 20.0
-    """Lost: no valid target for this time, s."""
+    """Time without a valid target after which the run ends as lost, s."""
     diverged_range_m: Length = 20.0
-    """Diverged: the source or the goal is farther away than this, m."""
+    """Distance from the source or the goal beyond which the run ends as diverged, m."""
     odor_within_m: Length = 0.22
-    """Found: a search for an odor ends with the source within this distance of the
-    origin of B, m."""
+    """Greatest distance of the source from the origin of B, m, at the end of a search
+    for an odor that counts as found."""
     odor_ahead_deg: float = Field(default=75.0, ge=0.0, le=180.0)
-    """Found: in addition, the direction to the source differs from the heading by at
-    most this, deg."""
+    """Greatest angle between the heading and the direction to the source, deg, at the
+    end of a search for an odor that counts as found."""
     sound_within_m: Length = 0.6
-    """Found: a search for a sound ends with the source within this distance of the
-    origin of B, m."""
+    """Greatest distance of the source from the origin of B, m, at the end of a search
+    for a sound that counts as found."""
 
 
 class OdorSourceParameters(OdorParameters):
@@ -83,9 +86,9 @@ class IntegratorParameters(Parameters):
     """How Drake integrates the plant, with a fixed step."""
 
     scheme: Literal["runge_kutta2", "runge_kutta3", "runge_kutta5"] = "runge_kutta5"
-    """Integration scheme. With the default step and motor lag, the fifth order stays
-    within 1 um of the true path over 20 s for all commands; the third order deviates by
-    up to 0.6 mm."""
+    """Integration scheme. The errors of the path over 20 s with the default step and
+    motor lag, for all commands, are at most 1 um with ``runge_kutta5`` and up to 0.6 mm
+    with ``runge_kutta3``."""
     step_s: float = Field(default=0.0125, ge=1e-5, le=0.025)
     """Largest step, s."""
 
@@ -99,20 +102,20 @@ class RunParameters(Parameters):
     """One line for the list of ``phonotaxis scenarios``."""
     engine: Literal["drake", "compiled", "auto"] = "auto"
     """``drake``: Drake's simulator; ``compiled``: one compiled loop over the same
-    blocks, which agrees within 1e-9 m and takes a fraction of the time; ``auto``:
-    compiled for 100 or more runs at once."""
+    blocks, which is faster and agrees with Drake within 1e-9 m; ``auto``: ``compiled``
+    for 100 or more runs at once, otherwise ``drake``."""
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Seed of all random numbers of the run."""
     tick_s: Period = TICK_S
     """Period of control, odometry, emitters and log, s. Hearing and range sensors have
-    their own periods, which are multiples of it."""
+    their own periods, which are multiples of the tick."""
     duration_s: float = Field(default=40.0, ge=1e-9, le=3_600.0)
     """Longest simulated time, s; at most one hour."""
     arena_m: Size = (7.0, 7.0)
     """Extents of the floor in pictures, m; the arena has no walls."""
     robots: _Participants = Field(default={})
     """Robots by name, each with the fields that differ from those of the scenario;
-    empty: one robot, named ``robot``, without differences."""
+    empty: one robot, named ``robot``, with the fields of the scenario."""
     sources: _Participants = Field(default={})
     """Sources by name, each with the fields that differ from ``source`` and ``sound``;
     empty: one source, named ``source``. A source that no robot follows is an

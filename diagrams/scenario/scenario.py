@@ -61,7 +61,8 @@ class Scenario(FollowerParameters, RunParameters):
     """One run. Every field has a default: the default scenario is complete.
 
     The fields of a robot apply to all robots, unless ``robots`` sets them for one
-    robot. The same rule applies to sources.
+    robot. ``source`` and ``sound`` apply to all sources, unless ``sources`` sets them
+    for one source.
     """
 
     @cached_property
@@ -129,16 +130,17 @@ class Scenario(FollowerParameters, RunParameters):
         return max(robot.microphones.frame_s for robot in self.all_robots.values())
 
     def target(self, robot: str) -> str:
-        """Name of the source or leader that a robot follows, or of its goal."""
+        """Name of the target of a robot: a source, a leader, its goal, or the odor."""
         own = self.all_robots[robot]
         if own.has_goal:
             return GOAL if own.route is not None else ODOR
         return own.follows or next(iter(self.all_sources))
 
     def of_robot(self, name: str) -> Scenario:
-        """Returns the scenario of one robot, alone with the source that it follows.
+        """Returns the scenario of one robot and of the source that it follows.
 
-        If it follows a robot, ``source`` is at rest at the start of that leader.
+        If the robot follows a leader, ``source`` is at rest at the start pose of this
+        leader.
         """
         if not self.robots and not self.sources:
             return self
@@ -205,12 +207,13 @@ class Scenario(FollowerParameters, RunParameters):
         """Returns all bodies that a robot can hit and see, and its target.
 
         Args:
-            robot: Name of the robot; empty: the first one.
+            robot: Name of the robot; empty: the first robot.
             paths: Paths of the other robots; a robot without a path is at rest at its
                 start.
 
         Returns:
-            Bodies by name, the target last.
+            The bodies by name, and the target. If the target has a body, this body is
+            the last one.
         """
         robot = robot or next(iter(self.all_robots))
         target, paths = self.target(robot), paths or {}
@@ -236,7 +239,7 @@ class Scenario(FollowerParameters, RunParameters):
         return dict(self.surroundings().bodies)
 
     def robots_seen(self, robot: str) -> tuple[int, ...]:
-        """Numbers of those bodies that are robots, among all that a robot can see."""
+        """Indices of the other robots in ``surroundings(robot).obstacles``."""
         names = enumerate(self.surroundings(robot).obstacles)
         return tuple(number for number, name in names if name in self.all_robots)
 
@@ -260,11 +263,11 @@ class Scenario(FollowerParameters, RunParameters):
         return self.goal_radius(moves=self.source.path().moves)
 
     def goal_radius(self, *, moves: bool) -> NonNegative:
-        """P is in the goal within this distance of the target, m.
+        """Greatest distance of P from the target with which P is in the goal, m.
 
         Args:
-            moves: Whether the target moves. The goal is then as wide as the following
-                band.
+            moves: Whether the target moves. The follow distance is then increased by
+                the following band, and otherwise by the goal margin.
         """
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
         return self.follow_distance_m + margin
@@ -287,7 +290,7 @@ class Scenario(FollowerParameters, RunParameters):
 
     @model_validator(mode="after")
     def _check(self) -> Scenario:
-        # The other checks assume that these pass.
+        # All further checks assume that these three checks pass.
         self._check_names()
         self._check_targets()
         self._check_searches()
@@ -422,7 +425,8 @@ class Scenario(FollowerParameters, RunParameters):
                 )
 
     def _check_step(self) -> None:
-        # Limits of step over lag: longer steps of these schemes amplify a decay.
+        # Greatest stable ratio of step to lag. With longer steps, the integration
+        # scheme amplifies a solution that should decay.
         limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
         step = self.integrator.step_s
         for prefix, robot in self.robot_fields():

@@ -22,7 +22,8 @@ from systems.framework.input_error import InputError
 LARGEST_BYTES = 100_000
 #: Largest number of levels.
 DEEPEST = 20
-#: Largest size with all aliases expanded; a few lines of aliases can mean gigabytes.
+#: Largest number of characters after the expansion of all aliases. Without this
+#: limit, a few lines of aliases could expand to gigabytes.
 LARGEST_MEANING = 1_000_000
 
 
@@ -58,8 +59,8 @@ def parse_yaml(text: str | bytes, field: str) -> Any:
         raise InputError(
             field, f"is not valid YAML{where}: {what}; correct it"
         ) from None
-    # The constructors raise these for values that do not fit their tag, for example
-    # !!int x, 2024-13-45, !!bool x.
+    # The constructors of ruamel raise these errors for values that do not fit their
+    # tag, for example !!int x, 2024-13-45, !!bool x.
     except (YAMLError, ValueError, ArithmeticError, LookupError, TypeError) as error:
         text = f"is not valid YAML: {type(error).__name__}: {error}; correct it"
         raise InputError(field, text) from None

@@ -1,9 +1,9 @@
 """The motion of a robot that carries a loudspeaker along its waypoints.
 
 The carrier is a differential drive with the same equations as the plant
-(``plant_derivatives``). Its controller knows its pose. No other body acts on it, so
-its motion is a function of time. The motion is integrated once, tick by tick, up to
-the latest time that is needed.
+(``plant_derivatives``). The controller knows the pose of the carrier. No other body
+acts on the carrier, so its motion is a function of time. The motion is integrated once,
+tick by tick, up to the latest time that is needed.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ register_jitable(value_weights)
 #: Motors of the carrier. They have the same lag as those of the follower.
 _PLANT = PlantParameters()
 
-#: Time from a command to its mean effect: the motor lag, and half a tick because the
-#: command is held. The feed-forward looks ahead by this time.
+#: Time from a command to its mean effect, s: the motor lag plus half a tick, because
+#: the command is held for a tick. The feed-forward uses the plan this far ahead.
 LEAD_S = _PLANT.motor_lag_s + 0.5 * TICK_S
 
-# Feedback gains of the error ahead, 1/s, the error aside, 1/m^2, and the heading error,
-# 1/s. Errors ahead decay within half a second (ten motor lags). Errors aside decay over
-# 0.3 m of the path at 0.3 m/s.
+# Feedback gains: longitudinal error, 1/s; lateral error, 1/m^2; heading error, 1/s.
+# Longitudinal errors decay within half a second (ten motor lags). Lateral errors decay
+# over 0.3 m of the path at 0.3 m/s.
 _AHEAD, _ASIDE, _TURN = 2.0, 50.0, 5.0
 
 # Integration steps per tick.
@@ -59,7 +59,8 @@ def drive_along(
             m/s, rad/s), and left and right wheel speed, rad/s.
 
     Returns:
-        (n, 8) states at the n ticks after the first, up to the last.
+        (n, 8) states in the order of ``knot``, at the n ticks after the first tick, up
+        to the last tick.
     """
     times = np.arange(*ticks) * TICK_S
     states = drive(
@@ -91,10 +92,10 @@ def drive(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Follows planned poses with feed-forward and feedback, tick by tick.
 
-    In each tick the function computes the errors ahead, aside, and of the heading. The
-    planned twist plus the feedback gives speed and yaw rate. The wheel commands follow,
-    within the limit of acceleration. Then the function integrates the plant over the
-    tick by the classical Runge-Kutta method of fourth order.
+    In each tick the function computes the longitudinal, lateral, and heading errors. It
+    adds the feedback of these errors to the planned speed and yaw rate. It converts the
+    sum to wheel commands and limits the acceleration of each wheel. Then it integrates
+    the plant over the tick by the classical Runge-Kutta method of fourth order.
 
     Args:
         state: (7,) state of the plant at the first tick, see ``plant_derivatives``.
@@ -111,8 +112,8 @@ def drive(
         (n + 1, 7) states at the ticks.
 
     Reference: the feedback is that of Kanayama, Kimura, Miyazaki and Noguchi, "A stable
-    tracking control method for an autonomous mobile robot", ICRA 1990. Here the gain of
-    the heading does not vanish at rest.
+    tracking control method for an autonomous mobile robot", ICRA 1990. In contrast to
+    the paper, the gain of the heading error does not vanish at rest.
     """
     states = np.empty((len(poses) + 1, 7))
     command = np.empty(2)
@@ -127,7 +128,7 @@ def drive(
         speed = twists[k, 0] * math.cos(turn) + _AHEAD * (c * dx + s * dy)
         aside = twists[k, 0] * (c * dy - s * dx)
         yaw_rate = twists[k, 1] + _ASIDE * aside + _TURN * math.sin(turn)
-        # The acceleration of a wheel is the command minus its speed, over the lag.
+        # The acceleration of a wheel is (command - wheel speed) / lag.
         most = wheel_acceleration * lag
         for wheel, side in enumerate((-0.5, 0.5)):
             ahead = (speed + side * yaw_rate * separation) / radius - now[5 + wheel]
@@ -152,7 +153,7 @@ def poses_between(
 
     Args:
         knots: (m, 8) states as in ``drive_along``, one tick apart.
-        ticks: (n,) times since the first knot, ticks. Times after the last knot give
+        ticks: (n,) times since the first knot, in ticks. Times after the last knot give
             the last pose.
 
     Returns:

@@ -24,11 +24,12 @@ from systems.framework.parameters import (
 )
 from systems.world.paths import ACCELERATION_M_S2, AtEnd, WaypointPath
 
-#: Least ratio of the wheels' acceleration to the acceleration along the path. The
-#: commands are held for half a motor lag, and the feedback needs a reserve.
+#: Least ratio of the wheels' acceleration to the acceleration along the path. It is
+#: above 1 because commands are held for a tick (half a motor lag), and because the
+#: feedback needs a reserve.
 _HEADROOM = 1.5
 
-#: Turn during which the yaw rate rises in a corner, rad.
+#: Angle by which the robot turns while its yaw rate rises in a corner, rad.
 _TURN_IN_RAD = 0.08
 
 
@@ -84,9 +85,9 @@ class CarrierParameters(Parameters):
     def wheel_acceleration_m_s2(self) -> float:
         """Limit of the acceleration of each wheel's rim, m/s^2.
 
-        Straight ahead both wheels accelerate by 2 F/m. The limit of a turn is about the
-        same, because the inertia of the body is about that of half its mass at each
-        wheel.
+        Straight ahead, both wheels accelerate by 2 F/m. In a turn the limit is about
+        the same. The reason is that the moment of inertia of the body is about that of
+        two point masses at the wheels, each half of the mass of the body.
         """
         return 2.0 * self.wheel_force_n / self.mass_kg
 
@@ -94,7 +95,7 @@ class CarrierParameters(Parameters):
     def top_yaw_rate(self) -> float:
         """Top yaw rate in corners, rad/s.
 
-        The wheels reach this yaw rate while the robot turns by 0.08 rad.
+        The robot accelerates to this yaw rate while it turns by 0.08 rad.
         """
         yaw_acceleration = 2.0 * self.wheel_acceleration_m_s2 / self.wheel_separation_m
         return math.sqrt(2.0 * _TURN_IN_RAD * yaw_acceleration)
@@ -148,7 +149,7 @@ def driven_path(carrier: CarrierParameters) -> DrivenPath:
         carrier: Parameters of the carrier.
 
     Returns:
-        The motion, the same object for equal parameters.
+        The motion. Equal parameters give the same object.
     """
     robot = RobotParameters(
         wheel_radius_m=carrier.wheel_radius_m,

@@ -44,7 +44,7 @@ def _rim_twist(left, right, separation):
 
 
 class PlantNumbers(NamedTuple):
-    """Constants of the motion of the plant, the last arguments of compiled code."""
+    """Constants of the plant, which compiled functions take as their last arguments."""
 
     left_rim_m: float
     """Path of the left end of the axle per angle of its wheel, m/rad."""
@@ -66,7 +66,7 @@ class PlantNumbers(NamedTuple):
             plant: Lag of the motors, and share of the rim speeds that is lost by slip.
 
         Returns:
-            The constants. Slip reduces the two radii.
+            The constants. Slip reduces ``left_rim_m`` and ``right_rim_m``.
         """
         left, right = plant.slip
         return cls(
@@ -88,7 +88,10 @@ def plant_derivatives(
     top_wheel_speed: Any,
     motor_lag_s: Any,
 ) -> Any:
-    """Computes the time derivatives of the plant. ``.py_func`` takes AutoDiffXd.
+    """Computes the time derivatives of the plant.
+
+    The compiled function takes floats. Its attribute ``.py_func`` is the same function
+    in Python and also takes AutoDiffXd.
 
     Args:
         state: (7,) x, y, theta, left and right wheel angle, left and right wheel
@@ -185,8 +188,8 @@ def saturated(value: Any, limit: Any) -> Any:
         limit: Largest magnitude, not negative.
 
     Returns:
-        The value, or the limit with the sign of the value. The limit has derivatives of
-        zero.
+        The value, or the limit with the sign of the value. A limited value has zero
+        derivatives.
     """
     if value > limit:
         return value * 0.0 + limit
@@ -199,7 +202,8 @@ def saturated(value: Any, limit: Any) -> Any:
 def _velocities(state, numbers):
     """Returns the velocity in W, m/s and rad/s, and the slip velocities, m/s.
 
-    The slip velocities are those of the left rim, the right rim, and sideways.
+    The slip velocities are the forward speeds of the left and right rim relative to the
+    ground, and the leftward speed of the axle.
     """
     left, right = numbers.left_rim_m * state[5], numbers.right_rim_m * state[6]
     v, omega = _rim_twist(left, right, numbers.wheel_separation_m)
@@ -217,7 +221,7 @@ def _velocities(state, numbers):
 #: Table columns of the port ``slip_velocities`` with friction.
 _SLIP_COLUMNS = "slip_left", "slip_right", "slip_sideways"
 
-#: Largest factor by which Drake's integrators stretch a last step.
+#: Largest factor by which Drake's integrators stretch the last step of an interval.
 _STRETCH = 1.01
 
 
@@ -229,9 +233,9 @@ class PlantStepNumbers(NamedTuple):
     of_plant: tuple[Any, ...]
     """``PlantNumbers``, and ``GripNumbers`` with friction."""
     advance: Any
-    """One of ``SCHEMES``."""
+    """Function from ``SCHEMES`` that advances the state by one integrator step."""
     step_s: float
-    """Largest step, s."""
+    """Largest step of the integrator, s."""
     tick_s: float
     left_rim_m: float
     right_rim_m: float
@@ -247,7 +251,7 @@ def plant_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
     (commanded,) = inputs
     derivatives, of_plant = numbers.derivatives, numbers.of_plant
     time, end = tick * numbers.tick_s, (tick + 1) * numbers.tick_s
-    # Times, steps, and sums are computed in Drake's order, so they round equally.
+    # Times, steps, and sums are computed in Drake's order, so rounding is the same.
     while time < end:
         h = end - time
         if h > _STRETCH * numbers.step_s:
@@ -325,10 +329,11 @@ def DiffDrivePlant_(T):
     class Impl(Block_[T]):
         """Moves the robot, with motor lag, saturation, and wheels that roll or slip.
 
-        Continuous state: x, y, theta, two wheel angles, and two wheel speeds. With
-        ``plant.friction`` the forward speed, leftward speed, and yaw rate of the body
-        follow. Without friction these result from the wheel speeds. The outputs are
-        functions of the state, without feedthrough. The heading is not wrapped.
+        The continuous state has x, y, theta, two wheel angles, and two wheel speeds. If
+        ``plant.friction`` is set, the state also has the forward speed, leftward speed,
+        and yaw rate of the body. Otherwise the wheel speeds determine these three
+        values. The outputs are functions of the state, without feedthrough. The heading
+        is not wrapped to one turn.
 
         Args:
             robot: Dimensions and top speed.
@@ -337,8 +342,8 @@ def DiffDrivePlant_(T):
                 at rest.
 
         Raises:
-            ValueError: The initial pose, a state, or a command is not finite. An
-                error-controlled integrator would then take steps without end.
+            ValueError: The initial pose, a state, or a command is not finite. With such
+                a value, an error-controlled integrator would never finish.
 
         Reference: Han 2019, table 6; the motor lag and the grip are ours.
         """

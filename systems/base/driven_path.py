@@ -16,8 +16,8 @@ from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath
 
-#: Time after the end of the plan when the robot is stopped, s. By then the feedback
-#: moves it by less than 1 nm/s.
+#: Time from the end of the plan to the time at which the velocity is set to zero, s.
+#: At that time the feedback moves the robot at less than 1 nm/s.
 _SETTLING_S = 10.0
 
 #: Least number of ticks that are computed at once.
@@ -27,9 +27,9 @@ _CHUNK_TICKS = 400
 class DrivenPath:
     """Pose and velocity of a robot that drives through waypoints.
 
-    The wheel commands change every 25 ms from the start time on. This tick does not
-    depend on the ticks of the followers. Between ticks the pose is a cubic Hermite
-    polynomial, which differs from the plant by at most 1 um and 10 urad. In the
+    The wheel commands change every 25 ms from the start time on. This period does not
+    depend on the control period of the followers. Between ticks the pose is a cubic
+    Hermite polynomial, which differs from the plant by at most 1 um and 10 urad. In the
     scenarios of the library the robot stays within 2 mm of its plan. At 0.7 m/s it
     stays within 4 cm of the arcs of corners. It stops within 5 mm of the last waypoint.
 
@@ -66,7 +66,7 @@ class DrivenPath:
         self._table = np.array(self._knots)
 
     def _drive_on(self, tick: int) -> None:
-        """Computes the knots up to the one after a tick, or up to the end."""
+        """Computes knots at least up to the tick after ``tick``, or up to the end."""
         from systems.base.carrier import drive_along
 
         knots = self._knots
@@ -87,14 +87,14 @@ class DrivenPath:
         self._table = np.vstack([self._table, rows])
 
     def _since(self, ticks: float) -> tuple[float, list[float], list[float]]:
-        """Returns the elapsed share of a tick, and the knots at both ends of it."""
+        """Returns the elapsed share of a tick, and the knots at its start and end."""
         if ticks >= len(self._knots) - 1:
             self._drive_on(int(min(ticks, self._end)))
         k = min(int(ticks), len(self._knots) - 2)
         return min(ticks - k, 1.0), self._knots[k], self._knots[k + 1]
 
     def pose(self, time: float) -> tuple[float, float, float]:
-        """Returns (x, y, theta) in W at a time in s, m and rad."""
+        """Returns (x, y, theta) in W, m and rad, at a time in s."""
         if not self.moves or time <= self._start:
             return self._rest
         s, a, b = self._since((time - self._start) / TICK_S)
@@ -106,7 +106,7 @@ class DrivenPath:
         )
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Returns the (n, 3) poses in W at n times in s, m and rad; see ``pose``."""
+        """Returns the (n, 3) poses in W, m and rad, at n times in s; see ``pose``."""
         times = np.asarray(times, dtype=float)
         if not self.moves or not len(times):
             return np.full((len(times), 3), self._rest)
@@ -117,7 +117,7 @@ class DrivenPath:
         return poses_between(self._table, ticks)
 
     def velocity(self, time: float) -> tuple[float, float, float]:
-        """Returns (vx, vy, omega) in W at a time in s, m/s and rad/s."""
+        """Returns (vx, vy, omega) in W, m/s and rad/s, at a time in s."""
         if not self.moves or time <= self._start:
             return (0.0, 0.0, 0.0)
         s, a, b = self._since((time - self._start) / TICK_S)
@@ -136,7 +136,7 @@ class DrivenPath:
         point of the body is fastest at the start or at the end of the tick.
 
         Args:
-            until: Time up to which ticks count, s.
+            until: Time up to which ticks count, s. It is rounded up to a whole tick.
 
         Returns:
             (n, 2) speeds, m/s, and yaw rates, rad/s.

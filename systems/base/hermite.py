@@ -8,14 +8,16 @@ from systems.framework.signals import TICK_S
 
 
 def value_weights(s: Any) -> tuple[Any, Any, Any]:
-    """Computes the weights of the cubic Hermite polynomial over a tick.
+    """Computes the weights p, q, and r of the cubic Hermite polynomial over a tick.
+
+    A tick starts with the value a and the slope a', and ends with the value b and the
+    slope b'. The value in between is a + p (b - a) + q a' + r b'.
 
     Args:
         s: Elapsed share of the tick, from 0 to 1.
 
     Returns:
-        Weight of the difference of both values, 1; weights of the slopes at the start
-        and at the end, s.
+        (p, q, r). p has no unit, q and r are in s.
     """
     rest = TICK_S * s * (1.0 - s)
     return s * s * (3.0 - 2.0 * s), rest * (1.0 - s), -rest * s

@@ -32,13 +32,15 @@ class LaggedMotion(NamedTuple):
     kept: float
     """Share exp(-duration/tau) of w - c that is left at the end."""
     lagged_s: float
-    """Angle tau (1 - kept) of the lagged part per rad/s of w - c, s."""
+    """Final angle of the lagged part per rad/s of w - c, tau (1 - kept), s."""
     least_share: float
-    """Least share with which the steady part of a tick counts in the error bound of
-    the encoders, at any net path. See docs/results_guard.md, "Encoders"."""
+    """Factor kappa in the error bound of the encoders. A wheel that reverses within a
+    tick travels farther than its net distance. Therefore the bound counts at least
+    kappa times the steady part. See docs/results_guard.md, "Encoders"."""
     nodes: tuple[tuple[float, float, float, float], ...]
-    """Nodes of the quadrature: shares of the steady part and of the lagged part that
-    the robot has covered at the node, and weights of the node for both parts."""
+    """Nodes of the quadrature. A node has four numbers: the shares of the steady part
+    and of the lagged part that are complete at the node, and the weights of the node
+    for both parts."""
 
 
 def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
@@ -85,8 +87,8 @@ def advance_pose(pose: Any, travelled: Any, steady: Any, motion: LaggedMotion) -
     Args:
         pose: (x, y, theta) at the start in W, m and rad; floats or AutoDiffXd.
         travelled: Path, m, and turn, rad, of the body in the period.
-        steady: Path and turn if the wheels had run at their commanded speeds from the
-            start.
+        steady: Path, m, and turn, rad, that would result if the wheels had run at their
+            commanded speeds from the start.
         motion: ``LaggedMotion`` of the period.
 
     Returns:

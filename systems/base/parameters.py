@@ -20,9 +20,9 @@ class PlantParameters(Parameters):
     motor_lag_s: Duration = 0.05
     """Time constant of each wheel's speed loop, s (not printed, our choice)."""
     slip: Annotated[tuple[_Slip, _Slip], Strict(False)] = (0.0, 0.0)
-    """Share of the left and right rim speed that is lost. The encoders do not measure
-    it. A negative value is a wheel that is larger than ``wheel_radius_m`` by this
-    share."""
+    """Share of the rim speed that the left and the right wheel lose by slip. The
+    encoders do not measure this loss. A negative share describes a wheel whose radius
+    is larger than ``wheel_radius_m`` by this share."""
     friction: Annotated[float, Field(ge=1e-3, le=100.0)] | None = None
     """Coefficient of friction between tires and floor. The wheels slip if the motion
     needs more force than this share of the weight. None: the wheels never slip."""
@@ -37,5 +37,5 @@ class OdometryParameters(Parameters):
     """Whether angles are rounded to whole pulses. A linearization needs exact
     angles."""
     lost_at_s: Duration | None = None
-    """Time of a fault at which the odometry restarts at (0, 0, 0), s. none: no
+    """Time of a fault that resets the pose of the odometry to (0, 0, 0), s. none: no
     fault."""

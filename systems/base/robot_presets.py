@@ -19,14 +19,15 @@ _SONG: Mapping[str, Any] = {
     "top_speed_m_s": 0.2,
 }
 
-#: Fields of ``RobotParameters`` that differ from the follower of Han 2019.
+#: For each preset, the fields of ``RobotParameters`` that differ from the follower of
+#: Han 2019.
 ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
     "han2019": {},
     # ROBOTIS e-Manual, TurtleBot3 Burger: 138 x 178 mm, 1 kg, wheels of 66 mm diameter,
     # 160 mm apart, 0.22 m/s. Mass, wheels, and track are also in tables 1 and 2 of
     # Engelbrecht, Steyn and Djouani (2021). P is half a wheel separation ahead of the
-    # axle, so its speeds along and across the heading have the same limit. The real
-    # robot has no microphones. These positions are ours.
+    # axle, so the speeds of P along and across the heading have the same limit. The
+    # real robot has no microphones. The microphone positions are our choice.
     "turtlebot3_burger": {
         "length_m": 0.138,
         "width_m": 0.178,
@@ -37,11 +38,12 @@ ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
         "mass_kg": 1.0,
         "top_speed_m_s": 0.22,
     },
-    # Song 2011 prints neither size nor track. These values are ours. P is only 1 cm
+    # Song 2011 prints neither size nor track. Both are our choice. P is only 1 cm
     # ahead of the axle, because no law steers by it. The olfactory robot does not use
     # its microphones.
     "song2011_olfactory": _SONG,
-    # One microphone in the middle, three on arms of 15 cm (3.1), one of these ahead.
+    # One microphone is in the middle. Three are on arms of 15 cm (Song 2011, 3.1). One
+    # of these arms points ahead.
     "song2011_hearing": {
         **_SONG,
         "microphones_m": (

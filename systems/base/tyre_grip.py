@@ -10,12 +10,13 @@ from numba.extending import register_jitable
 from systems.base.robot import RobotParameters
 
 GRAVITY_M_S2 = 9.81
-#: Time constant with which the remaining slip decays when a wheel grips again, s. A
-#: third-order step of 25 ms removes 98 % of the slip. All integrators are stable.
+#: Time constant with which the remaining slip decays when a wheel grips again, s. One
+#: step of the third-order integrator, 25 ms, removes 98 % of the slip. All integrators
+#: are stable with this time constant.
 _REGRIP_S = 0.016
-#: Iterations of the search for forces. With the printed dimensions each iteration
-#: reduces the error to 0.4 of its value. It reduces the error to two thirds if the body
-#: is no wider than the distance between its wheels.
+#: Number of iterations of the search for forces. Each iteration multiplies the error by
+#: 0.4 with the printed dimensions (Han 2019). If the body is no wider than the distance
+#: between its wheels, the factor is two thirds.
 _SWEEPS = 60
 
 
@@ -29,14 +30,14 @@ class GripNumbers(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotParameters, friction: float) -> GripNumbers:
-        """Computes the grip of a uniform rectangle whose weight the two wheels share.
+        """Computes the constants for a uniform rectangle on two equally loaded wheels.
 
         Args:
             robot: Length and width of the rectangle.
             friction: Coefficient of friction between tires and floor.
 
         Returns:
-            Half of friction times gravity, m/s^2, and (length^2 + width^2) / 12, m^2.
+            friction * gravity / 2, m/s^2, and (length^2 + width^2) / 12, m^2.
         """
         return cls(
             friction * GRAVITY_M_S2 / 2.0,
@@ -52,16 +53,17 @@ def grip_accelerations(
     wheel_separation_m: float,
     grip: GripNumbers,
 ) -> tuple[Any, Any, Any]:
-    """Computes the acceleration of the body by the forces of its tires.
+    """Computes the acceleration that the forces of the tires give to the body.
 
-    If the friction suffices, the forces are those with which no wheel slips. If it does
-    not suffice, the force of each wheel is at most ``traction_m_s2`` in any direction.
-    Under this limit the forces come nearest to motion without slip (Gauss' principle of
-    least constraint). A sliding wheel pushes along its slip with the limit. It has no
-    force left for the side.
+    All forces are divided by the mass of the robot. If the friction suffices, the
+    forces prevent all slip. Otherwise the force of each wheel is limited to
+    ``traction_m_s2`` in any direction. Within this limit, the function chooses the
+    forces whose motion is nearest to motion without slip (Gauss' principle of least
+    constraint). The tire of a sliding wheel pushes along its slip with the full limit.
+    No force is left across the slip.
 
-    The function computes the forces without slip first. If a force exceeds the limit,
-    projected gradient descent finds the limited forces.
+    The function first computes the forces that prevent slip. If one of them exceeds the
+    limit, projected gradient descent finds the limited forces.
 
     Args:
         motion: Forward and leftward speed of the middle of the axle, m/s, and yaw rate,
@@ -77,12 +79,13 @@ def grip_accelerations(
     forward, sideways, yaw = motion
     traction_m_s2, gyration_m2 = grip
     half = wheel_separation_m / 2.0
-    # Accelerations of the contact points that keep or make the slip zero.
+    # Accelerations of the contact points with which slip stays zero or decays to zero.
     left_slip = rims[0] - (forward - yaw * half)
     right_slip = rims[1] - (forward + yaw * half)
     left_wanted = rim_accelerations[0] + left_slip / _REGRIP_S
     right_wanted = rim_accelerations[1] + right_slip / _REGRIP_S
-    # Forces without slip, divided by the mass. Both wheels share them equally.
+    # Forces that prevent slip, divided by the mass. Both wheels share the push and the
+    # lateral force equally.
     lever = half * half / gyration_m2
     push = (left_wanted + right_wanted) / 2.0 - yaw * sideways
     twist = (right_wanted - left_wanted) / (2.0 * lever)

@@ -40,7 +40,7 @@ class OdometryNumbers(NamedTuple):
     pulses: int
     """Pulses per revolution; 0: angles are not rounded."""
     motion: LaggedMotion
-    """Motion of the wheels in a tick."""
+    """Constants of the motion of the wheels in a tick."""
     lost_tick: int = -1
     """Tick at which the pose restarts at zero; -1: never."""
 
@@ -48,11 +48,12 @@ class OdometryNumbers(NamedTuple):
 def odometry_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Continues the pose to the present wheel angles.
+    """Advances the pose to the present wheel angles.
 
     The state is the pose and both encoder angles of the last tick. The step computes
     the path and turn from the new angles. It also computes the path and turn that the
-    held command would give without lag. ``advance_pose`` integrates the motion.
+    held command would give without lag. ``advance_pose`` computes the new pose from
+    both.
     """
     left, right = inputs[0][0], inputs[0][1]
     if numbers.pulses > 0:
@@ -88,17 +89,18 @@ def WheelOdometry_(T):
         The block assumes that the wheels approach their command with the nominal motor
         lag between two ticks. The encoders give the angles at both ticks. Command and
         lag give the motion in between. If the wheels roll with that lag and the angles
-        are exact, the pose at a tick is exact. The mean heading over a tick would not
-        be enough. If the forward speed varied in phase with the yaw acceleration, its
-        errors would add up.
+        are exact, the pose at a tick is exact. A simpler method moves the robot along
+        its mean heading in each tick. The errors of the simpler method add up if the
+        forward speed varies in phase with the yaw acceleration.
 
         With angles in whole pulses the position error is at most (q/L) s + q. Here q is
         the path of the rim per pulse, L is the wheel separation, and s is the mean path
         of both rims (docs/results_guard.md has the proof).
 
-        Discrete state, every tick: pose and encoder angles at the last tick. The
-        outputs continue this state to the present angles, without latency. The velocity
-        at a tick is the mean over the last tick. The block does not measure slip.
+        The discrete state has the pose and the encoder angles of the last tick. It is
+        updated every tick. The outputs advance this pose to the present angles, without
+        latency. The velocity at the output is the mean velocity since the last tick.
+        The block does not measure slip.
 
         Args:
             robot: Wheel radius and separation.

@@ -14,7 +14,7 @@ from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.world.geometry import rotate, safe_norm
 
-#: Tangent of the largest angle by which ``turned_off_back`` turns.
+#: Tangent of the largest angle by which ``turned_off_back`` turns a vector.
 _ASIDE = math.tan(math.radians(5.0))
 
 
@@ -42,8 +42,9 @@ def integrate_velocity(
 ) -> Any:
     """Computes the velocity of the virtual mass after one period.
 
-    The function limits the velocity, which is a state. Without the limit v_P would
-    wind up to F_m/D_r, which is 2 m/s per meter of distance to the target.
+    The function limits the velocity, because the velocity is a state that would wind
+    up. Without the limit, v_P would grow until damping D_r balances the pull of the
+    target. With the default gains this speed is 2 m/s per meter of distance.
 
     Args:
         v_WP: Velocity (vx, vy) in W, m/s; floats or AutoDiffXd.
@@ -95,25 +96,28 @@ def hand_position_velocity(twist_B: Any, theta: Any, control_point_m: Any) -> An
 
 @register_jitable
 def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
-    """Turns a vector for P aside if it points straight back.
+    """Turns a vector aside if it points straight back.
+
+    The vector is a wanted velocity of P or a vector from P to its target.
 
     The heading follows theta' = |v_P| sin(psi - theta)/epsilon, where psi is the
     direction of v_P. A heading along v_P is a stable equilibrium. A heading opposite to
-    v_P is an unstable equilibrium. There the robot would drive backward for meters,
-    even into its target, until rounding errors grow. This function points the vector
-    aside, so the body turns around. The method is ours, because the papers do not say
-    how an acceleration becomes wheel speeds.
+    v_P is an unstable equilibrium. At the unstable equilibrium the robot would drive
+    backward for meters, even into its target, until rounding errors grow. This function
+    points the vector aside, so the body turns around. The method is ours, because the
+    papers do not say how an acceleration becomes wheel speeds.
 
     Args:
         x: First component in W, any unit; float or AutoDiffXd.
         y: Second component in W, in the same unit.
         theta: Heading of B in W, rad.
-        least: Backward component up to which a vector does not change, in that unit.
+        least: Backward component up to which a vector does not change, in the unit of
+            x.
 
     Returns:
-        (x, y) in W, at most 5 deg from straight back. The vector turns to its own
-        side, or to the left if it has no side. Vectors that point elsewhere do not
-        change.
+        (x, y) in W. A vector near straight back turns to the side to which it already
+        points, or to the left if it points exactly back. After the turn it is at most
+        5 deg from straight back. All other vectors do not change.
     """
     along, across = rotate(-theta, x, y)
     aside = _ASIDE * (-along - least)
@@ -124,7 +128,7 @@ def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
 
 @register_jitable
 def limited_wheel_speeds(v: Any, omega: Any, robot: RobotParameters) -> Any:
-    """Computes the wheel speeds, scaled together to the limit.
+    """Computes the wheel speeds. Scales down both if one exceeds the limit.
 
     The scaling keeps the curvature omega/v of the path.
 
@@ -207,15 +211,18 @@ def WheelCommand_(T):
     class Impl(Block_[T]):
         """Computes wheel speeds so that P moves according to the command of a law.
 
-        The block integrates an acceleration, which moves the virtual mass at P. It
-        obeys a velocity of P or a twist of the body at once. Above the top speed, the
-        velocity of P keeps its direction. For a twist, this keeps the curvature of the
-        path. Above the limit of a wheel, the path keeps its curvature.
+        If the command is an acceleration, the block integrates it to a velocity of the
+        virtual mass at P. If the command is a velocity of P or a twist of the body, the
+        command acts at once. If P would exceed its top speed, the block reduces the
+        speed of P but keeps its direction. For a twist, this reduction keeps the
+        curvature of the path. If a wheel would exceed its limit, the block scales down
+        both wheel speeds, which keeps the curvature of the path.
 
-        Discrete state, every tick: velocity of P and wheel speeds, which are the
-        outputs. An update at the time t uses the inputs at t and acts from t on. The
-        latency from an echo to the wheels is 0 ms. The latency from the end of an audio
-        frame to the wheels is the one tick of the estimator. There is no feedthrough.
+        The discrete state has the velocity of P and the wheel speeds, which are the
+        outputs. It is updated every tick. An update at the time t uses the inputs at t
+        and acts from t on. The latency from an echo to the wheels is 0 ms. The latency
+        from the end of an audio frame to the wheels is one tick, which the estimator
+        needs. There is no feedthrough.
 
         Args:
             command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or

@@ -1,8 +1,9 @@
 """Finds sets of lags that belong together among the many peaks of each pair.
 
-In a room, the correlation of two channels has a peak for every pair of paths. The peak
-of an echo may be the highest. The lags of the direct sound are consistent: the lag from
-channel i to k is the sum of those from i to j and from j to k.
+In a room, each channel contains the direct sound and its echoes. The correlation of two
+channels has a peak for every pair of these arrivals. The peak of an echo may be the
+highest. The lags of the direct sound are consistent: the lag from channel i to k is the
+sum of the lags from i to j and from j to k.
 """
 
 from __future__ import annotations
@@ -11,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-# Number of peaks per pair, and number of sets of lags, that are followed.
+# Largest number of peaks per pair, and of sets of lags, that the search keeps.
 _PEAKS, _SETS = 12, 48
 
-# Two sets differ if some lag differs by more than the first value, columns. Lags count
-# as consistent up to the second value, columns.
+# Two sets are different if one of their lags differs by more than _APART columns. Lags
+# are consistent if their sums differ by at most _OFF columns.
 _APART, _OFF = 8, 2
 
 
@@ -25,7 +26,7 @@ def consistent_lags(
     reach: NDArray[np.int64],
     count: int,
 ) -> list[NDArray[np.int64]]:
-    """Finds the sets of lags with the greatest sums of the correlations of all pairs.
+    """Finds the sets of lags with the greatest sum of correlations over all pairs.
 
     The channels are added one after another. Each set is combined with each peak of the
     next channel, and the best combinations are kept.
@@ -34,10 +35,11 @@ def consistent_lags(
         correlations: (p, 2 m + 1) correlation of each pair; lag 0 is in the middle.
         pairs: (p, 2) channels i < j of n.
         reach: (p,) longest lag of each pair in either direction, columns, at most m.
-        count: Number of sets.
+        count: Largest number of sets.
 
     Returns:
-        Sets (n,) of lags relative to channel 0, columns; the best one first.
+        Sets of (n,) lags relative to channel 0, columns. The set with the greatest sum
+        is first.
     """
     wide = maximum_filter1d(correlations, 2 * _OFF + 1, axis=1)
     middle = correlations.shape[1] // 2
@@ -71,7 +73,7 @@ def consistent_lags(
 
 
 def _peaks(correlation: NDArray[np.float32], reach: int) -> NDArray[np.int64]:
-    """Returns the lags of the highest peaks within reach, including its ends."""
+    """Returns the lags of the highest peaks from -reach to reach, ends included."""
     from scipy.signal import find_peaks
 
     middle = correlation.size // 2

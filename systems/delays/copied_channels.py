@@ -1,8 +1,8 @@
-"""Finds channels that repeat another one.
+"""Finds channels that repeat another channel.
 
-Two microphones may record the same sound at the same time. However, their own noise and
-that of their converters differ. The difference between two real channels, after the
-best gain and delay in whole samples, is therefore at least this noise.
+Two microphones may record the same sound at the same time. However, the noise of each
+microphone and of its converter is different. Two real channels therefore differ by at
+least this noise, even after the best gain and delay (whole samples) are applied.
 """
 
 from __future__ import annotations
@@ -17,26 +17,27 @@ from scipy import fft
 
 from systems.framework.compiling import njit
 
-# Limits of the mean square difference of a copy. The first is a share of a squared
-# step, of which rounding causes a twelfth. The second is a share of the power of the
-# copy. The larger limit counts.
+# Limits of the mean square difference between a channel and its copy. _ROUNDING is a
+# share of the squared step between two sample values. Rounding causes 1/12 of it.
+# _EXACT_SHARE is a share of the power of the copy. The larger limit counts.
 _ROUNDING = 0.1
 _EXACT_SHARE = 1e-6
 
-# It must in any case be below this share, so that an almost silent channel is no copy.
+# In any case, the difference must be below this share of the power of the copy, so that
+# an almost silent channel is no copy.
 _LIKE_SHARE = 0.01
 
-# Two inputs of one microphone differ by the noise of their converters. Their difference
-# is below the first share of the power of the sound. In a pause, it is below the second
-# share of the power there. A pause has less than the third share of the power of the
-# sound.
+# Two inputs of one microphone differ by the noise of their converters. During a sound,
+# their difference is below the share _SHARED_SOUND of its power. In a pause, their
+# difference is below the share _SHARED_PAUSE of the power in the pause. A pause has
+# less than the share _PAUSE of the power of the sound.
 _SHARED_SOUND, _SHARED_PAUSE, _PAUSE = 1e-3, 0.02, 0.01
 
-# Number of samples from the middle of a frame that exclude most pairs. The difference
-# in these samples may be larger than in the frame by the second value.
+# First, only _PROBE samples in the middle of a frame are compared, which excludes most
+# pairs. The limit of their difference is _PROBE_MARGIN times that of the whole frame.
 _PROBE, _PROBE_MARGIN = 128, 4.0
 
-# Lengths of the loudest section and of the quietest one that are examined, s.
+# Lengths of the two sections that are examined, the loudest and the quietest one, s.
 _LOUD_S, _PAUSE_S = 0.25, 0.05
 
 
@@ -52,10 +53,11 @@ def repeats(
         first: (n,) samples.
         second: (n,) samples.
         lag: Delay of the second channel, samples.
-        step: Difference between two possible values of a sample, in its unit.
+        step: Smallest difference between two values of a sample, in the unit of the
+            samples.
 
     Returns:
-        True if the difference after the best gain is no more than that of rounding.
+        True if rounding explains the difference after the best gain.
     """
     left, power, other = _difference(first, second, lag)
     return bool(_is_copy(left, power, other, _ROUNDING * step**2))
@@ -75,14 +77,14 @@ def frame_repeats(
         frame: (n, samples) channels; integers are counts.
         pairs: (p, 2) channels to compare.
         later: (n - 1,) delays of the channels relative to channel 0, samples.
-        at_once: (p,) whether to compare the pair at lag 0. False if both microphones
-            may record the same at the same time.
+        at_once: (p,) whether to compare each pair at lag 0. It is False if the two
+            microphones may record the same signal at the same time.
         noisy: Whether the frames contain noise. Without noise, a sound that arrives
             later by whole samples looks like a copy, so pairs are compared only at lag
             0.
 
     Returns:
-        True if at least one of the pairs repeats.
+        True if at least one pair contains a copy.
     """
     step = 1.0 if frame.dtype == np.int16 else 0.0
     rounding = _ROUNDING * step**2
@@ -135,15 +137,15 @@ def copied_pairs(
     """Finds the pairs of channels that repeat each other.
 
     Each pair is compared at the lag of its highest correlation. A pair repeats if the
-    channels differ by rounding alone in the loudest section. If the recording has a
-    pause, two inputs of one microphone are found, too.
+    channels differ only by rounding in the loudest section. If the recording has a
+    pause, the function also finds two inputs of one microphone.
 
     Args:
         samples: (n, samples) channels that are not silent, without NaN.
         sample_rate_hz: Rate of the samples, Hz.
 
     Returns:
-        (i, j) of each such pair, i < j, channels from 0.
+        Channel numbers (i, j) of each such pair, counted from 0, with i < j.
     """
     loud, most = _block(samples, _LOUD_S, sample_rate_hz, np.argmax)
     pause, least = _block(samples, _PAUSE_S, sample_rate_hz, np.argmin)
@@ -174,7 +176,7 @@ def _block(
     sample_rate_hz: float,
     choose: Callable[[NDArray[np.float64]], np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns a section chosen by its power, and its power in each channel.
+    """Chooses a section by its power, and returns it with the power of each channel.
 
     Sections in which a channel is constant (digital silence) are not chosen.
 
@@ -208,7 +210,7 @@ def _shares(block: NDArray[np.float64], i: int, j: int, lag: int) -> float:
 def _difference(
     first: NDArray[Any], second: NDArray[Any], lag: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Computes how much a channel contains in addition to another one.
+    """Computes how much the second channel differs from the first one.
 
     Returns:
         Variances of the difference after the best gain, of the second channel, and of

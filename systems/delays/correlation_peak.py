@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-# Largest number of steps, and the step at which the search ends, samples.
+# Largest number of steps. The search ends when a step is below _TOLERANCE samples.
 _ITERATIONS = 10
 _TOLERANCE = 1e-6
 
-# Variance of an arrival that is rounded to whole samples: 1/12 per pair.
+# Variance of an arrival due to rounding to whole samples, samples^2. The delay of a
+# pair has twice this variance, 1/12.
 _ROUNDING = 1.0 / 24.0
 
 
@@ -33,8 +34,8 @@ def _turned(
 ) -> None:  # pragma: no cover  (compiled)
     """Computes real and imaginary part of a cross-spectrum (n,) times exp(j w t).
 
-    Sines and cosines are evaluated only for bins whose number is a power of two. The
-    others follow from sums and products.
+    Sines and cosines are evaluated only for bins whose number is a power of two. Sums
+    and products give the sines and cosines of the other bins.
     """
     bins = cross.size
     cosine, sine = np.empty(bins), np.empty(bins)
@@ -60,7 +61,7 @@ def _slope_and_curve(
     first: float,
     step: float,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the derivatives of a correlation.
+    """Computes the first and the negative second derivative of a correlation.
 
     Returns:
         Sums of -w W Im(z) and of w^2 W Re(z).
@@ -106,7 +107,7 @@ def _refine(
 ]:  # pragma: no cover  (compiled)
     """Refines the peaks of weighted cross-correlations by Newton's method.
 
-    It also computes sums for the errors of the peaks.
+    The function also computes sums for the errors of the peaks.
 
     Args:
         cross: (p, n) cross-spectra of the pairs.
@@ -117,9 +118,9 @@ def _refine(
         newton: Whether to search; otherwise the delays stay at ``start``.
 
     Returns:
-        (p,) delays tau, samples. Let z be the cross-spectrum after removal of tau. Then
-        (p,) sums of Re(z); (p,) shares of the sum W |z| that is in phase; and (p, 3)
-        sums of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
+        (p,) delays tau, samples. Let z be the cross-spectrum after removal of tau. The
+        other results are (p,) sums of Re(z); (p,) ratios of the sum of W Re(z) to the
+        sum of W |z|; and (p, 3) sums of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
     """
     pairs, bins = cross.shape
     tau, plain, agreement = np.empty(pairs), np.empty(pairs), np.empty(pairs)
@@ -177,7 +178,7 @@ def _arrival_variances(
         curve, squares, noise = sums[p]
         scale = padding / (2.0 * curve * curve * (channels - 1))
         cross = 0.5 * n[i] * n[j] * noise
-        # Part of each channel: its noise with the signal of the other channel.
+        # Part of each channel: product of its noise and the other channel's signal.
         parts[i] += scale * (n[i] * squares * math.sqrt(s[j] / s[i]) + cross)
         parts[j] += scale * (n[j] * squares * math.sqrt(s[i] / s[j]) + cross)
     return parts
@@ -194,7 +195,8 @@ def _reconcile(
     """Computes the arrivals that fit all delays best by least squares.
 
     Returns:
-        Largest change of an arrival, and largest disagreement of a delay with them.
+        Largest change of an arrival, and largest disagreement between a delay and the
+        arrivals, samples.
     """
     moved, closure = 0.0, 0.0
     reconciled[0] = 0.0
@@ -229,8 +231,8 @@ def measure_peaks(
         energy: (n,) energies of the channels, units of the frame squared.
         arrivals: (n,) arrivals to start from, see ``find_peaks``, samples.
         tables: ``PairTables``.
-        sizes: First bin; length of the transform, samples; and effective length of the
-            cut channels, without the loss at their edges, samples.
+        sizes: First bin; length of the transform, samples; and length of the cut
+            channels minus the loss at their soft edges, samples.
         newton: See ``find_peaks``.
 
     Returns:
@@ -241,7 +243,8 @@ def measure_peaks(
     first, length, cut_samples = sizes
     others = len(energy) - 1
     step = 2.0 * math.pi / length
-    # The channels are cut at whole samples: only the rest of each delay is left.
+    # The channels are cut at whole samples. Each remaining delay is a fraction of a
+    # sample.
     whole = np.rint(arrivals)
     start = np.empty(len(pairs))
     for p in range(len(pairs)):

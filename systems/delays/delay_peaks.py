@@ -56,10 +56,11 @@ class PairTables(NamedTuple):
     pairs: NDArray[np.int64]
     """(p, 2) all pairs of n channels."""
     to_delays: NDArray[np.float64]
-    """(n - 1, p) least-squares conversion of the delays of pairs to t_k - t_0."""
+    """(n - 1, p) matrix that converts the delays of all pairs to the delays t_k - t_0
+    by least squares."""
     to_shares: NDArray[np.float64]
-    """(n, p) least-squares conversion of the logarithms of the coherences of pairs to
-    the logarithms of the channels' shares of signal. A coherence is the geometric mean
+    """(n, p) matrix that converts logarithms by least squares, from the coherences of
+    the pairs to the shares of signal in the channels. A coherence is the geometric mean
     of two shares. The conversion is exact for three channels."""
 
     @classmethod
@@ -86,13 +87,13 @@ class Peaks(NamedTuple):
     correlation: float
     """Least correlation coefficient of the pairs, 0 to 1."""
     angular_frequency: float
-    """Root mean square angular frequency of the shared sound, rad per sample; the least
-    value of the pairs."""
+    """Root mean square angular frequency of the sound that two channels share, rad per
+    sample. It is the least value of all pairs."""
     noise_energy: float
-    """Energy within the band that the mean channel does not share with the others,
-    units of the frame squared."""
+    """Energy within the band that a channel does not share with the other channels,
+    averaged over the channels, units of the frame squared."""
     moved: float
-    """Largest change of an arrival, samples."""
+    """Largest difference between an arrival and the given one, samples."""
     closure: float
     """Largest disagreement between the delay of a pair and ``arrivals``, samples."""
 
@@ -111,15 +112,15 @@ def find_peaks(
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrivals relative to channel 0, samples.
+        arrivals: (n,) arrivals to start from, relative to channel 0, samples.
         tables: The pairs of channels.
         length: Length of the Fourier transform, at least that of the frame.
         band: Bins to use.
-        phat: Whether to whiten.
-        newton: Whether to search between samples.
+        phat: Whether to whiten the cross-spectra.
+        newton: Whether to refine the delays between samples by Newton's method.
 
     Returns:
-        The peaks, or None if there is no peak.
+        The peaks, or None if a pair has no peak.
     """
     rows = filled_rows(len(frame))
     cut, cut_samples = cut_rows(frame, np.rint(arrivals), rows, length)

@@ -30,7 +30,8 @@ class DelayPlan:
     """Quantities that can be computed before the first frame.
 
     Raises:
-        InputError: Band, frame and array do not fit the sample rate.
+        InputError: The band does not fit the sample rate, or the frames are too short
+            for the array.
     """
 
     shape: ArrayShape
@@ -40,7 +41,7 @@ class DelayPlan:
     sample_rate_hz: float
     """Rate of the frames, Hz."""
     frame_samples: int
-    """Length of the frames."""
+    """Length of the frames, samples."""
     low_hz: float
     """Lower end of the band, Hz."""
     high_hz: float
@@ -69,10 +70,11 @@ class DelayPlan:
 
     @cached_property
     def edges(self) -> NDArray[np.int64]:
-        """(n - 1, 2) pairs of close channels that join all, as a tree from channel 0.
+        """(n - 1, 2) pairs of channels that form a tree from channel 0 to all channels.
 
-        Pairs of close channels have few lags to search. The first channel of an edge is
-        0 or the second one of an earlier edge.
+        The microphones of each pair are close to each other, so that there are few lags
+        to search. The first channel of an edge is channel 0 or the second channel of an
+        earlier edge.
         """
         places = self.shape.p_AM
         gaps = np.linalg.norm(places[:, np.newaxis] - places, axis=2)
@@ -98,7 +100,7 @@ class DelayPlan:
 
     @cached_property
     def length(self) -> int:
-        """Samples of the Fourier transform, padded so that lags do not wrap."""
+        """Length of the transform, samples, with padding so that lags do not wrap."""
         least = self.frame_samples + int(self.edge_lags.max()) + 2
         # Transforms with many factors of two are the fastest.
         return _TWOS * int(fft.next_fast_len(-(-least // _TWOS)))
@@ -112,12 +114,12 @@ class DelayPlan:
 
     @cached_property
     def grid(self) -> int:
-        """Samples of a correlation in the first search."""
+        """Number of samples of a correlation in the first search."""
         least = math.ceil(_GRID_DENSITY * self.band.stop)
         return int(fft.next_fast_len(least, real=True))
 
     @cached_property
     def gates(self) -> NDArray[np.int64]:
-        """(n - 1,) largest lag of each edge in the first search, plus one."""
+        """(n - 1,) largest lag of each edge in the first search, samples, plus one."""
         exact = self.edge_lags * (self.grid / self.length)
         return np.ceil(exact).astype(np.int64) + 1

@@ -1,4 +1,4 @@
-"""First search for the delays of a frame; detects whether it contains a sound.
+"""Detects a sound in a frame and finds first values of its delays.
 
 Noise in different channels is independent, whatever its color. The correlation of such
 channels at a lag is Gaussian, and the spectra of the channels give its variance. The
@@ -18,10 +18,10 @@ from systems.delays.delay_peaks import whitening
 from systems.delays.delay_plan import DelayPlan
 from systems.framework.compiling import njit
 
-# Largest coherence: there is always some noise.
+# Largest coherence that is assumed, because there is always some noise.
 _WHOLE = 0.99
 
-# Largest height above noise that is computed, standard deviations.
+# Noise is assumed never to reach this height, standard deviations of the noise.
 _HIGHEST = 38.0
 
 
@@ -31,14 +31,16 @@ class DelaySearch(NamedTuple):
     arrivals: NDArray[np.float64]
     """(n,) arrivals relative to channel 0, samples."""
     ambiguity: float
-    """Ratio of the second to the first peak within the gate, 0 to 1; worst edge."""
+    """Ratio of the second peak to the highest peak within the gate, 0 to 1. It is the
+    largest ratio of all edges of the plan."""
     chance: float
-    """Probability that noise alone has peaks as high as all of these."""
+    """Probability that noise alone has peaks as high as those of all edges."""
     weakest: float
-    """Probability that noise alone has a peak as high as the lowest of these. It is
-    near 1 if the sound has not reached all channels yet."""
+    """Probability that noise alone has a peak as high as the lowest peak of all edges.
+    It is near 1 if the sound has not reached all channels yet."""
     energy: float
-    """Energy of the mean channel within the band, units of the frame squared."""
+    """Energy of a channel within the band, averaged over the channels, units of the
+    frame squared."""
 
 
 def amdf(
@@ -82,10 +84,10 @@ def _amdf(
 def _peak(
     values: NDArray[Any],
 ) -> tuple[np.intp, float]:  # pragma: no cover  (compiled)
-    """Finds the highest value, and the ratio of the next peak to it.
+    """Finds the highest value, and the ratio of the second peak to the highest one.
 
-    The main lobe ends on each side where the values are at most half the peak. A
-    highest value at a border is no peak: its ratio is 1.
+    The main lobe ends on each side where the values are at most half the peak. If the
+    highest value is at a border, it is no peak, and the ratio is 1.
     """
     best = np.argmax(values)
     top = values[best]
@@ -109,11 +111,14 @@ def _cross_spectra(
 ) -> tuple[
     NDArray[np.complex64], NDArray[np.float64], float
 ]:  # pragma: no cover  (compiled)
-    """Computes the cross-spectra of the edges, from the bin ``first`` on.
+    """Computes the cross-spectra of the edges.
+
+    The spectra begin at the bin ``first``. All other bins of the cross-spectra are
+    zero.
 
     Returns:
         (e, size) cross-spectra C; (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins
-        k; and the energy of the mean channel, 0 if a channel is silent.
+        k; and the mean energy of the channels, which is 0 if a channel is silent.
     """
     channels, bins = spectra.shape
     cross = np.zeros((len(edges), size), dtype=spectra.dtype)
@@ -140,7 +145,8 @@ def _gated_peak(
     """Finds the highest peak within the gate.
 
     Returns:
-        Lag of the peak, ratio of the second peak to it, and its height.
+        Lag of the highest peak, samples; ratio of the second peak to the highest one;
+        and height of the highest peak.
     """
     gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
     for k in range(gate):
@@ -159,12 +165,13 @@ def _gated_peak(
 def _chance_of_noise(
     heights: NDArray[np.float64], counts: NDArray[np.float64]
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the probability that noise reaches all peaks, and the lowest one.
+    """Computes the probabilities that noise reaches all peaks, and the lowest peak.
 
     Args:
-        heights: (e,) peaks over their standard deviation.
+        heights: (e,) heights of the peaks, in standard deviations of the noise.
         counts: (e,) expected number of upward zero crossings of noise within the gate.
-            Noise crosses a height z exp(-z^2 / 2) times as often (Rice 1944).
+            At the height z, the number of crossings is smaller by the factor
+            exp(-z^2 / 2) (Rice 1944).
     """
     log_product, weakest = 0.0, 0.0
     for e in range(heights.size):
@@ -173,7 +180,8 @@ def _chance_of_noise(
         below = (1.0 - 0.5 * math.erfc(z / math.sqrt(2.0))) * math.exp(-crossings)
         log_product += math.log(max(1.0 - below, 1e-300))
         weakest = max(weakest, 1.0 - below)
-    # Probability of the product of m independent probabilities (Fisher).
+    # Probability that a product of as many independent uniform numbers is at most this
+    # product (Fisher).
     term, total = 1.0, 0.0
     for k in range(heights.size):
         total += term
@@ -193,17 +201,17 @@ def _judge(
 ) -> tuple[NDArray[np.float64], float, float, float]:  # pragma: no cover  (compiled)
     """Computes arrivals, ambiguity, chance and weakest of ``DelaySearch``.
 
-    The correlation of each edge gives the lag of its highest peak. The lags add up to
-    arrivals along the tree. The height of the peak relative to that of noise gives the
-    chance.
+    The highest peak in the correlation of each edge gives the lag of the edge. The sums
+    of the lags along the tree give the arrivals. The heights of the peaks relative to
+    the noise give the chance.
 
     Args:
         cross: (e, grid // 2 + 1) cross-spectra of the edges.
-        grid: Samples of their correlations.
+        grid: Number of samples of each correlation.
         moments: (e, 2) sums of ``_cross_spectra``.
-        edges: (e, 2) channels, a tree.
+        edges: (e, 2) channels of each edge. The edges form a tree.
         gates: (e,) largest lags, samples of the correlation.
-        padding: Length of the transform over that of the frame.
+        padding: Length of the transform divided by the length of the frame.
         stretch: Samples of the frame per sample of the correlation.
     """
     count = len(cross)
@@ -217,7 +225,8 @@ def _judge(
         i, j = edges[e]
         arrivals[j] = arrivals[i] + lag * stretch
         ambiguity = max(ambiguity, ratio)
-        # Padding makes the bins dependent, so that fewer count than are summed.
+        # Padding makes the bins dependent. The number of independent bins is therefore
+        # smaller than that of the summed bins.
         heights[e] = height / (math.sqrt(2.0 * padding * moments[e, 0]) + 1e-300)
         rms_bin = math.sqrt(moments[e, 1] / (moments[e, 0] + 1e-300))
         counts[e] = 2.0 * gates[e] / grid * rms_bin
@@ -228,16 +237,17 @@ def _judge(
 def weakest_sound(plan: DelayPlan, rate: float) -> float:
     """Computes the level of the weakest sound that is distinguished from noise.
 
-    For a given energy, the sound with the spectrum of the noise has the highest
-    correlation relative to noise (Cauchy-Schwarz). The level is therefore valid for
-    every sound.
+    A sound with the spectrum of the noise is the easiest to detect. It has the highest
+    correlation relative to noise of all sounds with the same energy (Cauchy-Schwarz).
+    The weakest sound that can be detected therefore has this spectrum.
 
     Args:
         plan: Rates, band and array.
-        rate: Probability below which noise does not explain a correlation.
+        rate: A correlation counts as a sound if noise reaches it with at most this
+            probability.
 
     Returns:
-        Energy of the sound over that of the noise, within the band.
+        Ratio of the energy of the sound to the energy of the noise, within the band.
     """
     from scipy.optimize import brentq
 
@@ -278,12 +288,12 @@ def _arrivals(lags: NDArray[np.float64], plan: DelayPlan) -> NDArray[np.float64]
 def _amdf_search(
     frame: NDArray[np.float32], plan: DelayPlan
 ) -> tuple[NDArray[np.float64], float]:
-    """Computes arrivals by the function of the papers, and their ambiguity."""
+    """Computes the arrivals by ``amdf``, and their ambiguity."""
     lags, ambiguity = np.empty(len(plan.edges)), 0.0
     for e, (i, j) in enumerate(plan.edges.tolist()):
         reach = int(plan.edge_lags[e]) + 1
         difference = amdf(frame[i], frame[j], reach)
-        # Its depth below the mean corresponds to the height of a correlation.
+        # The depth of a minimum below the mean corresponds to the height of a peak.
         best, ratio = _peak(difference.mean() - difference)
         lags[e] = best - reach
         ambiguity = max(ambiguity, ratio)
@@ -305,14 +315,14 @@ def search_delays(
         frame: (n, frame_samples) channels, any unit.
         spectra: (n, bins) transform of length ``plan.length`` within the band.
         plan: Rates and array.
-        band: Bins of the transform.
-        phat: Whether to whiten.
-        by_amdf: Whether the delays are those of the function of the papers. Detection
-            uses the correlation in any case.
+        band: Bins of the transform that ``spectra`` contains.
+        phat: Whether to whiten the cross-spectra.
+        by_amdf: Whether ``amdf`` gives the delays. Detection uses the correlation in
+            any case.
 
     Returns:
-        First arrivals, samples, and measures of their reliability; None if a channel is
-        silent.
+        First values of the arrivals, samples, and measures of their reliability; None
+        if a channel is silent.
     """
     size = plan.grid // 2 + 1
     cross, moments, energy = _cross_spectra(spectra, plan.edges, band.start, size)
@@ -321,9 +331,9 @@ def search_delays(
     white = cross.copy() if phat else None
     found = _correlation_search(cross, moments, energy, plan)
     if white is not None:
-        # The peaks of a tone are equal. After whitening, noise decides between them.
-        # The ambiguity is therefore the larger of both, and the plain correlation
-        # decides about noise.
+        # All peaks of a tone are equally high. After whitening, noise decides which one
+        # is the highest. The ambiguity is therefore the larger one of both searches.
+        # The search without whitening decides whether the frame contains only noise.
         white[:, band] *= whitening(white[:, band])
         seen = _correlation_search(white, moments, energy, plan)
         arrivals, ambiguity = seen.arrivals, max(found.ambiguity, seen.ambiguity)

@@ -85,7 +85,7 @@ def _correlations(
     """Computes the whitened correlations of all pairs on the grid of the plan.
 
     Returns:
-        (p, 2 m + 1) correlations, and m.
+        (p, 2 m + 1) correlations, and m, which is the column of lag 0.
     """
     spectra = transform_rows(frame, plan.length)[:, band]
     i, j = plan.shape.pairs.T

@@ -1,7 +1,8 @@
 """Measures the delays between the channels of a frame.
 
-First, the delays of close channels are searched on a grid. The channels are then cut
-to the section that they share, so that the edges of the frame do not shift the result.
+First, a search on a grid finds the delays between close microphones. The channels are
+then cut to the section that they share, so that the edges of the frame do not shift the
+result.
 Newton's method on the cross-spectrum finds the peak of the correlation of each pair.
 The coherence of the cut channels gives the errors of the delays.
 """
@@ -19,8 +20,8 @@ from systems.delays.delay_search import DelaySearch, search_delays
 from systems.delays.occupied_band import occupied_band
 from systems.delays.transforms import transform_rows
 
-# The channels are cut again if a delay changes by more than the first value, samples.
-# The second value limits the number of cuts.
+# The channels are cut again if an arrival changes by _SETTLED samples or more. They are
+# cut at most _CUTS times.
 _SETTLED = 0.75
 _CUTS = 4
 
@@ -29,7 +30,7 @@ class _Method(NamedTuple):
     phat: bool = False
     """Whether the cross-spectra are whitened."""
     by_amdf: bool = False
-    """Whether delays are whole samples by the function of the papers."""
+    """Whether ``amdf`` gives the delays, in whole samples."""
 
 
 #: Methods to measure delays, by name.
@@ -45,8 +46,8 @@ class DelayEstimate(NamedTuple):
     """Delays of one frame, and measures of their reliability."""
 
     tau: NDArray[np.float64]
-    """(n - 1,) t_k - t_0 of the channels 1 ... n - 1, s. Positive if the sound reaches
-    channel 0 earlier."""
+    """(n - 1,) delays t_k - t_0 of the channels k = 1 ... n - 1, s. A delay is positive
+    if the sound reaches channel 0 earlier."""
     covariance: NDArray[np.float64]
     """(n - 1, n - 1) covariance of the delays, s^2."""
     correlation: float
@@ -54,14 +55,16 @@ class DelayEstimate(NamedTuple):
     closure: float
     """Largest disagreement between the delay of a pair and ``tau``, s."""
     ambiguity: float
-    """Ratio of the second to the first peak within the gate, 0 to 1; worst edge."""
+    """Ratio of the second peak to the highest peak within the gate, 0 to 1. It is the
+    largest ratio of all edges of the plan."""
     chance: float
-    """Probability that noise alone has peaks as high as all of these."""
+    """Probability that noise alone has peaks as high as those of all edges."""
     angular_frequency: float
-    """Root mean square angular frequency of the shared sound, rad/s."""
+    """Root mean square angular frequency of the sound that the channels share,
+    rad/s."""
     noise_energy: float
-    """Energy within the band that the mean channel does not share with the others,
-    units of the frame squared."""
+    """Energy within the band that a channel does not share with the other channels,
+    averaged over the channels, units of the frame squared."""
     band: slice
     """Bins of the plan's transform that were used."""
 
@@ -134,10 +137,10 @@ def settled_delays(
         frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
         method: A key of METHODS.
-        seen: Result of ``look``, or other arrivals to start from.
+        seen: Result of ``look``, or a copy of it with other arrivals to start from.
 
     Returns:
-        As ``estimate_delays``.
+        The estimate or None, as for ``estimate_delays``.
     """
     chosen = METHODS[method]
     search, band = seen

@@ -9,17 +9,18 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-# Echoes that remain, mainly those off the floor, shift each arrival independently
-# (standard deviation, s) and the whole direction (rad). These values apply if at least
-# the share ``_NEWS`` of a frame's energy is no echo. The errors are larger for smaller
-# shares. All values are from the trials in rooms, docs/results_hearing.md.
+# Echoes that remain are mainly reflections off the floor. They shift each arrival
+# independently (standard deviation ``_ARRIVAL_S``) and turn the whole direction
+# (standard deviation ``_DIRECTION_RAD``). These values apply if at least the share
+# ``_NEWS`` of a frame's energy is no echo. For smaller shares, the errors are larger.
+# All values are from the trials in rooms, docs/results_hearing.md.
 _ARRIVAL_S = 1.2e-6
 _DIRECTION_RAD = 2e-3
 _NEWS = 0.12
 
 # An echo with the delay d shifts the peak of a correlation in proportion to 1 / (w^2
-# d). Its phase varies over the band w, so that most of its effect cancels. The errors
-# above are those at this root mean square frequency, rad/s.
+# d). The phase of the echo varies with the frequency w within the band, so that most of
+# its effect cancels. The errors above apply at this root mean square frequency, rad/s.
 _BAND = 2.0 * math.pi * 4.5e3
 
 # Number of parts of a frame. Fewer parts detect the start of a sound less well. With
@@ -40,8 +41,8 @@ def echo_errors(
             rad/s.
 
     Returns:
-        (n - 1, n - 1) covariance of the delays of channels 1 ... n - 1 to channel 0,
-        s^2.
+        (n - 1, n - 1) covariance of the delays of channels 1 ... n - 1 relative to
+        channel 0, s^2.
     """
     turns = (shape.p_AM[1:] - shape.p_AM[0]) * (_DIRECTION_RAD / c)
     single = _ARRIVAL_S**2 * (np.eye(len(turns)) + 1.0)
@@ -52,8 +53,9 @@ def echo_errors(
 def energy_spread(frame: NDArray[np.float32]) -> float:
     """Computes the share of a frame over which its energy is spread.
 
-    It is the squared mean of the energies of the fifths of the frame over their mean
-    square. For a steady sound in a share p of a silent frame, it is p.
+    The frame is divided into five parts. The result is the squared mean of their
+    energies, divided by the mean of their squared energies. If a steady sound fills the
+    share p of an otherwise silent frame, the result is p.
 
     Args:
         frame: (n, samples) channels, not all silent.

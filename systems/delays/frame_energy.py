@@ -16,7 +16,7 @@ BLOCK_SAMPLES = 64
 
 @njit(cache=True)
 def frame_energy(frame: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
-    """Computes the sum of squares of a frame (n, samples) about its block means."""
+    """Computes the sum of squares of a frame (n, samples), block means subtracted."""
     channels, samples = frame.shape
     whole = samples - samples % BLOCK_SAMPLES
     energy = 0.0
@@ -32,7 +32,7 @@ def frame_energy(frame: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
 def _block_energy(
     samples: NDArray[Any], begin: int, count: int
 ) -> Any:  # pragma: no cover  (compiled)
-    """Computes the sum of squares of one block, floats or integers, about its mean."""
+    """Computes the sum of squares of a block of numbers, after subtracting its mean."""
     total, squares = np.float32(0.0), np.float32(0.0)
     for k in range(count):
         x = np.float32(samples[begin + k])

@@ -1,9 +1,9 @@
 """Halves the sample rate of frames, if the band allows it.
 
-Transforms are then faster. The half-band filter has 19 taps, every other one of them
-zero. It is flat to 0.02 dB up to ``PASSED`` times the sample rate. It suppresses the
-frequencies that alias to this range by 55 dB. The filter is symmetrical and the same
-for all channels, so that it does not change delays.
+Transforms are then faster. The half-band filter has 19 taps. Every other tap is zero,
+except the middle one. The filter is flat to 0.02 dB up to ``PASSED`` times the sample
+rate. Frequencies that alias to this range are suppressed by 55 dB. The filter is
+symmetrical and the same for all channels, so that it does not change delays.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ PASSED = 0.15
 
 # Number of nonzero taps on each side of the middle one.
 _PAIRS = 5
-# Parameter of the Kaiser window. A larger one leaks less and has a narrower band.
+# Parameter of the Kaiser window. A larger value reduces leakage and narrows the band.
 _BETA = 5.0
 
 
 def _taps() -> tuple[np.float32, ...]:
-    """Returns the taps at 1, 3, 5 ... samples from the middle one, which is 1/2."""
+    """Returns the taps 1, 3, 5 ... samples away from the middle tap, which is 1/2."""
     away = 2.0 * np.arange(_PAIRS) + 1.0
     window = np.i0(_BETA * np.sqrt(1.0 - (away / (2.0 * _PAIRS)) ** 2))
     taps = np.sinc(away / 2.0) * window
@@ -45,8 +45,9 @@ def halve_rate(
         frame: (n, samples) channels, floats or counts.
 
     Returns:
-        (n, samples // 2) float32, at the second, fourth ... sample. The frame is
-        continued by silence, so four or five samples at each end are incomplete.
+        (n, samples // 2) float32 values of the filter at the second, fourth ... sample.
+        The filter assumes silence before and after the frame. The first and last four
+        or five values are therefore incomplete.
     """
     channels, samples = frame.shape
     half = samples // 2
@@ -67,8 +68,8 @@ def _halve_row(
 ) -> None:  # pragma: no cover  (compiled)
     """Filters one channel.
 
-    ``odd`` (half,) is scratch memory, and so is ``even`` except for its ends, which are
-    zero.
+    ``odd`` (half,) and the inside of ``even`` are scratch memory. The ends of ``even``
+    must be zero.
     """
     inside = even[_PAIRS - 1 : _PAIRS - 1 + odd.size]
     for k in range(odd.size):

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-#: Length of the raised-cosine edges of the cut channels, samples. Sharp edges pull a
-#: peak to whole samples by the inverse of length and squared bandwidth. For a 25 ms
-#: frame at 50 kHz, this is 2e-3 samples, as much as noise at 30 dB. Soft edges reduce
-#: it to a twentieth, and to zero if they follow the delays below one sample.
+#: Length of the raised-cosine edges of the cut channels, samples. Sharp edges shift a
+#: peak towards whole samples. The shift is inversely proportional to the length and to
+#: the squared bandwidth. For a 25 ms frame at 50 kHz, it is 2e-3 samples, as much as
+#: the error due to noise at 30 dB. Soft edges reduce the shift to a twentieth. If the
+#: edges also follow the fractions of a sample in the delays, the shift is zero.
 EDGE_SAMPLES = 16
 
 
@@ -23,12 +24,12 @@ def cut_to_overlap(
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrivals relative to channel 0, samples. Channels are cut at
-            whole samples, and their edges follow the rest of the delay.
+        arrivals: (n,) arrivals relative to channel 0, samples. The channels are cut at
+            whole samples. Their soft edges follow the remaining fractions of a sample.
 
     Returns:
-        (n, m) in the unit of the frame; m is the length of the frame less the largest
-        difference of the arrivals, in whole samples.
+        (n, m) channels in the unit of the frame. Here m is the length of the frame
+        minus the largest difference between two arrivals, in whole samples.
     """
     cut, length = cut_rows(frame, arrivals, *frame.shape)
     return np.ascontiguousarray(cut[:, :length])
@@ -38,7 +39,7 @@ def cut_to_overlap(
 def cut_rows(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64], rows: int, columns: int
 ) -> tuple[NDArray[np.float32], int]:  # pragma: no cover  (compiled)
-    """Cuts as ``cut_to_overlap``, with zeros after the section and in further rows.
+    """Cuts like ``cut_to_overlap``, and adds columns and rows of zeros.
 
     Args:
         frame: (n, samples) channels.
@@ -47,7 +48,8 @@ def cut_rows(
         columns: Columns of the output, at least m.
 
     Returns:
-        (rows, columns), of which the first m columns contain the section, and m.
+        (rows, columns) array, which contains the section in its first n rows and m
+        columns; and m.
     """
     channels, samples = frame.shape
     whole = np.rint(arrivals)
@@ -67,6 +69,6 @@ def cut_rows(
 
 @njit(cache=True)
 def _ramp(k: float) -> np.float32:  # pragma: no cover  (compiled)
-    """Returns the sample k of a raised cosine; k need not be whole."""
+    """Returns the value of a raised cosine at sample k, which need not be whole."""
     share = min(max((k + 0.5) / EDGE_SAMPLES, 0.0), 1.0)
     return np.float32(0.5 - 0.5 * math.cos(math.pi * share))

@@ -2,10 +2,10 @@
 
 In a room, the direct sound arrives first. For some tens of milliseconds, further sound
 in the same band is more likely an echo than new sound. The short-time spectra of each
-channel are therefore weighted and whitened. The weight is the rise above a decaying
-memory of the past spectra. This is the precedence effect, as in the echo-free onsets of
-Huang, Ohnishi and Sugie (1995). All weights are real, so that the delays between the
-channels do not change.
+channel are therefore weighted and whitened. The weight is the share of the power that
+exceeds a decaying memory of the past spectra. This is the precedence effect, as in the
+echo-free onsets of Huang, Ohnishi and Sugie (1995). All weights are real, so that the
+delays between the channels do not change.
 """
 
 from __future__ import annotations
@@ -18,26 +18,27 @@ from scipy import fft
 
 from systems.framework.compiling import njit
 
-# Length of a spectrum, s: short compared with the delay of the first echoes, long
-# compared with a period of the lowest band.
+# Length of the window of a spectrum, s. It is short compared with the delay of the
+# first echoes, and long compared with a period of the lowest band.
 _WINDOW_S = 2.56e-3
 _HOPS_PER_WINDOW = 4
 
-# Time constant of the memory, s. It is that of a room with a reverberation time (60 dB)
-# of 0.69 s. In the trials in docs/results_hearing.md, results change little from 20 to
-# 100 ms.
+# Time constant of the memory, s. A room with a reverberation time (60 dB) of 0.69 s has
+# the same time constant. In the trials in docs/results_hearing.md, values from 20 to
+# 100 ms give similar results.
 _DECAY_S = 0.05
 
-# Power counts as new only above this many times the noise. One in exp(4) bins of noise
-# exceeds it. Without this limit, whitening would raise noise to the level of the sound.
+# Power counts as new only above this many times the noise. Noise exceeds this limit in
+# one of exp(4) bins. Without the limit, whitening would raise noise to the level of the
+# sound.
 _NOISE_MARGIN = 4.0
 
-# Whitening is limited below this share of the strongest power of a channel.
+# Whitening is limited for bins below this share of the strongest power of a channel.
 _WHITENING_FLOOR = 0.01
 
 
 class EchoMemory:
-    """Sizes and decay of the memory for frames at a sample rate."""
+    """Sizes and decay of the memory, for frames of one sample rate."""
 
     def __init__(self, channels: int, sample_rate_hz: float) -> None:
         self.window = _HOPS_PER_WINDOW * max(
@@ -64,7 +65,7 @@ class EchoMemory:
         return memory * np.float32(self.decay_a_hop ** (samples / self.hop))
 
     def least(self, noise_density: float) -> float:
-        """Returns the least power in the memory for noise of this energy per sample."""
+        """Returns the least power in the memory for a given noise energy per sample."""
         return _NOISE_MARGIN * noise_density * float(np.vdot(self.taper, self.taper))
 
 
@@ -78,9 +79,9 @@ def _weigh(
 ) -> float:  # pragma: no cover  (compiled)
     """Weights spectra (n, instants, bins) in place and updates the memory.
 
-    New power is the excess over the memory. Its ratio to the power gives the weight,
-    and the root of the power whitens. The memory is the largest of the decayed memory,
-    the present power and the noise.
+    New power is the excess of the power over the memory. The weight is the ratio of the
+    new power to the power. Division by the root of the power whitens the spectrum. The
+    new memory is the largest of the decayed memory, the present power and the noise.
 
     Returns:
         Share of the energy that is new.
@@ -137,8 +138,8 @@ def keep_first_wave_front(
         frame: (n, samples) channels, any unit.
         memory: (n, bins) memory of the last frame; None after silence.
         sizes: Sizes of window and memory.
-        noise_density: Mean square per sample of white noise as loud as the noise, units
-            of the frame squared; 0 if it is unknown.
+        noise_density: Mean square per sample of white noise that is as loud as the
+            noise of the frame, units of the frame squared; 0 if it is unknown.
 
     Returns:
         (n, samples) weighted and whitened channels, the new memory, and the share of

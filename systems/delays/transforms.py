@@ -1,7 +1,7 @@
 """Fourier transforms of the channels of a frame, in compiled code.
 
-The results are equal to those of SciPy to the last bit. SciPy takes additional
-time to select the function for a transform, as much as for the transforms of a frame.
+The results are equal to those of SciPy to the last bit. SciPy needs as much time to
+select the function for a transform as for the transforms of a frame.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ from systems.framework.compiling import njit
 def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
     """Returns the number of rows to transform for a number of channels.
 
-    Rows of single precision are transformed four at a time, and a remainder of three
-    one by one. A fourth row of zeros then saves a third of the time.
+    The library transforms rows of single precision four at a time. It transforms a
+    remainder of three rows one by one. A fourth row of zeros then saves a third of the
+    time for the transforms.
 
     Args:
         channels: Number of channels.
 
     Returns:
-        Number of rows: that of the channels, or one more.
+        The number of channels, or one more.
     """
     return channels + (1 if channels % 4 == 3 else 0)
 

@@ -176,7 +176,8 @@ class _Declared:
     """Input ports, in the order of the step."""
     outputs: Sequence[Port] = ()
     """Output ports, in the order of the step. A port that carries an object publishes
-    the field of the state with the name of the port. The step does not fill it."""
+    the field of the state that has the name of the port. The step does not fill this
+    port."""
     states: Sequence[str] = ()
     """Names of the elements of the state, continuous elements first."""
     columns: Mapping[str, tuple[str, ...]] = {}
@@ -304,8 +305,8 @@ class _Declared:
             )
             sources.add(self.xa_ticket())
             if step.publish is not None:
-                # Drake replaces abstract states before the blocks that have a discrete
-                # state read their inputs, which must be those of the tick before.
+                # Drake replaces abstract states before blocks with a discrete state
+                # read their inputs. These inputs must be those of the previous tick.
                 # Therefore published values are a discrete state, too.
                 published = self.__publish(step.state)
                 self.__ends = np.cumsum(self.__output_sizes)[:-1]
@@ -387,7 +388,7 @@ class _Declared:
         )
 
     def __read(self: Any, context: Any) -> list[Any]:
-        """One entry per input port; that of an unread port is empty."""
+        """One entry per input port; the entry of an unread port is empty."""
         ports, objects = self.__read_ports, self.__objects
         read = read_arrays if self.__as_arrays else read_lists
         numbers = [port for k, port in enumerate(ports) if k not in objects]

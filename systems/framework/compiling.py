@@ -11,7 +11,7 @@ No function uses the option ``fastmath`` of numba. With this option, the compile
 reorder sums. The last bit of a sum would then depend on the machine, on the caller and
 on the order of compilation. In a run of 40 s, such a difference grows to centimeters
 (``tests/evals/test_compiled_code.py``). Without ``fastmath``, the compiled loop of a
-robot that listens takes 10 to 15 % longer, and the loop of Drake 5 %.
+robot that listens takes 10 to 15 % longer, and the loop of Drake takes 5 % longer.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from typing import Any
 _PACKAGES = ("systems", "diagrams", "analysis", "studies", "benchmarks")
 _ROOT = Path(__file__).resolve().parents[2]
 #: These files define how numba compiles functions of other files. The other files need
-#: not import them, so that every digest includes these files.
+#: not import these files. Therefore every digest includes them.
 OVERLOADS = (
     _ROOT / "systems" / "framework" / "scalar_math.py",
     _ROOT / "systems" / "world" / "geometry.py",

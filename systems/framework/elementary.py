@@ -1,9 +1,10 @@
 """Elementary functions of floats, arrays and AutoDiffXd.
 
-For floats, the functions of ``math`` give the same results as those of ``pydrake.math``
-in a third of the time. However, they raise errors where a result is infinite or not a
-number. In these cases, and for AutoDiffXd, this module uses ``pydrake.math``. It uses
-numpy for the sine and cosine of arrays.
+For floats, the functions of ``math`` give the same results as those of
+``pydrake.math``, and take a third of their time. However, the functions of ``math``
+raise errors where a result is infinite or not a number. In these cases, and for
+AutoDiffXd, this module uses ``pydrake.math``. It uses numpy for the sine and cosine of
+arrays.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 A comparison with NaN is false and hides the error: an echo flag of NaN looks like no
 echo, and an obstacle at NaN looks out of reach. A sum is finite only if all its terms
-are, and it takes little time. Therefore each block sums all values that it reads.
+are finite, and its computation takes little time. Therefore each block sums all values
+that it reads.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def read_list(context: Any, port: Any) -> list[Any]:
 
 
 def read_lists(context: Any, ports: Sequence[Any]) -> list[list[Any]]:
-    """Reads several vector input ports in half the time of ``read_list``.
+    """Reads several vector input ports, twice as fast as ``read_list``.
 
     Args:
         context: Context of the block.

@@ -36,7 +36,7 @@ class HostCall:
 
     Args:
         function: The function, see ``HostFunction``.
-        inputs: Number of inputs. All further numbers are outputs.
+        inputs: Number of inputs. All numbers after the inputs are outputs.
     """
 
     def __init__(self, function: HostFunction, inputs: int) -> None:
@@ -89,7 +89,7 @@ _called: Any = intrinsic(_define_called)
 
 
 def _host_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untyped-def]
-    """Calls the function. State: the inputs, then the outputs of the next tick."""
+    """Calls the function. The state holds the inputs, then the next outputs."""
     if tick % numbers.period_ticks != 0:
         return
     k = 0
@@ -121,9 +121,9 @@ def host_step(
     Args:
         function: The function, see ``HostFunction``.
         inputs: Number of elements of all input ports.
-        outputs: Number of elements of all output ports. The step publishes them for the
-            next tick. If this is 0, the loop calls the function before the steps that
-            publish outputs.
+        outputs: Number of elements of all output ports. The step publishes these
+            elements for the next tick. If there are none, the loop calls the function
+            before the steps that publish outputs.
         period_ticks: Period of the calls, ticks.
 
     Returns:

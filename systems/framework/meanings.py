@@ -1,7 +1,8 @@
 """The meanings of the fields of a parameter model, read from their docstrings.
 
 This module reads the docstrings of a model only on request. Pydantic would read them
-whenever a model is imported. This takes a quarter of the time for loading a scenario.
+whenever a model is imported. This would take a quarter of the time that it takes to
+load a scenario.
 """
 
 from __future__ import annotations

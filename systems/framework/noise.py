@@ -109,7 +109,7 @@ def standard_normals(
     """Draws a few normal numbers for one tick of one block.
 
     Each number is the sum of two entries of a table with 65 536 quantiles. The numbers
-    are normally distributed up to 5.9 standard deviations, and none is larger. The
+    are normally distributed up to 5.9 standard deviations. No number is larger. The
     generator splitmix64 selects the entries. Its initial state is a hash of seed and
     tick. For many numbers, use ``frame_noise``.
 
@@ -153,8 +153,8 @@ def tick_normals(
     """Draws the ``standard_normals`` of a tick in compiled code.
 
     The numbers have double precision. With single precision, the two engines would
-    differ: the product with a Python float has single precision in numpy, but double
-    precision in compiled code.
+    differ: the product of such a number and a Python float has single precision in
+    numpy, but double precision in compiled code.
 
     Args:
         noise: Seed and table of the block.

@@ -15,8 +15,8 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field, Strict
 
 # The ranges are decades wider than any robot on a floor needs. A value outside its
-# range is a typing error. It would cause an overflow or an endless run. A field that
-# needs a narrower range defines its own range.
+# range is a typing error. Such a value would cause an overflow or an endless run. A
+# field that needs a narrower range defines its own range.
 _LARGEST_M = 1_000.0
 _DAY_S = 86_400.0
 _LARGEST = 1e6

@@ -17,8 +17,9 @@ class _Template(TemplateSystem):
     """A template that creates classes without a search for their module.
 
     Drake adds methods to each new class, and these methods are templates, too. For each
-    of them, Drake searches all loaded modules once per stack frame. The result is
-    always the same module of Drake. With nested imports, this takes 0.25 s per block.
+    of these methods, Drake searches all loaded modules once per stack frame. The result
+    is always the same module of Drake. With nested imports, the search takes 0.25 s per
+    block.
     """
 
     def __init__(self, name: str, scalars: Any, pairs: Any, scope: ModuleType) -> None:
@@ -38,7 +39,7 @@ class _Template(TemplateSystem):
 
 
 def _make_copyable(cls: Any) -> None:
-    """Makes copies for another scalar type use the arguments of the original."""
+    """Defines copies for another scalar type, with the arguments of the original."""
     construct = cls._construct
 
     @functools.wraps(construct)

@@ -84,7 +84,7 @@ class MagneticHeading(Block):
     The headings of Song 2011 are clockwise from north. Angles in W are
     counterclockwise.
 
-    The block has no state. It draws new noise every tick. Latency: none.
+    The block has no state. It draws new noise every tick. There is no latency.
 
     Args:
         parameters: North, distortions of the field, and noise.

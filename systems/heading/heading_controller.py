@@ -93,8 +93,8 @@ def heading_controller_step(
 ) -> None:
     """Computes the duties of the motors.
 
-    State: integral part, deg; deviation at the last tick, deg; whether the robot moved
-    at the last tick, 0 or 1.
+    The state holds three numbers: the integral part, deg; the deviation at the last
+    tick, deg; and whether the robot moved at the last tick, 0 or 1.
     """
     expected, heading, move = inputs
     duty = outputs[0]
@@ -121,9 +121,10 @@ class HeadingController(Block):
     At the first tick of a move, the integral part starts at 0. The differential part is
     also 0 at this tick, so that it does not jump.
 
-    Discrete state, every tick: integral part, last deviation, and whether the robot
-    moved. Latency: none. The paper uses a period of 10 ms. Our tick of 25 ms reduces
-    the phase margin by one degree (``analysis.linear.heading_loop``).
+    The discrete state holds the integral part, the last deviation, and whether the
+    robot moved at the last tick. It is updated every tick. There is no latency. The
+    paper uses a period of 10 ms. Our tick of 25 ms reduces the phase margin by one
+    degree (``analysis.linear.heading_loop``).
 
     Args:
         parameters: Gains and limits.

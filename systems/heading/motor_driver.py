@@ -24,7 +24,7 @@ class MotorNumbers(NamedTuple):
 def motor_driver_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: MotorNumbers
 ) -> None:
-    """Computes the wheel speeds. State: left and right wheel speed, rad/s."""
+    """Computes the wheel speeds. The state is the left and right wheel speed, rad/s."""
     duty = inputs[0]
     state[0], state[1] = numbers.full_speed * duty[0], numbers.full_speed * duty[1]
 
@@ -38,8 +38,8 @@ def _publish(state: Any, outputs: Any, numbers: MotorNumbers) -> None:
 class MotorDriver(Block):
     """Computes the commanded wheel speeds from the duties of the motors.
 
-    Discrete state, every tick: the output. A new output is valid from the update on.
-    The plant models the lag of the motors.
+    The discrete state is the output, and is updated every tick. A new output is valid
+    after the update. The plant models the lag of the motors.
 
     Args:
         parameters: Speed at full duty.

@@ -17,7 +17,7 @@ class CompassParameters(Parameters):
     """Direction of north and distortions of the field. The paper prints no values."""
 
     north_deg: Angle = 90.0
-    """Direction of magnetic north in W, deg CCW from its x axis."""
+    """Direction of magnetic north in W, CCW from the x axis of W, deg."""
     hard_iron: Annotated[tuple[_Part, _Part], Strict(False)] = (0.0, 0.0)
     """Magnetic field of the robot along x and y of B, divided by the horizontal field
     of the earth. Fields of 0.02, 0.05 and 0.1 change the heading by up to 1.1, 2.9 and
@@ -49,9 +49,10 @@ class HeadingControlParameters(Parameters):
     turning_beyond_deg: Positive = 50.0
     """L, output beyond which the robot turns on the spot, deg."""
     pulse_widths: Literal["mended", "printed", "else_only"] = "mended"
-    """Conversion of the output to duties. ``mended``: from full speed ahead to turning
-    on the spot without a jump. ``printed``: table 2, with which the robot drives
-    backward. ``else_only``: table 2 with only the missing ``else`` added."""
+    """Conversion of the output to duties. ``mended``: the duties change without a jump
+    from full speed ahead to turning on the spot. ``printed``: table 2 as printed, with
+    which the robot drives backward. ``else_only``: table 2 with only the missing
+    ``else`` added."""
 
 
 class MotorDriverParameters(Parameters):

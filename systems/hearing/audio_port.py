@@ -37,7 +37,7 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def audio_of_run(run: RunFacts) -> Callable[[int], AudioFrame]:
-    """Returns the source of frames in a compiled loop.
+    """Returns the function that computes the frames in a compiled loop.
 
     Args:
         run: The run.

@@ -4,11 +4,12 @@ A sound s of unknown waveform reaches microphone m at the time t_m with the gain
 white noise. If s is replaced by its best estimate, the likelihood of a position grows
 with sum_k |Y_k|^2 / sum_m a_m^2, where Y_k = sum_m a_m X_m(w_k) exp(j w_k t_m).
 
-Newton's method maximizes it. At a position, slope and curvature with respect to the
-times of arrival give a set of delays with a covariance. The position that fits these
-delays (``systems.hearing.multilateration``) is the next one. With the least number of
-microphones, the result is the peak of the delays. With more microphones, the method
-uses only delays that belong to a position.
+Newton's method maximizes this expression. At each position, the slope and curvature of
+the expression with respect to the times of arrival give a set of delays with a
+covariance. The position that fits these delays (``systems.hearing.multilateration``) is
+the next one. With the least number of microphones, the result is the maximum over all
+delays. With more microphones, it is the maximum over those delays that belong to a
+position.
 
 The gains are those of the channels: the principal component of their cross-spectra.
 They are proportional to 1/R_m if the microphones are alike.
@@ -28,7 +29,8 @@ from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# Number of Newton steps, and the change of a delay at which they end, samples.
+# Largest number of Newton steps. They end when all delays change by less than _SETTLED
+# samples.
 _STEPS = 8
 _SETTLED = 1e-4
 
@@ -55,7 +57,7 @@ def _ranges(
 
 
 def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.float64]:
-    """Returns the delays of the sound from an estimated source.
+    """Returns the delays of sound that comes from an estimated source.
 
     Args:
         fix: Position in A, or the direction to a plane wave if its range is not valid.
@@ -63,7 +65,7 @@ def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.fl
         c: Speed of sound, m/s.
 
     Returns:
-        (n - 1,) t_k - t_0, s.
+        (n - 1,) delays t_k - t_0, s.
     """
     if fix.range_valid:
         ranges = _ranges(shape.p_AM, fix.p_AS)
@@ -81,12 +83,12 @@ def refine_source(
     sample_rate_hz: float,
     band_hz: tuple[float, float],
 ) -> SourceFix | None:
-    """Finds the most likely position near a first one.
+    """Finds the most likely position near a first estimate.
 
     Args:
         frame: (n, samples) channels, any unit.
-        start: Estimate whose delays are right to half a period of the highest frequency
-            of the sound.
+        start: First estimate. The errors of its delays must be below half a period of
+            the highest frequency of the sound.
         shape: The n microphones.
         c: Speed of sound, m/s.
         sample_rate_hz: Sample rate of the frame, Hz.
@@ -138,8 +140,9 @@ def _spectra(
     """Computes the spectra within the band.
 
     Returns:
-        (n, bins) spectra; w of the first bin and its step, rad per sample; and the
-        padding, which is the number of bins that share the noise of one.
+        (n, bins) spectra; angular frequency w of the first bin, rad per sample; step of
+        w from bin to bin, rad per sample; and the padding. The padding is the number of
+        adjacent bins over which the noise of one independent bin is spread.
     """
     length = int(fft.next_fast_len(cut.shape[1], real=True))
     first = max(1, math.ceil(band_hz[0] * length / sample_rate_hz))
@@ -168,8 +171,8 @@ def _pair_sums(
         rest: (n,) delays, samples.
 
     Returns:
-        (n, n) sums of the products X_m X_n^*: real part, w times imaginary part, w^2
-        times real part; and the sum of w^2.
+        Three (n, n) matrices for the products X_m X_j^*: sums of the real part, of w
+        times the imaginary part, and of w^2 times the real part; and the sum of w^2.
     """
     n, bins = spectra.shape
     aligned = np.empty((bins, n), dtype=np.complex128)
@@ -210,12 +213,12 @@ def _newton_step(
     """Computes one Newton step of the delays.
 
     The gains are the principal eigenvector of the cross powers. Slope and curvature of
-    the likelihood then give the step. The other eigenvalues give the noise, and with it
-    the covariance.
+    the likelihood then give the step. The other eigenvalues give the noise, which
+    determines the covariance.
 
     Returns:
-        (n - 1,) change of the delays to the maximum, samples, and their (n - 1, n - 1)
-        covariance; None if there is no maximum.
+        (n - 1,) change of the delays, samples, and (n - 1, n - 1) covariance of the
+        delays, samples^2. None if there is no maximum.
     """
     n, bins = spectra.shape
     power, slope, curve, squares = _pair_sums(
@@ -238,6 +241,6 @@ def _newton_step(
     noise = float(np.sum(values[:-1])) / (bins * (n - 1))
     off = ~np.eye(n, dtype=bool)
     signal = float(np.sum((weights * curve)[off]) / np.sum(weights[off] ** 2))
-    # The noise of one channel multiplies the sound of the others, and their noise.
+    # The noise of one channel is multiplied by the sound and the noise of the others.
     excess = 1.0 + noise * squares / signal if signal > 0.0 else math.inf
     return inverse @ gradient, inverse * (noise * excess)

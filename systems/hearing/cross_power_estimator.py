@@ -41,11 +41,12 @@ from systems.hearing.steer_near import near_grid, steer
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.parameters import MicArrayParameters
 
-#: The correlation of sound with less bandwidth than this repeats within the delays of
-#: the array, so that any bearing fits, Hz. A steady tone has up to 310 Hz due to its
-#: ends and echoes. A siren has some thousand.
+#: Least bandwidth of a sound, Hz. With less bandwidth, the correlation repeats within
+#: the delays of the array, so that any bearing fits. A steady tone has a bandwidth of
+#: up to 310 Hz because of its ends and of echoes. A siren has some thousand
+#: Hz.
 _LEAST_BANDWIDTH_HZ = 600.0
-#: A channel with less power than this share of the median channel counts as silent.
+#: A channel counts as silent up to this share of the power of the median channel.
 _DEAF = 1e-4
 #: The response must exceed this share of the sum that the occupied bins of all pairs
 #: would have if they came from one position. Otherwise nothing is heard.
@@ -69,7 +70,7 @@ class Direction(NamedTuple):
     """(2,) position from the middle microphone in B axes, m; None if only the bearing
     is known."""
     ambiguous: bool = False
-    """Whether other directions fit as well."""
+    """Whether other directions fit about equally well."""
     other: float = 0.0
     """Bearing of the best other direction, rad."""
 
@@ -111,9 +112,9 @@ class ArrayListener:
         self._own, self._c = parameters, c
         self.band_hz = parameters.low_hz, top
         self.p_PR_B = places[0]
-        """(2,) middle microphone from P in B axes, m."""
+        """(2,) position of the middle microphone relative to P, in B axes, m."""
         self.p_RM = places - places[0]
-        """(n, 2) microphones from the middle one, m."""
+        """(n, 2) positions of the microphones relative to the middle one, m."""
         self.facts = FrameSpectra(
             len(places), microphones.frame_samples, microphones.sample_rate_hz, top
         )
@@ -158,12 +159,12 @@ class ArrayListener:
 
         The cross powers of the noise are subtracted, and the rest is whitened. The
         correlations of all pairs are then added up for a grid of positions. The
-        strongest position gives the bearing. The peaks of the correlations near its
-        delays give a range.
+        strongest position gives the bearing. The peaks of the correlations near the
+        delays of this position give a range.
 
         Args:
             sound: Spectra gathered while the source sounded.
-            noise: Spectra gathered before; it may contain no frame.
+            noise: Spectra gathered before the sound. They may contain no frame.
 
         Returns:
             The direction, or None if nothing is heard or fewer than three microphones
@@ -263,10 +264,10 @@ class ArrayListener:
     def _printed(
         self, weighted: NDArray[np.complex128], lost: list[int]
     ) -> Direction | None:
-        """Estimates the direction by the printed method.
+        """Estimates the direction by the method printed in the paper.
 
-        It uses delays in whole samples, pairs with the middle microphone, and spherical
-        interpolation.
+        The method uses delays in whole samples, pairs with the middle microphone, and
+        spherical interpolation.
         """
         if lost:
             return None
@@ -308,12 +309,12 @@ _NOTHING, _NOISE, _SOUND = range(3)
 
 
 class _Memory(NamedTuple):
-    """What one frame leaves for the next one."""
+    """Values that the estimator keeps from one frame to the next one."""
 
     asked: int
     """Value of ``listening`` at the last frame."""
     before: NDArray[np.float64]
-    """(channels, samples) last frame, if it was gathered."""
+    """(channels, samples) last frame that was gathered."""
     noise: CrossPowers
     sound: CrossPowers
     outputs: NDArray[np.float64]
@@ -324,15 +325,16 @@ class CrossPowerEstimator(Block):
 
     The block gathers cross-power spectra while ``listening`` requests them. The sums
     for noise and for sound are separate. When ``listening`` no longer requests sound,
-    the estimate appears at the outputs. It stays there until sound is requested again,
-    when all outputs become zero. If nothing was heard, all outputs are zero except
-    ``lost_microphone``. This is the number of the first silent channel, from 1, or 0.
+    the estimate appears at the outputs. It stays there until sound is requested again.
+    All outputs then become zero. If nothing was heard, all outputs are zero except
+    ``lost_microphone``. ``lost_microphone`` is the number of the first silent channel,
+    counted from 1, or 0 if no channel is silent.
 
     Bearing and range refer to the middle microphone, which is the first. ``p_PS_B``
     refers to P. It is a unit vector if the range is unknown, and ``range_status`` gives
     the reason (``systems.hearing.source_fix``). ``ambiguous`` is 1 if another
-    direction, ``alternative_bearing``, fits as well. It is also 1 if the bandwidth of
-    the sound is so small that any direction fits.
+    direction, ``alternative_bearing``, fits about equally well. It is also 1 if the
+    bandwidth of the sound is so small that any direction fits.
 
     ``audio`` is evaluated only while ``listening`` requests it.
 
@@ -394,8 +396,9 @@ class CrossPowerEstimator(Block):
 
         Args:
             asked: Value of ``listening``.
-            audio: Returns the frame; called only if the frame is required.
-            memory: What the previous frame left.
+            audio: Function that returns the frame. It is called only if the frame is
+                required.
+            memory: Memory after the previous frame.
 
         Returns:
             The new memory.

@@ -10,19 +10,20 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-#: A bin is occupied if its cross power exceeds this share of the channels' power,
+#: A bin is occupied if its cross power exceeds three limits. The first limit is this
+#: share of the power of the two channels.
 _LEAST_SHARE = 0.25
-#: and this share of the power of the noise. The cross power of noise changes by about
-#: as much from one second to the next.
+#: The second limit is this share of the power of the noise. The cross power of noise
+#: changes by about as much from one second to the next.
 _LEAST_OVER_NOISE = 0.3
-#: It must also exceed this share of the cross power of the strongest bin.
+#: The third limit is this share of the cross power of the strongest bin.
 _LEAST_POWER = 1e-4
 #: Number of correlation values per sample.
 FINE = 8
 
 
 class FrameSpectra(NamedTuple):
-    """How frames become spectra: each pair of successive frames with a Hann window."""
+    """Sizes of the spectra of two successive frames, joined under a Hann window."""
 
     channels: int
     samples: int
@@ -107,14 +108,15 @@ def signal_powers(
     Args:
         facts: How frames became spectra.
         sound: Sums of at least one frame while the source sounded.
-        noise: Sums from before, which are subtracted; None: nothing is subtracted.
+        noise: Sums from before the sound, which are subtracted. None: nothing is
+            subtracted.
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
         (pairs, bins) mean cross powers, and (pairs, bins) whether a bin is occupied.
         The cross power of an occupied bin is a large share of the power of both
-        channels. It is not far below the strongest bin, and it is above the uncertainty
-        of the noise.
+        channels. It is not far below that of the strongest bin, and it is above the
+        uncertainty of the noise.
     """
     mean, own = sound.pairs / sound.frames, sound.own / sound.frames
     steady = np.zeros_like(own)

@@ -12,13 +12,13 @@ g_m - g_0. The fit has two stages.
 The start is a linear problem. The squared ranges are linear in the direction and the
 inverse range from microphone 0 (Smith and Abel, 1987).
 
-Gauss-Newton steps in (u, w) on the whitened delays follow. Their coordinates depend on
-the array. For a row, and for a plane array in space, the direction has its components
-within the span of the array as coordinates. For other arrays, the coordinates are
-rotations of u perpendicular to itself.
+Gauss-Newton steps in (u, w) on the whitened delays follow. The coordinates of u depend
+on the array. For a row, and for a plane array in space, they are the components of u
+within the span of the array. For other arrays, they are rotations of u perpendicular to
+itself.
 
-All kernels are written as loops. For arrays of this size loops are fastest, and numba
-compiles them in a tenth of the time.
+All kernels are written as loops. For arrays of this size, loops are faster than array
+expressions, and numba compiles them ten times as fast.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ class DelayProblem(NamedTuple):
     """Delays and the array that measured them."""
 
     d: NDArray[np.float64]
-    """(n - 1,) range differences to microphone 0, m."""
+    """(n - 1,) range from each other microphone minus range from microphone 0, m."""
     root: NDArray[np.float64]
     """(n - 1, n - 1) lower triangular matrix that whitens d: the errors become
     independent with variance 1."""
     p: NDArray[np.float64]
-    """(n, d) microphones from their centroid, m."""
+    """(n, d) positions of the microphones relative to their centroid, m."""
     span: NDArray[np.float64]
     """(r, d) orthonormal basis of the span of the microphones."""
     side: NDArray[np.float64]
@@ -192,8 +192,8 @@ def _coordinates(
 ) -> tuple[NDArray[np.float64], int]:  # pragma: no cover  (compiled)
     """Computes the derivatives of a direction with respect to its coordinates.
 
-    If ``bound``, u keeps unit length within the span. Its coordinates are then
-    rotations perpendicular to itself. Otherwise its coordinates are its components in
+    If ``bound``, u keeps unit length within the span. The coordinates are then
+    rotations of u perpendicular to itself. Otherwise they are the components of u in
     the span.
 
     Returns:
@@ -219,7 +219,8 @@ def _coordinates(
         for i in range(dim):
             basis[i, 0] = a * span[1, i] - b * span[0, i]
     if rank == 3:
-        # Two unit vectors perpendicular to u; the first one from the axis farthest off.
+        # Two unit vectors perpendicular to u. The first one is made from the axis that
+        # is farthest from u.
         least = 0
         for i in range(1, 3):
             if abs(u[i]) < abs(u[least]):
@@ -276,7 +277,7 @@ def _descend(
         far: Whether w stays as it is.
 
     Returns:
-        u, w and the sum of squared residuals there.
+        The final u and w, and the sum of the squared residuals at this position.
     """
     m = problem.d.size
     basis, k = _coordinates(problem, u, bound)
@@ -324,7 +325,8 @@ def _descend_within(
 ) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
     """Runs ``_descend`` with the constraints w >= 0 and |u| = 1.
 
-    The steps are repeated with a constraint as an equation where a result violates it.
+    If a result violates a constraint, the steps are repeated with this constraint as an
+    equation.
     """
     bound = _is_bound(problem)
     cost = 0.0
@@ -354,13 +356,16 @@ def _starts(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], int
 ]:  # pragma: no cover  (compiled)
-    """Computes starts from the linear equations seen from microphone 0.
+    """Computes positions to start from, by linear equations relative to microphone 0.
 
-    With v the components of the direction in the span, q = p_b - p_0 and d the range
-    difference, the equation is q . v - w (q^2 - d^2) / 2 = -d. The first start is a
-    plane wave (w = 0). If v must have unit length, v is linear in w, and |v| = 1 gives
-    up to two further starts. Otherwise least squares for v and w give one further start
-    if there are enough delays.
+    Let v be the components of the direction in the span. For each microphone b, let
+    q = p_b - p_0, and let d be the range difference. The equation is then
+
+        q . v - w (q^2 - d^2) / 2 = -d.
+
+    The first start is a plane wave (w = 0). If v must have unit length, v is a linear
+    function of w, and |v| = 1 gives up to two further starts. Otherwise least squares
+    for v and w give one further start if there are enough delays.
 
     Returns:
         (3, r) components v, (3,) inverse ranges, and the number of starts.
@@ -433,8 +438,8 @@ def _search(
 ]:  # pragma: no cover  (compiled)
     """Finds the two positions with the lowest costs.
 
-    Each start is refined by ``_descend_within``, the plane wave last. It is left out if
-    another start already fits.
+    ``_descend_within`` refines each start. The plane wave is the last start. It is left
+    out if another start already fits.
 
     Returns:
         (2, d) directions, (2,) inverse ranges and (2,) chi-squares, the best one first.
@@ -473,7 +478,7 @@ def _covariance(
         problem: Delays and array.
         u: (d,) direction.
         w: Inverse range, 1/m.
-        prior: Prior information on w: 1 over its variance, m^2.
+        prior: Prior information on w, which is the inverse of the variance of w, m^2.
 
     Returns:
         (k + 1, k + 1) covariance of the coordinates of u and of w; (d, 3) derivatives
@@ -547,9 +552,10 @@ def fit_delays(
             used if the delays give no range.
 
     Returns:
-        u (d,); w and its variance (infinite: no range); covariances (d, d) of u and of
-        the position, or of u twice without a range; chi-square; position of the twin
-        (zeros: none); and the status of the range (``range_status``).
+        (d,) direction u; w; variance of w, infinite without a range; (d, d) covariance
+        of u; (d, d) covariance of the position, or that of u again without a range;
+        chi-square; (d,) position of the twin, zeros without a twin; and the status of
+        the range (``range_status``).
     """
     us, ws, costs = _search(problem)
     n, dim = problem.p.shape

@@ -32,7 +32,7 @@ def relative_position(pose_WB: Any, pose_WS: Any, control_point_m: Any) -> Any:
         control_point_m: Distance of P ahead of the origin of B, m.
 
     Returns:
-        x and y of p_PS_B, the source from P in B axes, m.
+        x and y of p_PS_B, the position of the source relative to P, in B axes, m.
     """
     x_P, y_P = control_point(pose_WB, control_point_m)
     return rotate(-pose_WB[2], pose_WS[0] - x_P, pose_WS[1] - y_P)
@@ -83,7 +83,7 @@ def stated_covariance(x: Any, y: Any, hearing: Any) -> Any:
 
 
 class _PerFrame:
-    """Table with one row per measurement, which is computed when it is read.
+    """Table with one row per measurement. Each row is computed when it is read.
 
     Args:
         row: Function that returns the row of a measurement.
@@ -106,12 +106,12 @@ class IdealSourceNumbers(NamedTuple):
     frame_ticks: int
     """Ticks between two measurements."""
     sounds: Any
-    """Whether there is sound, by number of the measurement: ``_PerFrame`` or (n,)
-    array."""
+    """Table that contains for each measurement whether there is sound: ``_PerFrame`` or
+    (n,) array."""
     noisy: bool
     noise: Any
-    """Two standard normal numbers, by number of the measurement: ``_PerFrame`` or (n,
-    2)."""
+    """Table that contains two standard normal numbers for each measurement:
+    ``_PerFrame`` or (n, 2) array."""
 
 
 def ideal_source_step(
@@ -157,9 +157,9 @@ def IdealSourceSensor_(T):
 
         The block replaces ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator``, and it
         has the outputs of ``TDOAEstimator``. Its discrete state, updated every frame,
-        is p_PS_B and ``detected``. Its latency is one tick, as that of the estimator,
-        so that both builds have the same loop. Unlike the estimator with a row, it
-        distinguishes front from back.
+        is p_PS_B and ``detected``. Its latency is one tick, like that of the estimator,
+        so that the control loop is the same with either block. Unlike the estimator
+        with a row of microphones, the block distinguishes front from back.
 
         Args:
             robot: Position of P.

@@ -26,49 +26,51 @@ from systems.hearing.source_fix import NEAREST_M, SourceFix
 from systems.sound.array_shape import ArrayShape
 
 # A frame with at least this correlation contains almost nothing but direct sound. The
-# second value applies until a frame of noise alone was heard, because noise may
-# explain the rest up to then.
+# second value applies until the first frame without a sound. Until then, the noise
+# level is unknown, and noise may explain the rest of the energy.
 _DIRECT_CORRELATION = 0.98
 _FIRST_CORRELATION = 0.9
 
-# What the channels do not share counts as noise if its energy is below this many times
-# the energy between the sounds. Otherwise it counts as echoes.
+# Energy that the channels do not share counts as noise up to this many times the energy
+# between the sounds. Otherwise it counts as echoes.
 _NOISE_MARGIN = 3.0
 
 # Number of frames over which the noise level is averaged.
 _NOISE_FRAMES = 8.0
 
 # A knock, or a sound with too much reverberation to be detected, must not raise the
-# noise level. One frame therefore counts as at most this many times the noise level.
+# noise level much. The average uses at most this many times the noise level for one
+# frame.
 _LOUDEST_NOISE = 1.5
 
-# After the suppression of echoes, a frame is accepted from this correlation on and up
-# to this ambiguity.
+# After the suppression of echoes, a frame is accepted if it has at least this
+# correlation and at most this ambiguity.
 _ECHO_CORRELATION = 0.4
 _ECHO_AMBIGUITY = 0.7
 
-# The first frame of a sound may contain it in some channels only. This is assumed if
-# noise alone explains the lowest peak with more than this probability.
+# The first frame of a sound may contain the sound in some channels only. The localizer
+# rejects such a frame if noise alone reaches the lowest peak with more than this
+# probability.
 _SHARED_CHANCE = 1e-3
 
 # One percent of the frames with the weakest detectable sound are quieter than expected
 # by more than this number of standard deviations.
 _QUIET = 2.33
 
-# Number of sets of delays that are examined where sounds overlap, and the least
-# correlation of a set. Beside two sounds of 0.5-8 kHz, one in twenty chance sets
-# correlates more.
+# Number of sets of delays that are examined if sounds overlap, and least correlation of
+# a set. Some sets occur by chance. If two sounds of 0.5-8 kHz overlap, one in twenty
+# such sets has a higher correlation.
 _SETS = 4
 _SET_CORRELATION = 0.1
 
-# No chance set correlates as much as this.
+# No set that occurs by chance has a correlation as high as this.
 _SURE_CORRELATION = 0.25
 
 # The delays of the pairs in a set may disagree by this many standard deviations in
 # addition to the usual limit.
 _SET_CLOSURE = 2.0
 
-# Two sets are one sound if none of their delays differ by more than this, s.
+# Two sets belong to one sound if each of their delays differs by at most this, s.
 _ONE_SOUND_S = 1e-4
 
 # Two microphones are an even pair if their distances from the centroid differ by less
@@ -81,13 +83,13 @@ _WHOLE_FRAME = 0.8
 
 
 class HearingMemory(NamedTuple):
-    """What one frame leaves for the next one."""
+    """Values that the localizer keeps from one frame to the next one."""
 
     energy: float
-    """Average energy of a frame between the sounds, without rumble, in units of the
-    frame squared. It is 0 until such a frame was heard."""
+    """Average energy of a frame without a sound, rumble excluded, in units of the frame
+    squared. It is 0 before the first such frame."""
     noise_energy: float
-    """Average energy of the mean channel of such a frame, within the band, at the
+    """Average energy of one channel of a frame without a sound, within the band, at the
     sample rate of the plan."""
     echoes: NDArray[np.float32] | None = None
     """(n, bins) memory of ``systems.delays.precedence``; None if it is below the
@@ -110,7 +112,7 @@ class Candidate(NamedTuple):
     sure: bool = True
     """Whether the correlation is higher than any that occurs by chance."""
     alone: bool = False
-    """Whether it dominates the frame: the delays of the whole frame are its delays."""
+    """Whether this sound dominates, so that it determines the delays of the frame."""
 
 
 class _Sound(NamedTuple):
@@ -173,17 +175,17 @@ class Localiser:
         channels = plan.shape.count
         self._frame_shape = (channels, frame_samples)
         self._scatter = _QUIET * math.sqrt(2.0 / (channels * frame_samples))
-        # Uneven pairs: a source straight ahead of the centroid is not equally far from
-        # both microphones.
+        # Uneven pairs: the two microphones have different distances from a source
+        # straight ahead of the centroid.
         i, j = plan.shape.pairs.T
         from_centre = np.linalg.norm(plan.shape.p_AM, axis=1)
         self._uneven = np.abs(from_centre[i] - from_centre[j]) > _ALIKE_M
         self._all = np.ones(len(i), dtype=bool)
-        # Converts energy of the mean channel on one side of the spectrum to energy of
-        # all channels and samples on both sides.
+        # Factor that converts the average energy of one channel, on one side of the
+        # spectrum, to the energy of all channels and samples, on both sides.
         self._frame_share = 2.0 * channels * frame_samples / plan.frame_samples
-        # A band of the kind "found" may be arbitrarily narrow, so this limit is
-        # unknown.
+        # For the setting "found", the band may be arbitrarily narrow, so the weakest
+        # sound is unknown.
         self._weakest = 0.0
         if parameters.band == "set":
             self._weakest = weakest_sound(plan, parameters.false_alarm_rate)
@@ -204,11 +206,11 @@ class Localiser:
 
         Args:
             frame: (n, samples) channels, in any unit, for example counts.
-            memory: What the previous frame left.
+            memory: Memory after the previous frame.
 
         Returns:
-            The source on the side of ``ArrayShape.ahead``, or None if nothing is heard;
-            and the new memory.
+            The source on the side of ``ArrayShape.ahead``, or None if there is no
+            estimate; and the new memory.
 
         Raises:
             InputError: The frame has another shape than this array needs, or is not
@@ -229,7 +231,7 @@ class Localiser:
 
         Args:
             frame: (n, samples) channels, in any unit, for example counts.
-            memory: What the previous frame left.
+            memory: Memory after the previous frame.
 
         Returns:
             The sound that ``localise`` finds, if any, then further sounds in the order
@@ -243,7 +245,7 @@ class Localiser:
             return [], after
         first, after = self._first(sound, memory, after)
         found = [] if first is None else [first._replace(alone=True)]
-        # Chance correlations are higher if the sound fills only a part of the frame.
+        # Correlations by chance are higher if the sound fills only a part of the frame.
         spread = energy_spread(sound.heard)
         for delays in estimate_delay_sets(
             sound.heard, self.plan, self.parameters.method, sound.seen, _SETS
@@ -260,8 +262,8 @@ class Localiser:
     def _one_of_several(self, delays: DelayEstimate) -> Candidate | None:
         """Returns the position that explains a set of delays, or None.
 
-        The other sounds are noise for this one. The delays of its pairs may therefore
-        disagree by an additional multiple of their standard deviation.
+        The other sounds act as noise. The delays of the pairs may therefore disagree by
+        an additional multiple of their standard deviation.
         """
         scatter = math.sqrt(float(np.diag(delays.covariance).max()))
         closure = max(0.0, delays.closure - _SET_CLOSURE * scatter)
@@ -393,15 +395,15 @@ class Localiser:
         fix: SourceFix,
         memory: HearingMemory,
     ) -> bool:
-        """Returns whether two channels of a located frame repeat each other.
+        """Returns whether two channels of a frame with a fix repeat each other.
 
         Without noise, microphones at equal distances from the source record equal
         samples. In frames without noise, only uneven pairs are therefore compared at
         lag 0.
         """
         shape = self.plan.shape
-        # A fix without range has the delays of a plane wave, which may not be those of
-        # the frame. Channels are compared at lag 0, too.
+        # A fix without range has the delays of a plane wave. They may differ from those
+        # of the frame, so the channels are also compared at lag 0.
         later = self._sample_rate_hz * arrival_delays(fix, shape, self.plan.c)
         noisy = memory.energy > 0.0
         at_once = self._all if noisy else self._uneven
@@ -424,7 +426,7 @@ class Localiser:
         """Returns the memory after a frame of noise.
 
         Args:
-            memory: What the previous frame left.
+            memory: Memory after the previous frame.
             energy: Energy of the frame without rumble.
             noise_energy: Energy within the band; None if it was not measured.
         """
@@ -444,11 +446,11 @@ class Localiser:
         )
 
     def _noise_density(self, memory: HearingMemory) -> float:
-        """Returns the mean square per sample of white noise as loud in the band."""
+        """Returns the mean square of white noise as loud as the noise in the band."""
         return memory.noise_energy / self._band_samples
 
     def _is_direct(self, delays: DelayEstimate, memory: HearingMemory) -> bool:
-        """Returns whether noise alone explains what the channels do not share."""
+        """Returns whether noise explains the energy that the channels do not share."""
         known = memory.noise_energy
         least = _DIRECT_CORRELATION if known > 0.0 else _FIRST_CORRELATION
         return (
@@ -465,8 +467,8 @@ class Localiser:
 
         Args:
             delays: Delays of the sound.
-            frame: The frame for the method ``ml``, which refines the position; None: no
-                refinement.
+            frame: The frame, in which the method ``ml`` refines the position. None: the
+                position is not refined.
             echoes: (n - 1, n - 1) additional covariance of the delays after the
                 suppression of echoes, s^2.
 

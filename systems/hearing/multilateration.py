@@ -37,8 +37,9 @@ def locate_source(
     Returns:
         The source on the side of ``shape.ahead``. Its range is valid if it exceeds its
         standard deviation. Otherwise the direction is that of a source far away. For
-        arrays without closed form, the error of this direction includes the unknown
-        range, which is assumed to be rarely less than two apertures.
+        arrays without a closed form, the error of this direction includes the effect of
+        the unknown range. The standard deviation of the inverse range is then assumed
+        to be the inverse of two apertures.
     """
     if shape.equal_row is not None and shape.angles == ("bearing",):
         fix = near_field.locate_in_row(tau, covariance, shape.equal_row, c)
@@ -71,7 +72,7 @@ def locate_source(
 
 
 def whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns L^-1 of a covariance L L^T, which may be singular to rounding."""
+    """Returns L^-1 for a covariance L L^T, even if rounding makes it singular."""
     floor = 1e-12 * np.diag(covariance) + 1e-30
     return np.linalg.inv(np.linalg.cholesky(covariance + np.diag(floor)))
 
@@ -87,8 +88,9 @@ def angles_of(
         shape: The array, which may not measure every angle.
 
     Returns:
-        Standard deviation of the azimuth, elevation and its standard deviation, rad;
-        None for an elevation that does not exist.
+        Standard deviation of the azimuth; elevation; and standard deviation of the
+        elevation, rad. The last two are None if there is no elevation. A standard
+        deviation is infinite if the array does not measure the angle.
     """
     level = math.hypot(u[0], u[1])
     x, y = (u[0] / level, u[1] / level) if level > 0.0 else (1.0, 0.0)

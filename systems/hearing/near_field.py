@@ -2,7 +2,7 @@
 
 M1, M2 and M3 are at y = l, 0, -l, and the source is ahead, x > 0. Let a = c tau_12 and
 b = c tau_13, where tau_ij = t_j - t_i. Apollonius' theorem gives R1 = (2 l^2 + 2 a^2 -
-b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; eq. 9 of Han 2019 is not consistent with its own
+b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; in Han 2019, eq. 9 is not consistent with
 eq. 7). Then R2 = R1 + a, R3 = R1 + b and sin(bearing) = (R3^2 - R1^2) / (4 l R2). These
 equations are exact at any distance.
 """
@@ -18,7 +18,8 @@ from systems.framework.compiling import njit
 from systems.hearing.source_fix import RANGED, SourceFix, range_status
 from systems.sound.array_shape import EqualRow
 
-# If b - 2a is below this, rounding dominates it. It counts as zero: a plane wave.
+# If b - 2 a is at most this, it consists mainly of rounding errors. It then counts as
+# zero, and the wave is a plane wave.
 _LEAST_GAP_M = 1e-9
 
 # Keeps the covariance finite for a source on the line of the microphones.
@@ -51,9 +52,9 @@ def source_from_delays(
         c: Speed of sound, m/s.
 
     Returns:
-        Bearing in [-pi/2, pi/2], rad, left positive; range, m; and its status
-        (``range_status``). Without a range, the range is 0, and the bearing is that of
-        a source far away.
+        Bearing in [-pi/2, pi/2], rad, positive to the left; range, m; and status of the
+        range (``range_status``). If there is no range, the value of the range is 0, and
+        the bearing is that of a source far away.
     """
     a, b = c * tau_12, c * tau_13
     status, r1, r2, r3 = _ranges(a, b, spacing)
@@ -114,7 +115,8 @@ def _locate(
     """Computes the position in the array's axes, with errors.
 
     Returns:
-        Position, its covariance, error of the bearing, range, its status and its error.
+        Position and its covariance; standard deviation of the bearing; range, its
+        status, and its standard deviation.
     """
     tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
     tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]

@@ -50,23 +50,24 @@ class TDOAParameters(Parameters):
     """Largest disagreement between the delay of a pair and the delays of all pairs,
     s."""
     maximum_misfit: Fraction = 0.05
-    """Largest misfit of a delay to the estimated position, in addition to
-    ``maximum_closure_s``, as a share of the longest delay across the array. It has an
-    effect only with more delays than unknowns: four microphones in a row or more."""
+    """Largest difference between a measured delay and the delay of the estimated
+    position, as a share of the longest delay across the array. ``maximum_closure_s`` is
+    added to this limit. The limit has an effect only if there are more delays than
+    unknowns, for example with four or more microphones in a row."""
     maximum_ambiguity: Fraction = 0.8
-    """Largest ratio of the second to the first peak of a correlation."""
+    """Largest ratio of the second peak of a correlation to its highest peak."""
     maximum_bearing_std_deg: Positive = 3.0
     """Largest standard deviation of a bearing, deg."""
     maximum_relative_range_std: Positive = 0.25
-    """Largest standard deviation of a range, as a share of the range. Above it, only
-    the bearing is used."""
+    """Largest standard deviation of a range, as a share of the range. If the standard
+    deviation is larger, only the bearing is used."""
     schedule_known: bool = False
-    """Whether the estimator ignores frames that cannot contain sound of the source by
-    its schedule. This separates sources that take turns, and the robot's own
-    loudspeaker."""
+    """Whether the estimator knows the schedule of the source. The estimator then
+    ignores frames that cannot contain sound of the source. This separates the source
+    from sources that sound at other times, and from the robot's own loudspeaker."""
     choose: Literal["loudest", "followed"] = "loudest"
-    """Which of several overlapping sounds to use: the loudest, or that of the source
-    that was followed so far."""
+    """Which of several overlapping sounds to use. ``loudest``: the loudest sound.
+    ``followed``: the sound of the source that was followed so far."""
     first_bearing_deg: Angle | None = None
     """Bearing of the source to follow, seen from the centroid of the microphones at the
     start, deg CCW. Unset: the first source that is heard alone. It requires ``choose:
@@ -92,19 +93,19 @@ class CrossPowerParameters(Parameters):
 
     method: Literal["srp_near", "gcc_plane", "gcc_si"] = "srp_near"
     """``srp_near`` steers all pairs to near and far positions. ``gcc_plane`` uses the
-    delays of all pairs with sub-sample resolution. It fits a position where that is
-    reliable, otherwise a plane wave. ``gcc_si`` is the printed method: whole samples,
-    pairs with the middle microphone, and spherical interpolation."""
+    delays of all pairs with sub-sample resolution. It fits a position if that is
+    reliable, and otherwise a plane wave. ``gcc_si`` is the method printed in Song 2011:
+    whole samples, pairs with the middle microphone, and spherical interpolation."""
     low_hz: Frequency = 200.0
     """Lower edge of the band, Hz (Song 2011, 4.3)."""
     high_hz: Frequency = 8_000.0
     """Upper edge of the band, Hz (Song 2011, 4.3)."""
     noise_cross_power: bool = True
-    """Whether to subtract the cross powers of the noise, measured before (Song 2011,
-    4.3)."""
+    """Whether to subtract the cross powers of the noise, which are measured before the
+    sound (Song 2011, 4.3)."""
     ambiguous_share: Fraction = 0.9
-    """Another direction makes the result ambiguous if its response is at least this
-    share of the strongest."""
+    """The result is ambiguous if the response of another direction is at least this
+    share of the strongest response."""
 
 
 class TrackerParameters(Parameters):
@@ -115,8 +116,8 @@ class TrackerParameters(Parameters):
     ``robot``: it moves with the robot. ``motion``: it moves on with its own velocity,
     which fades."""
     maximum_age_s: Duration = 6.0
-    """A target that was not heard for longer than this is lost, s. The default is three
-    periods of the sound."""
+    """Longest time since the target was last heard, s. After a longer time, the target
+    is lost. The default is three periods of the sound."""
     assumed_range_m: Length = 3.0
     """Assumed range of the first target when only its bearing is known, m."""
     resolve_front_back: bool = True
@@ -130,9 +131,11 @@ class TrackerParameters(Parameters):
     measurement_floor_m: NonNegativeLength = 0.01
     """Standard deviation of errors that are not in the covariance of an estimate, m."""
     gate_floor_m: Length = 0.2
-    """Standard deviation that the gate adds to the covariances, m."""
+    """Standard deviation that is added to the covariances in the test for outliers,
+    m."""
     believed_outliers: int = Field(default=3, ge=1, le=1_000)
-    """Number of consecutive outliers after which they are accepted if they agree."""
+    """Number of consecutive outliers that are accepted if they agree with each
+    other."""
 
 
 class IdealHearingParameters(Parameters):

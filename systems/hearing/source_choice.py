@@ -1,11 +1,12 @@
 """Chooses the sound of the followed source among the sounds of a frame.
 
-Each source has a position in W with a covariance. For the followed source, it is that
-of the tracker. For each other source, it is where that source was last heard.
+Each source has a position in W with a covariance. The tracker gives the position of the
+followed source. Every other source has the position at which it was last heard.
 
-Positions are compared with sounds through the delays that they would cause
-(third-degree cubature, Arasaratnam and Haykin 2009). The two sides of a row have the
-same delays, and an unknown range is a large covariance.
+The position of each source is converted to expected delays (third-degree cubature,
+Arasaratnam and Haykin 2009). The expected delays are compared with those of each sound.
+Positions on both sides of a row have the same delays, so both sides are compared. An
+unknown range is represented by a large covariance.
 
 Each sound is assigned to at most one source, so that the total likelihood is greatest
 (global nearest neighbors). A sound that belongs to no known source is a new source.
@@ -26,19 +27,19 @@ from systems.hearing.localise import Candidate
 from systems.hearing.tracking.target_filter import NEVER_HEARD_S
 from systems.sound.array_shape import ArrayShape
 
-# Number of other sources that are remembered, and for how long, s.
+# Number of other sources that are remembered, and time until they are forgotten, s.
 _OTHERS = 4
 _FORGOTTEN_S = 6.0
 
-# A competitor that was never heard together with the followed source may be that source
-# at a wrong position. It is dropped once the followed source has been silent for this
-# long, s.
+# Another source that was never heard together with the followed source may be the
+# followed source at a wrong position. The other source is dropped once the followed
+# source has been silent for this long, s.
 _DOUBTED_S = 3.0
 
-# A sound that is not sure may be chance, which does not repeat. Another source is
-# confirmed once it was heard this many times, with gaps of at most this long, s. The
-# followed source is confirmed when it is heard a second time after a silence of this
-# length, s.
+# A sound that is not sure may be due to chance, but chance does not repeat. Another
+# source is confirmed once it was heard _TIMES times with gaps of at most _GAP_S
+# seconds. After a silence of more than _SILENCE_S seconds, the followed source is
+# confirmed once it is heard a second time.
 _TIMES = 3
 _GAP_S = 0.06
 _SILENCE_S = 0.2
@@ -54,14 +55,16 @@ _NOWHERE = -1.0
 # exceeds this share of the first one's correlation.
 _SECOND = 0.6
 
-# Standard deviations of errors that are not in the covariances. The first is that of
-# the delays, mainly due to turning of the robot within a frame, m. The second is that
-# of the tracker's position, m. The third is that of the velocity of a source, m/s.
+# Standard deviations of errors that are not in the covariances.
+# Error of the range differences, m, mainly because the robot turns within a frame.
 _DELAY_FLOOR_M = 0.008
+# Error of the position that the tracker gives, m.
 _PLACE_FLOOR_M = 0.03
+# Unknown velocity of a source, m/s.
 _SPEED_M_S = 0.35
 
-# Assumed range if only the direction is known, m. Its standard deviation is half of it.
+# Assumed range if only the direction is known, m. Its standard deviation is half of
+# this value.
 _RANGE_M = 2.5
 
 # Standard deviation of the first bearing that the user gives, rad.
@@ -76,13 +79,14 @@ class Belief(NamedTuple):
     covariance: NDArray[np.float64]
     """(2, 2) covariance of the position, m^2."""
     age: float
-    """Time since the source was last heard, s; ``NEVER_HEARD_S`` or more: never."""
+    """Time since the source was last heard, s. It is at least ``NEVER_HEARD_S`` if the
+    source was never heard."""
     pose: NDArray[np.float64]
     """(3,) x, y, theta of B in W, m and rad."""
 
 
 class _Line(NamedTuple):
-    """Line of a row of microphones, or none."""
+    """Line of a row of microphones, at which sources are mirrored."""
 
     p: NDArray[np.float64]
     """(2,) point of the line in W, m."""
@@ -106,14 +110,14 @@ class _Place(NamedTuple):
 
 
 class ChoiceMemory(NamedTuple):
-    """What the choice in one frame leaves for the next one."""
+    """Values that the choice keeps from one frame to the next one."""
 
     line: NDArray[np.float64]
     """(4,) point and normal of the row when the followed source was last heard."""
     others: NDArray[np.float64]
-    """(k, 13) other sources. Columns: time since the source was heard, s; number of
-    times; 1 if it was heard together with the followed source; position (2); covariance
-    (4); point (2) and normal (2) of the row."""
+    """(k, 13) other sources. Columns: time since the source was last heard, s; number
+    of times that it was heard; 1 if it was heard together with the followed source;
+    position (2); covariance (4); point (2) and normal (2) of the row at that time."""
 
     @classmethod
     def unpack(cls, values: NDArray[np.float64]) -> ChoiceMemory:
@@ -131,7 +135,7 @@ class SourceChoice:
     Args:
         shape: The microphones, in a plane, in axes of B.
         c: Speed of sound, m/s.
-        p_BA: (2,) centroid of the microphones from the origin of B, m.
+        p_BA: (2,) centroid of the microphones relative to the origin of B, m.
         frame_s: Period of the frames, s.
         first_bearing: Bearing of the source before it is heard, rad. None: the source
             is the first sound that is heard alone.
@@ -169,15 +173,15 @@ class SourceChoice:
         """Returns the sound of the followed source.
 
         The costs of all sounds are computed for the followed source (``own``) and for
-        the other known sources (``costs``). Infinite costs then exclude assignments
-        that are not credible. The assignment with the least total cost follows. It
-        updates the other sources, and it gives the sound of the followed source.
+        the other known sources (``costs``). Assignments that are not credible then get
+        infinite costs. The assignment with the least total cost gives the sound of the
+        followed source. It also updates the other sources.
 
         Args:
             candidates: Sounds of a frame.
-            memory: What the previous frame left.
+            memory: Memory after the previous frame.
             belief: Present estimate of the source, and pose of the robot.
-            may_sound: Whether the source can sound by its schedule.
+            may_sound: Whether the schedule of the source permits a sound in this frame.
 
         Returns:
             Index of the sound in ``candidates``, or None if the source is not heard;
@@ -201,7 +205,8 @@ class SourceChoice:
             # The first sound that is alone becomes the followed source.
             own[0] = _NOWHERE - 1.0
         counts = others[:, 1] >= _TIMES
-        # Sounds nearer to a confirmed source that still sounds are its side peaks.
+        # A sound may fit a confirmed source that still sounds better than the followed
+        # source. It is then a side peak of the confirmed source.
         beside = counts & (others[:, 0] <= _SILENCE_S)
         own[own > costs.min(axis=1, initial=math.inf, where=beside)] = math.inf
         # After a silence, a sound that is not sure must be heard twice.
@@ -212,7 +217,7 @@ class SourceChoice:
         shared = costs.copy()
         # A sound that may be the followed source confirms no other source.
         shared[np.ix_(np.isfinite(own), ~counts)] = math.inf
-        # A sound that is not sure is none of a confirmed source that was silent.
+        # A sound that is not sure is not assigned to a silent confirmed source.
         shared[np.ix_(~sure, counts & ~beside)] = math.inf
         belongs = _assigned(np.column_stack((own, shared)))
         chosen = belongs.index(0) if 0 in belongs else None
@@ -221,16 +226,16 @@ class SourceChoice:
                 self._remember(others, place, candidate, (centre, turn, line))
         if chosen is None or _is_ambiguous(chosen, own, belongs, candidates):
             return None, memory._replace(others=others)
-        # The chosen sound was not that of an unconfirmed source.
+        # Unconfirmed sources that the chosen sound also fits are dropped.
         others[~counts & np.isfinite(costs[chosen]), 0] = NEVER_HEARD_S
-        # These were heard together with the followed source.
+        # These other sources were heard together with the followed source.
         others[(others[:, 0] == 0.0) & (others[:, 1] > 1.0), 2] = 1.0
         return chosen, ChoiceMemory(np.concatenate(line), others)
 
     def _array(
         self, pose: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], _Line]:
-        """Returns the microphones' centroid in W, the rotation R_WB, and their line."""
+        """Returns the microphones' centroid in W, R_WB, and the line of the row."""
         cosine, sine = math.cos(pose[2]), math.sin(pose[2])
         turn = np.array([[cosine, -sine], [sine, cosine]])
         centre = pose[:2] + turn @ self._p_BA
@@ -267,8 +272,8 @@ class SourceChoice:
     ) -> float:
         """Returns twice the negative log-likelihood of a sound from a source.
 
-        The smaller value of the two sides of the row counts. It is infinite if the
-        delays are outside the gate.
+        The value is computed for both sides of the row, and the smaller one counts. It
+        is infinite if the delays are outside the gate on both sides.
         """
         if place is None:
             return math.inf
@@ -296,8 +301,8 @@ class SourceChoice:
 
         Args:
             others: Other sources, changed.
-            place: Number of the known source, from 1; None: a new source, which
-                replaces the one that was not heard for the longest time.
+            place: Number of the known source, from 1. None: a new source, which
+                replaces the source with the longest silence.
             candidate: The sound.
             array: Return value of ``_array``.
         """
@@ -321,7 +326,8 @@ def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
         costs: (sounds, sources), infinite if a sound cannot be that of the source.
 
     Returns:
-        Index of the source of each sound, each at most once; None: no known source.
+        Index of the source for each sound, or None if the sound belongs to no known
+        source. Each source has at most one sound.
     """
     sounds, places = costs.shape
     finite = np.where(np.isfinite(costs), costs, 1e9)

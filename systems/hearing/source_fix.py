@@ -92,10 +92,10 @@ class SourceFix:
     covariance: NDArray[np.float64]
     """(d, d) covariance of p_AS, m^2; of the unit vector if the range is not valid."""
     chi_square: float = 0.0
-    """Sum of the squared residuals of the delays over their errors. Its mean is
-    ``ArrayShape.freedom`` if the geometry is right."""
+    """Sum of the squared residuals of the delays, whitened by the covariance of the
+    delays. Its mean is ``ArrayShape.freedom`` if the geometry is right."""
     twin: NDArray[np.float64] | None = None
-    """(d,) another position that fits as well and is no mirror image, m."""
+    """(d,) another position, m, that fits about equally well and is no mirror image."""
 
     @property
     def range_valid(self) -> bool:
@@ -103,7 +103,7 @@ class SourceFix:
         return self.range_status == RANGED
 
     def without_range(self) -> SourceFix:
-        """Returns the same direction without a range, because it is too uncertain."""
+        """Returns the same direction without the range, which is too uncertain."""
         if not self.range_valid:
             return self
         u = self.p_AS / np.linalg.norm(self.p_AS)
@@ -118,7 +118,7 @@ class SourceFix:
         )
 
     def within_error(self, share: float) -> SourceFix:
-        """Returns the same estimate, without its range if that is too uncertain.
+        """Returns the same estimate, but without a range that is too uncertain.
 
         Args:
             share: The error of the range must be below this share of the range.

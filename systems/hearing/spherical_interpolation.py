@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.hearing.source_fix import RANGED, range_status
 
-#: Positions farther than this are rejected: the bearing of the plane wave is better, m.
+#: Largest range of a position, m. At larger ranges, the bearing of the plane wave is
+#: better.
 FARTHEST_M = 4.0
 #: Largest difference between the bearings of the position and of the plane wave, deg.
 AGREEMENT_DEG = 15.0
@@ -23,13 +24,15 @@ def interpolate_sphere(
     See Song 2011, eq. 14 to 17; Smith, Abel 1987.
 
     Args:
-        p_RM: (n, k) microphones from the reference microphone, m; n is at least k + 1.
-            With n = k + 1, the equations are exact.
-        d: (n,) range from each microphone less that from the reference microphone, m.
+        p_RM: (n, k) positions of the other microphones relative to the reference
+            microphone, m; n is at least k + 1. With n = k + 1, the equations are exact.
+        d: (n,) range differences, m: the range from each microphone minus the range
+            from the reference microphone.
 
     Returns:
-        (k,) source from the reference microphone, m, and its range, m. The range is
-        negative or infinite if no position has these differences.
+        (k,) position of the source relative to the reference microphone, m, and its
+        range, m. The range is negative or infinite if no position has these range
+        differences.
     """
     S, d = np.asarray(p_RM, dtype=float), np.asarray(d, dtype=float)
     inverse = np.linalg.pinv(S)
@@ -46,12 +49,12 @@ def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:
     """Computes the bearing of a source far away.
 
     Args:
-        p_RM: (n, 2) microphones from the reference microphone, m.
+        p_RM: (n, 2) positions relative to the reference microphone, m.
         d: (n,) range differences, m.
 
     Returns:
-        Bearing CCW from x, rad. It is never on the wrong side. For a source at 0.25 m,
-        its error is about 5 deg.
+        Bearing CCW from x, rad. The bearing is never on the wrong side. For a source at
+        0.25 m, the error of the bearing is about 5 deg.
     """
     x, y = -np.linalg.pinv(np.asarray(p_RM, dtype=float)) @ np.asarray(d, dtype=float)
     return math.atan2(y, x)
@@ -63,16 +66,16 @@ def near_or_far(
     """Computes the bearing, and the position if it is credible.
 
     Errors can change the sign of the sum of the range differences. Spherical
-    interpolation then turns the bearing by 180 deg. Its position is therefore used only
-    within 4 m, and within 15 deg of the plane wave.
+    interpolation then turns the bearing by 180 deg. The position is therefore used only
+    up to 4 m, and only if its bearing is within 15 deg of that of the plane wave.
 
     Args:
-        p_RM: (n, 2) microphones from the reference microphone, m.
+        p_RM: (n, 2) positions relative to the reference microphone, m.
         d: (n,) range differences, m.
 
     Returns:
-        Bearing, rad; (2,) position from the reference microphone, m, or None; and the
-        status of the range (``range_status``).
+        Bearing, rad; (2,) position relative to the reference microphone, m, or None;
+        and the status of the range (``range_status``).
     """
     plane = plane_wave_bearing(p_RM, d)
     place, distance = interpolate_sphere(p_RM, d)

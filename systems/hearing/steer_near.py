@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 _RANGES_M = (0.4, 3.0)
 #: Step of the bearings of the grid, deg. The peak is refined between them.
 _STEP_DEG = 2.0
-#: A peak counts as another direction if it is at least this far away, deg.
+#: A peak counts as another direction if it is more than this from the strongest one,
+#: deg.
 _APART_DEG = 15.0
 
 
@@ -72,13 +73,13 @@ def steer(
 
     Args:
         grid: The grid.
-        correlations: (pairs, n) correlations over the delay, 0 first, as those of
-            ``cross_correlations``.
+        correlations: (pairs, n) correlations over the delay, in the order of
+            ``cross_correlations``: delay 0 is first, negative delays are at the end.
         fine_rate_hz: Correlation values per second, Hz.
 
     Returns:
-        The strongest bearing, refined between those of the grid by a parabola, and the
-        strongest other peak.
+        The strongest position and the strongest other peak. A parabola refines the
+        strongest bearing between the bearings of the grid.
     """
     response = np.zeros(grid.delays.shape[1:])
     length = correlations.shape[1]

@@ -64,16 +64,16 @@ def robot_choice(
     p_PA_B: NDArray[np.float64],
     frame_s: float,
 ) -> SourceChoice:
-    """Makes the choice among the sounds that the localizer of a robot finds.
+    """Makes the ``SourceChoice`` for the sounds that the localizer of a robot finds.
 
     Args:
-        localiser: Localizer of ``robot_localiser``.
+        localiser: Localizer that ``robot_localiser`` returns.
         robot: Position of P.
         p_PA_B: (2,) centroid of the microphones from P in B axes, m.
         frame_s: Period of the frames, s.
 
     Returns:
-        The choice, with the first bearing of the localizer's parameters.
+        The choice. Its first bearing is that of the localizer's parameters.
     """
     degrees = localiser.parameters.first_bearing_deg
     return SourceChoice(
@@ -88,7 +88,7 @@ def robot_choice(
 def may_sound(
     sound: SoundParameters, time: float, longest_way: float, frame_s: float
 ) -> bool:
-    """Returns whether a frame can contain direct sound of a source by its schedule.
+    """Returns whether the schedule of a source permits direct sound in a frame.
 
     Args:
         sound: Schedule of the source.
@@ -134,23 +134,24 @@ class TDOAEstimator(Block):
     echoes, but no errors of microphone positions or of the speed of sound.
 
     With ``choose: followed``, the block locates each of the sounds of a frame. It
-    chooses the one from the expected position of the source
-    (``systems.hearing.source_choice``). It then has four further input ports, which
-    ``SourceTracker`` and ``WheelOdometry`` publish: p_WS_estimated [m], covariance_W
-    [m^2], age [s] and pose_WB_estimated [m, m, rad]. These ports affect only the state,
-    so there is no algebraic loop.
+    chooses the sound that comes from the expected position of the source
+    (``systems.hearing.source_choice``). The block then has four further input ports:
+    p_WS_estimated [m], covariance_W [m^2], age [s] and pose_WB_estimated [m, m, rad].
+    ``SourceTracker`` publishes the first three, and ``WheelOdometry`` publishes the
+    pose. The four ports affect only the state, so there is no algebraic loop.
 
     State: the outputs, ``HearingMemory``, and ``ChoiceMemory`` with ``choose:
     followed``.
-    Rate and latency: the block updates every ``frame_s`` of the microphones, 25 ms,
-    from the frame that ends then. The outputs change one tick later, which models the
-    computing time.
+    Rate and latency: the block updates once per ``frame_s`` of the microphones (25 ms).
+    It then processes the frame that ends at this moment. The outputs change one tick
+    later, which models the computing time.
 
     Args:
         parameters: Method, band and thresholds.
         robot: Positions of the microphones.
         acoustics: Speed of sound.
-        sound: The sound of the source; its gate is the schedule if that is known.
+        sound: The sound of the source. Its gate is the schedule, which has an effect
+            only if ``schedule_known`` is set.
         microphones: Sample rate and length of the frames.
 
     Raises:
@@ -233,7 +234,7 @@ class TDOAEstimator(Block):
 
         Args:
             audio: The frame.
-            memory: What the previous frame left.
+            memory: Memory after the previous frame.
             choice: Memory and present belief for ``choose: followed``; otherwise None.
 
         Returns:

@@ -15,7 +15,7 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 def matched_decay(limit: float, ratio: float) -> float:
-    """Computes the decay constant for which two laws are equal at half a limit.
+    """Computes the decay constant of a gain that changes by a ratio over half a limit.
 
     Args:
         limit: Limit of distance or speed, m or m/s.
@@ -28,7 +28,7 @@ def matched_decay(limit: float, ratio: float) -> float:
 
 
 def matched_share(limit: float, decay: float) -> float:
-    """Computes the inverse of ``matched_decay``.
+    """Computes the ratio of two gains from a decay constant (see ``matched_decay``).
 
     Args:
         limit: Limit of distance or speed, m or m/s.
@@ -43,9 +43,9 @@ def matched_share(limit: float, decay: float) -> float:
 class ActiveParameters(Parameters):
     """Spring and damper that vary with distance and speed (Han 2019, eq. 20-22).
 
-    alpha and beta follow from the other fields. With them each term equals that of a
-    law with the constant gains K_0 and D_0: the spring at half the reach, the damper
-    at half the speed limit.
+    alpha and beta follow from the other fields. At half the reach, the spring term
+    equals that of a law with the constant stiffness K_0. At half the speed limit, the
+    velocity term equals that of a law with the constant damping D_0.
     """
 
     reference_stiffness_n_m: Stiffness = 84.5
@@ -87,7 +87,7 @@ class ActiveParameters(Parameters):
 
     @cached_property
     def beta_m_s(self) -> float:
-        """Growth speed of the damper, m/s (eq. 22, misprinted)."""
+        """Increase of s that raises the damping e-fold, m/s (eq. 22, misprinted)."""
         ratio = self.matched_damping_n_s_m / self.reference_damping_n_s_m
         return matched_decay(self.speed_limit_m_s, ratio)
 
@@ -97,12 +97,13 @@ def active_force(c: Any, s: Any, gains: ActiveParameters) -> Any:
 
     This is eq. 20 of Han 2019. The spring term is bounded. It is largest at c = alpha
     and zero at contact. The velocity term is d_ref mu_0 for an obstacle at rest, at any
-    distance. Eq. 19-b multiplies K_0(c) by (rho_0 - c) once more, but eq. 20 and
-    table 4 agree with each other.
+    distance. Eq. 19-b has a further factor (rho_0 - c) at K_0(c). The function follows
+    eq. 20, which agrees with table 4.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Speed of the obstacle, m/s. From mu_0 up, the velocity term is 0 (table 4).
+        s: Speed of the obstacle, m/s. At mu_0 and above, the velocity term is 0
+            (table 4).
         gains: Gains of the law.
 
     Returns:
@@ -144,7 +145,7 @@ ACTIVE = Law(
         stiffest=lambda gains, least_range_m: (
             gains.reference_stiffness_n_m * math.exp(-2.0)
         ),
-        # The velocity term is d_ref mu_0 at rest, and 0 from mu_0 up.
+        # The velocity term is d_ref mu_0 at rest. It is 0 at mu_0 and above.
         spring_speed=lambda gains: gains.speed_limit_m_s,
         sets_follow_distance=True,
     ),

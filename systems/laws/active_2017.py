@@ -15,25 +15,25 @@ class Active2017Parameters(Parameters):
     """
 
     distance_gain_j: Positive = 1.22
-    """Gain K_0, J, of the push K_0/c. Han's laws use the symbol K_0 for a stiffness."""
+    """Gain K_0 of the push K_0/c, J. Han's laws use the symbol K_0 for a stiffness."""
     saturation_distance_m: Length = 0.1
     """Distance rho_1 below which the push stays at K_0/rho_1, m (Kim 2017, 5)."""
     damping_n_s_m: Damping = 0.8
     """Damping D_0, N s/m."""
     saturation_speed_m_s: Speed = 0.72
-    """Speed mu_1 above which the velocity term stays at D_0 mu_1, m/s. Kim 2017, 5
-    chooses mu_1 by trial so that the robot stays below 720 mm/s, and prints no value.
-    The default is that speed."""
+    """Speed mu_1 above which the velocity term stays at D_0 mu_1, m/s. Kim 2017
+    (section 5) chooses mu_1 by trial so that the robot stays below 720 mm/s, and prints
+    no value. The default of mu_1 is 720 mm/s."""
 
 
 def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
     """Computes K_a(c)/c + D_a(s) s, in which both terms saturate.
 
     Kim 2017 prints eq. 21 and describes K_a and D_a in words (figure 6). The push must
-    saturate below rho_1, and the velocity term above mu_1. Our reading is: K_a is K_0
-    at distances above rho_1 and K_0 c/rho_1 below. D_a is D_0 at speeds below mu_1 and
-    D_0 mu_1/s above. The paper says that K *increases* as c falls to rho_1. In our
-    reading the push increases.
+    saturate below rho_1, and the velocity term must saturate above mu_1. In our
+    reading, K_a is K_0 at distances above rho_1 and K_0 c/rho_1 below rho_1. D_a is D_0
+    at speeds below mu_1 and D_0 mu_1/s above mu_1. The paper says that K *increases* as
+    c falls to rho_1. In our reading, K_a stays constant and the push K_a/c increases.
 
     The law has no limit of reach. The push halves when the distance doubles.
 

@@ -51,5 +51,5 @@ FORCE_LAWS = tuple(name for name, law in LAWS.items() if not law.plans)
 
 
 def law_title(name: str) -> str:
-    """Returns the heading of a law in reports. For a user's law this is its name."""
+    """Returns the heading of a law in reports, which is the name for a user's law."""
     return LAWS[name].title if name in LAWS else name

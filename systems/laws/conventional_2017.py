@@ -15,7 +15,7 @@ class Conventional2017Parameters(Parameters):
     """
 
     distance_gain_j: Positive = 0.917
-    """Gain K_0, J, of the push K_0/c. Han's laws use the symbol K_0 for a stiffness."""
+    """Gain K_0 of the push K_0/c, J. Han's laws use the symbol K_0 for a stiffness."""
     damping_n_s_m: Damping = 0.8
     """Damping D_0, N s/m."""
 
@@ -26,7 +26,7 @@ def conventional_2017_force(
     """Computes K_0/c + D_0 s at any distance (Kim 2017, eq. 20).
 
     As printed, the push has no bound as c approaches 0. Here the least range of the
-    sensors bounds it, because the sensors cannot distinguish distances below that
+    sensors bounds the push, because the sensors cannot distinguish distances below this
     range. The law has no limit of reach. The push halves when the distance doubles.
 
     Args:

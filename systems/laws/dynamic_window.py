@@ -32,8 +32,8 @@ class DynamicWindowParameters(MapParameters):
     period_s: Duration = 0.1
     """Time from one choice to the next, s."""
     farthest_m: Length = 2.6
-    """Largest distance to an obstacle on the arc that counts, m. Obstacles beyond it
-    count as being at this distance."""
+    """Largest distance along the arc that counts, m. Obstacles that are farther away
+    count as if they were at this distance."""
 
 
 DWA = Law(

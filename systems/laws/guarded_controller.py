@@ -55,25 +55,25 @@ class GuardedController(Block):
     weaves, so that its narrow sensor cones sweep the space beside it.
 
     The robot looks to both sides before it first moves. If the guard stops it, it looks
-    past both sides of the blocking cell. If the robot does not see this cell free,
-    routes avoid the cell for a time. If the robot still does not get away, it backs
-    off.
+    past both sides of the blocking cell. If the sensors do not show that this cell is
+    free, routes avoid the cell for a time. If the robot still does not get away, it
+    backs off.
 
-    The block tracks moving bodies (``systems.planning.hazards``). It attributes echoes
-    from floor that was free before to bodies that have moved there. While a body may
-    come near, the block chooses among some speeds and headings the pair of least cost.
-    The cost has three terms: the deviation from the wanted motion, the distance from
-    the bodies, and whether the sensors see them.
+    The block tracks moving bodies (``systems.planning.hazards``). If an echo comes from
+    floor that was free before, the block assumes that a body has moved there. While a
+    body may come near, the block compares several pairs of speed and heading, and
+    chooses the pair of least cost. The cost has three terms: the deviation from the
+    wanted motion, the distance from the bodies, and whether the sensors see the bodies.
 
-    If every route crosses cells with echoes for ``search_way_s``, the robot stops and
-    reports this (``gives_up``) until there is a route.
+    If every route crosses cells with echoes for ``search_way_s``, the robot stops. It
+    reports at the port ``gives_up`` that it gives up, until there is a route.
 
     The port ``plan`` has the mode, the point for which the robot heads, and the
-    remaining distance. The modes are 0 no target, 1 driving, 2 looking, 3 backing off,
-    and 4 no route found. This law needs the guard, because it does not avoid obstacles
-    by itself.
+    remaining distance. The modes are: 0, no target; 1, driving; 2, looking; 3, backing
+    off; 4, no route found. This law needs the guard, because it does not avoid
+    obstacles by itself.
 
-    Abstract state: ``DriveState``. The outputs are functions of the state and the
+    The abstract state is ``DriveState``. The outputs are functions of the state and the
     present inputs at every tick. There is no latency.
 
     Args:

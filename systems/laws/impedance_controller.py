@@ -35,10 +35,10 @@ from systems.ranging.collision_vector import SLOTS
 from systems.ranging.parameters import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
-#: Numbers in the state per tick: feature, C_x and C_y of each slot.
+#: How many numbers the state has per tick: feature, C_x, and C_y of each slot.
 _ROW = 3 * SLOTS
 
-#: If a target is straight behind P by more than this, the pull turns aside, m.
+#: Distance in m. If a target is straight behind P by more, the pull turns aside.
 _BEHIND_M = 0.3
 
 
@@ -98,7 +98,7 @@ def repulsion_force(C_W: Any, s: Any, force: Any, arguments: Any = ()) -> Any:
     Args:
         C_W: Collision vector (x, y) in W, m; floats or AutoDiffXd.
         s: Speed of the obstacle, m/s.
-        force: Function ``force(c, s, *arguments)`` that returns N.
+        force: Function ``force(c, s, *arguments)`` that returns the force in N.
         arguments: Further arguments of ``force`` after c and s.
 
     Returns:
@@ -113,7 +113,7 @@ class ImpedanceNumbers(NamedTuple):
     """Constants of the step of ``ImpedanceController``."""
 
     force: Callable[..., Any]
-    """Function ``force(c, s, *arguments)`` that returns N."""
+    """Function ``force(c, s, *arguments)`` that returns the force in N."""
     arguments: tuple[Any, ...]
     """Gains of the law; for some laws also the least range of the sensors, m."""
     attraction: AttractionParameters
@@ -132,12 +132,13 @@ def impedance_step(
 ) -> None:
     """Computes the acceleration of the virtual mass, the forces and the speeds s.
 
-    The state has one row per tick of a round of the sensors. The first row belongs to
-    the last tick. A row has the feature, C_x, and C_y (in W, m) of each slot.
+    The state has one row for each tick of a sensor round, most recent tick first. A row
+    has the feature, C_x, and C_y (in W, m) of each slot.
 
-    The step sums the attraction and the push of each occupied slot. It computes s from
-    the row of one round ago, where this row has the same feature. Then it shifts the
-    rows by one tick and writes the new vectors to the first row.
+    For each occupied slot, the step searches the row of one round ago for the same
+    feature. If it finds the feature, it computes s from the old and the new vector.
+    Otherwise s is 0. The step sums the attraction and the pushes of all occupied slots.
+    Then it shifts the rows by one tick and writes the new vectors to the first row.
     """
     p_WS, valid, C_B, features, pose, v_WP = inputs
     # Attraction, computed relative to P.
@@ -183,7 +184,7 @@ def impedance_step(
 
 @register_jitable
 def _same_feature(before, now):
-    """Compares two features, which are whole numbers from 1 up; 0 is an empty slot."""
+    """Returns whether two features are equal. Features count from 1; 0: empty slot."""
     return before > 0.5 and abs(float_of(before) - float_of(now)) < 0.5
 
 
@@ -209,20 +210,21 @@ LAW_COLUMNS: Mapping[str, tuple[str, ...]] = {
 @define_for_scalars("ImpedanceController_", __name__)
 def ImpedanceController_(T):
     class Impl(Block_[T]):
-        """Pulls the robot to the target and pushes it off obstacles by a law's force.
+        """Pulls the robot to the target and pushes it away from obstacles.
 
-        Each collision vector has a speed s. The block subtracts the vector of the same
-        feature one sensor round ago and divides by the time of the round. s is 0 if
-        the feature was absent one round ago. A round is the time in which every sensor
-        fires once: one tick if all sensors fire at every tick, three ticks if three
-        sensors fire in turn. Over a round every range is measured anew. Therefore s is
-        exact at constant velocities, also if a vector comes from two sensors. At other
-        velocities s is the mean over the round. The ranges of this mean may be older
-        than the present by up to one round minus one tick.
+        The law computes the push from the length c of a collision vector and a speed s.
+        The block computes s from two collision vectors of the same feature: the present
+        vector and the vector of one sensor round ago. If the feature was absent one
+        round ago, s is 0. A round is the time in which every sensor fires once: one
+        tick if all sensors fire at every tick, three ticks if three sensors fire in
+        turn. During a round, every range is measured anew. Therefore s is exact at
+        constant velocities, even if a vector comes from two sensors. If the velocities
+        change, s is the mean over a round. The ranges in the present vector may be up
+        to one round minus one tick old.
 
-        Discrete state, every tick: the collision vectors of the last round of the
-        sensors. The outputs are functions of the state and the present input. There is
-        no latency.
+        The discrete state has the collision vectors of the last sensor round. It is
+        updated every tick. The outputs are functions of the state and the present
+        input. There is no latency.
 
         Args:
             law: A law of ``systems.laws.catalogue`` that has a force, or a function
@@ -284,7 +286,7 @@ def _force_and_arguments(
 
 
 def _slot_names(round_ticks: int) -> tuple[str, ...]:
-    """Returns the names of the state variables, those of the last tick first."""
+    """Returns the names of the state variables, most recent tick first."""
     return tuple(
         f"{name}_{slot}{after}"
         for after in ("", *(f"_{k}_ticks_ago" for k in range(2, round_ticks + 1)))

@@ -37,10 +37,10 @@ class Tuning:
     rule: Literal["barrier", "matched"]
     """How the gains follow from the requirements.
 
-    ``barrier``: the first gain of ``Law.loop_gains``, to which the push is
-    proportional, follows from the required barrier. The second gain follows from the
-    energy that the velocity term may put back. ``matched``: the rule of the active law
-    of 2019, for laws with the same gains."""
+    ``barrier``: the first gain of ``Law.loop_gains`` follows from the required barrier.
+    The push must be proportional to this gain. The second gain follows from the energy
+    that the velocity term may return to the motion. ``matched``: the rule of the active
+    law of 2019. It suits laws that have the same gains."""
     stiffest: Callable[[Any, float], float]
     """Function of the gains and the sensors' least range in m. It returns the largest
     -df/dc for an obstacle at rest, N/m."""
@@ -49,8 +49,8 @@ class Tuning:
     spring term, m/s."""
     sets_follow_distance: bool = False
     """Whether the design chooses a follow distance that allows for the push of the law.
-    This makes no sense for a law without a limit of reach, because its push acts at
-    every useful follow distance."""
+    For a law without a limit of reach this choice makes no sense, because the push acts
+    at every useful follow distance."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,9 @@ class Law:
     plans: bool = False
     """Whether the block decides on a motion instead of a force.
 
-    Such a block has no linear model. It may also take the arguments ``following``,
-    ``known`` (parameters of the map), ``bodies`` (their number), and ``seed``."""
+    Such a block has no linear model. Its class may also take the arguments
+    ``following``, ``known`` (parameters of the map), ``bodies`` (number of bodies), and
+    ``seed``."""
     on_route: bool = False
     """Whether the robot drives to a goal on a planned route instead of following a
     sound. Such a law also has ``plans``."""
@@ -103,9 +104,9 @@ class Law:
     def controller(self) -> Callable[..., Any] | None:
         """Class of the law's block, or None if the law names none.
 
-        The class takes robot, attraction, repulsion, and sensors. It is imported on
-        the first call, because the check of a scenario needs no Drake and no compiled
-        code.
+        The class takes the arguments robot, attraction, repulsion, and sensors. This
+        property imports the class when it is read. Therefore the check of a scenario
+        needs no Drake and no compiled code.
         """
         if not self.controller_name:
             return None

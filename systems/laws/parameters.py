@@ -31,7 +31,7 @@ class AttractionParameters(Parameters):
 
 
 class SharedRepulsion(Parameters):
-    """Parameters of the push that all laws share."""
+    """Parameters that the pushes of all laws share."""
 
     velocity_term: VelocityTerm = "printed"
     """Definition of the speed s: ``printed`` is |dC/dt|, ``closing`` is the speed of

@@ -35,7 +35,7 @@ class PathIntegralParameters(MapParameters):
     turn_spread_rad_s: Positive = 1.1
     """Standard deviation of the sampled yaw rates, rad/s."""
     temperature: Positive = 0.37
-    """Increase of the cost that lowers the weight of a sequence to 1/e (Nav2: 0.3)."""
+    """Increase of the cost that divides the weight of a sequence by e (Nav2: 0.3)."""
     control_gain: NonNegative = 0.015
     """Cost gamma of a deviation from the last plan (Nav2: 0.015)."""
     goal_gain: NonNegative = 5.0
@@ -46,7 +46,7 @@ class PathIntegralParameters(MapParameters):
     forward_gain: NonNegative = 0.81
     """Cost of driving backward, s/m (Nav2's prefer forward critic: 5)."""
     obstacle_gain: NonNegative = 3.4
-    """Cost of a position at the edge of the clearance of an obstacle (Nav2's cost
+    """Cost of a position at the distance ``clearance_m`` from an obstacle (Nav2's cost
     critic: 3.81)."""
     inflation_m: Length = 0.057
     """Distance over which the cost of ``obstacle_gain`` falls to 1/e, m."""

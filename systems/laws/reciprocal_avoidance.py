@@ -12,7 +12,7 @@ class ReciprocalAvoidanceParameters(Parameters):
     horizon_s: Duration = 1.8
     """Time for which the chosen velocity avoids contacts, s."""
     offset_m: Length = 0.045
-    """Distance of the holonomic point ahead of the axle, m."""
+    """Distance ahead of the axle of the point whose velocity ORCA chooses, m."""
     clearance_m: NonNegativeLength = 0.02
     """Distance that the robot keeps from all bodies, m."""
     farthest_m: Length = 5.0

@@ -2,7 +2,7 @@
 
 The papers do not print K_0, k_ref, D_0, and d_ref. The command ``phonotaxis design``
 derives the defaults from requirements, which are the same for each law.
-docs/avoidance.md explains them.
+docs/avoidance.md explains these requirements.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ class AirflowSensors(Block):
     With the lobe ``cosine``, F1 points 45 deg to the left and F2 45 deg to the right.
     Both sensors measure the wind at the origin of B.
 
-    The block has no state. It draws new noise every tick. Latency: none.
+    The block has no state. It draws new noise every tick. There is no latency.
 
     Args:
         parameters: Gain, lobe and noise.

@@ -44,7 +44,7 @@ class GasNumbers(NamedTuple):
     noise_share: float
     drift_per_s: float
     faults: NDArray[np.float64]
-    """(3, 2) kind of the fault (0: none) and its start, s, per sensor."""
+    """(3, 2) for each sensor: kind of the fault (0: none) and start of the fault, s."""
     tick_s: float
     noise: TickNoise
 
@@ -66,7 +66,7 @@ def gas_sensor_step(
 ) -> None:
     """Computes the readings of the sensors.
 
-    State: the three ratios without noise, then the three last readings.
+    The state holds the three ratios without noise, then the three last readings.
     """
     ratios, truths = outputs
     gas = np.empty(3)
@@ -97,8 +97,8 @@ class GasSensorArray(Block):
     (1 + C/C1)^-exponent with a first-order lag. By default, the lag is shorter when the
     concentration grows than when it falls. ``gas_concentration`` is the true C/C1.
 
-    Discrete state, every tick: ratio and last reading of each sensor. Latency: only the
-    lag.
+    The discrete state holds the ratio and the last reading of each sensor, and is
+    updated every tick. There is no latency apart from the lag.
 
     Args:
         parameters: Positions, power law, lag, errors and faults.

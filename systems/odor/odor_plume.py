@@ -95,8 +95,8 @@ _STEADY_M_S = 1e-3
 _FAR = 6.0
 #: Longest simulated time before a run, s.
 _LONGEST_SPIN_UP_S = 25.0
-#: The strength of the source refers to a gas sensor with this exponent, at this
-#: distance downwind, m, in a wind of this speed, m/s.
+#: The strength of the source refers to these conditions: exponent of the gas sensor,
+#: its distance downwind of the source, m, and speed of the wind, m/s.
 _EXPONENT, _REFERENCE_M, _REFERENCE_M_S = 0.7155, 2.0, 1.0
 
 
@@ -261,7 +261,7 @@ def plume_step(
 ) -> None:
     """Updates the plume once per period.
 
-    State: the output port ``plume``.
+    The state is the output port ``plume``.
     """
     if tick % numbers.period == 0:
         _advance(state, inputs[0], tick, numbers)
@@ -288,15 +288,16 @@ class OdorPlume(Block):
     that the wind carries it. The floor reflects the odor. Walls and robots do not
     affect it. At the beginning of a run, the source has released odor for ``age_s``.
 
-    Discrete state: the output. It changes every 0.1 s and depends on the wind 0.1 s
-    before.
+    The discrete state is the output. It changes every 0.1 s, and depends on the wind
+    0.1 s before the change.
 
     Args:
         parameters: Kind, strength and spread of the plume.
         wind: Wind before the run, and wind of a steady plume.
         p_WO: Position of the source in W, m.
         seed: Seed of the puffs' own velocities.
-        tick_s: Period of the robots, s. 0.1 s is a multiple of it.
+        tick_s: Period of the robots, s. The period of the plume, 0.1 s, is a multiple
+            of it.
 
     Raises:
         InputError: A steady plume has no wind.

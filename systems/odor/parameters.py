@@ -56,8 +56,8 @@ class OdorParameters(Parameters):
     height_m: NonNegativeLength = 0.0
     """H, height of the source above the floor, m."""
     puffs_per_s: float = Field(default=16.0, ge=1.0, le=50.0)
-    """Number of puffs released per second, 1/s. The model stores 320 puffs. Even
-    at 50 puffs per second, they reach 6 m in a wind of 1 m/s."""
+    """Number of puffs released per second, 1/s. The model stores 320 puffs. Even at 50
+    puffs per second, these puffs reach 6 m in a wind of 1 m/s."""
     level_growth: float = Field(default=0.12, ge=1e-3, le=1.0)
     """Growth of the horizontal spread of a puff per distance traveled."""
     upright_growth: float = Field(default=0.13, ge=1e-3, le=1.0)
@@ -70,8 +70,8 @@ class OdorParameters(Parameters):
     """Correlation time of a puff's own velocity, s."""
     mean_intensity: float = Field(default=0.197, ge=1e-3, le=1.0)
     """gamma_1 / u, growth of the horizontal spread of the steady plume. The default is
-    the value of the default puffs in the default wind near the source. 2 m downwind,
-    their value is about 0.19."""
+    the value of the default puffs in the default wind near the source. The value of the
+    puffs 2 m downwind is about 0.19."""
     reach_m: float = Field(default=6.0, ge=0.5, le=1_000.0)
     """Distance from the source beyond which puffs are removed, m."""
     age_s: Time = 60.0
@@ -120,11 +120,11 @@ class GasSensorParameters(Parameters):
     """Exponent in Rs/R0 = (1 + C/C1)^-exponent. The default is the value for ethanol in
     the table of GADEN."""
     response_s: Duration = 2.5
-    """Time constant while the concentration grows, s. The default reaches 95 % in 7.5 s
-    (2.3.3: 5 to 10)."""
+    """Time constant while the concentration grows, s. With the default, a reading
+    reaches 95 % of its change in 7.5 s (2.3.3 prints 5 to 10 s)."""
     recovery_s: Duration = 5.8
-    """Time constant while the concentration falls, s. The default reaches 95 % in
-    17.4 s (2.3.3: 15 to 20)."""
+    """Time constant while the concentration falls, s. With the default, a reading
+    reaches 95 % of its change in 17.4 s (2.3.3 prints 15 to 20 s)."""
     noise: float = Field(default=0.003, ge=0.0, le=1.0)
     """Standard deviation of a reading, divided by the reading."""
     mismatch: float = Field(default=0.01, ge=0.0, le=0.1)
@@ -165,7 +165,7 @@ class AirflowParameters(Parameters):
     lobe: Literal["cosine", "crosswind"] = "cosine"
     """Directional sensitivity. ``cosine``: the wires are most sensitive to wind from 45
     deg to the left and to the right. ``crosswind``: the wires are parallel to the axis
-    of the robot, next to a partition. They measure the crosswind if it comes from their
-    side, and a fifth of the wind along the axis."""
+    of the robot, next to a partition. Each wire measures the crosswind if it comes from
+    the side of this wire, and a fifth of the wind along the axis."""
     noise: float = Field(default=0.02, ge=0.0, le=1.0)
     """Standard deviation of a reading, divided by the reading."""

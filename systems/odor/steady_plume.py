@@ -109,8 +109,8 @@ def sharan_concentration(
         z: Height above the floor, m.
         rate: Q, amount per second.
         speed: u, speed of the wind, m/s.
-        intensities: (alpha, beta, gamma), sigma^2 / x^2 along the wind, across the
-            wind, and vertically.
+        intensities: (alpha, beta, gamma), the values of sigma^2 / x^2 along the wind,
+            across the wind, and in the vertical direction.
 
     Returns:
         Concentration, amount per cubic meter.

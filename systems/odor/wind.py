@@ -102,7 +102,7 @@ def wind_step(
 ) -> None:
     """Updates the unsteady velocity once per period.
 
-    State: the output port ``wind``.
+    The state is the output port ``wind``.
     """
     if tick % numbers.period != 0 or numbers.spread == 0.0:
         return
@@ -156,12 +156,13 @@ class WindField(Block):
     unsteady velocity is an Ornstein-Uhlenbeck process, with an exact discretization.
     Obstacles and robots do not affect the wind.
 
-    Discrete state: the output. It changes every 0.1 s.
+    The discrete state is the output. It changes every 0.1 s.
 
     Args:
         parameters: Kind, mean and unsteadiness of the wind.
         seed: Seed of the unsteady velocity.
-        tick_s: Period of the robots, s. 0.1 s is a multiple of it.
+        tick_s: Period of the robots, s. The period of the wind, 0.1 s, is a multiple of
+            it.
 
     Reference: Song 2011, 4.1, for the speeds. The rest is ours.
     """

@@ -1,4 +1,4 @@
-"""The point of a path to head for: the farthest one that a straight drive may reach."""
+"""The carrot: the farthest point of a path to which the robot may drive straight."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import math
 from systems.framework.compiling import njit
 from systems.planning.way import STRAIGHT, Way
 
-#: The straight line may cost this multiple of the path, which zigzags between cells.
+#: A straight line is accepted if it costs at most this multiple of the path to the same
+#: point.
 _DEARER = 1.1
-#: Points within this distance are always accepted, m: the robot may stand beside the
-#: middle of its cell, which makes the comparison inexact.
+#: Points within this distance, m, are always accepted. The robot may stand beside the
+#: middle of its cell, so the comparison of costs is inexact.
 _NEAREST_M = 0.4
 
 
@@ -18,19 +19,21 @@ _NEAREST_M = 0.4
 def find_carrot(
     way: Way, x: float, y: float, farthest_m: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Returns the farthest point of a path to which the straight line costs no more.
+    """Returns the farthest point of a path that a straight line reaches as cheaply.
 
     The cost of the straight line is its length times the mean price of the cells under
-    it. The function compares this cost with the cost of the path to the same point.
+    it. The function compares this cost with the cost of the path to the same point. The
+    straight line may cost 10 % more.
 
     Args:
         way: From ``find_way``.
         x: Position of the robot, m.
         y: Position of the robot, m.
-        farthest_m: The search ends at the first point that is farther away, m.
+        farthest_m: Distance from the robot, m. The search ends at the first point
+            beyond it.
 
     Returns:
-        (x, y) m; the position of the robot if there is no path.
+        (x, y) of the point, m. Without a path, this is the position of the robot.
     """
     found, begin, cell = (x, y), 0, way.facts[0, 5]
     for k in range(int(way.facts[0, 0])):

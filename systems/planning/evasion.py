@@ -11,22 +11,23 @@ from systems.framework.compiling import njit
 from systems.planning.hazards import AGE_S, SPREAD, VX, VY, WEIGHT, X, Y
 from systems.planning.turning import wrapped
 
-#: How far motions are predicted, s, and the step of the prediction, s.
+#: Duration of the prediction of motions, s, and its time step, s.
 _AHEAD_S, _STEP_S = 4.0, 0.2
-#: A particle nearer to the robot's body than the first distance counts fully. Up to the
-#: second distance it counts less, m.
+#: A particle nearer to the robot's body than the first distance, m, counts fully. Up to
+#: the second distance, m, it counts less.
 _HIT_M, _NEAR_M = 0.15, 0.43
-#: Share by which a contact at the end of the prediction counts less than one now.
+#: A contact at the end of the prediction counts less than a contact now, by this share.
 _LATER = 0.2
-#: A particle that comes nearer than the first distance is a full threat. Up to the
-#: second distance it is a smaller one, m. Contacts later than the third number do not
-#: count, s.
+#: A particle that comes nearer than the first distance, m, is a full threat. Up to the
+#: second distance, m, the threat decreases to zero. The third number is the duration of
+#: this prediction, s.
 _THREAT_M, _NO_THREAT_M, _THREAT_S = 0.8, 1.6, 4.0
 #: Factor for a threat that moves away.
 _GOING = 0.25
-#: The need to look at a track is 1 after this time without an echo, s. It is also 1 if
-#: its velocity has 1.5 times this standard deviation, m/s. Least need, and largest need
-#: of a track without echoes.
+#: The need to look at a track is 1 after the first number, s, without an echo. The need
+#: is also 1 if the standard deviation of the track's velocity is 1.5 times the second
+#: number, m/s. The third number is the least need. The fourth number is the largest
+#: need of a track without echoes.
 _STALE_S, _UNSURE_M_S, _LEAST_NEED, _MOST_NEED = 0.8, 0.1, 0.1, 2.0
 #: Angle off the heading within which a threat is in view, rad. Largest angle out of
 #: view that counts, rad.
@@ -48,13 +49,13 @@ _BESIDE_M, _BESIDE_S, _BESIDE_TURN_M, _WITHDRAWS = 0.09, 0.4, 0.2, 0.2
 _SLOW_RAD_S, _BODY_SHARE = 0.3, 0.3
 #: Price of a deviation from the wanted heading, m/s per rad.
 _TURN_PRICE = 0.1
-#: Angle off the robot's heading within which a speed that the guard has refused is not
-#: tried again, rad.
+#: A speed that the guard has refused is not tried again at headings within this angle,
+#: rad, of the robot's heading.
 _HELD_RAD = 0.6
 
 
 class EvasionNumbers(NamedTuple):
-    """Constants of a choice."""
+    """Constants of ``choose_motion``."""
 
     turn_gain: float
     """Yaw rate per heading error, 1/s."""
@@ -83,8 +84,8 @@ def _is_held(
 ) -> bool:  # pragma: no cover  (compiled)
     """Return whether the guard would refuse a motion because of bodies nearby.
 
-    The bodies are moved on by ``time`` seconds. A body does not count if the robot
-    moves away from it fast enough.
+    The function first moves the bodies on by ``time`` seconds. A body does not count if
+    the robot moves away from it fast enough.
     """
     x, y, theta = pose
     speed, omega = motion
@@ -154,9 +155,9 @@ def _risk_along(
 
     ``held_rad_s`` selects the prediction. If it is infinite, the robot moves as if
     without a guard. Otherwise the robot stands wherever the guard holds it, and turns
-    at most at this rate. In each step, the function moves the robot, and then compares
-    its rectangle with all particles. Each particle counts with its nearest approach,
-    and a later approach counts less.
+    at most at the rate ``held_rad_s``. In each step, the function moves the robot, and
+    then compares its rectangle with all particles. Each particle counts with its
+    nearest approach, and a later approach counts less.
     """
     steps, total, held = math.ceil(_AHEAD_S / _STEP_S), 0.0, False
     x, y, theta = pose[0], pose[1], pose[2]
@@ -196,7 +197,7 @@ def _risk_along(
 def _least_distance(
     dx: float, dy: float, ux: float, uy: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Return the least distance in the next 4 s, m, and when it occurs, s.
+    """Return the least distance, m, in the next 4 s, and the time until then, s.
 
     ``(dx, dy)`` and ``(ux, uy)`` are the relative position and velocity.
     """
@@ -210,22 +211,23 @@ def _least_distance(
 def find_threats(
     bodies: Any, count: int, pose: Any, wanted: Any, threats: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """Finds how much each particle has to be watched, and in which direction it is.
+    """Finds how much the robot has to watch each particle, and in which direction.
 
-    A particle is a threat if it will come near the robot. The function compares a robot
-    that drives as wanted with one that stands, and takes the nearer approach. The robot
-    has to watch a threat that it has not seen for a while, or whose velocity is
-    uncertain.
+    A particle is a threat if it will come near the robot. The function predicts the
+    least distance for a robot that drives as wanted and for a robot at rest. It takes
+    the smaller of both. The robot has to watch a threat that it has not seen for a
+    while, or whose velocity is uncertain.
 
     Args:
         bodies: (n, 7) from ``pick_hazards``.
         count: Number of particles in ``bodies``.
         pose: (x, y, theta) of the robot, m and rad.
         wanted: Wanted speed, m/s, and heading, rad.
-        threats: (n, 2) filled: bearing in W, rad, and number of bodies to be watched.
+        threats: (n, 2) array that the function fills: bearing in W, rad, and number of
+            bodies to be watched.
 
     Returns:
-        Sum of these numbers.
+        Sum of the numbers of bodies to be watched.
     """
     speed, heading = max(wanted[0], 0.0), wanted[1]
     vx, vy = speed * math.cos(heading), speed * math.sin(heading)
@@ -259,7 +261,8 @@ def watch_of(
         heading: Heading of the robot, rad.
 
     Returns:
-        Sum over the threats: bodies times their angle out of view, rad, at most 1 each.
+        Sum over all threats of the number of bodies times the angle out of view, rad.
+        Each angle counts at most 1 rad.
     """
     total = 0.0
     for n in range(count):
@@ -286,18 +289,18 @@ def choose_motion(
     * the threats that are out of view at this heading, times ``watch_gain``;
     * the bodies that come near within 4 s, times ``risk_gain``.
 
-    The function tries all pairs of a heading and a speed. The headings are five around
-    the path, the current one, the weaving one, and two towards the threats. The last
-    term is expensive, so the function skips it for motions that are already too
-    expensive without it.
+    The function tries all pairs of a heading and a speed. It uses nine headings: five
+    around the heading of the path, the current heading, the weaving heading, and two
+    towards the threats. The last term takes long to compute. The function skips it if
+    the other terms already exceed the lowest price.
 
     Args:
         bodies: (n, 7) from ``pick_hazards``.
         count: Number of particles in ``bodies``.
         pose: (x, y, theta) of the robot, m and rad.
-        wanted: Wanted speed, m/s; heading of the path, rad; and the momentary heading
-            that weaves around it, rad.
-        held: Speed that the guard has just refused, m/s; 0: none.
+        wanted: Wanted speed, m/s; heading of the path, rad; and weaving heading, rad,
+            which oscillates around the heading of the path.
+        held: Speed that the guard has just refused, m/s, or 0.
         numbers: Properties of the robot, and prices.
 
     Returns:

@@ -25,12 +25,12 @@ def wanted_speed(left: float, along: float, own: Any) -> float:
     """Computes the wanted speed.
 
     Args:
-        left: Remaining distance to the follow distance, m.
+        left: Distance from the target minus the follow distance, m.
         along: Speed of the target in the direction of travel, m/s.
         own: ``FollowingParameters``.
 
     Returns:
-        m/s; negative: back off.
+        Wanted speed, m/s. If it is negative, the robot backs off.
     """
     wanted = own.approach_gain * left + own.source_share * along
     return min(max(wanted, -own.back_speed_m_s), own.cruise_speed_m_s)
@@ -38,7 +38,7 @@ def wanted_speed(left: float, along: float, own: Any) -> float:
 
 @register_jitable
 def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
-    """Computes how fast to go straight to the target, and in which direction it is.
+    """Computes the speed of a straight approach to the target, and its direction.
 
     Args:
         inputs: Position and velocity of the target, m and m/s; whether there is a
@@ -47,7 +47,7 @@ def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
 
     Returns:
         Wanted speed, m/s, and bearing of the target from the axle in W, rad. Without a
-        target, speed 0 and the heading of the robot.
+        target, the speed is 0 and the bearing is the heading of the robot.
     """
     target, velocity, valid, pose = inputs[0], inputs[1], inputs[2][0], inputs[3]
     if valid < 0.5:

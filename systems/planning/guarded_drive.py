@@ -1,10 +1,10 @@
 """One tick of the guarded law: where to drive, when to look, and how to evade bodies.
 
 The robot is in one of five modes. It waits without a target. It drives along the path
-that `systems.planning.way` finds. It looks around before it first moves, and at a place
-that blocks it. It backs off after it has stayed in one place for too long. It gives up
-for the moment when all paths lead through occupied cells. In every mode,
-`systems.planning.evasion` may replace the motion to avoid moving bodies.
+that `systems.planning.way` finds. It looks around before it moves for the first time,
+and it looks at a place that blocks it. It backs off after it has stayed in one place
+for too long. It gives up temporarily if all paths lead through occupied cells. In every
+mode, `systems.planning.evasion` may replace the motion to avoid moving bodies.
 """
 
 from __future__ import annotations
@@ -45,19 +45,19 @@ WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)
     CARROT_Y,
     WAY_LEFT,  # remaining length of the path, m
     PLANNED_S,  # time of the last plan
-    BLOCKED_S,  # when the guard last let the robot go on
-    STAYS_X,  # where the robot was when it last moved on
+    BLOCKED_S,  # last time when the guard let the robot go on
+    STAYS_X,  # position of the robot when it last moved on
     STAYS_Y,
-    STAYS_S,  # and when
+    STAYS_S,  # time when it last moved on
     HAS_LOOKED,  # 1 after the first look around
     FIRST_LOOK,  # headings of the current look
     SECOND_LOOK,
-    LOOKS_DONE,  # number of these headings that are done
+    LOOKS_DONE,  # number of headings of the current look that are done
     BLOCK_X,  # cell that blocks the robot
     BLOCK_Y,
     BACKED_S,  # start of backing off
-    HELD,  # speed that the guard last refused, m/s; 0: none
-    HELD_S,  # and when
+    HELD,  # speed that the guard last refused, m/s, or 0
+    HELD_S,  # time of this refusal
     PASSABLE_S,  # time of the last path without occupied cells
     MEMORY,  # number of entries
 ) = range(23)
@@ -65,17 +65,19 @@ WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)
 #: Half of the angle of a look, rad: for the first look, before the robot has moved; and
 #: for a look at a cell that blocks the robot.
 _FIRST_LOOK_RAD, _LOOK_RAD = 0.4, 0.6
-#: A heading of a look is done within this error, rad. Yaw rate per error, 1/s.
+#: A heading of a look is done if the heading error is below the first number, rad. The
+#: second number is the yaw rate per heading error during a look, 1/s.
 _LOOKED_RAD, _LOOK_GAIN = 0.1, 4.0
-#: A look ends early if the disc is this much farther from non-free space than it has to
-#: be, m.
+#: A look ends early if the distance of the disc from non-free space exceeds the
+#: required distance by this much, m.
 _ROOM_M = 0.03
-#: If the heading error is larger, the robot turns before it drives, rad.
+#: If the heading error is larger than this angle, rad, the robot turns before it
+#: drives.
 _TURN_FIRST_RAD = 1.0
-#: A robot that has moved this far does not stay in one place, m.
+#: A robot that has moved farther than this distance, m, does not stay in one place.
 _STAYS_M = 0.15
-#: The robot has arrived if the error of its distance from the target is smaller, m, and
-#: the target is slower than this, m/s.
+#: The robot has arrived if the error of its distance from the target is below the first
+#: number, m, and the target is slower than the second number, m/s.
 _THERE_M, _RESTS_M_S = 0.2, 0.1
 #: A path is straight if its length is at most this multiple of the direct distance.
 _DETOUR = 1.15
@@ -89,7 +91,7 @@ _LITTLE_BEHIND_M, _FAR_BEHIND_M = 0.3, 0.9
 #: Distance within which the robot evades bodies, m. If the need to watch bodies is
 #: below the second number, the robot does not evade.
 _NEAR_M, _WATCHED = 3.5, 0.05
-#: After the guard has refused a speed, the robot avoids this speed for a time, s.
+#: After the guard has refused a speed, the robot avoids it for this time, s.
 _HELD_S = 0.4
 #: Largest number of cells that are compared to find the one that blocks the robot.
 _MOST_CELLS = 1_000
@@ -136,14 +138,15 @@ def drive_guarded(
 
     1. Update the tracks of moving bodies with the new echoes.
     2. Plan a path at regular intervals, and compute the wanted speed and heading error.
-    3. Update three timers: since when the robot stays in one place, since when the
-       guard blocks it, and since when all paths lead through occupied cells.
+    3. Update three timers: how long the robot has stayed in one place, how long the
+       guard has blocked the robot, and how long all paths have led through occupied
+       cells.
     4. Change the mode if a timer has expired, and compute the motion of this mode.
     5. Replace this motion if moving bodies are near (``_evade``).
 
     Args:
         tick: Number of the tick.
-        state: Changed.
+        state: Modified in place.
         inputs: Position and velocity of the target, m and m/s; whether there is a
             target; pose of the robot, m and rad; report of the guard; ranges, echoes
             and ages of the range sensors; free space.
@@ -174,14 +177,14 @@ def drive_guarded(
     wanted, error, there = _find_heading(
         time, target, velocity, pose, state, space, numbers
     )
-    # Timer 1: since when the robot stays in one place.
+    # Timer 1: how long the robot has stayed in one place.
     if math.hypot(pose[0] - m[0, STAYS_X], pose[1] - m[0, STAYS_Y]) > _STAYS_M or there:
         _stays(m, pose, time)
-    # Timer 2: since when the guard blocks the robot. The guard does not block it if it
-    # passes the command or only slows it.
+    # Timer 2: how long the guard has blocked the robot. A guard that passes the
+    # command, or only slows the robot, does not block the robot.
     if report[0] < TURNED or there or wanted <= 0.0:
         m[0, BLOCKED_S] = time
-    # Timer 3: since when all paths lead through occupied cells.
+    # Timer 3: how long all paths have led through occupied cells.
     if time - m[0, PASSABLE_S] > own.search_way_s and not there:
         m[0, MODE], m[0, BLOCKED_S] = GIVING_UP, time
         _stays(m, pose, time)
@@ -225,15 +228,15 @@ def _remember_held(
 def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untyped-def]
     """Replace speed and turn if a moving body may come near.
 
-    The heading that the current turn aims at includes the weaving. ``choose_motion``
-    compares other motions with it. A look at a blocked place ends when the robot has to
-    evade. The first look around continues.
+    The function first computes the weaving heading from the current turn.
+    ``choose_motion`` compares other headings with this heading. A look at a blocked
+    place ends when the robot has to evade. The first look around continues.
     """
     m, hazards = state.memory, state.hazards
     count = pick_hazards(hazards, time, pose, _NEAR_M)
     if count == 0:
         return
-    # The current turn is the gain times the error of this heading.
+    # The current yaw rate is the gain times the error of the weaving heading.
     weaving = pose[2] + m[0, TURN] / numbers.following.turn_gain
     way = wanted, pose[2] + error, weaving
     speed, heading, watched = choose_motion(
@@ -257,13 +260,14 @@ def _stays(m: Any, pose: Any, time: float) -> None:  # pragma: no cover  (compil
 def _find_heading(  # type: ignore[no-untyped-def]
     time, target, velocity, pose, state, space, numbers
 ):
-    """Return the wanted speed, m/s, the heading error, rad, and whether it has arrived.
+    """Return wanted speed, m/s, heading error, rad, and whether the robot has arrived.
 
     A new path is planned every ``replan_s``. Echoes near the target and near tracked
-    bodies do not block it. The robot heads to the carrot: the farthest point of the
-    path to which a straight drive costs no more. The wanted speed depends on the
-    distance that remains beyond the follow distance. This distance is the length of the
-    path, or the direct distance if the path is almost straight.
+    bodies do not block the path. The robot heads to the carrot: the farthest point of
+    the path that a straight drive reaches as cheaply (``find_carrot``). The wanted
+    speed depends on the distance from the target minus the follow distance. The
+    distance from the target is the length of the path. If the path is almost straight,
+    the direct distance replaces this length.
     """
     m, own, way, hazards = state.memory, numbers.own, state.way, state.hazards
     x, y, theta = pose[0], pose[1], pose[2]
@@ -308,8 +312,9 @@ def _begin_look(  # type: ignore[no-untyped-def]
     """Begin a look before the robot first moves, or when the guard blocks it.
 
     The first look is centered on the direction of the path. A later look is centered on
-    the cell that blocks the robot, as seen from P. It begins after the guard has
-    blocked the robot for ``patience_s``. The robot first turns to the nearer side.
+    the cell that blocks the robot, as seen from P. The later look begins after the
+    guard has blocked the robot for ``patience_s``. The robot first turns to the nearer
+    side.
     """
     m, x, y = state.memory, pose[0], pose[1]
     half = _FIRST_LOOK_RAD
@@ -332,9 +337,10 @@ def _begin_look(  # type: ignore[no-untyped-def]
 def _look(time, pose, report, state, numbers):  # type: ignore[no-untyped-def]
     """Turn to both sides of the blocking cell, until there is room.
 
-    The look ends as soon as the guard reports room. If both sides are done without
-    room, the cell is marked as blocked for ``mark_s``. Then the robot plans a new path
-    and drives. The first look around always turns to both sides and marks nothing.
+    The look ends as soon as the guard reports room. If the robot has turned to both
+    sides and there is no room, it marks the cell as blocked for ``mark_s``. Then it
+    plans a new path and drives. The first look around always turns to both sides and
+    marks nothing.
     """
     m, own = state.memory, numbers.own
     first = m[0, HAS_LOOKED] < 0.5
@@ -358,7 +364,7 @@ def _blocking(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Return the middle of the non-free cell nearest to a point ahead of the axle.
 
-    The point is 0.1 m ahead. It is returned itself if all cells are free.
+    The point is 0.1 m ahead. If all cells are free, the function returns this point.
     """
     corners = np.empty((_MOST_CELLS, 2))
     count = edge_cells(space, x, y, radius + 0.3, space.facts[0, ROLLED], corners)
@@ -379,10 +385,11 @@ def _drive(  # type: ignore[no-untyped-def]
     """Drive towards the carrot.
 
     The heading weaves around the direction of the carrot, so that the range sensors
-    sweep the floor beside the path. The robot weaves more widely while the target moves
-    in open space, and for ``_MOVES_S`` after a moving body was detected. In this case
-    it weaves less the farther it lags behind the target. With a large heading error,
-    the robot only turns.
+    sweep the floor beside the path. The robot weaves more widely in two cases. In the
+    first case, the target moves and the path is not narrow. In the second case, a
+    moving body was detected within the last ``_MOVES_S``. In both cases, a robot that
+    lags behind the target weaves less. With a large heading error, the robot only
+    turns.
     """
     m, own = state.memory, numbers.own
     if there:

@@ -1,4 +1,4 @@
-"""The velocity nearest to a wanted one that obeys half planes and a top speed."""
+"""The nearest velocity to a wanted one, within half planes and a top speed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _obeys(
 def _offset(
     planes: Any, k: int, slack: float, hard: int
 ) -> float:  # pragma: no cover  (compiled)
-    """Return the offset of a plane, less the slack unless the plane is hard."""
+    """Return the offset of a plane, minus the slack if the plane is soft."""
     soft = k < len(planes) - hard
     return planes[k, 2] - slack if soft else planes[k, 2]
 
@@ -42,12 +42,13 @@ def _offset(
 def _nearest(
     planes: Any, wanted: Any, top: float, slack: float, hard: int
 ) -> tuple[float, float, bool]:  # pragma: no cover  (compiled)
-    """Return the nearest velocity for a given slack, and whether there is one.
+    """Return the permitted velocity nearest to the wanted one, and whether it exists.
 
-    The optimum of such a small problem is the wanted velocity, its projection on a
-    border, or the intersection of two borders. The function tries all these candidates
-    and keeps the nearest one that obeys all constraints. Index -1 stands for no border,
-    0 to ``count - 1`` for the planes, and ``count`` for the circle of the top speed.
+    The slack is given. The optimum of such a small problem is the wanted velocity, its
+    projection on a border, or the intersection of two borders. The function tries all
+    these candidates and keeps the nearest one that obeys all constraints. In the loops,
+    index -1 stands for no border, 0 to ``count - 1`` for the planes, and ``count`` for
+    the circle of the top speed.
     """
     count = len(planes)
     found = 0.0, 0.0, False
@@ -104,21 +105,21 @@ def _nearest(
 def nearest_velocity(
     planes: Any, wanted: Any, top: float, hard: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Returns the velocity nearest to a wanted one that obeys all half planes.
+    """Returns the velocity that obeys all half planes and is nearest to a wanted one.
 
-    If no velocity obeys all of them, the function moves the soft planes back by the
-    same distance. It finds the least distance for which there is a velocity by
-    bisection.
+    If no velocity obeys all half planes, the function moves all soft planes back by the
+    same distance. Bisection finds the least distance that permits a velocity.
 
     Args:
-        planes: (n, 3) unit normal x, y and offset, m/s, of n . v >= offset.
+        planes: (k, 3) half planes n . v >= offset: unit normal n (x, y), and offset,
+            m/s.
         wanted: (x, y) m/s.
         top: Largest speed, m/s.
-        hard: Number of planes at the end that are never moved. Standing still obeys
-            them.
+        hard: Number of hard planes. They are the last rows of ``planes`` and are never
+            moved. A robot at rest obeys them.
 
     Returns:
-        x, y, m/s, and the distance by which planes were moved, m/s.
+        Velocity (x, y), m/s, and the distance by which the soft planes were moved, m/s.
     """
     x, y, obeys = _nearest(planes, wanted, top, 0.0, hard)
     if obeys:

@@ -39,12 +39,14 @@ _LOOKS = 3
 
 #: Distance of a particle behind the surface that echoes, m.
 _BEYOND_M = 0.02
-#: A range does not fit a particle if it differs by more than this, m.
+#: A range does not fit a particle if it differs from the distance of the particle by
+#: more than this, m.
 _GATE_M = 0.10
-#: A body may be in an aperture although its particle is this far beside the edge, m.
+#: A body may be in an aperture although its particle is up to this distance, m, outside
+#: the edge.
 _EDGE_M = 0.04
-#: Factors for the weight of a particle: it should have been seen and was not; or it
-#: does not fit the echo that its track explains.
+#: Factor for the weight of a particle that should have been seen but was not. Factor
+#: for the weight of a particle that does not fit the echo of its track.
 _UNSEEN, _ELSEWHERE = 0.1, 0.5
 #: Standard deviation of the range of a particle with the right velocity, m, in addition
 #: to the noise of the sensor. Least factor for the weight of a particle with a wrong
@@ -60,8 +62,9 @@ _RATE_M_S = 0.2
 _JITTER, _JITTER_M_S, _JITTER_M = 0.5, 0.01, 0.005
 #: Share of bodies that stop per second.
 _STOPS_HZ = 0.04
-#: A track with a lower probability ends. A track explains an echo only if this share of
-#: a body is near the echo.
+#: A track ends if its probability is below the first number. A track explains an echo
+#: only if its probability, times the share of its particles near the echo, exceeds the
+#: second number.
 _LEAST_EXISTS, _LEAST_SHARE = 0.03, 0.03
 #: Highest probability of a track. Share of the remaining doubt that one echo removes.
 _CERTAIN, _SEEN_AGAIN = 0.98, 0.2
@@ -70,18 +73,19 @@ _FORGET_S, _FAR_M = 12.0, 5.0
 #: Spacing of the points at which an arc is checked, and how far behind the arc they
 #: reach, both in cells.
 _ARC_STEP, _BEHIND = 0.3, 0.6
-#: ``find_movers`` lists tracks with at least this probability that were seen within
-#: this time, s. Echoes within this radius come from the body, m.
+#: ``find_movers`` lists a track if its probability is at least the first number and it
+#: was seen within the second number, s. Echoes within the third number, m, of its
+#: position come from the body.
 _LIKELY, _LATELY_S, _BODY_M = 0.3, 3.0, 0.5
 #: Largest number of draws for a particle that no sensor would have seen before.
 _TRIES = 12
-#: A range that changes faster belongs to another body, m/s. A look that is older than
-#: this is not compared, ticks.
+#: A range that changes faster than the first number, m/s, belongs to another body. A
+#: look that is older than the second number, ticks, is not compared with the next look.
 _FASTEST_M_S, _OLDEST_TICKS = 2.0, 4.5
 
 
 class HazardSensors(NamedTuple):
-    """Properties of the sensors and the bodies that the tracks depend on."""
+    """Properties of sensors and bodies on which the tracks depend."""
 
     places: NDArray[np.float64]
     """(sensors, 2) position relative to the axle in B, m."""
@@ -107,12 +111,12 @@ class Hazards(NamedTuple):
     """(tracks, particles, 5) particles of each track; the weights of a track add up to
     1."""
     looks: NDArray[np.float64]
-    """(3, sensors, 6) last looks of each sensor, the newest first."""
+    """(3, sensors, 6) last looks of each sensor, most recent first."""
     memory: NDArray[np.float64]
     """(1, 2) ``RANDOM`` and ``MOVED_S``."""
     picked: NDArray[np.float64]
-    """(n, 7) particles that ``pick_hazards`` has chosen to represent all others. Their
-    weights are expected numbers of bodies."""
+    """(n, 7) particles that ``pick_hazards`` has chosen as a sample of all particles.
+    The weight of a picked particle is an expected number of bodies."""
 
 
 def make_hazards(sensors: int) -> Hazards:
@@ -122,7 +126,7 @@ def make_hazards(sensors: int) -> Hazards:
         sensors: Number of range sensors.
 
     Returns:
-        No tracks.
+        The empty memory.
     """
     memory = np.array([[1.0, -np.inf]])
     looks = np.zeros((_LOOKS, sensors, 6))
@@ -150,23 +154,25 @@ def track_hazards(
 
     Each new reading passes through these steps:
 
-    1. An echo near the target belongs to the target, and is not attributed to a track.
-    2. The track that explains the echo best is the one that has echoed.
-    3. All tracks are weighed with the reading (``_weigh``). The track that has echoed
-       becomes more probable.
-    4. An echo that no track explains begins a new track. This requires that the whole
-       arc of the echo was seen free before: an obstacle at rest is never there. The
-       previous echo of the sensor has to fit, so that the range rate is known.
+    1. An echo near the target is attributed to the target, and not to a track.
+    2. Any other echo is attributed to the track that explains it best.
+    3. All tracks are weighed with the reading (``_weigh``). The track to which the echo
+       is attributed becomes more probable.
+    4. An echo that no track explains begins a new track on two conditions. The whole
+       arc of the echo was seen free before, so no obstacle at rest can be there. The
+       previous echo of the sensor fits the new one, so the range rate is known.
 
-    Finally, improbable tracks end, and particles are drawn again where few have weight.
+    Finally, improbable tracks end. If only few particles of a track have weight, its
+    particles are drawn again.
 
     Args:
-        hazards: Changed.
-        time: s.
+        hazards: Modified in place.
+        time: Current time, s.
         pose: (x, y, theta) of the robot, m and rad.
-        readings: Ranges, m; echoes, 0 or 1; and their ages, s.
+        readings: Ranges, m; echoes, 0 or 1; and ages of the readings, s.
         space: Cells that were seen free.
-        target: (x, y, radius) of the followed target, m. Echoes near it belong to it.
+        target: (x, y, radius) of the followed target, m. Echoes near the target belong
+            to the target.
         sensors: Properties of the sensors.
     """
     ages, tick_s = readings[2], sensors.tick_s
@@ -232,7 +238,7 @@ def _goes_on(
 ) -> bool:  # pragma: no cover  (compiled)
     """Return whether an echo fits the previous look of its sensor.
 
-    Only then is the range rate known.
+    If it does not fit, the range rate is unknown.
     """
     look, then = hazards.looks[0, k], hazards.looks[1, k]
     since = time - then[TIME]
@@ -267,7 +273,7 @@ def _chance(memory: Any) -> float:  # pragma: no cover  (compiled)
 
 @njit(cache=True)
 def _normal(memory: Any) -> float:  # pragma: no cover  (compiled)
-    """Return an approximately normal number: mean 0, deviation 1, at most 3 in size."""
+    """Return a roughly normal random number from -3 to 3: mean 0, deviation 1."""
     return 2.0 * (_chance(memory) + _chance(memory) + _chance(memory) - 1.5)
 
 
@@ -331,20 +337,22 @@ def _weigh(
 ) -> None:  # pragma: no cover  (compiled)
     """Weigh the particles of a track with the newest look of sensor ``k``.
 
-    ``best`` is the track that explains the echo, -1 if there is none. For each
-    particle, ``gap`` is the measured distance minus the distance of the particle.
-    Without an echo, ``gap`` is infinite for particles within the greatest range. There
-    are four cases:
+    ``best`` is the track to which the echo is attributed, or -1. If ``best`` is track
+    ``t``, the track has echoed. For each particle, ``gap`` is the measured distance
+    minus the distance of the particle. Without an echo, ``gap`` is infinite for
+    particles within the greatest range, and 0 for the others. There are four cases:
 
-    * The particle is outside the aperture. If its track has echoed, it loses weight.
-    * The sensor has seen past the particle (large gap). It loses most of its weight,
-      unless it is near the edge of the aperture.
+    * The particle is outside the aperture. If its track has echoed, the particle loses
+      weight.
+    * The sensor has seen past the particle (large gap). The particle loses most of its
+      weight, unless it is near the edge of the aperture.
     * The particle fits the echo of its track. Its weight depends on the gap, and the
       particle moves to the measured range.
-    * The particle is behind the echo of its track. It loses weight.
+    * The particle is behind the echo of its track. The particle loses weight.
 
-    Other particles keep their weight: the echo of something nearer may hide them. If
-    the track has not echoed, the lost weight lowers its probability by Bayes' rule.
+    Other particles keep their weight, because a nearer object may hide them. If the
+    track has not echoed, the lost weight lowers the probability of the track by Bayes'
+    rule.
     """
     p, fit_m = hazards.particles[t], math.hypot(_FIT_M, sensors.noise_m)
     look, half, echoed = hazards.looks[0, k], sensors.directions[k, 1], t == best
@@ -409,9 +417,9 @@ def _came_from_free(
 ) -> bool:  # pragma: no cover  (compiled)
     """Return whether the whole arc of an echo was seen free before.
 
-    The function checks points along the arc, over the width of the aperture. In depth
-    the points begin at the range less its error. They end at the range plus its error
-    and a part of a cell. All cells there must still count as free.
+    The function checks points along the arc, over the width of the aperture. In depth,
+    the points extend from the range minus its largest error to the range plus this
+    error and a part of a cell. The cells of all points must still count as free.
     """
     cells, cell = space.hits.shape[0], space.cell_m
     step_m = _ARC_STEP * cell
@@ -438,11 +446,13 @@ def _begin(
 ) -> None:  # pragma: no cover  (compiled)
     """Begin a track that replaces the least probable one.
 
-    The body is anywhere on the arc of the newest echo of sensor ``k``. Its radial speed
-    follows from the range rate and the motion of the sensor, with an error. Its speed
-    across is unknown: it is drawn uniformly, so that the total speed stays below the
-    top speed. A draw is repeated, at most 12 times, if a sensor would have seen the
-    body at its oldest look. This check is left out if the oldest look is too old.
+    The body may be anywhere on the arc of the newest echo of sensor ``k``. The radial
+    speed of the body follows from the range rate and the motion of the sensor, with an
+    error. The tangential speed is unknown. The function draws this speed uniformly from
+    the values for which the total speed does not exceed the top speed. It repeats a
+    draw if a sensor would have seen the drawn body in its oldest look. It omits this
+    check if the oldest look of sensor ``k`` is too old. Each particle is drawn at most
+    12 times.
     """
     tracks, memory, top = hazards.tracks, hazards.memory, sensors.top_speed_m_s
     look, then, half = (
@@ -488,9 +498,10 @@ def _was_visible(
 ) -> bool:  # pragma: no cover  (compiled)
     """Return whether the oldest looks contradict a particle.
 
-    The particle is moved back by ``ago`` seconds with its velocity. A look contradicts
-    the particle if the particle was inside the aperture and nearer than the reading,
-    both by at least 3 cm: the sensor would have seen it, but did not.
+    The function moves the particle back in time by ``ago`` seconds. A look contradicts
+    the particle if two conditions hold. The particle was inside the aperture, at least
+    3 cm from the edge. It was also at least 3 cm nearer than the reading. The sensor
+    would have seen such a body, but did not.
     """
     x, y = particle[X] - ago * particle[VX], particle[Y] - ago * particle[VY]
     for k in range(hazards.looks.shape[1]):
@@ -507,10 +518,10 @@ def _was_visible(
 def _draw_anew(hazards: Hazards, t: int) -> None:  # pragma: no cover  (compiled)
     """Draw the particles of a track again in proportion to their weights.
 
-    This happens only if the effective number of particles is at most half. It is one
-    over the sum of the squared weights. The draw is systematic: it takes particles at
-    equal steps of the cumulated weight. Small noise then separates copies of the same
-    particle.
+    The function draws only if the effective number of particles is at most half of
+    their number. The effective number is one over the sum of the squared weights. The
+    draw is systematic: it takes particles at equal steps of the cumulative weight.
+    Small noise then separates copies of the same particle.
     """
     p, memory = hazards.particles[t], hazards.memory
     squares = 0.0
@@ -535,7 +546,7 @@ def _draw_anew(hazards: Hazards, t: int) -> None:  # pragma: no cover  (compiled
 
 @njit(cache=True)
 def _spread(p: Any, which: int) -> float:  # pragma: no cover  (compiled)
-    """Return the standard deviation of one value of all particles, without weights."""
+    """Return the unweighted standard deviation of one value over all particles."""
     mean, square = 0.0, 0.0
     for n in range(len(p)):
         mean += p[n, which] / len(p)
@@ -551,9 +562,9 @@ def find_movers(
 
     Args:
         hazards: The tracks.
-        time: s.
-        places: (n, 3) filled: mean position of a track, m, and the radius around it
-            from which its echoes may come, m.
+        time: Current time, s.
+        places: (n, 3) array that the function fills: mean position of each track, m,
+            and radius within which echoes may come from the body, m.
 
     Returns:
         Number of bodies.
@@ -576,16 +587,16 @@ def find_movers(
 def pick_hazards(
     hazards: Hazards, time: float, pose: Any, within_m: float
 ) -> int:  # pragma: no cover  (compiled)
-    """Picks particles of the tracks near a robot that represent all others.
+    """Picks a sample of the particles of all tracks near a robot.
 
-    The function takes 25 particles of each track, at equal steps of the cumulated
-    weight. Each gets an equal part of the probability of the track.
+    The function takes 25 particles of each track, at equal steps of the cumulative
+    weight. Each picked particle gets an equal part of the probability of the track.
 
     Args:
-        hazards: ``picked`` changes.
-        time: s.
+        hazards: The tracks. The function writes ``picked``.
+        time: Current time, s.
         pose: (x, y, theta) of the robot, m and rad.
-        within_m: Tracks that are farther away are left out, m.
+        within_m: Distance from the robot, m. Tracks beyond it are left out.
 
     Returns:
         Number of picked particles.

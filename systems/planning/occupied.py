@@ -1,4 +1,4 @@
-"""Cells that range sensors received echoes from and have not seen free since.
+"""Occupied cells: echoes came from them, and no sensor has seen them free since.
 
 This is the map of the baselines: an occupancy grid that does not distinguish unknown
 cells from free ones.
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.safety.free_space import FIRST_I, FIRST_J, FreeSpace
 
-#: A cell with fewer hits is not occupied. More hits than the second number do not make
-#: it more certain.
+#: A cell with fewer hits than the first number is not occupied. More hits than the
+#: second number do not make it more certain.
 _LEAST_HITS, _MOST_HITS = 1.0, 6.0
 
 
@@ -31,10 +31,12 @@ def list_occupied(
         x: Position of the place, m.
         y: Position of the place, m.
         reach: Half of the side of the square in which cells are listed, m.
-        clear: (x, y, radius) of the followed target, m: its echoes do not count.
+        clear: (x, y, radius) of the followed target, m. Cells within this radius are
+            not listed.
 
     Returns:
-        (n, 3) middles of the cells, m, and how certain they are, from 0 to 1.
+        (n, 3) middle (x, y) of each cell, m, and certainty from 0 to 1 that the cell is
+        occupied.
     """
     cell, cells = space.cell_m, space.hits.shape[0]
     found, count = np.empty((64, 3)), 0

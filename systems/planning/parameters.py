@@ -20,23 +20,24 @@ class SafetyFilterParameters(Parameters):
     """Distance kept between objects and the disc about the axle that contains the body,
     m."""
     approach_rate: float = Field(default=1.0, ge=1e-3, le=100.0)
-    """alpha, 1/s: share of the distance to an obstacle at rest by which P may approach
-    per second."""
+    """alpha, 1/s. P may approach an obstacle at rest at most at alpha times the
+    remaining distance."""
     horizon_s: float = Field(default=4.0, ge=0.1, le=60.0)
-    """Contacts with moving objects count if they are nearer in time than this, s."""
+    """Duration of the prediction, s. Later contacts with moving objects do not
+    count."""
 
 
 class FollowingParameters(Parameters):
-    """How a law that commands motions instead of forces follows and turns."""
+    """Following and turning of laws that command motions instead of forces."""
 
     cruise_speed_m_s: Speed = 0.62
     """Largest wanted speed, m/s."""
     back_speed_m_s: NonNegativeSpeed = 0.15
     """Speed of backing off, m/s."""
     approach_gain: Positive = 1.2
-    """Wanted speed per distance to go, 1/s."""
+    """Wanted speed per remaining distance, 1/s."""
     source_share: float = Field(default=0.8, ge=0.0, le=1.0)
-    """Share of the target's own speed that is added."""
+    """Share of the target's speed that is added to the wanted speed."""
     turn_gain: Positive = 3.0
     """Yaw rate per error of the heading, 1/s."""
     turn_rate_rad_s: float = Field(default=2.0, gt=0.0, le=20.0)

@@ -1,4 +1,4 @@
-"""A block that keeps P off objects by the smallest change of its velocity."""
+"""A block that changes the velocity of P as little as possible to avoid objects."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from systems.planning.parameters import SafetyFilterParameters
 from systems.planning.velocity_filter import FilterNumbers, filtered_velocity
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Time within which the robot leaves a moving object that has come too near, s.
+#: Time, s, in which the robot moves out of the reach of a moving object that has come
+#: too near.
 _LEAVE_S = 0.1
 
 
@@ -38,7 +39,7 @@ def safety_filter_step(
 ) -> None:
     """Computes wheel speeds, velocity of P, slack and action of the next tick.
 
-    They are the state of the block.
+    These values are the state of the block.
     """
     acceleration, pose, objects = inputs
     robot, theta = numbers.robot, pose[2]
@@ -64,19 +65,19 @@ def _publish(state: Any, outputs: Any, numbers: SafetyNumbers) -> None:
 
 
 class SafetyFilter(Block):
-    """Moves P as a law commands, except where this would lead into objects.
+    """Moves P as a law commands, except where the command leads into objects.
 
     The block replaces ``WheelCommand``. The virtual mass moves with the velocity that
-    the filter returns, which prevents windup. The filter considers all velocities that
-    the wheels can produce and that lead into no object. It chooses the one nearest to
-    the commanded velocity. If there is none, the filter lets moving objects come nearer
-    than allowed, by as little as possible. It never approaches objects at rest for that
-    purpose. The first number of ``filter_report`` is the slack, by which the
-    constraints are violated. The second number states whether the filter changed the
-    velocity.
+    the filter returns. This prevents windup. The filter considers all velocities that
+    the wheels can produce and that lead into no object. Among these velocities, it
+    chooses the one nearest to the commanded velocity. If there is no such velocity, the
+    filter violates the constraints of moving objects by as little as possible. The
+    limits on the approach to objects at rest always hold. The first number of
+    ``filter_report`` is the slack: the amount by which constraints are violated, m/s.
+    The second number is 1 if the filter has changed the velocity, and 0 otherwise.
 
-    The filter knows only objects that sensors have detected, and no free space. It
-    therefore guarantees less than ``MotionGuard``.
+    The filter knows the objects that sensors have detected, but it does not know where
+    space is free. It therefore guarantees less than ``MotionGuard``.
 
     Discrete state, every tick: the outputs. Rate and latency are those of
     ``WheelCommand``.
@@ -87,8 +88,8 @@ class SafetyFilter(Block):
         tick_s: Period of the command, s.
 
     Reference: ours; half planes of van den Berg and others (2011). Eq. 6 of
-    Engelbrecht, Steyn and Djouani (2021), which only stops the robot, is
-    ``TrajectoryImpedanceParameters.block_distance_m``.
+    Engelbrecht, Steyn and Djouani (2021) only stops the robot. The parameter of this
+    equation is ``TrajectoryImpedanceParameters.block_distance_m``.
     """
 
     part = "command"

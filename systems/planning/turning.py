@@ -7,7 +7,8 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-#: If the heading error is larger, the robot turns before it drives, rad.
+#: If the heading error is larger than this angle, rad, the robot turns before it
+#: drives.
 _TURN_FIRST_RAD = 1.0
 
 
@@ -21,10 +22,11 @@ def wrapped(angle: float) -> float:
 def turn_towards(
     speed: float, heading: float, theta: float, own: Any
 ) -> tuple[float, float]:
-    """Turns to a heading while driving; with a large heading error it only turns.
+    """Computes the motion that turns a robot to a heading while it drives.
 
     Args:
-        speed: Wanted speed, m/s.
+        speed: Wanted speed, m/s. If the heading error is large, forward speeds are
+            reduced to 0.
         heading: Wanted heading in W, rad.
         theta: Heading of the robot in W, rad.
         own: ``FollowingParameters``.

@@ -1,4 +1,4 @@
-"""Half planes of velocities that avoid objects, and that the wheels can produce."""
+"""Half planes of the velocities that avoid objects and that the wheels can produce."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 #: Objects below this speed count as at rest, m/s.
 _RESTS_M_S = 0.02
-#: The direction of an object that is nearer to P than this is unknown, m.
+#: An object nearer to P than this distance, m, has no defined direction and is ignored.
 _TOUCHES_M = 1e-9
 
 
@@ -23,36 +23,39 @@ class FilterNumbers(NamedTuple):
     """Distances that P keeps, and limits of the wheels."""
 
     keep_m: float
-    """Distance of P from objects, m: radius of the body about the axle, epsilon and
-    margin."""
+    """Distance that P keeps from objects, m. It is the sum of the radius of the body
+    about the axle, epsilon, and the margin."""
     approach_rate: float
     """alpha, 1/s."""
     horizon_s: float
-    """Time within which a velocity must not lead into moving objects, s."""
+    """Duration of the prediction, s. In this time, a velocity must not lead into moving
+    objects."""
     top_speed: float
     """Top speed of each wheel's rim and of P, m/s."""
     turn_share: float
-    """L/(2 epsilon)."""
+    """L/(2 epsilon), with the wheel separation L."""
     leave_s: float
-    """Time within which the robot leaves a moving object that has come too near, s."""
+    """Time, s, in which the robot moves out of the reach of a moving object that has
+    come too near."""
 
 
 @njit(cache=True)
 def disc_plane(
     center: Any, radius: float, velocity: Any, horizon_s: float, leave_s: float
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Returns the shortest way out of the velocities that lead into a disc.
+    """Returns the smallest change of a velocity that prevents contact with a disc.
 
-    These velocities form a cone with a round end (the velocity obstacle of van den Berg
-    and others). The function finds the point of its border that is nearest to the
-    velocity. This point is on the round end or on one of the two legs.
+    The velocities that lead to contact form a cone with a round end. It is the velocity
+    obstacle of van den Berg and others. The function finds the point of the cone's
+    border that is nearest to the given velocity. This point is on the round end or on
+    one of the two legs of the cone.
 
     Args:
         center: (x, y) of the disc relative to P, m.
         radius: Sum of both radii, m.
-        velocity: (x, y) relative to the disc, m/s.
-        horizon_s: Contacts later than this do not count, s.
-        leave_s: Time within which the velocity has to end an overlap, s.
+        velocity: (x, y) of P relative to the disc, m/s.
+        horizon_s: Time after which contacts do not count, s.
+        leave_s: Time, s, within which the velocity has to end an overlap.
 
     Returns:
         Outward normal x, y, and the depth of the velocity inside the cone, m/s. A
@@ -108,20 +111,23 @@ def wheel_planes(
 def filtered_velocity(
     wanted: Any, v_WP: Any, theta: float, objects: Any, numbers: FilterNumbers
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Returns the velocity of P nearest to a wanted one that avoids objects.
+    """Changes a wanted velocity of P as little as possible to avoid objects.
 
     Each object contributes one half plane:
 
     * P may approach an object at rest, or with unknown motion, at alpha times the
       remaining distance.
-    * P has to leave the velocities that lead into a moving object (``disc_plane``).
-    * Another robot uses the same filter, so P makes half of that change.
+    * P must not move at a velocity that leads into a moving object. ``disc_plane``
+      computes the smallest change of the present velocity that prevents this.
+    * If the object is another robot, P makes only half of this change, because the
+      other robot uses the same filter.
 
-    The constraints may contradict each other. Then two kinds are relaxed, all by the
-    same slack: the constraints of moving objects, and those to leave objects at rest
-    that are too near. The limits on approaching objects at rest and the wheel limits
-    are hard. A robot that stands still satisfies them. If all constraints shared the
-    slack, a fast object would push the robot through walls.
+    The constraints may contradict each other. Then the function relaxes two kinds of
+    constraints by the same slack. The first kind avoids moving objects. The second kind
+    moves P away from objects at rest that are too near. The limits on the approach to
+    objects at rest and the limits of the wheels are hard. A robot that stands still
+    satisfies them. If all constraints shared the slack, a fast object would push the
+    robot through walls.
 
     Args:
         wanted: (x, y) m/s.
@@ -131,9 +137,9 @@ def filtered_velocity(
         numbers: Distances and limits.
 
     Returns:
-        x, y, m/s, and the slack of the worst half plane, m/s.
+        Velocity (x, y), m/s, and slack, m/s.
     """
-    # Soft planes come first, then the hard planes, which a standing robot obeys.
+    # Soft planes come first, then hard planes. A robot at rest obeys all hard planes.
     planes, used = np.empty((2 * OBJECT_SLOTS + 4, 3)), 0
     kept, resting = np.empty((OBJECT_SLOTS, 3)), 0
     for slot in range(OBJECT_SLOTS):
@@ -147,7 +153,7 @@ def filtered_velocity(
         is_robot = objects[at + ROBOT] > 0.5
         moves = objects[at + KNOWN] > 0.5 and math.hypot(vx, vy) > _RESTS_M_S
         if moves or is_robot:
-            # A moving object or a robot: a disc behind its nearest point.
+            # A moving object or a robot counts as a disc behind its nearest point.
             center = x - radius * nx, y - radius * ny
             relative = v_WP[0] - vx, v_WP[1] - vy
             nx, ny, inside = disc_plane(

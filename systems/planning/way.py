@@ -1,4 +1,4 @@
-"""The cheapest path through seen and unknown space, on cells twice as wide."""
+"""The cheapest path through seen and unknown space, on cells of double width."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.safety.free_space import FIRST_I, FIRST_J, NEVER, FreeSpace
 
-#: Prices of a cell: seen free; unknown; disc near an occupied cell; disc very near an
-#: occupied cell; disc over a possibly occupied cell; disc over an occupied cell.
+#: Prices of a cell that was seen free, and of an unknown cell. The other prices apply
+#: if the disc at this cell is near an occupied cell, very near an occupied cell, over a
+#: possibly occupied cell, or over an occupied cell.
 FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
 #: Least number of hits of a possibly occupied cell, and of an occupied cell.
 _DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
-#: If the gap between the disc and an occupied cell is smaller, the place is tight, or
-#: near, m.
+#: The price is ``TIGHT`` if the gap between the disc and an occupied cell is below the
+#: first number, m. It is ``NEAR`` if the gap is below the second number, m.
 _TIGHT_M, _NEAR_M = 0.07, 0.19
 #: Length of a straight and of a diagonal step. A step costs its length times the price
 #: of the cell that it enters.
@@ -31,17 +32,17 @@ _FAR = 2**31 - 1
 class Way(NamedTuple):
     """A path through cells twice as wide as those of a ``FreeSpace``.
 
-    All arrays are changed by ``find_way``. The number of cell (i, j) of the window is i
-    m + j.
+    ``find_way`` changes all arrays except ``marks`` and ``marked``, which
+    ``mark_blocked`` changes. Cell (i, j) of the window has the number i m + j.
     """
 
     price: NDArray[np.int32]
     """(m, m) price of each cell, from ``FREE`` to ``OCCUPIED``."""
     cost: NDArray[np.int32]
-    """(m, m) cost of the cheapest path from each cell to the goal, as far as
-    searched."""
+    """(m, m) cost of the cheapest path from each cell to the goal, for the cells that
+    the search has reached."""
     towards: NDArray[np.int32]
-    """(m, m) number of the next cell on that path."""
+    """(m, m) number of the next cell on the path to the goal."""
     queue: NDArray[np.int32]
     """(k, 2) number of a cell, and index of the next entry in its bucket."""
     heads: NDArray[np.int32]
@@ -49,9 +50,9 @@ class Way(NamedTuple):
     path: NDArray[np.float64]
     """(p, 2) middles of the cells of the path, from the robot to the goal, m."""
     facts: NDArray[np.float64]
-    """(1, 6): number of points of ``path``; its length, m; highest price after its
-    first cell; numbers on the floor, along x and y, of the first cell of the window;
-    side of a cell, m."""
+    """(1, 6): number of points of ``path``; length of the path, m; highest price of the
+    cells after the first; numbers of the window's first cell on the floor, along x and
+    y; side of a cell, m."""
     marks: NDArray[np.float64]
     """(q, 3) positions marked as blocked, m, and the time until which a mark counts,
     s."""
@@ -96,18 +97,19 @@ def find_way(
     """Finds the cheapest path from a robot to a goal.
 
     The function computes the prices of all cells, searches from the goal to the start,
-    and then follows the search back from the start to the goal. It stores the points,
+    and then follows the cheapest path from the start to the goal. It stores the points,
     the length and the highest price of the path.
 
     Args:
-        way: Changed.
+        way: Modified in place.
         space: Cells that were seen free, and hits.
         start: (x, y) of the axle, m.
-        goal: (x, y), m. Outside the window, the nearest cell of the window counts.
-        time: s.
+        goal: (x, y), m. If the goal is outside the window, the path leads to the
+            nearest cell of the window.
+        time: Current time, s.
         radius: Radius of the disc that has to pass, m.
-        clear: (n, 3) positions and radii, m. Hits within such a radius do not block the
-            path: they come from the target or a moving body.
+        clear: (n, 3) positions and radii, m. Hits within these radii do not block the
+            path, because they come from the target or a moving body.
     """
     size, cell = way.price.shape[0], 2.0 * space.cell_m
     low = _first_cells(space)
@@ -138,12 +140,12 @@ def find_way(
 def mark_blocked(
     way: Way, place: Any, until: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Marks a place, so that paths avoid it for a time.
+    """Marks a place as blocked, so that paths avoid it until a given time.
 
     Args:
-        way: Changed.
+        way: Modified in place.
         place: (x, y), m.
-        until: End of that time, s.
+        until: Time until which the mark counts, s.
     """
     k = int(way.marked[0, 0]) % len(way.marks)
     way.marks[k, 0], way.marks[k, 1], way.marks[k, 2] = place[0], place[1], until
@@ -176,12 +178,12 @@ def _set_prices(
     radius: float,
     clear: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Set the price of each cell from its knowledge, nearby hits and marks.
+    """Set the price of each cell. It depends on what was seen, on hits and on marks.
 
     A wide cell is unknown if one of its four narrow cells was never seen free. Narrow
-    cells with enough hits raise the prices around them (``_keep_off``), except hits
-    near the places in ``clear``. Marked places count as occupied until their time has
-    passed.
+    cells with enough hits raise the prices around them (``_keep_off``). Hits near the
+    places in ``clear`` do not count. Marked places count as occupied until their time
+    has passed.
     """
     size, cells, cell = way.price.shape[0], space.free_until.shape[0], 2 * space.cell_m
     for i in range(size):
@@ -247,9 +249,9 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
 
     All costs are whole numbers, so a ring of buckets replaces the priority queue
     (Dial). Bucket ``cost % _BUCKETS`` is a linked list of all waiting cells of that
-    cost. No step costs as much as the number of buckets, so costs in one bucket never
-    mix. A cell that gets a lower cost enters the queue again; its older entry is
-    skipped.
+    cost. Every step costs less than the number of buckets, so a bucket never holds
+    cells with different costs. A cell that gets a lower cost enters the queue again;
+    its older entry is skipped.
     """
     size = way.price.shape[0]
     way.cost[:, :] = _FAR
@@ -269,7 +271,7 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
         waiting -= 1
         at = way.queue[entry, 0]
         i, j = at // size, at % size
-        # An older entry: the cell has got a lower cost since.
+        # Skip an older entry: the cell has a lower cost by now.
         if way.cost[i, j] != cost:
             continue
         if at == start:

@@ -42,8 +42,8 @@ def _send(
 ) -> int:
     """Appends the frames of one robot to the bytes that are sent in this tick.
 
-    Each frame has a row of random numbers of its own, whether it is lost or not.
-    Returns the number of frames sent so far.
+    Each frame has its own row of random numbers, even if it is lost. Returns the number
+    of frames sent so far.
     """
     for frame in range(int(frames[0])):
         row, sent = sent, sent + 1
@@ -66,7 +66,8 @@ def radio_channel_step(
 ) -> None:
     """Shifts the bytes in transit by one tick, and adds the frames of this tick.
 
-    State: ``delay`` rows with the size of the port ``air``. The first row arrives next.
+    The state has ``delay`` rows with the size of the port ``air``. The first row
+    arrives next.
     """
     for k in range((numbers.delay - 1) * AIR_SIZE):
         state[k] = state[k + AIR_SIZE]
@@ -98,11 +99,11 @@ class RadioChannel(Block):
     For each robot that sends, the block has an input port ``frames_<robot>`` (number of
     frames, and nine bytes per frame). All radios receive the same bytes. A robot also
     receives its own frames. The addresses in the frames identify the senders. A frame
-    is lost with the probability ``loss``, whatever happens to other frames. A byte
-    changes with the probability ``byte_error``.
+    is lost with the probability ``loss``, independently of other frames. A byte changes
+    with the probability ``byte_error``.
 
-    Discrete state, every tick: the bytes in transit. Latency: ``latency_s``, rounded to
-    ticks, at least one tick.
+    The discrete state holds the bytes in transit, and is updated every tick. The
+    latency is ``latency_s``, rounded to ticks, and at least one tick.
 
     Args:
         parameters: Latency, losses and errors.

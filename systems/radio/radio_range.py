@@ -65,7 +65,7 @@ def radio_range_step(
 ) -> None:
     """Measures the level once per period.
 
-    State: the last measured level, dBm.
+    The state is the last measured level, dBm.
     """
     if tick % numbers.period == 0:
         pose, other = inputs
@@ -83,7 +83,7 @@ class RadioRange(Block):
     normally distributed error. The path loss depends on the distance between the
     origins of the two robots.
 
-    Discrete state: the last measured level. Latency: none.
+    The discrete state is the last measured level. There is no latency.
 
     Args:
         parameters: Levels and fading.

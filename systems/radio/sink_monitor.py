@@ -14,9 +14,9 @@ from systems.framework.signals import TICK_S
 from systems.radio.radio_channel import AIR_SIZE
 from systems.radio.stream import PARSER_SIZE, parse_byte
 
-#: Status of each robot: number of frames received, function of the last frame (-1: no
-#: frame yet), its value, time since it was received, s, and result of the search (-1:
-#: none yet, 0: not found, 1: found).
+#: Status of each robot: number of frames received; function of the last frame (-1: no
+#: frame yet); value of the last frame; time since the last frame, s; and result of the
+#: search (-1: none yet, 0: not found, 1: found).
 SINK_FIELDS = ("frames", "function", "value", "age_s", "result")
 _COUNT, _FUNCTION, _VALUE, _AGE, _RESULT = range(len(SINK_FIELDS))
 
@@ -35,7 +35,7 @@ def sink_monitor_step(
 ) -> None:
     """Updates the status of each robot with the bytes of this tick.
 
-    State: the ``SINK_FIELDS`` of each robot, then the state of the parser.
+    The state holds the ``SINK_FIELDS`` of each robot, then the state of the parser.
     """
     air, fields, robots = inputs[0], 5, len(numbers.addresses)
     for robot in range(robots):
@@ -68,8 +68,8 @@ def _publish(state: Any, outputs: Any, numbers: SinkNumbers) -> None:
 class SinkMonitor(Block):
     """Receives all frames, and stores the last frame of each robot.
 
-    Discrete state, every tick: the output, and the state of the parser. Latency: one
-    tick.
+    The discrete state holds the output and the state of the parser, and is updated
+    every tick. The latency is one tick.
 
     Args:
         robots: Addresses of the robots, by name.

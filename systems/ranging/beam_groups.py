@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.ranging.collision_vector import foot_on_segment
 
-#: Columns of a group. NEAR is the vector from P to its nearest point, m. MIDDLE is the
-#: vector from P to the middle between its two outer hits, m. EXTENT is the distance
-#: between the outer hits, m. CHORD is the spacing of the beams at the nearest point, m.
-#: OPEN is 1 if the surface may continue beyond an outer hit, otherwise 0.
+#: Columns of a group. NEAR is the vector from P to the nearest point of the group, m.
+#: MIDDLE is the vector from P to the middle between its two outer hits, m. EXTENT is
+#: the distance between the outer hits, m. CHORD is the spacing of the beams at the
+#: nearest point, m. OPEN is 1 if the surface may continue beyond an outer hit,
+#: otherwise 0.
 NEAR_X, NEAR_Y, MIDDLE_X, MIDDLE_Y, EXTENT, CHORD, OPEN = range(7)
 GROUP_SIZE = 7
 
@@ -25,15 +26,15 @@ class BeamNumbers(NamedTuple):
     apart_rad: NDArray[np.float64]
     """(n,) angle between each beam and its right neighbor, rad; 0 if it has none."""
     maximum_range_m: float
-    """Surfaces farther away give no echo, m."""
+    """Largest range, m. Surfaces farther away give no echo."""
     gap_m: float
     """Constant part of the largest distance between adjacent hits on one surface, m."""
     stretch: float
-    """Part of this largest distance that grows with the spacing of the beams, as a
-    factor."""
+    """Factor of the spacing of the beams in this largest distance. The result is added
+    to ``gap_m``."""
     dip_m: float
-    """Two objects meet where the distance from P exceeds both minima by more than this,
-    m."""
+    """Rise of the distance from P that separates two objects, m. A surface is split
+    where its distance from P exceeds the minima on both sides by more than this."""
 
 
 @njit(cache=True)
@@ -57,9 +58,9 @@ def _is_open(
     """Whether a surface may continue beyond its outer hit.
 
     The beam beside the outer hit decides. If there is no such beam, the surface may
-    continue. If the beam has an echo, a nearer hit may hide the surface, and a farther
-    hit shows its end. Without an echo, the surface may continue if it would be out of
-    range there.
+    continue. If this beam has an echo, a nearer hit may hide the surface, and a farther
+    hit shows the end of the surface. If this beam has no echo, the surface may continue
+    if it would be out of range there.
 
     Args:
         ranges: (n,) ranges of the beams, m.
@@ -122,8 +123,8 @@ def group_beams(
     The function visits the beams from left to right. Adjacent hits belong to one
     surface if they are close enough. A surface can approach P twice, for example at the
     two walls of a corner. The function splits such a hollow surface where it is
-    farthest from P, because the nearest point alone would not describe its other side.
-    The beam at the split belongs to both objects.
+    farthest from P, because the nearest point alone would not describe both sides. The
+    beam at the split belongs to both objects.
 
     Args:
         hits: (n, 2) hits from P, m, from left to right.

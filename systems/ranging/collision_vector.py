@@ -114,15 +114,16 @@ def collision_vectors(
         points: One entry per sensor, from left to right: (x, y) from P, m, or None
             without an echo.
         parameters: The aggregation rule.
-        neighbours: Pairs of adjacent sensors, counted from 0, the left one first
-            (``UltrasonicParameters.neighbours``). None pairs each sensor with the next
-            one.
+        neighbours: Pairs of adjacent sensors, counted from 0, each with the left sensor
+            first (``UltrasonicParameters.neighbours``). None pairs each sensor with the
+            next one.
 
     Returns:
         At most ``SLOTS`` entries (feature, x, y) with x and y from P, m. The feature
-        states which sensors the vector comes from, so that a change of the sensor is
-        not mistaken for a motion. Features 1 to n are single sensors (case I, Han 2019,
-        eq. 12). Feature n + k is sensor k with its right neighbor (case II, eq. 14).
+        identifies the sensors of the vector, so that a change of the sensors is not
+        mistaken for a motion. Features 1 to n are single sensors (case I, Han 2019, eq.
+        12). Feature n + k is sensor k, counted from 1, with its right neighbor (case
+        II, eq. 14).
     """
     if neighbours is None:
         neighbours = pairwise(range(len(points)))
@@ -143,8 +144,8 @@ def _vectors(points, heard, neighbours, separation, joined, every):
     Args:
         points: n positions (x, y) from P, m; arbitrary where there is no echo.
         heard: n flags, true where there is an echo.
-        neighbours: Pairs of adjacent sensors, the left one first.
-        separation: Echoes farther apart are not joined, m.
+        neighbours: Pairs of adjacent sensors, each with the left sensor first.
+        separation: Largest distance between joined echoes, m.
         joined: Whether to join the nearest echo with its nearer neighbor.
         every: Whether to return one vector per pair and per single echo.
     """
@@ -231,8 +232,9 @@ def fill_slots(vectors: Any, outputs: Any) -> None:
 
     Args:
         vectors: At most three entries (feature, x, y) with x and y from P, m.
-        outputs: Vectors, m (6 elements), mask, 0 or 1 (3), and features (3). All
-            elements are 0 before the call; unused slots remain 0.
+        outputs: The three ports: vectors (6 elements), m; mask (3 elements), 0 or 1;
+            and features (3 elements). All elements are 0 before the call; unused slots
+            remain 0.
     """
     vectors_B, mask, features = outputs
     for k in range(len(vectors)):
@@ -268,7 +270,7 @@ class CollisionNumbers(NamedTuple):
     """Parameters of ``collision_step``."""
 
     separation_m: float
-    """Echoes farther apart are not joined, m."""
+    """Largest distance between joined echoes, m."""
     joined: bool
     """Whether the nearest echo is joined with a neighboring echo."""
     every: bool
@@ -278,7 +280,7 @@ class CollisionNumbers(NamedTuple):
     places: list[tuple[float, float]]
     """Positions of the sensors from P in B axes, m."""
     neighbours: list[tuple[int, int]]
-    """Pairs of adjacent sensors, counted from 0, the left one first."""
+    """Pairs of adjacent sensors, counted from 0, each with the left sensor first."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     tick_s: float
@@ -291,7 +293,7 @@ def collision_step(
 
     Args:
         tick: Not used.
-        state: Poses at the previous ticks of a round, the latest first, m and rad;
+        state: Poses at the previous ticks of a round, most recent first, m and rad;
             empty if every sensor fires at every tick.
         inputs: Values of the input ports.
         outputs: Values of the output ports.
@@ -333,17 +335,17 @@ def CollisionVector_(T):
     class Impl(Block_[T]):
         """Turns echoes into collision vectors from P (cases I and II).
 
-        Slots are filled from the first; only ``aggregation: sum`` fills more than one.
-        If all sensors fire at every tick, the output is a function of the present
+        The block fills the slots in order; only ``aggregation: sum`` fills more than
+        one. If all sensors fire at every tick, the output is a function of the present
         ranges: there is no state and no latency, and the ports of age and pose are not
         read. Otherwise the block assumes that a held range belongs to a point at rest
         in W, and converts this point to the present pose. The motion of an obstacle
-        since the sensor fired remains as an error; this time is at most one round less
-        one tick.
+        since the sensor fired remains as an error. The time since the sensor fired is
+        at most one round minus one tick.
 
-        Discrete state, updated every tick, if ranges are held: the poses at the
-        previous ticks of a round. Three sensors that fire one after the other, one per
-        tick, need two poses.
+        If ranges are held, the discrete state holds the poses at the previous ticks of
+        a round, and is updated every tick. Three sensors that fire one after the other,
+        one per tick, need two poses.
 
         Args:
             parameters: Aggregation rule, ``CollisionVectorParameters``.

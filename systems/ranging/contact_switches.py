@@ -17,7 +17,8 @@ from systems.world.geometry import beyond_rectangle
 
 #: Number of test points on each half of the front edge, in addition to its middle.
 _POINTS = 8
-#: A touch within this distance of the middle closes both switches; share of the width.
+#: A touch within this distance of the middle closes both switches. The distance is a
+#: share of the width.
 _MIDDLE = 0.1
 
 
@@ -29,7 +30,7 @@ class SwitchNumbers(NamedTuple):
     middle_m: float
     """A touch within this distance of the longitudinal axis closes both switches, m."""
     reach_m: float
-    """A switch closes where a body is within this distance of a test point, m."""
+    """Largest distance between a body and a test point at which a switch closes, m."""
     length_m: float
     """Length of the body at ``pose_WS``, m."""
     width_m: float
@@ -54,7 +55,7 @@ def _feel(
         body: x, y, theta, length and width of the body in W, m and rad.
         points: (n, 2) test points of the front edge in B, m.
         middle: A touch within this distance of the x axis closes both switches, m.
-        reach: Largest distance from a test point at which the body is felt, m.
+        reach: A switch closes up to this distance between body and test point, m.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     # Skip a body whose circumscribed circle is more than 1 m from the origin of B.
@@ -112,13 +113,13 @@ def contact_switches_step(
 class ContactSwitches(Block):
     """Detects bodies at the front of the robot.
 
-    A switch closes when a body is within its reach of its half of the front edge. In
-    the middle of the edge, both switches close. Flanks and rear have no switches.
-    ``touched`` is the true number of the touched body, counted from 0. The body at
-    ``pose_WS`` has the last number. The switches cannot distinguish a source from a
-    wall.
+    Each switch belongs to one half of the front edge. It closes when a body is within
+    ``reach_m`` of this half. In the middle of the edge, both switches close. The flanks
+    and the rear of the robot have no switches. ``touched`` is the true number of the
+    touched body, counted from 0. The body at ``pose_WS`` has the last number. The
+    switches cannot distinguish a source from a wall.
 
-    No state. Rate: every tick; latency: none.
+    The block has no state and no latency. It computes its outputs every tick.
 
     Args:
         parameters: Reach and faults, ``ContactParameters``.

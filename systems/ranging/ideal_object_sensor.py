@@ -48,7 +48,7 @@ class ObjectNumbers(NamedTuple):
     """Parameters of ``ideal_object_step``."""
 
     maximum_range_m: float
-    """Bodies farther from P are not seen, m."""
+    """Largest distance from P at which bodies are seen, m."""
     noise_m: float
     """Standard deviation of each coordinate of a position, m."""
     velocity_noise_m_s: float
@@ -71,8 +71,9 @@ def _see(
 ) -> None:  # pragma: no cover  (compiled)
     """Fills the slot of one body.
 
-    A body at rest is its nearest point. A moving body is a disc around its center, or
-    its nearest point if it is long or its disc contains P.
+    The function reports a body at rest as its nearest point, and a moving body as a
+    disc around its center. It reports a moving body as its nearest point if the body is
+    long or if the disc contains P.
 
     Args:
         slot: (OBJECT_SIZE,) zeros, to be filled.
@@ -219,18 +220,19 @@ def ideal_object_step(
 class IdealObjectSensor(Block):
     """Gives positions and velocities of the bodies around P, in all directions.
 
-    The output holds the eight nearest bodies within the range. A body at rest is a
-    rectangle: x and y lead to its nearest point. A moving body is a disc of radius
-    ``RADIUS`` around its center that contains the body; it has the velocity of the
-    center. A long moving body is its nearest point with the velocity of this point, and
-    a disc of half its width behind this point. The same applies to a moving body whose
-    disc contains P. The block computes velocities from the poses of the previous tick;
-    they are known from the second tick on.
+    The output holds the eight nearest bodies within the range. For a body at rest,
+    ``X`` and ``Y`` lead to the nearest point of its rectangle. The block reports a
+    moving body as a disc that contains the body and has the same center. ``X`` and
+    ``Y`` lead to the nearest point of the disc, and the velocity is that of the center.
+    The block reports a long moving body as its nearest point, with the velocity of this
+    point. Half of the width of this body is then ``RADIUS``. The same applies to a
+    moving body whose disc contains P. The block computes velocities from the present
+    and the previous poses. Velocities are known from the second tick on.
 
-    Discrete state: poses of the bodies at the previous tick and, with ``latency_s``,
-    the objects that are not reported yet. Positions are relative to P at the tick of
-    the measurement. Without ``latency_s`` there is no latency. Noise is drawn once per
-    tick.
+    The discrete state holds the poses of the bodies at the previous tick. With
+    ``latency_s``, it also holds the objects that are not reported yet. Positions are
+    relative to P at the tick of the measurement. Without ``latency_s`` there is no
+    latency. Noise is drawn once per tick.
 
     Args:
         parameters: Range and errors, ``ObjectSensorParameters``.

@@ -31,12 +31,12 @@ def nearest_vectors(
         pose_WB: (x, y, theta) of the robot, m and rad; floats or AutoDiffXd.
         rectangles: Rectangles (x, y, theta, length, width) in W, m and rad.
         control_point_m: Distance of P ahead of the axle, m.
-        maximum_range: Bodies farther from P are not seen, m.
+        maximum_range: Largest distance from P at which bodies are seen, m.
         slots: Largest number of vectors.
 
     Returns:
-        (feature, x, y) with x and y in B axes, m, nearest first. The feature is the
-        number of the body, counted from 1.
+        Vectors (feature, x, y), nearest body first, with x and y in B axes, m. The
+        feature is the number of the body, counted from 1.
     """
     p_WP = control_point(pose_WB, control_point_m)
     seen = []
@@ -63,7 +63,7 @@ class ObstacleNumbers(NamedTuple):
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     maximum_range_m: float
-    """Bodies farther from P are not seen, m."""
+    """Largest distance from P at which bodies are seen, m."""
     slots: int
     """Largest number of vectors."""
     source_size: tuple[float, float]
@@ -110,7 +110,7 @@ def IdealObstacleSensor_(T):
 
         Args:
             robot: Position of P.
-            maximum_range_m: Bodies farther from P are not seen, m.
+            maximum_range_m: Largest distance from P at which bodies are seen, m.
             all_bodies: Whether to report up to three bodies (``aggregation: sum``)
                 instead of the nearest one.
             source_size: Length and width of the leader, m.

@@ -46,7 +46,7 @@ class DetectorNumbers(NamedTuple):
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     oldest_s: float
-    """If the range of a sensor is older than this, the sensor has failed, s."""
+    """Age of a range above which its sensor counts as failed, s."""
 
 
 @njit(cache=True)
@@ -55,7 +55,7 @@ def _keep_hits(
 ) -> None:  # pragma: no cover  (compiled)
     """Stores the new hits of the beams in W.
 
-    A beam that holds its range keeps its last hit. A beam whose range is too old has no
+    A beam without a new range keeps its last hit. A beam whose range is too old has no
     echo.
 
     Args:
@@ -129,21 +129,23 @@ class ObjectDetector(Block):
     - the filtered velocity, once the block has tracked the object for long enough;
     - the radius, which is half of the width of the object, or 0 if the object is wide.
 
-    An object that is no longer seen stays for a while, because an object between narrow
-    beams is not hit. The beams do not show whether an object is a robot.
+    The block keeps an object for a while after it was last seen, because narrow beams
+    do not hit an object between them. The beams do not show whether an object is a
+    robot.
 
-    Beams detect only what they hit. With 7 beams, a disc 0.2 m wide is certain to be
-    seen only within 0.4 m of P. Motion along a surface shows only at the edges of the
-    surface, with a resolution equal to the spacing of the beams. Consider boxes that
-    cross at 0.15 to 0.3 m/s at a distance of 1 m, one second after they come into view.
-    Half of their velocities have an error of more than 25 % with 36 beams all around,
-    15 % with 72 and 7 % with 360. While the robot turns, bodies at rest seem to move at
-    up to 0.3, 0.12 and 0 m/s. Where the spacing of the beams exceeds ``coarse_m``, no
-    velocity is known. For the 7 beams, this is the case from 0.48 m on.
+    Beams detect only objects that they hit. With 7 beams, a disc 0.2 m wide is certain
+    to be seen only within 0.4 m of P. Motion along a surface is visible only at the
+    edges of the surface, with a resolution equal to the spacing of the beams. For
+    example, boxes cross at 0.15 to 0.3 m/s at a distance of 1 m. One second after they
+    come into view, the median error of their velocities is 25 % with 36 beams all
+    around. It is 15 % with 72 beams and 7 % with 360 beams. While the robot turns,
+    bodies at rest seem to move at up to 0.3 m/s with 36 beams, 0.12 m/s with 72 beams
+    and 0 m/s with 360 beams. No velocity is known where the spacing of the beams
+    exceeds ``coarse_m``. For the 7 beams, this is the case at distances above 0.48 m.
 
-    Discrete state, updated every tick: hits and tracks. The output is a function of
-    state and inputs: there is no latency, but the velocity takes about 0.5 s to follow
-    a change.
+    The discrete state holds the hits and the tracks, and is updated every tick. The
+    output is a function of state and inputs. There is no latency, but the velocity
+    takes about 0.5 s to follow a change.
 
     Args:
         parameters: Limits of grouping and tracking, ``ObjectDetectorParameters``.
@@ -152,8 +154,9 @@ class ObjectDetector(Block):
         tick_s: Control period of the robot, s.
 
     Reference: this block is our own. Engelbrecht, Steyn and Djouani (2021) print
-    neither how beams become obstacles nor how they obtain the velocities. A sum over
-    beams gives more damping than is stable at this tick.
+    neither how beams become obstacles nor how they obtain the velocities. If each beam
+    were an obstacle, the sum of their dampings would exceed the largest stable damping
+    at this tick.
     """
 
     part, stage = "objects", "obstacle sensing"

@@ -38,7 +38,7 @@ TRACK_SIZE = _COVARIANCE + 16
 _FIRST_M_S, _ANYWHERE_M = 0.5, 10.0
 # Time constant with which the depth of a track follows the measured depth, s.
 _DEPTH_S = 4.0
-# Time constant with which an invisible velocity along a surface decays, s.
+# Time constant with which a velocity along a surface decays if it is not visible, s.
 _FORGET_S = 5.0
 
 
@@ -46,22 +46,21 @@ class TrackNumbers(NamedTuple):
     """Parameters of the tracking."""
 
     gate_m: float
-    """A group farther from the predicted position of a track is another object, m."""
+    """Largest distance between a group and the predicted position of its track, m."""
     wide_m: float
-    """If an object is wider than this, its motion along its surface is not visible,
-    m."""
+    """Width of an object above which its motion along its surface is not visible, m."""
     coarse_m: float
-    """If the spacing of the beams exceeds this, motion is not visible, m."""
+    """Spacing of the beams above which motion is not visible, m."""
     noise_m: float
     """Standard deviation of the distance of a group, m."""
     walk: float
     """Rate at which the variance of each velocity component grows, (m/s)^2/s."""
     confirmation_s: float
-    """A velocity is known once the motion has been visible for this long, s."""
+    """Time for which a motion must be visible before its velocity is known, s."""
     memory_s: float
-    """A track that is not seen is kept for this long, s."""
+    """Time for which a track is kept after its object was last seen, s."""
     resting_m_s: float
-    """Objects slower than this count as at rest, m/s."""
+    """Speed below which an object counts as at rest, m/s."""
     tick_s: float
 
 
@@ -100,7 +99,7 @@ def _correct(
 
     Args:
         track: (TRACK_SIZE,) the track, changed.
-        off: Measured less predicted position along ``h``, m.
+        off: Measured minus predicted position along ``h``, m.
         h: (x, y) unit vector of the measured direction in W.
         variance: Variance of the measurement, m^2.
     """
@@ -138,7 +137,7 @@ def _turn_surface(
     old = np.array([x / far, y / far])
     new, across = np.array([along[0], along[1]]), np.array([-along[1], along[0]])
     old_across = np.array([-old[1], old[0]])
-    # Of each 2 x 2 block, keep the variances towards P and across, in new axes.
+    # Keep the variances of each 2 x 2 block towards P and across, in the new axes.
     outer, outer_across = np.outer(new, new), np.outer(across, across)
     for i in range(2):
         for j in range(2):
@@ -178,9 +177,10 @@ def _take_in(
 
     The measured position depends on the group. If motion along the surface is not
     visible, the position is the nearest point, and only its distance from P is
-    measured. Otherwise the position is in the direction of the middle of the group. Its
-    distance is that of the nearest point plus the smoothed depth. Both coordinates are
-    then measured; across, the noise is larger by the spacing of the beams.
+    measured. Otherwise the position is in the direction of the middle of the group. The
+    distance of the position is that of the nearest point plus the smoothed depth. Both
+    coordinates are then measured. The noise perpendicular to this direction is larger
+    by the spacing of the beams.
 
     Args:
         track: (TRACK_SIZE,) the track, changed.
@@ -190,7 +190,7 @@ def _take_in(
     """
     wide = _hides_motion(group, own)
     sure = group[CHORD] < own.coarse_m and (not wide or group[EXTENT] > 0.0)
-    # Smooth the depth, which is the distance of the middle less that of the nearest
+    # Smooth the depth, which is the distance of the middle minus that of the nearest
     # point.
     near = math.hypot(group[NEAR_X], group[NEAR_Y])
     far = max(math.hypot(group[MIDDLE_X], group[MIDDLE_Y]), 1e-9)
@@ -238,11 +238,12 @@ def _tracks_of(
 ) -> NDArray[np.int64]:  # pragma: no cover  (compiled)
     """Assigns groups to tracks.
 
-    The nearest pair of group and track is assigned first, then the next one, up to a
-    distance of ``gate_m``. Each track gets at most one group.
+    The function first assigns the group and the track with the smallest distance from
+    each other. It then assigns the pair with the next distance, and so on up to
+    ``gate_m``. Each track gets at most one group.
 
     Returns:
-        (n,) number of the track of each group; -1 if it has none.
+        (n,) number of the track of each group; -1 if the group has no track.
     """
     count = len(groups)
     away = np.full((count, TRACKS), np.inf)
@@ -277,11 +278,11 @@ def track_objects(
     The filter works in W, so that the motion of the robot does not appear as a motion
     of objects.
 
-    A beam measures a distance, but not a position between itself and its neighbors. The
-    position is therefore accurate towards P; across, it is as coarse as the beams. The
-    motion of a surface along itself is not visible if the surface is wide or may
-    continue beyond its hits. The filter then does not measure this velocity, which
-    starts at zero.
+    A beam measures a distance, but does not show where an object is between this beam
+    and its neighbors. A position is therefore accurate in the direction of P. In the
+    perpendicular direction, it is as coarse as the spacing of the beams. The motion of
+    a surface along itself is not visible if the surface is wide or may continue beyond
+    its hits. The filter then does not measure this velocity, which starts at zero.
 
     A beam on an oblique surface shows motion along the surface as motion towards P.
     Therefore no velocity is known where the spacing of the beams is large. The same

@@ -7,8 +7,8 @@ Empty slots are zero. A slot has these elements:
 - X, Y: vector from P to the nearest point of the object in W axes, m;
 - VX, VY: velocity of the object in W, m/s;
 - KNOWN: 1 if the velocity is known, else 0;
-- RADIUS: radius of a disc behind the nearest point that represents the object, m; 0 for
-  a point or a flat face;
+- RADIUS: radius of the disc that represents the object and has the nearest point on its
+  edge, m; 0 for a point or a flat face;
 - ROBOT: 1 if the object is a robot, else 0.
 """
 
@@ -35,7 +35,7 @@ OBJECTS_PORT = Port(
 
 @njit(cache=True)
 def nearest_objects(slots: Any) -> Any:  # pragma: no cover  (compiled)
-    """The nearest objects, as many as the port has slots.
+    """Selects the nearest objects, at most one per slot of the port.
 
     Args:
         slots: (n, OBJECT_SIZE) objects and empty slots, in any order.

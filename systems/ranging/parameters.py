@@ -53,9 +53,9 @@ class UltrasonicParameters(Parameters):
     """Named set of sensors. It provides the defaults of the other fields; fields that
     are set take precedence."""
     axes_deg: _Axes = (30.0, 0.0, -30.0)
-    """Directions of the cones in B, from left to right, counterclockwise from x, deg.
-    An integer n stands for n evenly spaced cones all around, the first of which points
-    backward."""
+    """Directions of the cones in B, counterclockwise from the x axis, deg. They are
+    listed from left to right. An integer n stands for n evenly spaced cones all around,
+    and the first cone points backward."""
     positions_m: _Places = ()
     """Positions of the sensors from P, in B axes, m. One position applies to all
     sensors; without a position, all sensors are at P."""
@@ -75,7 +75,7 @@ class UltrasonicParameters(Parameters):
     """Whether all sensors fire at once, or one after the other with one period between
     them."""
     assumed_sound_speed_m_s: SoundSpeed | None = None
-    """Speed of sound with which the sensors convert time to range, m/s. Unset, it is
+    """Speed of sound with which the sensors convert time to range, m/s. If unset, it is
     the true speed of sound."""
     faults: _Faults = ()
     """Sensors that fail during a run."""
@@ -147,7 +147,7 @@ class UltrasonicParameters(Parameters):
 
     @cached_property
     def neighbours(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of adjacent sensors, counted from 0, the left one first."""
+        """Pairs of adjacent sensors, counted from 0, with the left sensor first."""
         around = [*self.axes_deg, self.axes_deg[0] - 360.0]
         pairs = [
             (k, (k + 1) % self.count)
@@ -199,8 +199,8 @@ class UltrasonicParameters(Parameters):
             sound_speed: True speed of sound, m/s.
 
         Returns:
-            Factor of the ranges, standard deviation of the noise, m, the number
-            ``least_luck``, and smallest and largest range, m.
+            Factor of the ranges; standard deviation of the noise, m; the number
+            ``least_luck``; smallest range, m; and largest range, m.
         """
         stretch = (self.assumed_sound_speed_m_s or sound_speed) / sound_speed
         limits = self.minimum_range_m, self.maximum_range_m
@@ -229,12 +229,12 @@ class CollisionVectorParameters(Parameters):
     """Conversion of echoes to collision vectors."""
 
     aggregation: Aggregation = "paper"
-    """``paper``: the nearest echo, joined with the nearer of its neighbors if that is
-    close enough; ``nearest``: only the nearest echo; ``sum``: one vector per echo or
-    pair, whose forces are added; if there are more than three vectors, only the nearest
-    three."""
+    """``paper``: the nearest echo, joined with a neighboring echo that is close enough.
+    If both neighbors are close enough, the echo nearer to P is used. ``nearest``: only
+    the nearest echo. ``sum``: one vector per pair and per unpaired echo, but only the
+    nearest three vectors. The forces of the vectors are added."""
     pair_separation_m: NonNegativeLength = 0.5
-    """Echoes farther apart than this belong to two obstacles, m."""
+    """Largest distance between two echoes of the same obstacle, m."""
 
 
 class ContactFaultParameters(Parameters):
@@ -252,7 +252,7 @@ class ContactParameters(Parameters):
     """The two switches behind the front bumper (Song 2011, 2.1), with our sizes."""
 
     reach_m: Length = 0.01
-    """A switch closes where a body is within this distance of the front edge, m."""
+    """Distance between a body and the front edge up to which a switch closes, m."""
     faults: Annotated[
         tuple[ContactFaultParameters, ...], Strict(False), Field(max_length=2)
     ] = ()
@@ -279,29 +279,32 @@ class ObjectDetectorParameters(Parameters):
     """Grouping of beams into objects, and tracking; the paper prints no values."""
 
     gap_m: Length = 0.2
-    """Adjacent hits belong to one object if their distance is below this plus the
-    spacing of the beams on a surface tilted by ``most_oblique_deg``, m."""
+    """Constant part of the largest distance between adjacent hits of one object, m. The
+    other part is the spacing of the beams on a surface that is tilted by
+    ``most_oblique_deg``."""
     most_oblique_deg: float = Field(default=60.0, ge=0.0, le=85.0)
     """Largest angle between a beam and the normal of a surface at which adjacent hits
     still belong together, deg."""
     dip_m: Length = 0.08
-    """Two objects meet where the distance from P rises by this and falls again, m."""
+    """Rise of the distance from P that separates two objects, m. A surface is split
+    where its distance from P rises by more than this and falls by more than this
+    again."""
     wide_m: Length = 0.8
-    """If an object is wider than this, its motion along its surface is not visible,
-    m."""
+    """Width of an object above which its motion along its surface is not visible, m."""
     coarse_m: Length = 0.25
-    """No velocity is known where the spacing of the beams exceeds this, m."""
+    """Spacing of the beams above which no velocity is known, m."""
     gate_m: Length = 0.3
-    """Objects farther than this from a predicted position are different objects, m."""
+    """Largest distance between an object and its predicted position, m. An object
+    farther away counts as another object."""
     noise_m: NonNegativeLength = 0.04
     """Standard deviation of the distance of an object in addition to the noise of the
     ranges, m. The beams hit different points of an object from tick to tick."""
     velocity_change_m_s: Speed = 0.1
     """Standard deviation of the change of a velocity within one second, m/s."""
     confirmation_s: Time = 0.5
-    """A velocity is known once the motion has been visible for this long without
-    interruption, s."""
+    """Time for which a motion must be visible without interruption before its velocity
+    is known, s."""
     memory_s: Time = 0.5
     """Time for which an object is kept after it was last seen, s."""
     resting_m_s: NonNegativeSpeed = 0.05
-    """Objects slower than this count as at rest, m/s."""
+    """Speed below which an object counts as at rest, m/s."""

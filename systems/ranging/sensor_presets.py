@@ -28,8 +28,9 @@ SENSOR_PRESETS: Mapping[str, Mapping[str, Any]] = {
         "maximum_range_m": 5.0,
         "noise_m": 0.01,
     },
-    # Engelbrecht, Steyn and Djouani 2021, table 1: beams over the front half plane,
-    # 30 deg apart, R = 2 m. They do not print the width of a beam; these are narrow.
+    # Engelbrecht, Steyn and Djouani 2021, table 1: beams over the front half plane, 30
+    # deg apart, R = 2 m. They do not print the width of a beam; the beams here are
+    # narrow.
     "scan_7": {
         "axes_deg": (90.0, 60.0, 30.0, 0.0, -30.0, -60.0, -90.0),
         "beam_half_angle_deg": 0.5,

@@ -252,16 +252,16 @@ class UltrasonicArray(Block):
     The leader is a body like the obstacles; without a leader there is no port
     ``pose_WS``. Surfaces beyond the maximum range give no echo. Surfaces nearer than
     the minimum range give the minimum range: without an echo at contact, the law would
-    not push. A cone reports a range, not a direction.
+    not push the robot away. A cone reports a range, not a direction.
 
-    State: the last range and echo of each sensor. The output is a function of state and
-    present poses; there is no latency. The noise is drawn once per tick.
+    The state holds the last range and echo of each sensor. The output is a function of
+    state and present poses; there is no latency. The noise is drawn once per tick.
 
-    All sensors fire every ``period_s``, at multiples of this period, and hold their
-    reading in between. With ``firing: sequential``, one sensor fires per period, from
-    left to right, and the others hold their reading. For example, with three sensors
-    and periods of 25 ms the ranges are 0, 25 and 50 ms old. A sensor then fires again
-    after a round of 75 ms.
+    All sensors fire at multiples of ``period_s``, and hold their readings between these
+    times. With ``firing: sequential``, one sensor fires per period, from left to right,
+    and the other sensors hold their readings. For example, with three sensors and
+    periods of 25 ms the ranges are 0, 25 and 50 ms old. A sensor then fires again after
+    a round of 75 ms.
 
     Args:
         parameters: Positions, directions, errors and faults of the sensors.

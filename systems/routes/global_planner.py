@@ -1,4 +1,4 @@
-"""The route to the goal: planned from the map, and again when the robot stalls."""
+"""The route to the goal, planned from the map and again when the robot stalls."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class PlannerNumbers(NamedTuple):
     clearance_m: float
     stall_m: float
     stalled_s: float
-    """Infinite: the planner makes no new routes."""
+    """If it is infinite, the planner makes no new routes."""
     arrived_m: float
     control_point_m: float
     """Distance of P ahead of the axle, m."""
@@ -89,7 +89,7 @@ def planner_step(
     """Computes the route of the next tick.
 
     The planner remembers the objects in view. If P has not advanced for ``stalled_s``,
-    it plans a new route.
+    the planner plans a new route.
     """
     if numbers.stalled_s == math.inf:
         return
@@ -128,13 +128,13 @@ class GlobalPlanner(Block):
     (``plan_route``). The planner remembers the nearest points of objects that are not
     known to move, one per cell of the grid. The robot stalls if P advances by less than
     ``stall_m`` along the route in ``stalled_s``, and is farther from the goal than
-    ``arrived_m``. Then the block plans a route from the position of P that also avoids
-    these points and robots at rest. If there is none, the old route stays, and the
-    block tries again after ``stalled_s``.
+    ``arrived_m``. Then the block plans a new route from the position of P. The new
+    route also avoids the remembered points and robots at rest. If there is no such
+    route, the old route stays. The block tries again after ``stalled_s``.
 
-    State, every tick: ``PlannerState``. An update at t reads the inputs at t. Its route
-    is published from t on, so other updates read it in the next tick. The outputs are
-    state; no feedthrough.
+    State, every tick: ``PlannerState``. An update at t reads the inputs at t. The block
+    publishes the resulting route from t on, so other blocks read it in their next
+    update. The outputs are state; there is no feedthrough.
 
     Args:
         parameters: ``RouteParameters``.

@@ -1,4 +1,4 @@
-"""Search of the shortest path between two cells of a grid."""
+"""Search for the shortest path between two cells of a grid."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _pop(bounds: Any, cells: Any, count: int) -> int:  # pragma: no cover  (comp
 def search_cells(
     blocked: Any, start: tuple[int, int], goal: tuple[int, int]
 ) -> Any:  # pragma: no cover  (compiled)
-    """Searches a shortest path with A* on 8 neighbors; see ``find_cells``.
+    """Searches for a shortest path with A* on 8 neighbors; see ``find_cells``.
 
     The priority queue is a binary heap of cells, sorted by the cost so far plus the
     octile distance to the goal. When a cheaper way to a cell is found, the cell enters
@@ -133,8 +133,8 @@ def find_cells(
 ) -> NDArray[np.int64] | None:
     """Finds a shortest path between two cells.
 
-    Steps lead to the 8 neighbors. A diagonal step costs sqrt(2) times a straight one,
-    and needs both adjacent cells to be free.
+    Steps lead to the 8 neighbors. A diagonal step costs sqrt(2) times as much as a
+    straight step. It is possible only if both cells beside it are free.
 
     Args:
         blocked: (n, m) cells that cannot be entered.
@@ -142,8 +142,8 @@ def find_cells(
         goal: Cell, numbers along both axes.
 
     Returns:
-        (k, 2) cells from start to goal. None if one of them is blocked or enclosed by
-        blocked cells.
+        (k, 2) cells from start to goal. None if start or goal is blocked, or if no path
+        connects them.
     """
     cells: NDArray[np.int64] = search_cells(blocked, start, goal)
     return cells if len(cells) else None

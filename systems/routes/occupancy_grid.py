@@ -1,4 +1,4 @@
-"""A grid of the cells of an arena in which the center of a disc must not be."""
+"""A grid of an arena: the center of a disc must not be in the blocked cells."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ Discs = Any
 
 
 class OccupancyGrid(NamedTuple):
-    """Square cells of a rectangle of the floor with sides along the axes of W."""
+    """Square cells that cover a rectangle of the floor, parallel to the axes of W."""
 
     blocked: NDArray[np.bool_]
-    """(n, m) cells along x and y whose middle is too near to an obstacle."""
+    """(n, m) whether the middle of each cell, along x and y, is too near to an
+    obstacle."""
     low: tuple[float, float]
     """Least x and y, m."""
     cell_m: float
@@ -33,7 +34,7 @@ class OccupancyGrid(NamedTuple):
 def arena_about(
     points: ArrayLike, rectangles: ArrayLike, margin_m: float
 ) -> tuple[float, float, float, float]:
-    """Returns the smallest rectangle of floor that contains all, plus a margin.
+    """Returns the smallest rectangle that contains points and obstacles, plus a margin.
 
     Args:
         points: (n, 2) m.
@@ -91,11 +92,11 @@ def cell_of(
 
     Args:
         grid: The grid.
-        x: m.
-        y: m.
+        x: Position of the place, m.
+        y: Position of the place, m.
 
     Returns:
-        Its numbers along x and y; (-1, -1) outside the grid.
+        Numbers of the cell along x and y. They are (-1, -1) outside the grid.
     """
     i = math.floor((x - grid.low[0]) / grid.cell_m)
     j = math.floor((y - grid.low[1]) / grid.cell_m)
@@ -127,7 +128,7 @@ def _span(
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
     """Return the range of cells whose middles may lie in an interval.
 
-    The range is given by its first cell, and the cell after its last.
+    The function returns the first cell of this range, and the cell after its last one.
     """
     begin = math.floor((low - first) / cell - 0.5)
     end = math.ceil((high - first) / cell - 0.5) + 1
@@ -140,11 +141,12 @@ def block_rectangles(
 ) -> None:  # pragma: no cover  (compiled)
     """Blocks the cells whose middles are nearer to a rectangle than a radius.
 
-    The distances are exact. A distance transform measures between middles of cells, so
-    its error is up to 0.7 cells. Compiled steps cannot call it either.
+    The function computes exact distances. A distance transform is unsuitable for two
+    reasons. It measures between middles of cells, so its error is up to 0.7 cells. In
+    addition, compiled steps cannot call it.
 
     Args:
-        grid: Changed.
+        grid: Modified in place.
         rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
         radius: Radius by which the rectangles are enlarged, m.
     """
@@ -173,7 +175,7 @@ def block_discs(
     """Blocks the cells whose middles are nearer to a disc than a radius.
 
     Args:
-        grid: Changed.
+        grid: Modified in place.
         discs: (n, 3) positions and radii, m.
         radius: Radius by which the discs are enlarged, m.
     """

@@ -16,8 +16,8 @@ from systems.framework.parameters import (
     Speed,
 )
 
-#: Least number of cells in the radius of the disc. Then a step between two free cells
-#: comes nearer than the radius by less than 3 % of it.
+#: Least ratio of the disc's radius to the side of a cell. With this ratio, the distance
+#: of a step between two free cells from an obstacle is at least 97 % of the radius.
 _LEAST_CELLS = 3.0
 
 
@@ -43,8 +43,8 @@ class PathTargetParameters(Parameters):
     """How the target moves along the route."""
 
     speed_m_s: Speed = 0.15
-    """Speed of the target along the route, m/s (our choice; Engelbrecht and others
-    print none)."""
+    """Speed of the target along the route, m/s (our choice; Engelbrecht and others give
+    no value)."""
     acceleration_m_s2: Acceleration = 0.15
     """Acceleration from rest and to rest, m/s^2 (our choice)."""
     timing: Literal["timed", "waiting"] = "timed"
@@ -61,23 +61,23 @@ class RouteParameters(PathTargetParameters):
     """Goal of P in W, m."""
     clearance_m: Length = 0.35
     """Planned distance between the route and known obstacles, m (our choice). After
-    rounding the route keeps at least 92 % of it."""
+    rounding, the route keeps at least 92 % of this distance."""
     cell_m: Length = 0.05
     """Side of a cell of the grid, m (our choice)."""
     arena_margin_m: Length = 2.0
     """Margin around the smallest rectangle that contains start, goal and known
     obstacles, m (our choice). Routes stay within this area."""
     replan: bool = True
-    """Whether a robot that stalls plans a new route, with the obstacles that it has
+    """Whether a robot that stalls plans a new route around the obstacles that it has
     seen (our choice)."""
     stall_m: Length = 0.1
     """The robot stalls if P advances by less than this along the route within
     ``stalled_s``, m."""
     stalled_s: Duration = 6.0
-    """Time after which a robot that has not advanced by ``stall_m`` stalls, s."""
+    """Time, s, in which P has to advance by ``stall_m``. Otherwise the robot stalls."""
     arrived_m: Length = 0.15
-    """Distance from the goal within which the robot has arrived and does not stall,
-    m."""
+    """Distance from the goal, m. Within this distance, the robot has arrived and does
+    not stall."""
 
     @model_validator(mode="after")
     def _check(self) -> RouteParameters:

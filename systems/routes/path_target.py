@@ -19,8 +19,9 @@ from systems.world.geometry import control_point
 #: Indices of the state: position of the target along the route, m; its speed, m/s;
 #: position of P along the route, m; and first of four numbers that identify the route.
 ALONG, SPEED, REACHED, FINGERPRINT = range(4)
-#: The point nearest to P is searched from this distance behind the last one to this
-#: distance ahead of the target, m: a route may come near to itself.
+#: The point nearest to P is searched only on a part of the route, because a route may
+#: come near to itself. The part begins at the first distance, m, behind both the last
+#: nearest point and the target. It ends at the second distance, m, ahead of both.
 _BEHIND_M, _AHEAD_M = 1.0, 0.5
 #: The target has arrived within this distance of the goal, m.
 _THERE_M = 1e-6
@@ -46,7 +47,7 @@ def route_fingerprint(
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
     """Computes four numbers that identify a route.
 
-    They are the count and spacing of its points, and moments of x and y.
+    These numbers are the count and spacing of its points, and moments of x and y.
     """
     count, x, y = int(route[0]), 0.0, 0.0
     for k in range(count):
@@ -59,15 +60,15 @@ def route_fingerprint(
 def nearest_on_route(
     route: Any, x: float, y: float, low: float, high: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Finds the point of a part of a route that is nearest to a place.
+    """Finds the point on a part of a route that is nearest to a place.
 
-    The function projects the place on each segment of the part, limited to its ends,
-    and keeps the nearest projection.
+    The function projects the place on each segment of the part. It limits each
+    projection to the segment and to the part. Then it keeps the nearest projection.
 
     Args:
         route: (ROUTE_SIZE,) numbers of ``Route``.
-        x: m.
-        y: m.
+        x: Position of the place, m.
+        y: Position of the place, m.
         low: Start of the part along the route, m.
         high: End of the part along the route, m.
 
@@ -101,7 +102,7 @@ def nearest_on_route(
 def point_on_route(
     route: Any, along: float
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Returns a point of a route and the derivative by arc length.
+    """Returns a point of a route and its derivative with respect to arc length.
 
     The route is interpolated with cubic Hermite polynomials (Catmull and Rom), so its
     direction is continuous.
@@ -141,10 +142,10 @@ def next_speed(
 
     Args:
         speed: Speed now, m/s.
-        way: Remaining distance, m; negative if it is exceeded.
+        way: Remaining distance, m. It is negative if the target is already too far.
         top: Largest speed, m/s.
         acceleration: m/s^2.
-        tick_s: s.
+        tick_s: Duration of a tick, s.
 
     Returns:
         m/s, at least 0.
@@ -206,16 +207,17 @@ def path_target_step(
 
 
 class PathTarget(Block):
-    """Moves a target along the route, from rest to rest at the goal.
+    """Moves a target along the route. It starts from rest and stops at the goal.
 
-    ``target_state``: position and velocity in W. ``route_progress``: arc lengths of the
-    target and of the point of the route nearest to P. If there are several such points,
-    the block takes the one near the last one, or between it and the target.
+    ``target_state`` is the position and velocity of the target in W. ``route_progress``
+    has two numbers: the arc length of the target, and the arc length of the route's
+    point nearest to P. A route may come near to itself. The block therefore searches
+    for the nearest point only around and between the last nearest point and the target.
 
-    With ``timing: timed`` the speed follows the clock, whatever the robot does: it
-    rises, stays constant, and falls. With ``waiting`` the target brakes so that it is
-    never farther ahead than ``lead_m``, unless P goes back. On a new route, the target
-    begins at rest at the point nearest to P.
+    With ``timing: timed`` the speed of the target depends only on the time, whatever
+    the robot does. The speed rises, stays constant, and falls. With ``waiting`` the
+    target brakes so that it leads P by at most ``lead_m``, unless P goes back. On a new
+    route, the target begins at rest at the point nearest to P.
 
     Discrete state: arc length and speed of the target, arc length of P, and four
     numbers that identify the route. Rate and latency: a function of state and present
@@ -227,7 +229,8 @@ class PathTarget(Block):
         tick_s: Period of the robot, s.
 
     Reference: Engelbrecht, Steyn and Djouani (2021). Their eq. 2 contains the position
-    and velocity of the target; they do not print its timing. The waiting is ours.
+    and velocity of the target. They do not describe the timing of the target. The
+    waiting is ours.
     """
 
     part = "tracker"

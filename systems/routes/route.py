@@ -36,17 +36,17 @@ ROUTE_UNIT = "number of points, then in m their spacing, and x and y of each"
 
 #: Spacing of the points of a taut path when it is rounded, m.
 _FINE_M = 0.01
-#: Half of the window of the moving averages, in such points. Shorter windows are tried
-#: if the route would come too near to an obstacle.
+#: Half of the window of the moving averages, as a number of fine points. The values are
+#: tried in this order until the route keeps off obstacles.
 _HALF_WINDOWS = (15, 10, 7, 5, 3, 2, 1, 0)
 #: Number of successive averages: after two the curvature is continuous.
 _AVERAGES = 2
-#: A rounded route may come nearer to obstacles than planned by this distance, m, and at
-#: most by this share of the clearance.
+#: A rounded route may come nearer to obstacles than the taut path, by at most the first
+#: number, m, and at most the second number times the clearance.
 _ROUNDING_M, _ROUNDING_SHARE = 0.015, 0.05
-#: A straight way out may come nearer to obstacles than its start by this distance, m,
-#: and at most by this share of the clearance. Both shares and the 3 % of
-#: ``check_cells`` leave at least 92 % of the clearance.
+#: A straight way out may come nearer to obstacles than its start, by at most the first
+#: number, m, and at most the second number times the clearance. Both shares and the 3 %
+#: of ``check_cells`` leave at least 92 % of the clearance.
 _WAY_OUT_M, _WAY_OUT_SHARE = 0.01, 0.03
 #: A goal may be nearer to obstacles than the clearance by this rounding error, m.
 _GRAZE_M = 1e-9
@@ -97,7 +97,7 @@ def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compile
     """Writes a route in the format of the port ``route``.
 
     Args:
-        numbers: (ROUTE_SIZE,) changed.
+        numbers: (ROUTE_SIZE,) modified in place.
         points: (n, 2) with equal spacing, m.
     """
     for k in range(ROUTE_SIZE):
@@ -111,10 +111,10 @@ def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compile
 def _clearance(
     a: Any, b: Any, rectangles: Any, discs: Discs, least: float, most: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Return the distance of a segment from all obstacles, or ``most`` if it is larger.
+    """Return the distance of a segment from the nearest obstacle, limited to ``most``.
 
-    If the distance is below ``least``, the function returns early with the distance of
-    some obstacle below ``least``.
+    The function stops at the first obstacle that is nearer than ``least``, and returns
+    its distance.
     """
     best = most
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -144,16 +144,17 @@ def _clearance(
 def place_clearance(
     x: float, y: float, rectangles: Any, discs: Discs
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance of a place from all obstacles.
+    """Computes the distance of a place from the nearest obstacle.
 
     Args:
-        x: m.
-        y: m.
+        x: Position of the place, m.
+        y: Position of the place, m.
         rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
         discs: (n, 3) positions and radii, m.
 
     Returns:
-        m; 0 inside a rectangle, negative inside a disc, infinite without obstacles.
+        Distance, m. It is 0 inside a rectangle, negative inside a disc, and infinite
+        without obstacles.
     """
     best = np.inf
     for k in range(len(rectangles)):
@@ -169,7 +170,7 @@ def place_clearance(
 def _line_clearance(
     points: Any, rectangles: Any, discs: Discs, most: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Return the distance of a line from all obstacles, or ``most`` if it is larger."""
+    """Return the distance of a line from the nearest obstacle, limited to ``most``."""
     best = most
     for k in range(len(points) - 1):
         a, b = points[k], points[k + 1]
@@ -212,10 +213,11 @@ def _sees(
 def _pulled(
     points: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> Any:  # pragma: no cover  (compiled)
-    """Pull a path taut: from each kept point, go straight to the last one that it sees.
+    """Pull a path taut: connect each kept point with the last point that it sees.
 
-    The search from a point ends at the first point that it does not see. Consecutive
-    points always count as seeing each other.
+    A point sees another if the segment between both keeps the clearance. The search
+    from a kept point ends at the first point that it does not see. Consecutive points
+    always count as seeing each other.
     """
     kept = np.empty_like(points)
     kept[0] = points[0]
@@ -256,8 +258,8 @@ def _rounded(
     """Round a taut path as smoothly as the clearance permits.
 
     The function divides the path into fine points, and applies the moving averages. It
-    tries the windows from the widest to none. It stops when the route keeps the
-    clearance of the taut path, less a small allowance.
+    tries the widest window first, and no averaging last. It stops when the route keeps
+    the clearance of the taut path minus a small allowance.
     """
     count = max(math.ceil(_length(pulled) / _FINE_M), 1) + 1
     fine = _spaced(pulled, count)
@@ -286,11 +288,13 @@ def _way_out(
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
     """Return the nearest free cell that a straight way reaches safely.
 
-    On this way, the distance from obstacles falls below that at the start by at most a
-    small allowance.
+    On this way, the distance from obstacles is at least the distance at ``end``, minus
+    a small allowance. If the distance at ``end`` exceeds the clearance, the clearance
+    counts instead.
 
     Returns:
-        (-1, -1) if there is no such cell within two clearances.
+        Numbers of the cell along x and y. They are (-1, -1) if there is no such cell
+        within two clearances.
     """
     here = place_clearance(end[0], end[1], rectangles, discs)
     least = min(here, clearance)
@@ -323,10 +327,11 @@ def find_route(
 ) -> Any:  # pragma: no cover  (compiled)
     """Finds a route from a start to a goal.
 
-    Start and goal may be nearer to obstacles than the clearance. A straight way that
-    leads no nearer to obstacles connects each of them with a free cell. A* then finds a
-    path of cells between these two cells. The path is pulled taut and rounded. This
-    function is for compiled code and for planning during a run.
+    Start and goal may be nearer to obstacles than the clearance. A straight way
+    connects the start with a free cell, and another one connects the goal with a free
+    cell. Both ways lead at most slightly nearer to obstacles. A* then finds a path of
+    cells between the two free cells. The path is pulled taut and rounded. This function
+    is for compiled code and for planning during a run.
 
     Args:
         grid: Grid in which the cells nearer to obstacles than the clearance are
@@ -338,8 +343,8 @@ def find_route(
         clearance: Distance to be kept, m.
 
     Returns:
-        (p, 2) points with equal spacing from start to goal, m, at most
-        ``ROUTE_POINTS``; empty if there is no route.
+        (p, 2) at most ``ROUTE_POINTS`` points with equal spacing from start to goal, m.
+        The array is empty if there is no route.
     """
     none = np.empty((0, 2))
     if math.hypot(goal[0] - start[0], goal[1] - start[1]) < _SHORTEST_M:
@@ -392,21 +397,21 @@ def plan_route(
 ) -> Route:
     """Plans a short and smooth route for the center of a disc.
 
-    A* searches a grid of cells whose middles keep the clearance. The path is pulled
-    taut where straight legs keep the clearance, too. Two moving averages over 0.3 m
-    then round it. Shorter windows are used if the route would come nearer to an
-    obstacle than the clearance less 15 mm, or less 5 % of the clearance if this is
-    smaller. The route keeps at least 92 % of the clearance from all known obstacles. A
-    route longer than 30 m may come nearer at sharp corners: its ``ROUTE_POINTS`` points
-    are then too far apart to follow the arc.
+    A* searches a grid of cells whose middles keep the clearance. The function pulls the
+    path taut where straight legs also keep the clearance. Two moving averages over 0.3
+    m then round the path. The rounded route may come nearer to an obstacle than the
+    clearance by at most 15 mm, and at most 5 % of the clearance. If it comes nearer,
+    the function uses shorter averages. The route keeps at least 92 % of the clearance
+    from all known obstacles. A route longer than 30 m may come nearer at sharp corners:
+    its ``ROUTE_POINTS`` points are then too far apart to follow the arc.
 
     Args:
-        start: (x, y) in W, m. If it is nearer to an obstacle than the clearance, the
-            route first leads away from it.
+        start: (x, y) in W, m. If the start is nearer to an obstacle than the clearance,
+            the route first leads away from this obstacle.
         goal: (x, y) in W, m.
         rectangles: (k, 5) known obstacles in W, see ``systems.world.geometry``.
         clearance_m: Clearance from known obstacles, m. The route keeps at least 92 % of
-            it.
+            this distance.
         cell_m: Side of a cell, m.
         arena_margin_m: Margin around the smallest rectangle that contains start, goal
             and obstacles, m. The route stays within this area.
@@ -419,8 +424,8 @@ def plan_route(
             obstacle or to the start; there is no route; or the grid does not fit. The
             error names the field.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), sec. 2 names A* and prints no
-    grid; Hart, Nilsson and Raphael (1968).
+    Reference: Engelbrecht, Steyn and Djouani (2021) name A* in sec. 2, but describe no
+    grid. Hart, Nilsson and Raphael (1968) describe A*.
     """
     known: NDArray[np.float64] = np.array(rectangles, dtype=float).reshape(-1, 5)
     discs: NDArray[np.float64] = np.empty((0, 3))

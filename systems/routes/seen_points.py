@@ -1,4 +1,4 @@
-"""Memory of the objects that a robot has seen, for planning again."""
+"""Memory of the objects that a robot has seen, for the planning of new routes."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ def remember_objects(
     points near known obstacles.
 
     Args:
-        seen: Changed.
-        grid: Grid whose cells get at most one point each.
+        seen: Modified in place.
+        grid: The grid. The function remembers at most one point per cell.
         rectangles: (k, 5) known obstacles in W.
         objects: (64,) value of the port ``objects_W``.
         p_WP: (x, y) of P, m.
@@ -90,7 +90,7 @@ def remember_objects(
 def discs_to_avoid(
     seen: SeenPoints, objects: Any, p_WP: Any
 ) -> Any:  # pragma: no cover  (compiled)
-    """Lists all discs that a route has to avoid now: seen points, and robots at rest.
+    """Lists the discs that a new route has to avoid: seen points and robots at rest.
 
     Args:
         seen: Remembered points.
@@ -98,7 +98,7 @@ def discs_to_avoid(
         p_WP: (x, y) of P, m.
 
     Returns:
-        (n, 3) positions and radii of discs, m.
+        (n, 3) positions and radii of discs, m. Seen points have the radius 0.
     """
     count = min(seen.added[0], len(seen.points))
     discs = np.zeros((count + OBJECT_SLOTS, 3))

@@ -25,15 +25,16 @@ PASSED, SLOWED, TURNED, BRAKED, HALTED = range(5)
 #: Shares of the wanted wheel speeds that are tried, the largest first.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 
-#: A robot turns on the spot if two conditions hold. Its command drives it forward no
-#: faster than this, m/s. The lag leaves it no longer way forward than ``IN_PLACE_M``.
+#: A robot turns on the spot if two conditions hold. The commanded speed of the axle is
+#: below this number, m/s. The way that the axle still moves due to the lag of the
+#: motors is below ``IN_PLACE_M``.
 _IN_PLACE_M_S = 1e-6
 #: The robot withdraws from obstacles in view if at least this share of its motion leads
-#: away from them. With a larger share, it could not drive on past an obstacle that
-#: comes from behind.
+#: away from them. With a larger share, the robot could not drive on if an obstacle
+#: approached from behind.
 _WITHDRAWS = 0.2
-#: A robot between ``least_m`` and ``keep_m`` may come nearer by this much per tick, m.
-#: It can then drive along an edge.
+#: A robot between ``least_m`` and ``keep_m`` may come nearer to space that is not free
+#: by this much per tick, m. The robot can then drive along the edge of that space.
 _SLACK_M = 5e-4
 
 
@@ -55,12 +56,12 @@ class BrakingNumbers(NamedTuple):
     top_wheel_speed: float
     """Top speed of a wheel, rad/s."""
     keep_m: float
-    """Distance of the axle from space that is not free, m: radius of the body, and
-    margin."""
+    """Distance that the axle has to keep from space that is not free, m. It is the sum
+    of the radius of the body and the margins."""
     least_m: float
     """Smaller distance for a robot that has come nearer than ``keep_m``, m."""
     obstacle_speed_m_s: float
-    """Largest speed of obstacles in view, m/s; 0: all obstacles are at rest."""
+    """Largest speed of obstacles in view, m/s. With 0, all obstacles are at rest."""
     slow_turn_rad_s: float
     """A robot that turns on the spot no faster than this counts as at rest, rad/s."""
 
@@ -71,16 +72,16 @@ class Danger(NamedTuple):
     corners: NDArray[np.float64]
     """(m, 2) corners of cells that are not free, from ``edge_cells``, m."""
     corner_count: int
-    """Number of these cells."""
+    """Number of cells in ``corners``."""
     cell_m: float
     distance_m: float
-    """Distance of the axle from the nearest of these cells now, m."""
+    """Present distance of the axle from the nearest cell in ``corners``, m."""
     arcs: NDArray[np.float64]
     """(sensors, points, 2) points at which the view of each sensor ends, m."""
     ages: NDArray[np.float64]
     """(sensors,) time since the view of each sensor was updated, s."""
     view_distance_m: float
-    """Distance of the axle from the end of the view now, m."""
+    """Present distance of the axle from the nearest end of a view, m."""
 
 
 @register_jitable
@@ -90,10 +91,10 @@ def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, floa
     Args:
         speeds: Speeds of the left and right wheel at the start, rad/s.
         commanded: Commanded speeds, rad/s.
-        kept: Share of the difference that the lag leaves at the end.
+        kept: Share of the difference between both speeds that is left at the end.
 
     Returns:
-        Left and right, rad/s.
+        Speeds of the left and right wheel at the end, rad/s.
     """
     left = commanded[0] + (speeds[0] - commanded[0]) * kept
     right = commanded[1] + (speeds[1] - commanded[1]) * kept
@@ -113,7 +114,7 @@ def roll_on(
         numbers: Model of the robot.
 
     Returns:
-        (x, y, theta) and the speeds.
+        (x, y, theta), m and rad, and speeds of the left and right wheel, rad/s.
     """
     part = numbers.part
     duration, lagged = part.duration_s, part.lagged_s
@@ -159,10 +160,10 @@ def braked(
 def _nearest_view(
     danger: Danger, x: float, y: float, ahead_s: float, speed: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Return the distance of a place from the nearest end of a view, m.
+    """Return the distance, m, of a place from the nearest end of a view.
 
-    The distance is reduced by the way that an obstacle at ``speed`` may have covered
-    since the reading, up to ``ahead_s`` from now.
+    The function subtracts the way that an obstacle covers at ``speed`` from the time of
+    the reading until ``ahead_s`` from now.
     """
     nearest = np.inf
     for sensor in range(danger.arcs.shape[0]):
@@ -185,21 +186,23 @@ def can_be_braked(
 
     The function predicts this motion: the robot obeys the command for one tick, and
     then brakes to rest. It checks the position of the axle after each part of a tick.
-    The required distance from cells that are not free depends on the distance now:
+    The required distance of the axle from cells that are not free depends on its
+    present distance from them:
 
-    * The robot is at least at ``keep_m``: it has to keep ``keep_m``.
-    * It is nearer, but not below ``least_m``: it may come nearer by at most
-      ``_SLACK_M``, and never below ``least_m``.
-    * It is below ``least_m``, for example because nearby cells were forgotten. It may
-      not come nearer, and has to end farther away. No cell within ``least_m`` may come
-      nearer with any of its points.
+    * At least ``keep_m`` plus ``_SLACK_M``: the axle has to keep ``keep_m``.
+    * Smaller, but not below ``least_m``: the axle may come nearer by at most
+      ``_SLACK_M``, and never nearer than ``least_m``.
+    * Below ``least_m``, for example because nearby cells were forgotten: the axle must
+      not come nearer, and has to end farther away. In addition, it must not come nearer
+      to any point of a cell within ``least_m``.
 
     A turn on the spot does not move the disc, so these limits do not apply to it.
 
-    If obstacles may move, the axle also has to keep ``keep_m`` from the points that an
-    obstacle may reach from the end of a view. Such an obstacle moves at
-    ``obstacle_speed_m_s`` since the reading. As an alternative, the robot may withdraw
-    from the end of the view. A slow turn on the spot counts as rest and is not checked.
+    If obstacles may move, the function assumes an obstacle that starts at the end of a
+    view at the time of the reading, and moves at ``obstacle_speed_m_s``. The axle then
+    also has to keep ``keep_m`` from all points that such an obstacle may reach. As an
+    alternative, the robot may withdraw from the end of the view. A slow turn on the
+    spot counts as rest, so the function does not check it against moving obstacles.
 
     Args:
         pose: (x, y, theta) now, m and rad.
@@ -209,7 +212,7 @@ def can_be_braked(
         numbers: Model of the robot.
 
     Returns:
-        Whether it may.
+        Whether the robot may obey the command.
     """
     radius, lag = numbers.wheel_radius_m, numbers.motor_lag_s
     now, keep, least = danger.distance_m, numbers.keep_m, numbers.least_m
@@ -239,7 +242,7 @@ def can_be_braked(
             reached < need or (near and _enters(begin, pose, danger, least))
         ):
             return False
-        # Motion of the axle, or of the rim of the disc by the turn.
+        # Way of the axle, or way of the disc's rim in the turn if this is longer.
         moved = max(way, keep * abs(pose[2] - begin[2]))
         if moving and not _keeps_off_moving(
             (x, y), parts * part_s, moved, danger, numbers
@@ -260,15 +263,17 @@ def _enters(
 ) -> bool:  # pragma: no cover  (compiled)
     """Return whether a disc has come nearer to a point of a cell that is not free.
 
-    The disc at the start contains no obstacle, whatever the memory says about its
-    cells. A point in the disc now may have been nearer to the middle at the start. Then
-    it was in the disc at the start, too, and contains no obstacle. Such points lie on
-    one side of the bisector between both middles. A cell lies there if its corners do.
+    The function compares the disc at the start with the disc now. The disc at the start
+    contains no obstacle, whatever the memory says about its cells. Some points of the
+    disc now are nearer to the middle at the start than to the middle now. These points
+    were also in the disc at the start, so no obstacle is there. They lie on one side of
+    the perpendicular bisector between both middles. A cell lies on this side if all its
+    corners do.
 
     Args:
         begin: (x, y) of the middle at the start, m.
         pose: (x, y, theta) now, m and rad.
-        danger: Contains the cells.
+        danger: The cells that are not free.
         radius: Radius of the disc, m.
     """
     x, y, cell = pose[0], pose[1], danger.cell_m
@@ -288,7 +293,7 @@ def _enters(
 
 @njit(cache=True)
 def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (compiled)
-    """Return the speed of the axle, forward or backward, m/s."""
+    """Return the absolute speed of the axle, m/s."""
     return abs(0.5 * (speeds[0] + speeds[1]) * wheel_radius_m)
 
 
@@ -298,7 +303,8 @@ def _keeps_off_moving(
 ) -> bool:  # pragma: no cover  (compiled)
     """Return whether the robot keeps away from obstacles in view that may move.
 
-    It does if no such obstacle can be near at that time, or if the robot withdraws.
+    This holds if no such obstacle can be within ``keep_m`` of ``place`` after
+    ``ahead_s``. It also holds if the robot withdraws.
     """
     x, y = place
     speed = numbers.obstacle_speed_m_s
@@ -316,14 +322,14 @@ def danger_of(
 
     Args:
         space: Memory of free space.
-        time: s.
+        time: Current time, s.
         pose: (x, y, theta) now, m and rad.
-        reach: Distance from the axle within which cells are collected, m, and the
-            rolled way for which they have to stay free, m.
+        reach: Distance from the axle within which cells are collected, m, and rolled
+            way for which free cells have to stay free, m.
         numbers: Model of the robot.
 
     Returns:
-        Input of ``can_be_braked``.
+        The cells and views, as input of ``can_be_braked``.
     """
     # The square contains at most this number of cells.
     corners = np.empty((int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
@@ -331,7 +337,7 @@ def danger_of(
     x, y = pose[0], pose[1]
     count = edge_cells(space, x, y, reach[0], until, corners)
     distance = nearest_cell(corners, count, space.cell_m, x, y)
-    # In a cell that is not free, the distance is 0.
+    # If the axle is in a cell that is not free, the distance is 0.
     i, j = math.floor(x / space.cell_m), math.floor(y / space.cell_m)
     if not cell_is_free(space, i, j, until):
         distance = 0.0
@@ -354,14 +360,15 @@ def chosen(
     danger: Danger,
     numbers: BrakingNumbers,
 ) -> tuple[int, tuple[float, float]]:  # pragma: no cover  (compiled)
-    """Chooses the command: the wanted one as far as the robot can brake, or the brake.
+    """Chooses the first of several commands from which the robot can brake to rest.
 
-    The function tries these commands in order and returns the first that passes:
+    The function tries these commands in order (``can_be_braked``):
 
     1. the wanted wheel speeds, and smaller shares of them along the same curve;
     2. the wanted turn, while the forward motion brakes;
     3. the same turn, but slow enough to count as rest;
-    4. braking along the current curve, which was checked in the previous tick.
+    4. braking along the current curve. The check in the previous tick included this
+       motion, so it is not checked again.
 
     Args:
         pose: (x, y, theta) now, m and rad.

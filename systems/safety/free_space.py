@@ -18,15 +18,16 @@ register_jitable(lasting)
 FIRST_I, FIRST_J, ROLLED, TICK = range(4)
 #: Value of a cell that was never seen free.
 NEVER = -1.0
-#: The window moves when its middle is this far from the robot, cells. In a small
-#: window, the limit is its side divided by the second number.
+#: The window moves when its middle is farther from the robot than the first number,
+#: cells. In a small window, the limit is the side of the window divided by the second
+#: number.
 _SLACK = 20
 _SLACK_SHARE = 8
 #: Each reading updates one of this many rows; the other rows follow with later
 #: readings.
 _ROWS = 4
-#: Echoes from up to this distance count fully. Farther echoes count less, because their
-#: arcs are longer, m.
+#: Echoes within this distance, m, count fully. Farther echoes count less, because their
+#: arcs are longer.
 _FULL_HIT_M = 0.6
 
 
@@ -34,24 +35,27 @@ class FreeSpace(NamedTuple):
     """A square window of n x n cells of the floor that moves along with a robot.
 
     Cell (i, j) of the floor covers x from i to i + 1 and y from j to j + 1, in cells,
-    in the frame of the odometry. Its values are stored at [i % n, j % n].
+    in the frame of the odometry. The values of this cell are stored at [i % n, j % n].
     """
 
     free_until: NDArray[np.float64]
-    """(n, n) rolled way up to which a cell counts as free, m. Beyond this way its
-    position is too uncertain. ``NEVER``: the cell was not seen free."""
+    """(n, n) rolled way up to which a cell counts as free, m. After this way, the
+    position of the cell is too uncertain. The value is ``NEVER`` if the cell was not
+    seen free."""
     seen_s: NDArray[np.float64]
     """(n, n) time at which a cell was last seen free, s, or ``NEVER``."""
     hits: NDArray[np.float64]
-    """(n, n) number of echoes from about there since the cell was last seen free."""
+    """(n, n) weighted number of echoes from the place of a cell since it was last seen
+    free."""
     facts: NDArray[np.float64]
     """(1, 4): i and j of the first cell of the window; rolled way, m; tick of the last
     change."""
     arcs: NDArray[np.float64]
-    """(sensors, points, 2) points of the arc at which the view of each sensor ends,
-    from its right to its left edge, m. The arc follows from the last reading."""
+    """(sensors, points, 2) points of the arc at which the view of each sensor ends, m,
+    in order from the right to the left edge of its aperture. The arc follows from the
+    last reading of the sensor."""
     arcs_s: NDArray[np.float64]
-    """(sensors, 1) time of that reading, s, or ``NEVER``."""
+    """(sensors, 1) time of the last reading of each sensor, s, or ``NEVER``."""
     cell_m: float
     """Side of a cell, m."""
 
@@ -104,10 +108,10 @@ def cell_is_free(
         space: The window.
         i: Number of the cell on the floor along x.
         j: Number of the cell on the floor along y.
-        until: Rolled way up to which it has to be free, m.
+        until: Rolled way up to which the cell has to count as free, m.
 
     Returns:
-        Whether it does. Cells outside the window are not free.
+        Whether the cell counts as free. Cells outside the window do not.
     """
     cells = space.free_until.shape[0]
     di, dj = i - space.facts[0, FIRST_I], j - space.facts[0, FIRST_J]
@@ -123,7 +127,7 @@ def move_window(
     """Moves the window along with the robot, and forgets the cells that leave it.
 
     Args:
-        space: Changed.
+        space: Modified in place.
         x: Position of the robot, m.
         y: Position of the robot, m.
     """
@@ -153,11 +157,11 @@ def clear_disc(
     """Marks the cells that lie entirely within a disc as free.
 
     Args:
-        space: Changed.
+        space: Modified in place.
         x: Position of the center, m.
         y: Position of the center, m.
-        radius: m.
-        until: Rolled way up to which they are free, m.
+        radius: Radius of the disc, m.
+        until: Rolled way up to which the cells count as free, m.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
     low_i, low_j = math.floor((x - radius) / cell), math.floor((y - radius) / cell)
@@ -179,10 +183,10 @@ def clear_disc(
 def edge_cells(
     space: FreeSpace, x: float, y: float, reach: float, until: float, out: Any
 ) -> int:  # pragma: no cover  (compiled)
-    """Lists the cells that are not free and next to a free one, within a square.
+    """Lists the cells of a square that are not free, but are next to a free cell.
 
-    These cells are the edge of the space that is not free. No other cell that is not
-    free is nearer to a place in free space.
+    These cells are the edge of the space that is not free. For any place in free space,
+    the nearest cell that is not free belongs to this edge.
 
     Args:
         space: The window.
@@ -190,10 +194,12 @@ def edge_cells(
         y: Position of the middle of the square, m.
         reach: Half of the side of the square, m.
         until: Rolled way up to which cells have to be free, m.
-        out: (m, 2) filled with the corners of least x and y of the cells, m.
+        out: (m, 2) array that the function fills: corner of least x and y of each cell,
+            m.
 
     Returns:
-        Number of these cells. If it exceeds m, ``out`` contains only m of them.
+        Number of listed cells. If this number exceeds m, ``out`` contains only m of
+        them.
     """
     cell, count = space.cell_m, 0
     low_i, low_j = math.floor((x - reach) / cell), math.floor((y - reach) / cell)
@@ -246,7 +252,7 @@ def nearest_cell(
         y: Position of the place, m.
 
     Returns:
-        m; infinite without cells.
+        Distance, m. It is infinite without cells.
     """
     best = np.inf
     for k in range(count):
@@ -268,22 +274,22 @@ def see(
 ) -> None:  # pragma: no cover  (compiled)
     """Enters the newest readings of the sensors into the cells.
 
-    Sensors at one place form a group. For each group, the function visits the cells of
-    its sector within the greatest distance seen. The circle around a cell hides an
-    angle of the view. The cell becomes free if the group has seen all of this angle
-    free, beyond the circle. If an echo comes from the distance of the cell, in the
-    direction of its middle, the cell gets a hit. A cell that becomes free loses all
-    hits.
+    Sensors at one place form a group. For each group, the function visits the cells in
+    the sectors of the group, up to the greatest distance that the group has seen. As
+    seen from the group, the circle around a cell covers an angle. If the group has seen
+    free floor in this whole angle up to the far side of the circle, the cell becomes
+    free. It then loses all hits. Otherwise, the cell gets a hit if an echo comes from
+    the direction of its middle and from about its distance.
 
     Args:
-        space: Changed.
-        time: s.
+        space: Modified in place.
+        time: Current time, s.
         turn: Number that selects the rows: only every fourth row of cells is updated.
         pose: (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
-        readings: (sensors, 2) distance up to which each sensor has seen free, m, and
-            distance of its echo, m. Without a new reading the first is 0. Without an
-            echo the second is infinite.
+        readings: (sensors, 2) distance up to which each sensor has seen free floor, m,
+            and distance of its echo, m. The first distance is 0 without a new reading.
+            The second is infinite without an echo.
         error: ``PlaceError``.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
@@ -342,7 +348,7 @@ def _of_sectors(
 
     Returns:
         (sectors, 3) distance seen free, distance of the nearest echo, and the greater
-        of both, m. Without an echo, the third is the first.
+        of both, m. Without an echo, the third number equals the first.
     """
     seen = np.empty((len(sectors.right), 3))
     for k in range(len(seen)):
@@ -360,16 +366,17 @@ def _of_sectors(
 def _in_direction(
     bearing: float, hides: float, sectors: Sectors, seen: Any, begin: int, end: int
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Return the distance seen free behind a cell, and the distance of an echo, m.
+    """Return the distance seen free towards a cell, and the distance of an echo, m.
 
-    The distance seen free is the least one of all sectors that overlap the angle that
-    the cell hides. It is 0 if a part of this angle is outside the group. The echo is
-    that of the sector that contains the middle of the cell.
+    As seen from the group, the circle around the cell covers an angle. The distance
+    seen free is the least one of all sectors that overlap this angle. It is 0 if a part
+    of the angle is outside the sectors of the group. The echo is the echo of the sector
+    that contains the middle of the cell.
 
     Args:
         bearing: Bearing of the cell from the right edge of the group, rad, from 0 to a
             full turn.
-        hides: Half of the angle that the cell hides, rad.
+        hides: Half of the angle that the circle around the cell covers, rad.
         sectors: Sectors of all groups.
         seen: From ``_of_sectors``.
         begin: First sector of the group.
@@ -406,13 +413,13 @@ def end_view(
     """Stores the arc at which the view of a sensor ends.
 
     Args:
-        space: Changed.
+        space: Modified in place.
         sensor: Number of the sensor.
-        time: s.
+        time: Current time, s.
         pose: (x, y, theta) of the robot by its odometry, m and rad.
         place: (x, y) of the sensor relative to the axle in B, m.
-        direction: Direction of its axis in B and half of its aperture, rad.
-        reach: Distance up to which it has seen free, m.
+        direction: Direction of the sensor's axis in B, and half of its aperture, rad.
+        reach: Distance up to which the sensor has seen free floor, m.
     """
     axis, half_angle = direction
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -432,7 +439,7 @@ def _sector_box(
     """Return the least and greatest x and y of a sector of a disc, m.
 
     The extremes are at the center, at the two ends of the arc, or where the arc crosses
-    a direction of an axis.
+    the direction of a coordinate axis.
     """
     low_x, low_y, high_x, high_y = x, y, x, y
     quarter = math.ceil(right / (math.pi / 2.0))

@@ -44,14 +44,14 @@ class MapNumbers(NamedTuple):
     limits: tuple[float, float, float]
     """Least and greatest range, and largest amount by which a range is too long, m."""
     error: PlaceError
-    """What the position error of a cell by odometry depends on."""
+    """Quantities that determine the position error of a cell due to odometry."""
     least_way: float
-    """Least mean way of both rims that a tick counts for, m per rad/s of the faster
-    wheel's command; 0 without pulses."""
+    """Least way of each rim that counts for a tick, m per rad/s of the faster wheel's
+    command. It is 0 without pulses."""
     radius: float
     """Radius of the disc that contains the body, m."""
     bubble: float
-    """Radius of the disc that is free at the start, m."""
+    """Radius of the disc that is assumed to be free at the start, m."""
     tick_s: float
     round_ticks: int
     """Number of ticks between two readings of a sensor."""
@@ -82,7 +82,8 @@ def map_step(
     time = tick * numbers.tick_s
     low, high, margin = numbers.limits
     move_window(space, pose[0], pose[1])
-    # The first tick clears the bubble. Later ticks add the way rolled since.
+    # The first tick clears the bubble. Each later tick adds the way rolled since the
+    # tick before.
     if space.facts[0, TICK] == NEVER:
         clear_disc(
             space,
@@ -109,7 +110,8 @@ def map_step(
         readings[k, 0], readings[k, 1] = 0.0, np.inf
         if ages[k] > 0.5 * numbers.tick_s:
             continue
-        # An object nearer than the least range reads as that range: nothing is free.
+        # For an object nearer than the least range, the sensor reports the least range.
+        # In this case, nothing counts as free.
         if echo[k] < 0.5:
             readings[k, 0] = high - margin
         else:
@@ -131,16 +133,17 @@ def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float
     Args:
         was_at: Pose in the tick before, m and rad.
         pose: Pose now, m and rad.
-        least: Least way that counts for each wheel, m: a wheel may have moved back and
-            forth.
+        least: Least way that counts for each wheel, m, because a wheel may have moved
+            back and forth.
         error: Contains the wheel separation and the pulse.
 
     Returns:
-        m. The result includes half a pulse, by which the way may exceed the count of
-        the encoders.
+        Mean way, m. It includes half a pulse, because the true way may exceed the count
+        of the encoders by this amount.
     """
     turn = pose[2] - was_at[2]
-    # The way is longer than its chord by at most 1/cos(turn/2). This factor is larger.
+    # The way is longer than its chord by at most the factor 1/cos(turn/2). The factor
+    # used here is larger.
     chord = math.hypot(pose[0] - was_at[0], pose[1] - was_at[1])
     way = chord * (1.0 + 0.25 * turn * turn)
     aside = 0.5 * error.wheel_separation_m * abs(turn)
@@ -151,15 +154,17 @@ def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float
 class FreeSpaceMap(Block):
     """Remembers which cells range sensors have seen free, and where echoes came from.
 
-    The sensors at one place see a cell free if the circle around it lies within their
-    apertures. The circle also has to be nearer than their readings, less a margin. The
-    cell stays free as long as its position relative to the robot is known to
-    ``place_error_m``. The position becomes uncertain because encoders count whole
-    pulses, and because wheels are known only up to ``wheel_error``. All sensors that
-    fire in a tick are entered in this tick.
+    The sensors at one place see a cell free if two conditions hold. The circle around
+    the cell lies within the apertures of these sensors. The whole circle is nearer than
+    their readings minus a margin. The cell stays free as long as its position relative
+    to the robot is known to ``place_error_m``. The position becomes uncertain because
+    encoders count whole pulses, and because the travel of each wheel has the relative
+    error ``wheel_error``. The block enters each reading in the tick in which the sensor
+    fires.
 
-    At the start, the bubble counts as free. The disc that contains the body counts as
-    free in every tick, because ``MotionGuard`` keeps it free.
+    At the start, a disc with the radius ``start_bubble_m`` counts as free. The disc
+    that contains the body counts as free in every tick, because ``MotionGuard`` keeps
+    it free.
 
     Abstract state: ``FreeSpace``, and the pose in the last tick.
     Rate and latency: a function of state and present inputs, in every tick; no latency.

@@ -42,10 +42,11 @@ class GuardNumbers(NamedTuple):
     robot: RobotParameters
     braking: BrakingNumbers
     kept: float
-    """Share of a change of wheel speed that the lag leaves after a tick."""
+    """Share of the difference between commanded and actual wheel speed that is left
+    after a tick."""
     reach: tuple[float, float]
-    """Distance from the axle within which cells are checked, m, and the rolled way for
-    which they have to stay free, m."""
+    """Distance from the axle within which cells are checked, m, and rolled way for
+    which free cells have to stay free, m."""
 
 
 def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
@@ -64,14 +65,14 @@ def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
     robot, braking = numbers.robot, numbers.braking
     theta, tick_s = pose[2], braking.tick_s
     before = state[0], state[1]
-    # Wheel speeds that the law wants; with a fault of the sensing, it has to stop.
+    # Wheel speeds that the law wants. With a fault of the sensing, both are zero.
     v_WP = numbers.velocity(before, command, theta, robot, tick_s)
     v, omega = hand_position_twist(v_WP, theta, robot.control_point_m)
     trusted = fault[0] < 0.5
     wish = limited_wheel_speeds(v, omega, robot) if trusted else (0.0, 0.0)
     here = pose[0], pose[1], pose[2]
     speeds = state[8], state[9]
-    # The part of this wish that the robot can brake from.
+    # The part of these wheel speeds from which the robot can brake to rest.
     danger = danger_of(space, tick * tick_s, here, numbers.reach, braking)
     done, wheels = chosen(here, speeds, wish, (state[2], state[3]), danger, braking)
     if not trusted:
@@ -106,30 +107,32 @@ def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
 
 
 class MotionGuard(Block):
-    """Obeys a law as far as the robot can brake to rest in free space.
+    """Passes the commands of a law as far as the robot can brake to rest in free space.
 
     The block replaces ``WheelCommand``: it has the same input and does the same work.
-    It passes the resulting wheel speeds if the robot can still brake to rest one tick
-    later. On the way to rest, the disc around the axle that contains the body has to
-    stay ``margin_m`` away from all cells that are not known to be free. Otherwise the
-    block passes lower speeds along the same curve, or the turn alone, or it brakes. The
-    virtual mass moves with the command that the guard passes.
+    It passes the resulting wheel speeds for one tick if the robot can brake to rest
+    after this tick. A disc around the axle contains the body. Until the robot is at
+    rest, this disc has to stay ``margin_m`` away from all cells that are not known to
+    be free. Otherwise the block passes lower speeds along the same curve, or the turn
+    alone, or it brakes. The virtual mass moves with the command that the guard passes.
 
-    With ``obstacle_speed_m_s``, the same applies to all obstacles in the sensors' view
-    that may come nearer at that speed, unless the robot withdraws from them.
+    If ``obstacle_speed_m_s`` is above zero, obstacles in the sensors' view may come
+    nearer at this speed. The disc then also has to stay ``margin_m`` away from all
+    points that such obstacles may reach, unless the robot withdraws from the obstacles.
 
     During a fault of the sensing, the guard brakes the robot to rest, whatever the law
     commands.
 
     ``guard_report`` has four numbers. The first is the action: 0 passed, 1 slowed, 2
     turned, 3 braked, 4 halted because of a fault of the sensing. The second is the
-    distance of the disc from space that is not free, less the distance that it has to
-    keep. The third is the stopping distance. The fourth is the second number for the
-    end of the view instead.
+    distance of the disc from space that is not free, minus the distance that the disc
+    has to keep. The third is the stopping distance. The fourth is the distance of the
+    disc from the end of the sensors' view, minus the distance that the disc has to
+    keep.
 
-    Discrete state, every tick: velocity of P, wheel speeds, report, and the wheel
-    speeds that follow with the lag of the motors. Rate and latency are those of
-    ``WheelCommand``.
+    Discrete state, every tick: velocity of P, wheel speeds, report, and modeled wheel
+    speeds, which follow the commanded ones with the lag of the motors. Rate and latency
+    are those of ``WheelCommand``.
 
     Args:
         parameters: ``GuardParameters``.
@@ -140,9 +143,9 @@ class MotionGuard(Block):
             ``twist_B``.
         tick_s: Period of the command, s.
 
-    Reference: ours; docs/guard.md has theorem and proof. Passive safety is that of
-    Bouraine, Fraichard and Salhi (2012), passive orientation safety that of Mitsch,
-    Ghorbal, Vogelbacher and Platzer (2017).
+    Reference: ours; docs/guard.md has theorem and proof. The concept of passive safety
+    is from Bouraine, Fraichard and Salhi (2012). The concept of passive orientation
+    safety is from Mitsch, Ghorbal, Vogelbacher and Platzer (2017).
     """
 
     part = "command"

@@ -31,18 +31,19 @@ class FreeSpaceParameters(Parameters):
     cell_m: float = Field(default=0.05, ge=0.005, le=0.25)
     """Side of a cell, m."""
     window_m: Length = 12.8
-    """Side of the remembered square, m; it moves along with the robot."""
+    """Side of the remembered square, m. The square moves along with the robot."""
     start_bubble_m: Length = 1.0
     """Radius about the axle that is assumed to be free at the start, m."""
     range_margin_m: NonNegativeLength = 0.002
-    """Largest amount by which a range is too long, m, in addition to five standard
+    """Largest amount, m, by which a range is too long, in addition to five standard
     deviations of its noise."""
     wheel_error: Fraction = 0.0
     """Relative error of each wheel's travel, in addition to the pulses of its
     encoder."""
     place_error_m: NonNegativeLength = 0.006
-    """Largest position error of a cell that counts as free, m, due to encoders and
-    ``wheel_error``. The guard keeps this distance in addition to its margin."""
+    """Largest position error, m, of a cell that counts as free. The error is due to the
+    encoders and ``wheel_error``. The guard keeps this distance in addition to its
+    margin."""
 
     @property
     def cells(self) -> int:
@@ -89,15 +90,16 @@ class GuardParameters(Parameters):
     """How the guard keeps a robot in free space."""
 
     obstacle_speed_m_s: NonNegativeSpeed = 0.0
-    """Largest speed of obstacles in view that the guard allows for, m/s; 0: all
-    obstacles are at rest."""
+    """Largest speed, m/s, that the guard assumes for obstacles in view. With 0, it
+    assumes that all obstacles are at rest."""
     braking_m_s2: Acceleration = 1.5
     """Deceleration of the faster wheel's rim when the guard brakes, m/s^2."""
     margin_m: NonNegativeLength = 0.006
-    """Distance that the guard keeps between the disc around the body and space that is
-    not free, m, in addition to ``free_space.place_error_m``."""
+    """Distance, m, that the guard keeps between the disc around the body and space that
+    is not free, in addition to ``free_space.place_error_m``."""
     least_margin_m: NonNegativeLength = 0.003
-    """Margin of a robot that has come nearer because a model was wrong, m."""
+    """Smaller margin, m, for a robot that has come nearer than ``margin_m`` because a
+    model was wrong."""
     slow_turn_rad_s: float = Field(default=0.3, ge=0.0, le=10.0)
     """A robot that turns on the spot no faster than this counts as at rest, rad/s."""
 

@@ -1,4 +1,4 @@
-"""A monitor of range sensors and odometry, on which the guard relies."""
+"""A monitor that finds faults of range sensors and odometry for the guard."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ SENSING_FAULTS = "none", "odometry lost", "silent", "frozen", "noisy"
 _NONE, _LOST, _SILENT, _FROZEN, _NOISY = range(5)
 
 #: Indices in the state of a sensor: its last two ranges, m; number of consecutive
-#: echoes; number of consecutive equal echoes; heading at the first of these, rad; mean
-#: share of recent readings that no motion explains; tick until which the last fault
-#: counts; and number of this fault.
+#: echoes; number of consecutive equal echoes; heading at the first equal echo, rad;
+#: mean share of recent readings that no motion explains; tick until which the last
+#: fault counts; and number of the last fault.
 _LAST, _BEFORE, _HEARD, _EQUAL, _HEADING, _STRANGE, _UNTIL, _FOUND = range(8)
 _EACH = 8
 
 #: Indices in the state before the sensors: pose, m and rad; whether odometry was lost.
 _POSE, _IS_LOST, _SENSORS = 0, 3, 4
 
-#: The odometry is lost if the pose moves farther than this multiple of what the wheels
-#: can do.
+#: The odometry is lost if the pose moves in one tick by more than this multiple of the
+#: largest motion that the wheels can cause.
 _FASTER = 2.0
-#: A sensor is silent if it has not fired for this number of rounds and this time, s.
+#: A sensor is silent if it has not fired for this number of rounds, and for at least
+#: this time, s.
 _ROUNDS, _SILENT_S = 3, 0.2
 #: A sensor with noise is frozen after this number of consecutive equal echoes. Any
 #: sensor is frozen if its echoes stay equal during a turn by its aperture plus the
@@ -43,7 +44,7 @@ _PART, _MOST_STRANGE = 0.1, 0.5
 #: Largest yaw rate at which ranges are checked for noise, rad/s. In a faster turn,
 #: edges of apertures move along surfaces.
 _SLOW_RAD_S = 0.3
-#: Time for which a fault of a sensor counts after its last sign, s.
+#: Time for which a fault of a sensor still counts after its last detection, s.
 _KEPT_S = 2.0
 
 
@@ -53,15 +54,17 @@ class MonitorNumbers(NamedTuple):
     limits: tuple[float, float]
     """Largest motion of the axle, m, and of the heading, rad, in one tick."""
     ranges: tuple[float, float]
-    """Least and greatest range, m. Only ranges between them are compared."""
+    """Least and greatest range, m. Only ranges between these limits are checked for
+    equal echoes."""
     silent_s: float
-    """Age of a range from which its sensor is silent, s."""
+    """A sensor is silent if its range is older than this, s."""
     equal: float
-    """Number of equal echoes of a frozen sensor; infinite without noise."""
+    """A sensor is frozen after this number of equal echoes. The number is infinite
+    without noise."""
     turn_rad: float
-    """Turn during which echoes cannot stay equal, rad."""
+    """Largest turn during which echoes may stay equal, rad."""
     step_m: float
-    """Second difference of a range that neither motion nor noise causes, m."""
+    """Largest second difference of a range that motion and noise can cause, m."""
     tick_s: float
 
 
@@ -131,24 +134,26 @@ def monitor_step(
 class SensingMonitor(Block):
     """Finds faults of range sensors and odometry, so that a guard stops the robot.
 
-    The faults by their numbers, ``SENSING_FAULTS``:
+    These are the faults with their numbers (``SENSING_FAULTS``):
 
-    1. In one tick, the pose of the odometry has moved farther than twice what the
-       wheels can do. This fault stays for the rest of the run.
-    2. A sensor has not fired for three rounds and 0.2 s.
-    3. The echoes of a sensor stay equal: 12 times although it has noise, or while the
-       robot turns by more than the sensor's aperture.
-    4. While the robot turns slowly, half of the recent echoes of a sensor have moved by
-       more than bodies and the specified noise can explain.
+    1. In one tick, the pose of the odometry has moved by more than twice the largest
+       motion that the wheels can cause. This fault stays for the rest of the run.
+    2. A sensor has not fired for three rounds, and for at least 0.2 s.
+    3. The echoes of a sensor stay equal. For a sensor with noise, 12 equal echoes are a
+       fault. For any sensor, equal echoes are a fault if the robot meanwhile turns by
+       more than the sensor's aperture.
+    4. More than half of the recent ranges of a sensor have changed by more than motion
+       and the specified noise can cause. The block checks ranges in this way only while
+       the robot turns slowly.
 
-    Faults 2 to 4 count for 2 s after their last sign.
+    Faults 2 to 4 still count for 2 s after their last detection.
 
     The monitor cannot distinguish a sensor that never reports an echo from one that
     points at empty space.
 
     Discrete state, every tick: pose; whether odometry was lost; and for each sensor its
-    last two ranges, the counts, the fault, and until when it counts. The output is a
-    function of state and inputs: no latency.
+    last two ranges, the counts, the last fault, and the tick until which this fault
+    counts. The output is a function of state and inputs: no latency.
 
     Args:
         sensors: The range sensors.

@@ -15,9 +15,10 @@ from systems.base.robot import RobotParameters, body_radius
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 
-#: Rims count as at rest if the lag leaves them no longer way than this, m.
+#: The rims of the wheels count as at rest if they will move by less than this, m, due
+#: to the lag.
 REST_M = 2e-4
-#: A robot turns on the spot if the lag leaves it no longer way forward than this, m.
+#: A robot turns on the spot if its axle will move by less than this, m, due to the lag.
 IN_PLACE_M = 5e-5
 #: Longest time between two positions that the guard compares with cells, s.
 _PART_S = 0.025
@@ -27,7 +28,7 @@ class Sectors(NamedTuple):
     """Apertures of range sensors, cut into sectors where they overlap.
 
     A group consists of all sensors at one place. Its sectors are adjacent and in
-    counterclockwise order. A sector between two apertures is seen by no sensor.
+    counterclockwise order. No sensor sees a sector between two apertures.
     """
 
     places: NDArray[np.float64]
@@ -44,15 +45,15 @@ class Sectors(NamedTuple):
 
 
 class PlaceError(NamedTuple):
-    """What the position error of a remembered cell depends on.
+    """Quantities that determine the position error of a remembered cell.
 
-    The error is that of the position relative to the robot.
+    The position of the cell is relative to the robot.
     """
 
     wheel_error: float
     """Relative error of each wheel's travel."""
     pulse_m: float
-    """Way of the rim per pulse of the encoder, m; 0: angles are not rounded."""
+    """Way of the rim per pulse of the encoder, m. It is 0 if angles are not rounded."""
     wheel_separation_m: float
     allowed_m: float
     """Largest position error of a cell that counts as free, m."""
@@ -105,12 +106,14 @@ def lasting(distance: float, error: PlaceError) -> float:
     """Computes the mean way of both rims after which a cell is forgotten, m.
 
     Args:
-        distance: Distance of the cell from the axle when it was seen, or more, m.
+        distance: Distance of the cell from the axle when it was seen, m, or an upper
+            bound of this distance.
         error: Errors of wheels and encoders.
 
     Returns:
-        The way at which ``place_error`` reaches the allowed error, m. It is infinite if
-        the error does not grow, and minus infinity if it is too large from the start.
+        The way at which ``place_error`` reaches the allowed error, m. The way is
+        infinite if the error does not grow. It is minus infinity if the error is too
+        large from the start.
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     a = 2.0 * e / separation
@@ -193,13 +196,14 @@ def stopping_way(
 
 
 def tick_parts(tick_s: float) -> int:
-    """Computes the number of parts of a tick after which positions are checked.
+    """Computes the number of parts into which the guard divides a tick.
 
     Args:
         tick_s: Period of the command, s.
 
     Returns:
-        The number. A part lasts at most 25 ms.
+        Number of parts. A part lasts at most 25 ms. The guard checks the position at
+        the end of each part.
     """
     return math.ceil(tick_s / _PART_S - 1e-9)
 
@@ -207,16 +211,18 @@ def tick_parts(tick_s: float) -> int:
 def unseen_approach(
     robot: RobotParameters, plant: PlantParameters, tick_s: float
 ) -> float:
-    """Computes how much nearer to a cell the axle may come than the guard checks, m.
+    """Computes by how much the axle may come nearer to a cell than the guard sees, m.
 
     The guard compares the position of the axle with cells at the end of each part of a
-    tick, until braking leaves the rims ``REST_M`` of way. Meanwhile the axle may
+    tick, until the rims will move by less than ``REST_M``. Between and after these
+    checks, four effects may bring the axle nearer to a cell:
 
-    * pass a corner: both ends of a chord d are at R from a point, but its middle is
-      nearer;
-    * deviate from the chord by a quarter of its length times the turn;
-    * go on and come back, if the wheels are reversed within the part;
-    * and coast after all that, also in a turn on the spot.
+    * The axle passes a corner of a cell. Both ends of the chord of its path are at the
+      radius of the body from the corner, but the middle of the chord is nearer.
+    * The path deviates from the chord by a quarter of the chord's length times the
+      turn.
+    * The axle goes on and comes back if the wheels reverse within the part.
+    * The axle coasts after the last check. It may also coast in a turn on the spot.
 
     Args:
         robot: Body, wheels and top speed.
@@ -224,8 +230,8 @@ def unseen_approach(
         tick_s: Period of the command, s.
 
     Returns:
-        The sum of the four, m: 1.6 mm with all defaults. ``least_margin_m`` has to be
-        at least as large.
+        Sum of the four effects, m. It is 1.6 mm with all defaults. ``least_margin_m``
+        has to be at least as large as this sum.
     """
     top, lag, part_s = (
         robot.top_speed_m_s,
@@ -234,11 +240,11 @@ def unseen_approach(
     )
     radius, half = body_radius(robot), min(0.5 * top * part_s, body_radius(robot))
     corner = radius - math.sqrt(radius * radius - half * half)
-    # The largest bow, for any distribution of the faster rim's speed between the
-    # wheels.
+    # The largest deviation of the path from its chord. It occurs if half of the rim's
+    # top speed drives the axle forward, and the other half turns the robot.
     bow = 0.25 * (0.5 * top * part_s) * (top * part_s / robot.wheel_separation_m)
-    # Speed at the start of the part from which the axle is back at its end, if the
-    # command reverses to full speed.
+    # Speed at the start of the part, if the command reverses to full speed and the axle
+    # is back at its starting point at the end of the part.
     lagged_s = -lag * math.expm1(-part_s / lag)
     begin = min(top * (part_s / lagged_s - 1.0), top)
     turns_s = lag * math.log1p(begin / top)

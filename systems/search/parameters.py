@@ -42,16 +42,17 @@ class UpwindGradientParameters(Parameters):
     """Our rules: go upwind, and turn toward the side with more gas."""
 
     gain_deg: Angle = 20.0
-    """Angle from upwind toward the front sensor with more gas, deg per factor e between
-    the ratios Rs/R0 of the two front sensors."""
+    """Gain of the angle from upwind toward the front sensor with more gas, deg. The
+    angle is this gain times the natural logarithm of the quotient of the two front
+    ratios Rs/R0."""
     largest_lean_deg: float = Field(default=45.0, ge=0.0, le=90.0)
     """Largest angle from upwind toward the side with more gas, deg."""
     lost_share: Fraction = 0.35
     """The robot has lost the plume if 1 - Rs/R0 of all sensors is below this share of
     the largest value so far."""
     cast_deg: float = Field(default=110.0, ge=45.0, le=180.0)
-    """Angle from upwind at which the robot searches for a lost plume, deg. It goes to
-    the two sides alternately, and each time one step farther."""
+    """Angle from upwind at which the robot searches for a lost plume, deg. The robot
+    goes to the two sides alternately, and each time one step farther."""
     still_air: Positive = 0.05
     """There is no wind if both airflow sensors read less than this, in their unit."""
 
@@ -72,11 +73,11 @@ class PlumeSearchParameters(Parameters):
     """Number of steps after which the robot gives up the search."""
     gate: bool = True
     """Whether a touched object must smell to count as the source. Off: any touched
-    object counts as the source, as printed."""
+    object counts as the source, as the paper prints."""
     gate_share: Fraction = 0.95
     """An object smells if the lowest gas ratio is below this. Clean air has the ratio
-    1. The mean ratios of the last two stops and all readings since the last stop
-    count."""
+    1. This lowest ratio is the minimum of the mean ratios of the last two stops and of
+    all readings since the last stop."""
     address: int = Field(default=1, ge=1, le=3)
     """Address of the robot in its radio frames (Song 2011, 3.3)."""
     call_every_s: Duration = 1.0
@@ -102,7 +103,8 @@ class SoundSearchParameters(Parameters):
     ``hold_within_m`` of the caller, it waits until the other robot reports its result.
     0: no robot goes first."""
     hold_within_m: Length = 1.2
-    """Distance from the caller, by radio level, within which the robot waits, m."""
+    """Distance from the caller within which the robot waits, m. The robot computes the
+    distance from the radio level."""
     hold_s: Duration = 200.0
     """Longest time for which the robot waits for the other robot, s."""
     call_within_s: Duration = 1800.0
@@ -117,15 +119,16 @@ class SoundSearchParameters(Parameters):
     """Time of a step for turning and driving, s (4.3)."""
     stop: Literal["range", "radio"] = "range"
     """Criterion for the arrival. ``range``: the heard range or the radio level.
-    ``radio``: only the radio level, as printed."""
+    ``radio``: only the radio level, as the paper prints."""
     stop_range_m: Length = 0.52
     """Heard range below which the robot has arrived, m."""
     radio_gate_m: Length = 1.2
-    """Distance by radio level below which the heard range counts, m."""
+    """Distance from the caller below which the heard range counts, m. The robot
+    computes the distance from the radio level."""
     radio_stop_m: Length = 0.42
-    """Distance by radio level below which the robot has arrived, m. The robot averages
-    the level over the listening time of a step. The paper prints 0.2 (4.3), but at this
-    distance the arms of the robots already touch."""
+    """Distance from the caller below which the robot has arrived, m. The robot computes
+    the distance from the mean radio level over the listening time of a step. The paper
+    prints 0.2 (4.3), but at this distance the arms of the robots already touch."""
     tries: int = Field(default=3, ge=1, le=100)
     """Number of consecutive steps without a unique direction of the sound after which
     the robot gives up."""

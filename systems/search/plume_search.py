@@ -47,12 +47,13 @@ class _Places(NamedTuple):
     readings: int
     """Number of readings in this stop."""
     smelt: int
-    """Lowest gas ratio: means of the last two stops, and readings since then."""
+    """Lowest gas ratio among the means of the last two stops and the readings since
+    then."""
     before: int
     """Lowest mean gas ratio at the last stop."""
     sum: int
-    """Sums of the five readings in this stop. Their smallest values, largest values and
-    means have the next three indices."""
+    """Sums of the five readings in this stop. The next three fields are the indices of
+    the smallest readings, the largest readings and the mean readings."""
     least: int
     most: int
     mean: int
@@ -83,7 +84,7 @@ class PlumeSearchNumbers(NamedTuple):
     """``turn(gas, airflow, memory, rules)``, for example ``song2011_turn``."""
     rules: Any
     wait: int
-    """Duration in ticks, as the next three fields."""
+    """Duration, ticks. The next three fields are also in ticks."""
     sense: int
     move: int
     repeat: int
@@ -299,8 +300,8 @@ class PlumeSearch(Block):
     The phases of ``song2011`` are those of the paper. The phases of ``upwind_gradient``
     are 1 upwind and 2 across.
 
-    Discrete state, every tick: the outputs, the measurements of the stop, and the
-    memory of the rules. Latency: one tick.
+    The discrete state holds the outputs, the measurements of the stop, and the memory
+    of the rules. It is updated every tick. The latency is one tick.
 
     Args:
         parameters: Durations of a step, rules, and end of the search.

@@ -16,13 +16,13 @@ def song2011_turn(
     """Computes the turning angle after a stop (Song 2011, 2.3.3 and 4.2).
 
     Phase 1 lasts until the robot is in the plume for the first time. Afterwards, the
-    airflow sensors determine the phase: 2 wind on one sensor, 3 wind on neither sensor,
-    4 wind on both sensors. Phase 4 compares R1 with R3, as phase 3 does.
-    For point G, section 4.2 prints "output of R1 was less than R2", but the text can
-    only mean R3.
+    airflow sensors determine the phase: phase 2 if one sensor has wind, phase 3 if
+    neither sensor has wind, and phase 4 if both sensors have wind. Phase 4 compares R1
+    with R3, as phase 3 does. For point G, section 4.2 prints "output of R1 was less
+    than R2", but the text can only mean R3.
 
     Args:
-        gas: (R1, R2, R3), ratios Rs/R0: right front, rear, left front.
+        gas: (R1, R2, R3), the ratios Rs/R0 right front, rear and left front.
         airflow: (F1, F2), left and right reading.
         memory: The first number is 1 after the robot was in the plume, else 0. The
             function changes it.

@@ -64,7 +64,7 @@ class _Places(NamedTuple):
     distance: int
     """Range of the source, m. 0 if it is not known."""
     away: int
-    """Distance of the caller by the radio level, m."""
+    """Distance from the caller, computed from the radio level, m."""
     parser: int
     frames: int
     size: int
@@ -172,15 +172,15 @@ def _decide(
 ) -> None:
     """Decides after a step whether the robot moves, listens again or stops.
 
-    The radio level gives a distance, the ears give a bearing and perhaps a range. The
-    robot has arrived if the distance or the range is below its threshold. The range
-    counts only near the caller. Without a unique bearing, the robot listens again. Near
-    the caller, the next move is shorter than ``move_s``.
+    The radio level gives a distance. The microphones give a bearing and perhaps a
+    range. The robot has arrived if the distance or the range is below its threshold.
+    The range counts only near the caller. Without a unique bearing, the robot listens
+    again. Near the caller, the next move is shorter than ``move_s``.
     """
     bearing, distance, detected, ranged, ambiguous, lost = heard
     own = numbers.own
     state[AT.fault] = float(_LOST_MICROPHONE) if lost > 0.5 else 0.0
-    # Distance of the caller by the mean radio level.
+    # Distance from the caller, computed from the mean radio level.
     level = state[_OWN.levels] / max(state[_OWN.readings], 1.0)
     away = radio_distance(level, numbers.level_dbm, numbers.exponent)
     state[_OWN.away] = away
@@ -193,7 +193,7 @@ def _decide(
     if ambiguous > 0.5:
         _missed(state, AMBIGUOUS, numbers)
         return
-    # The bearing is unique. Checks whether the heard range ends the search.
+    # The bearing is unique. Check whether the heard range ends the search.
     state[_OWN.misses] = 0.0
     state[_OWN.bearing] = math.degrees(bearing)
     state[_OWN.distance] = distance if ranged > 0.5 else 0.0
@@ -312,8 +312,8 @@ class SoundSearch(Block):
     ``systems.search.search_ending``. The phase is the activity: 1 waiting for the call,
     2 waiting for the first robot, 3 listening, 4 computing, 5 moving, 6 finished.
 
-    Discrete state, every tick: the outputs, the parser of the radio, and the
-    measurements of the step. Latency: one tick.
+    The discrete state holds the outputs, the parser of the radio, and the measurements
+    of the step. It is updated every tick. The latency is one tick.
 
     Args:
         parameters: Durations of a step, radio addresses, and end of the search.

@@ -33,8 +33,8 @@ _SHADED = 0.1
 _ABEAM_DEG = 80.0
 #: Lower limit of the gas ratios in the logarithm.
 _LEAST = 0.01
-#: Number of consecutive stops without wind that ends the search. The robot turns by
-#: 180 deg between them.
+#: Number of consecutive stops without wind after which the search ends. The robot turns
+#: by 180 deg between these stops.
 _CALM_STOPS = 3
 
 
@@ -46,9 +46,9 @@ def upwind_angle(airflow: Any) -> float:
         airflow: (F1, F2), left and right reading.
 
     Returns:
-        Turning angle to upwind, clockwise, deg. If the readings are proportional to the
-        cosine of the angle, the result is exact up to 39 deg. At larger angles, the
-        result is 80 deg to the side of the wind.
+        Turning angle to the upwind direction, clockwise, deg. If the readings are
+        proportional to the cosine of the angle, the result is exact up to 39 deg. At
+        larger angles, the result is 80 deg to the side of the wind.
     """
     left, right = airflow
     larger = max(left, right)

@@ -16,7 +16,7 @@ class AcousticParameters(Parameters):
     """Properties of the air."""
 
     sound_speed_m_s: SoundSpeed = 340.0
-    """Speed of sound where no temperature is set, m/s (Han 2019, 2.1)."""
+    """Speed of sound if no temperature is set, m/s (Han 2019, 2.1)."""
     temperature_c: float | None = Field(default=None, ge=-50.0, le=60.0)
     """Temperature, deg C; when set, the speed of sound follows from it."""
 

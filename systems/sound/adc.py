@@ -85,7 +85,7 @@ def convert(
         noise: (m, n) noise of unit variance.
         noise_pa: RMS of the noise, Pa.
         parameters: Sensitivity, gain and resolution.
-        gains: (m,) true gain over stated gain of each channel; None: 1.
+        gains: (m,) true gain divided by stated gain of each channel. None: all are 1.
 
     Returns:
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].

@@ -14,7 +14,8 @@ from systems.framework.input_error import InputError
 # Smallest distance between two microphones, m.
 _LEAST_DISTANCE_M = 1e-3
 
-# Microphones within this share of the aperture of a line or a plane are on it.
+# A microphone counts as on a line or a plane up to this distance from it, as a share of
+# the aperture.
 _FLATNESS = 0.01
 
 _UPRIGHT = ("above", "below")
@@ -48,10 +49,10 @@ class ArrayShape:
     """(r, d) orthonormal vectors in A that span the array. The vector of a row points
     to the left as seen in the direction ``ahead``."""
     ahead: NDArray[np.float64] | None
-    """(d,) unit vector perpendicular to the line or plane, towards the side that is
-    reported. It points towards +x, or +y for a row along x. For a plane in space it
-    points towards +z; if the plane is upright, the rule for rows applies. None if
-    nothing is ambiguous."""
+    """(d,) unit vector that is perpendicular to the line or plane and points to the
+    reported side. By default, it points towards +x for a row, or towards +y if the row
+    is along x. For a plane in space, it points towards +z by default; if the plane is
+    upright, the rule for rows applies. None if no side is ambiguous."""
     aperture_m: float
     """Largest distance between two microphones, m."""
     side: Literal["ahead", "behind", "above", "below"] | None = None
@@ -63,8 +64,8 @@ class ArrayShape:
 
         Args:
             positions: (n, 2) or (n, 3) positions in any frame, m; n is at least 3.
-            flat_m: Largest distance of a microphone from a line or a plane that it
-                belongs to, m. None: 1 % of the aperture.
+            flat_m: Largest distance from a line or a plane at which a microphone still
+                counts as on it, m. None: 1 % of the aperture.
 
         Returns:
             The microphones relative to their centroid, and what they span.
@@ -124,15 +125,15 @@ class ArrayShape:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom of the residuals of the delays; none if not positive."""
+        """Degrees of freedom of the residuals of the delays; 0 or less means none."""
         return self.count - 1 - self.unknowns
 
     @cached_property
     def angles(self) -> tuple[Literal["bearing", "elevation"], ...]:
         """Angles of a direction that the delays determine.
 
-        A slanted row determines neither angle. It determines the angle between the
-        direction and the row, but no azimuth and no elevation.
+        A slanted row determines neither bearing nor elevation. It determines only the
+        angle between the direction and the row.
         """
         if self.dimension == 2:
             return ("bearing",)

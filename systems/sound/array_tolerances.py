@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from systems.sound.parameters import MicArrayParameters, channel_skew
 
-# Largest spacing of knots, s. Within this time, even for a robot that turns at 4 rad/s,
-# the delay deviates from a cubic polynomial by less than 1e-4 sample.
+# Largest spacing of knots, s. Within this time, the delay deviates from a cubic
+# polynomial by less than 1e-4 sample, even if the robot turns at 4 rad/s.
 _SPACING_S = 0.0025
 
 
@@ -22,17 +22,18 @@ class Tolerances:
     """Errors of the n channels of an array."""
 
     position_errors: NDArray[np.float64]
-    """(n, 2) true less stated positions of the microphones, in B axes, m."""
+    """(n, 2) true minus stated positions of the microphones, in B axes, m."""
     channel_delays: NDArray[np.float64]
     """(n,) times by which the channels are sampled later than stated, s."""
     gains: NDArray[np.float64]
-    """(n,) true gain over stated gain of each channel, a ratio of amplitudes."""
+    """(n,) true gain divided by stated gain of each channel, as a ratio of
+    amplitudes."""
 
 
 def draw_tolerances(
     parameters: MicArrayParameters, count: int, generator: Generator
 ) -> Tolerances:
-    """Draws the errors of one array, each uniform between minus and plus its tolerance.
+    """Draws the errors of one array, uniformly distributed within its tolerances.
 
     Args:
         parameters: The tolerances.
@@ -40,7 +41,7 @@ def draw_tolerances(
         generator: Source of the random numbers.
 
     Returns:
-        Errors of positions (n, 2), m, and of delays (n,), s, and factors (n,) of the
+        (n, 2) errors of positions, m; (n,) errors of delays, s; and (n,) factors of the
         gain.
     """
     places = generator.uniform(-1.0, 1.0, (count, 2))
@@ -54,14 +55,14 @@ def draw_tolerances(
 
 
 class RealArray(NamedTuple):
-    """True properties of the array and the air; they may differ from stated ones."""
+    """True properties of array and air, which may differ from the stated ones."""
 
     p_BM: NDArray[np.float64]
     """(n, 2) microphones in B, m."""
     instants: NDArray[np.float64]
-    """(n, knots) times of the knots of each channel from the start of the frame, s."""
+    """(n, knots) times of the knots of each channel after the start of the frame, s."""
     gains: NDArray[np.float64]
-    """(n,) true gain over stated gain of each channel."""
+    """(n,) true gain divided by stated gain of each channel."""
     c: float
     """Speed of sound, m/s."""
 
@@ -72,7 +73,7 @@ def real_array(
     tolerances: Tolerances,
     c: float,
 ) -> RealArray:
-    """Array with its errors.
+    """Computes the true array from the stated array and its errors.
 
     Args:
         p_BM: (n, 2) stated positions of the microphones in B, m.
@@ -81,7 +82,8 @@ def real_array(
         c: Speed of sound, m/s.
 
     Returns:
-        True positions in B, m, instants of the knots of each channel, s, and gains.
+        True positions in B, m; instants of the knots of each channel, s; gains; and the
+        speed of sound, m/s.
 
     Raises:
         ValueError: The skew is given for another number of channels.

@@ -86,7 +86,7 @@ class EgoNoise:
             share: Rim speed as a share of the top speed, from ``driving_share``.
 
         Returns:
-            (n, samples) pressure over the RMS pressure of the source at 1 m.
+            (n, samples) pressure divided by the RMS pressure of the source at 1 m.
         """
         first = self._starts + (number - 1) * self._samples
         places = (first[:, None] + np.arange(self._samples)) % self._loops.shape[1]

@@ -54,39 +54,41 @@ class MicArray(Block):
 
     A frame published at t covers [t - frame_s, t); ``frame_s`` is 25 ms by default.
     Within a frame, the robot follows a cubic Hermite polynomial. Sound travels as in
-    ``systems.sound.propagation``. The state may lack the pose of one frame ago: before
-    the first frame, or if the output is evaluated between the ends of two frames. The
-    block then assumes that the robot has moved at its present velocity.
+    ``systems.sound.propagation``. In two cases, the state does not hold the pose of one
+    frame ago: before the first frame, and if the output is evaluated between the ends
+    of two frames. The block then assumes that the robot has moved at its present
+    velocity.
 
-    A room does not change the direct sound. For the reflections, robot and source are
-    at rest. Their positions are those at the last multiple of the room's
-    ``update_period_s``. The geometry is therefore up to this period old, plus the time
-    that the sound travels. The frame that ends at such an instant fades from the
-    previous positions to those of this instant.
+    A room does not change the direct sound. For the reflections, the block assumes that
+    robot and source are at rest. It uses their positions at the last multiple of the
+    room's ``update_period_s``. The geometry is therefore older than the sound by up to
+    this period plus the travel time of the sound. The frame that ends at an update
+    fades from the previous positions to the new positions.
 
-    A trial may set these numeric parameters in its context, at the latest before the
-    first tick. The class has constants of these names with their indices:
+    A trial may set these numeric parameters in its context before the first tick. For
+    each parameter, the class has a constant of the same name with the index of the
+    parameter:
 
     - ``POSITION_ERRORS``: (2 n,) x and y of one microphone after the other, m;
-    - ``CHANNEL_DELAYS``: (n,) s;
-    - ``GAINS``: (n,) 1 is no error;
+    - ``CHANNEL_DELAYS``: (n,) delays, s;
+    - ``GAINS``: (n,) factors, where 1 means no error;
     - ``SOUND_SPEED``: (1,) speed of sound in the air, m/s.
 
     The first three are explained in ``systems.sound.array_tolerances``. Their defaults
     are drawn from the seed, within the tolerances of the parameters.
 
-    State: time, pose and velocity of the robot at the end of the last frame. In a room,
-    the state also has time, pose of the robot and position of each source at the last
-    update. The state is updated every ``frame_s``. The output is a function of the
-    state and the present inputs; there is no latency.
+    The state holds time, pose and velocity of the robot at the end of the last frame.
+    In a room, the state also holds time, pose of the robot and position of each source
+    at the last update of the reflections. The state is updated every ``frame_s``. The
+    output is a function of the state and the present inputs; there is no latency.
 
     Args:
         parameters: Microphones, amplifier and converter.
         robot: Positions of the microphones.
         acoustics: Speed of sound.
         room: Walls, if there are any.
-        others: Names of further sources, which are not followed; each adds an input
-            port ``emission_<name>`` [Emission].
+        others: Names of further sources that the robot does not follow. Each name adds
+            an input port ``emission_<name>`` [Emission].
         seed: Seed of the noise and of the errors of the array.
 
     Raises:

@@ -129,11 +129,11 @@ class MicArrayParameters(Parameters):
     preamplifier_gain_db: float = Field(default=40.0, ge=-40.0, le=120.0)
     """Gain between microphone and converter, dB."""
     adc_full_scale_v: Positive = 1.65
-    """Largest positive and negative voltage before the converter clips, V."""
+    """Magnitude of the largest voltage that the converter does not clip, V."""
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
     channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
-    """Time by which each channel is sampled later, s; below one sample.
+    """Delay with which each channel is sampled, s; shorter than one sample.
 
     Give one time for each microphone, or an empty list if all channels are sampled at
     once.
@@ -142,17 +142,19 @@ class MicArrayParameters(Parameters):
     ego_noise_file: str | None = None
     """Recording of the noise of the robot itself (WAV, FLAC ...), repeated forever.
 
-    It has one channel for all microphones, or one channel for each.
+    The recording has one channel for all microphones, or one channel for each
+    microphone.
     """
     ego_noise_snr_db_at_1m: float = Field(default=20.0, ge=-40.0, le=150.0)
     """Level of the source at 1 m relative to the ego noise at top speed, dB."""
     ego_noise_share_at_rest: Fraction = 1.0
-    """Amplitude of the ego noise at rest over that at top speed. In between, the
-    amplitude is linear in the speed."""
+    """Amplitude of the ego noise at rest divided by its amplitude at top speed. Between
+    rest and top speed, the amplitude is a linear function of the speed."""
     position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
     """Largest error of the position of each microphone in x and in y, m.
 
-    This error and the next two are uniform, and drawn once from the seed.
+    This error and the errors of the next two fields are uniformly distributed. They are
+    drawn once from the seed.
     """
     delay_tolerance_s: float = Field(default=0.0, ge=0.0, le=1e-4)
     """Largest time by which each channel is sampled earlier or later, s."""
@@ -204,14 +206,14 @@ class MicArrayParameters(Parameters):
 
 
 def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
-    """Times by which the channels are sampled later.
+    """Delays with which the channels are sampled.
 
     Args:
-        parameters: Parameters with the skew; if it is empty, all times are 0.
+        parameters: Parameters with the skew. If the skew is empty, all delays are 0.
         count: Number of microphones.
 
     Returns:
-        (count,) times, s.
+        (count,) delays, s.
 
     Raises:
         InputError: The skew is given for another number of channels.
@@ -226,7 +228,7 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
     return np.array(skew) if skew else np.zeros(count)
 
 
-#: Largest allowed order of reflections, with more than four million images.
+#: Largest allowed order of reflections. It leads to more than four million images.
 GREATEST_ORDER = 150
 
 
@@ -242,14 +244,14 @@ class RoomParameters(Parameters):
     corner_m: Point | None = None
     """Corner of smallest x and y, in W, m.
 
-    Unset, the origin of W is in the middle of the floor.
+    If unset, the origin of W is in the middle of the floor.
     """
     reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
     """Time in which sound decays by 60 dB according to Sabine's formula, s.
 
-    The simulated decay agrees with this time in compact rooms that absorb little. In 7
-    x 7 x 3 m, the decay from -5 to -35 dB corresponds to 0.25, 0.45 and 0.72 s where
-    0.25, 0.4 and 0.6 s are set.
+    The simulated decay agrees with this time in compact rooms that absorb little. For
+    example, set 0.25, 0.4 or 0.6 s in a room of 7 x 7 x 3 m. The decay from -5 to -35
+    dB then corresponds to 0.25, 0.45 or 0.72 s.
     """
     absorption: float | None = Field(default=None, gt=0.0, le=1.0)
     """Share of the energy that the walls, floor and ceiling absorb.
@@ -259,15 +261,15 @@ class RoomParameters(Parameters):
     maximum_order: int | None = Field(default=None, ge=1, le=GREATEST_ORDER)
     """Largest number of reflections of one sound.
 
-    Unset, all reflections that arrive within the reverberation time count.
+    If unset, all reflections that arrive within the reverberation time are computed.
     """
     source_height_m: Length = 0.3
     """Height of every loudspeaker above the floor, m."""
     microphone_height_m: Length = 0.3
     """Height of the microphones above the floor, m."""
     update_period_s: float = Field(default=0.1, ge=1e-3, le=60.0)
-    """Period at which the poses for the reflections are updated, s; a multiple of a
-    frame."""
+    """Period at which the poses for the reflections are updated, s. It is a multiple of
+    the length of a frame."""
 
     @model_validator(mode="after")
     def _check(self) -> RoomParameters:

@@ -23,7 +23,7 @@ KERNEL_REACH = 6
 #: Below this distance, 1/R no longer grows, m, because a microphone is not a point.
 MINIMUM_RANGE_M = 0.01
 
-# Steps in samples that differ from a whole number by less than this are whole.
+# A step that differs from a whole number of samples by less than this is rounded.
 _SAME_RATE = 1e-9
 
 # A Kaiser window of 12 taps with this beta has an error of 1e-5 up to 18 kHz. At
@@ -33,12 +33,12 @@ _BETA = 10.0
 
 
 def _interpolation_kernel() -> NDArray[np.float32]:
-    """Windowed sinc as polynomials of the fraction of a sample, with an error of 1e-6.
+    """Fits polynomials to a windowed sinc, with an error of 1e-6.
 
     Returns:
-        (pairs, 2, 4) coefficients of the taps n and 11 - n. With u = fraction - 1/2,
-        the weights of the two taps are E + O and E - O, where E = sum_k e_k u^2k and O
-        = u sum_k o_k u^2k.
+        (pairs, 2, 4) coefficients of the taps n and 11 - n. The polynomials depend on
+        the fraction of a sample. With u = fraction - 1/2, the weights of the two taps
+        are E + O and E - O, where E = sum_k e_k u^2k and O = u sum_k o_k u^2k.
     """
     u = np.linspace(-0.5, 0.5, 257)
     x = np.arange(_TAPS) - (KERNEL_REACH - 0.5) - u[:, None]
@@ -60,10 +60,10 @@ INTERPOLATION_KERNEL = _interpolation_kernel()
 def _hermite(
     s: float, h: float, a: float, b: float, da: float, db: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Value and derivative at s in [0, 1] of the cubic between two knots.
+    """Value and derivative of the cubic between two knots, at the position s.
 
     Args:
-        s: Share of the interval.
+        s: Position in the interval, as a share of its length, 0 to 1.
         h: Length of the interval, s.
         a: Value at the first knot.
         b: Value at the second knot.
@@ -104,8 +104,8 @@ def microphone_paths(
         pose_0: (3,) first pose x, y, theta in W, m and rad.
         velocity_0: (3,) vx, vy in W and omega at the first pose, m/s and rad/s.
         end: Time of the second pose, s.
-        pose_1: (3,) second pose, as pose_0; theta may be wrapped.
-        velocity_1: (3,) velocity at the second pose, as velocity_0.
+        pose_1: (3,) second pose, in the form of pose_0; theta may be wrapped.
+        velocity_1: (3,) velocity at the second pose, in the form of velocity_0.
         p_BM: (m, 2) microphones in B, m.
 
     Returns:
@@ -161,7 +161,7 @@ def retarded_delays(
         rise: Height of the microphones above the source, m.
 
     Returns:
-        d and its rate of change, each (m, k), s and s/s.
+        (m, k) travel times d, s, and (m, k) rates of change of d, s/s.
     """
     delays = np.empty(times.shape)
     rates = np.empty(times.shape)
@@ -224,8 +224,9 @@ def _sample_delays(
         samples: Time of the first emitted sample, s, and rate of the samples, Hz.
 
     Returns:
-        Positions (m,) of the first instants among the emitted samples, delays (m, k) in
-        samples, their rates (m, k), and position of the earliest sample that is heard.
+        (m,) positions of the first instants among the emitted samples; (m, k) delays in
+        samples; (m, k) rates of change of the delays; and the position of the earliest
+        sample that is heard.
     """
     delays, rates = retarded_delays(
         times, p_WM, v_WM, knot_times, p_WS, v_WS, air[0], air[1]
@@ -277,12 +278,14 @@ def _interpolate(
     All times are in units of emitted samples. Between two knots, the delay is a cubic
     polynomial. The function computes the position of each output sample among the
     emitted samples, and the amplitude 1 / (c d). It then interpolates runs of output
-    samples at once. Within a run, the positions advance by one whole sample each.
+    samples at once. Within a run, the whole part of the position increases by one from
+    each output sample to the next.
 
     Args:
         samples: Emitted samples.
         kernel: ``INTERPOLATION_KERNEL``.
-        first: (m,) position of the first instant of each channel among the samples.
+        first: (m,) first instant of each channel, as a position among the emitted
+            samples.
         delays: (m, k) delays at evenly spaced knots.
         rates: (m, k) rates of change of the delays.
         units: Time from one output sample to the next; speed of sound, m per sample;
@@ -343,13 +346,14 @@ def _sampled_at(
 def sampled_at(
     sound: NDArray[np.float32], first: int, step: float, count: int
 ) -> NDArray[np.float32]:
-    """Samples of a sound at another rate, with the kernel of ``propagate``.
+    """Resamples a sound to another rate, with the kernel of ``propagate``.
 
     Args:
         sound: (m, n) samples.
-        first: Position of the first output sample; at least ``KERNEL_REACH``.
+        first: Position of the first output sample among the samples of the sound; at
+            least ``KERNEL_REACH``.
         step: Distance from one output sample to the next, in samples. At least
-            ``KERNEL_REACH`` samples must follow the last one.
+            ``KERNEL_REACH`` samples of the sound must follow the last output sample.
         count: Number of output samples.
 
     Returns:
@@ -372,7 +376,8 @@ def check_reach(
         c: Speed of sound, m/s.
 
     Raises:
-        InputError: The listener may hear sound that left before the emission begins.
+        InputError: The listener may hear sound that left the source before the stored
+            emission begins.
     """
     distance = math.dist(p_WL.tolist(), emission.p_WS[0].tolist())
     reach = time - emission.start_time - KERNEL_REACH / emission.sample_rate_hz
@@ -407,8 +412,8 @@ def propagate(
 
     Args:
         emission: Stored sound and motion of the source.
-        times: (m, k) evenly spaced instants from the first sample of each channel to
-            one sample past its last, s.
+        times: (m, k) evenly spaced instants, s. For each channel, they begin at its
+            first sample and end one sample after its last sample.
         p_WM: (m, k, 2) microphones at those instants, m.
         v_WM: (m, k, 2) velocities of the microphones, m/s.
         count: Number of samples per channel, a multiple of k - 1.
@@ -416,10 +421,12 @@ def propagate(
         rise: Height of the microphones above the source, m.
 
     Returns:
-        (m, count) sound pressure, Pa. Nearer than 1 cm, the amplitude is that at 1 cm.
+        (m, count) sound pressure, Pa. At distances below 1 cm, the amplitude is that at
+        1 cm.
 
     Raises:
-        InputError: A microphone hears sound that left before the emission begins.
+        InputError: A microphone hears sound that left the source before the stored
+            emission begins.
     """
     rate = emission.sample_rate_hz
     first, delays, rates, earliest = _sample_delays(

@@ -47,8 +47,10 @@ def record_frame(
         parameters: Microphones, amplifier, converter and length of the frame.
         seed: Seed of the noise.
         rise: Height of the microphones above the sources, m.
-        reflections: (n, samples) sound pressure of the reflections of each source, Pa.
-        ego_noise: (n, samples) ego noise over the level of the first source at 1 m.
+        reflections: For each source: (n, samples) sound pressure of its reflections,
+            Pa, or None if the source is silent.
+        ego_noise: (n, samples) ego noise divided by the level of the first source at 1
+            m.
 
     Returns:
         (n, samples) counts, with their full scale, rate and time.
@@ -87,7 +89,7 @@ def _direct_sound(
     parameters: MicArrayParameters,
     rise: float,
 ) -> list[NDArray[np.float32]]:
-    """Sound pressure without reflections of each sounding source, (n, samples) Pa."""
+    """(n, samples) direct sound pressure of each sounding source, Pa."""
     begin = time - parameters.frame_s
     sounding = [emission for emission in emissions if emission.sounding]
     for emission in emissions:
@@ -205,7 +207,7 @@ class Recorder:
         return MicMemory(last, places)
 
     def updates(self, time: float) -> bool:
-        """Whether the reflections get new positions at the end of a frame."""
+        """Whether the reflections get new positions at a time, s."""
         return round(time / self._parameters.frame_s) % self._update_frames == 0
 
     def _places(

@@ -30,15 +30,16 @@ def _place(places: NDArray[np.float64], source: int) -> tuple[float, ...]:
 class Reverberation:
     """Computes the sound of the reflections in a room.
 
-    The sound of a source is convolved with the response of the room. The response is
-    that of robot and source at rest in given positions. When the positions change, a
-    frame fades from the response of the old positions to that of the new positions. The
-    last responses are stored, so that a robot and a source at rest need only one
-    response.
+    The sound of a source is convolved with the response of the room. The response
+    assumes that robot and source are at rest in given positions. When the positions
+    change, a frame fades from the response for the old positions to the response for
+    the new positions. The class stores the last responses. Therefore it computes only
+    one response while robot and source are at rest.
 
     Args:
         room: Size and walls of the room.
-        c: Speed of sound from which absorption and length of the responses follow, m/s.
+        c: Speed of sound, m/s. It determines the absorption and the length of the
+            responses.
         parameters: Sample rate and length of the frames.
 
     Raises:
@@ -66,7 +67,7 @@ class Reverberation:
 
     @property
     def maximum_range_m(self) -> float:
-        """Longest travel of an audible reflection, m; emissions must cover it."""
+        """Longest way of an audible reflection, m; emissions must cover it."""
         return self._images.length / SAMPLE_RATE_HZ * self._c
 
     def frames(
@@ -80,7 +81,7 @@ class Reverberation:
         """Sound pressure of the reflections over the frame that ends now.
 
         Args:
-            emissions: Sounds of the k sources; they must reach back by the length of
+            emissions: Sounds of the k sources. Each must reach back by the length of
                 the response.
             time: Present time, s.
             old: (3 + 2 k,) pose of the robot in W, then x and y of each source, at the
@@ -89,7 +90,8 @@ class Reverberation:
             array: Array with its errors.
 
         Returns:
-            For each source (m, samples) Pa, or None if it is silent.
+            For each source: (m, samples) sound pressure, Pa, or None if the source is
+            silent.
 
         Raises:
             InputError: A microphone or a source is outside the room, or an emission

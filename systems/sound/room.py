@@ -1,8 +1,8 @@
 """Impulse responses of a shoebox room.
 
-The image sources (Allen and Berkley 1979) come from pyroomacoustics. All walls, floor
-and ceiling absorb the same share of the energy at every frequency. They do not scatter
-sound.
+The image sources (Allen and Berkley 1979) come from pyroomacoustics. The walls, the
+floor and the ceiling absorb the same share of the energy at every frequency. They do
+not scatter sound.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
 
     Args:
         room: Size and walls of the room.
-        c: Speed of sound from which absorption and length follow, m/s.
+        c: Speed of sound, m/s. It determines the absorption and the length of the
+            response.
 
     Returns:
         Signs, offsets in m and gains of k images, and the length of the response in
@@ -107,9 +108,10 @@ def _add_arrivals(
         images: Signs, offsets and gains of the images.
         p_S: (3,) source from the corner of the room, m.
         p_M: (m, 3) microphones from the corner of the room, m.
-        early: (m,) number of samples by which each impulse appears earlier.
+        early: (m,) number of samples by which the impulses appear earlier in each
+            channel.
         per_m: Number of samples in which sound travels one meter.
-        nearest: Smallest distance in the amplitude, m.
+        nearest: Distance below which the amplitude no longer grows, m.
         kernel: ``INTERPOLATION_KERNEL``.
         out: (m, length) responses, changed.
     """
@@ -160,13 +162,14 @@ def room_impulse_responses(
         p_WS: (2,) source in W, m.
         p_WM: (m, 2) microphones in W, m.
         c: Speed of sound, m/s.
-        late: Time by which all channels, or (m,) each channel, are sampled later, s.
+        late: Delay with which the channels are sampled, s: one number for all channels,
+            or (m,) one number per channel.
         direct: Whether to include the direct sound.
         images: Result of ``room_images``, if it is already known.
 
     Returns:
-        (m, length) pressure at 100 kHz relative to that at 1 m. The source emits the
-        impulse at the first sample.
+        (m, length) pressure at 100 kHz, relative to the pressure at 1 m. The source
+        emits the impulse at the first sample.
 
     Raises:
         InputError: See ``RoomParameters.walls``.

@@ -17,13 +17,13 @@ from systems.sound.acoustics import AcousticParameters
 from systems.sound.parameters import SoundParameters
 from systems.sound.waveforms import make_waveform
 
-#: Longest travel of sound without a room, m.
+#: Largest distance that sound travels if there is no room, m.
 MAXIMUM_RANGE_M = 30.0
 
-#: Start of a loudspeaker that has not been called, s.
+#: Start time of a loudspeaker that has not been called yet, s.
 _NEVER_S = 86_400.0
 
-#: Additional samples at the ends of an emission, for the interpolation.
+#: Number of additional samples at the end of an emission, for the interpolation.
 MARGIN = 64
 
 
@@ -86,8 +86,9 @@ def make_emission(
         time: Present time, a multiple of 10 us, s.
         waveform: Bursts end to end, from ``make_waveform``.
         sound: Schedule of the bursts.
-        p_WS: (k, 2) source in W at the last k ticks, the present one last, m.
-        v_WS: (k, 2) velocity of the source at these ticks, m/s.
+        p_WS: (k, 2) positions of the source in W at the last k ticks, m. The last row
+            is the present tick.
+        v_WS: (k, 2) velocities of the source in W at these ticks, m/s.
         tick_s: Time from one tick to the next, s.
 
     Returns:
@@ -124,19 +125,19 @@ def emissions_along(
     """Emissions of a ``SoundEmitter`` at each tick of a motion.
 
     Args:
-        p_WS: (ticks + n, 2) positions of the source, m. The first ``ticks`` rows
-            precede the first tick, when the source is at rest. A row needs to be known
-            only from its tick on.
+        p_WS: (ticks + n, 2) positions of the source, m. The first ``ticks`` rows are
+            before the first tick, and the source is at rest there. The caller may fill
+            the row of a tick as late as at this tick.
         v_WS: (ticks + n, 2) velocities of the source, m/s.
         waveform: Bursts end to end, from ``make_waveform``.
         sound: Schedule of the bursts.
         ticks: Number of earlier ticks, from ``history_ticks``.
         tick_s: Time from one tick to the next, s.
         on_since_s: Function that returns the time of the call, s, or None before the
-            call. None: the loudspeaker is not called.
+            call. If this argument is None, the loudspeaker plays without a call.
 
     Returns:
-        A function that maps a tick below n to its emission.
+        A function that returns the emission at a given tick below n.
     """
 
     def emission(tick: int) -> Emission:
@@ -169,7 +170,7 @@ def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParam
         on_since_s: Time of the call, s; None before the call.
 
     Returns:
-        The sound with its start time. Before the call, the start is at one day.
+        The sound with its start time. Before the call, the start time is one day.
     """
     since = _NEVER_S if on_since_s is None else on_since_s + sound.start_s
     return sound.model_copy(update={"start_s": since})
@@ -180,11 +181,11 @@ def history_ticks(
 ) -> int:
     """Number of ticks for which the motion of the source must be stored.
 
-    The first of these ticks is early enough for sound that arrives now from the maximum
-    range.
+    Sound that arrives in the present frame from the maximum range left the source after
+    the first of these ticks.
 
     Args:
-        maximum_range_m: Longest travel of sound, m.
+        maximum_range_m: Largest distance that sound travels, m.
         c: Speed of sound, m/s.
         frame_s: Longest frame of a listener, s.
         tick_s: Time from one tick to the next, s.
@@ -198,19 +199,21 @@ def history_ticks(
 class SoundEmitter(Block):
     """Plays the sound at the position of the source.
 
-    Discrete state, updated every tick: position and velocity of the source at the last
-    ticks, as far back as sound from the maximum range was emitted. Before time zero the
-    source is silent, and rests at its initial position. The output is a function of
-    time, state and present input; there is no latency.
+    The discrete state is updated every tick. It holds the positions and velocities of
+    the source at the last ticks. It reaches back to the time at which sound from the
+    maximum range was emitted. Before time zero, the source is silent and at rest at its
+    initial position. The output is a function of time, state and present input; there
+    is no latency.
 
     With ``called``, the block has a further input port ``calling`` (0 or 1). It stores
     the tick at which this port is 1 for the first time, and plays from this tick on.
-    Its schedule starts at this tick.
+    The schedule of the sound starts at this tick.
 
     Args:
         sound: Waveform, level and schedule of the sound.
         acoustics: Speed of sound.
-        maximum_range_m: Longest travel of sound to a listener, reflections included, m.
+        maximum_range_m: Largest distance that sound travels to a listener, including
+            reflections, m.
         frame_s: Longest frame of a listener, s.
         seed: Seed of the waveforms with noise.
         tick_s: Period of the update, s.

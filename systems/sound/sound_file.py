@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 
-# Programs that write to a pipe do not know the length and write one of these numbers.
+# Programs that write to a pipe do not know the length of the file. They write one of
+# these numbers instead.
 _UNKNOWN_SIZES = (0, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 
 # Number of frames that libsndfile reports for a FLAC file of unknown length.
@@ -44,12 +45,12 @@ def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
         field: Name of the parameter that holds the path, for the messages.
 
     Returns:
-        (channels, n) samples, full scale 1, and the rate in Hz.
+        (channels, n) samples, where 1 is full scale, and the rate in Hz.
 
     Raises:
-        InputError: The file is missing, not a sound file, empty, truncated, silent in
-            every channel or not finite. Or it holds more than ``MOST_SAMPLES`` samples,
-            or its rate is outside 1 to 400 kHz.
+        InputError: The file is missing, not a sound file, empty, truncated, or silent
+            in every channel. Or a sample is not finite, the file holds more than
+            ``MOST_SAMPLES`` samples, or its rate is outside 1 to 400 kHz.
     """
     path = require_file(path, field, "WAV or FLAC")
     where = repr(str(path))
@@ -85,11 +86,11 @@ def read_played(
         field: Name of the parameter that holds the path, for the messages.
 
     Returns:
-        (n,) samples, full scale 1, and the rate in Hz.
+        (n,) samples, where 1 is full scale, and the rate in Hz.
 
     Raises:
-        InputError: See ``read_sound``; or the file has several channels, or its rate is
-            too low.
+        InputError: ``read_sound`` refuses the file, the file has several channels, or
+            its rate is too low.
     """
     channels, rate = read_sound(path, field)
     if len(channels) != 1:
@@ -116,11 +117,11 @@ def read_noise(
         field: Name of the parameter that holds the path, for the messages.
 
     Returns:
-        (1 or count, n) samples, full scale 1, and the rate in Hz.
+        (1 or count, n) samples, where 1 is full scale, and the rate in Hz.
 
     Raises:
-        InputError: See ``read_sound``; or the file has another number of channels, or
-            is too short.
+        InputError: ``read_sound`` refuses the file, the number of its channels is
+            neither 1 nor ``count``, or the file is too short.
     """
     channels, rate = read_sound(path, field)
     if len(channels) not in (1, count):
@@ -141,9 +142,9 @@ def read_noise(
 class _Stream(soundfile.SoundFile):
     """A sound file that is read once from beginning to end.
 
-    soundfile queries the position of a seekable file after each block. This fails at
-    the end of a FLAC file of unknown length. The file therefore states that it is not
-    seekable.
+    soundfile queries the position of a seekable file after each block. This query fails
+    at the end of a FLAC file of unknown length. Therefore this class states that the
+    file is not seekable.
     """
 
     def seekable(self) -> bool:
@@ -213,7 +214,8 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
 
     libsndfile reads a truncated WAV file without an error message. It reads nothing
     from a file whose recorder left 0 as the length of the samples. This function
-    refuses truncated files, and replaces such a 0 by the mark of an unknown length.
+    refuses truncated files, and replaces a length of 0 by the mark of an unknown
+    length.
     """
     file_size = path.stat().st_size
     with path.open("rb") as file:
@@ -238,7 +240,7 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
 
 
 def _data_size(file: BinaryIO) -> int | None:
-    """Stated number of bytes of the samples of a WAV file; None if there are none.
+    """Stated number of bytes of the samples of a WAV file; None if no samples follow.
 
     Afterwards, the position in the file is the beginning of the samples.
     """

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from systems.sound.waveforms import LARGEST_CREST
 
-#: Largest number of bytes of samples. The header states its own size and that of the
-#: samples with 32 bits.
+#: Largest number of bytes of samples. The header stores the size of the file and the
+#: size of the samples with 32 bits each.
 LARGEST_WAV_BYTES = 2**32 - 1000
 
 

@@ -11,12 +11,12 @@ from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.parameters import EDGE_S, MICROPHONE_BAND_HZ, SoundParameters
 from systems.sound.sound_file import read_played
 
-#: The beginning of a file is cut up to the first sample above this level relative to
+#: A file is played from its first sample above this level on. The level is relative to
 #: the peak, dB.
 SILENCE_DB = -50.0
 #: Largest ratio of the peak to the requested RMS level.
 LARGEST_CREST = 4.0
-#: Shortest length of the noise, after which the noise repeats, s.
+#: Shortest length of the noise before it repeats, s.
 _NOISE_SECONDS = 2.0
 
 
@@ -28,9 +28,10 @@ def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
         seed: Seed of the noise.
 
     Returns:
-        (m n,) Pa at 100 kHz: m whole bursts of n samples, each with its edges. Burst k
-        of the run plays burst k mod m. A file continues from burst to burst, and starts
-        again at its end.
+        (m n,) sound pressure at 100 kHz, Pa. It consists of m whole bursts of n
+        samples, and each burst has its edges. The k-th burst of a run plays burst k mod
+        m of the waveform. A file continues from burst to burst. After its end, it
+        starts again.
 
     Raises:
         InputError: The file cannot be played. The message names the file and the

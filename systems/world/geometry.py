@@ -1,7 +1,8 @@
 """Planar geometry of points, rectangles, and sensor cones.
 
-A rectangle is (x, y, theta, length, width) in m and rad. The center and the heading are
-in the frame of the caller. The extents are along the rectangle's own x and y axes.
+A rectangle is (x, y, theta, length, width) in m and rad. The center (x, y) and the
+heading theta are in the frame of the caller. The length and the width are along the
+rectangle's own x and y axes.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from systems.world.plane import (
 #: of interest.
 _NORM_FLOOR = 1e-12
 
-#: Largest depth of an overlap that ``first_overlap`` may miss within a step, m.
+#: ``first_overlap`` may miss overlaps within a step up to this depth, m.
 _SHALLOW_M = 1e-4
 
 for _function in (
@@ -59,7 +60,7 @@ def safe_norm(x: Any, y: Any) -> Any:
         y: Second component, in the same unit.
 
     Returns:
-        Length in that unit, above 0; AutoDiffXd if a component is AutoDiffXd.
+        Length in the unit of x, above 0; AutoDiffXd if a component is AutoDiffXd.
     """
     return sqrt(x * x + y * y + _NORM_FLOOR**2)
 
@@ -88,7 +89,8 @@ def nearest_point_on_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
 
     Args:
         point: (x, y), m; floats, AutoDiffXd, or arrays.
-        rectangle: (x, y, theta, length, width), m and rad; each may be an array.
+        rectangle: (x, y, theta, length, width), m and rad; each component may be an
+            array.
 
     Returns:
         (dx, dy) in the frame of the arguments, m; (0, 0) if the point is inside.
@@ -145,8 +147,9 @@ def cone_range(
     """Computes the distance to the nearest surface inside a sensor's cone.
 
     The function cuts each edge of each rectangle to the part inside the cone. Then it
-    takes the nearest point of this part, which is exact. Hidden surfaces need no
-    special case, because only the nearest surface counts.
+    computes the exact distance to the nearest point of this part. The range is the
+    least of these distances. Hidden surfaces need no special case, because only the
+    nearest surface counts.
 
     Args:
         x: Position of the sensor, first component, m.
@@ -156,7 +159,8 @@ def cone_range(
         rectangles: (n, 5) rectangles in the same frame.
 
     Returns:
-        Range, m; 0 if the sensor is inside a rectangle, infinity if the cone is empty.
+        Range, m; 0 if the sensor is inside a rectangle, infinite if no surface is
+        inside the cone.
     """
     best = np.inf
     ca, sa = math.cos(axis), math.sin(axis)
@@ -168,12 +172,12 @@ def cone_range(
             j = (i + 1) % 4
             dx, dy = corners[i, 0] - x, corners[i, 1] - y
             fx, fy = corners[j, 0] - x, corners[j, 1] - y
-            # The sensor is inside if it is to the left of all edges.
+            # The sensor is inside the rectangle if it is to the left of all edges.
             if dx * fy - dy * fx < 0.0:
                 inside = False
             ax, ay = ca * dx + sa * dy, -sa * dx + ca * dy
             bx, by = ca * fx + sa * fy, -sa * fx + ca * fy
-            # Part of the edge, from low to high, that is within both sides of the cone.
+            # The part of the edge from low to high is between both sides of the cone.
             low, high = 0.0, 1.0
             for side in (1.0, -1.0):
                 ga = slope * ax - side * ay
@@ -215,7 +219,7 @@ def fan_ranges(
         control_point_m: Distance of P ahead of the origin of B, m.
 
     Returns:
-        (n,) ranges, m; infinite for an empty cone.
+        (n,) ranges, m; infinite if no surface is inside the cone.
     """
     x, y, theta = pose_WB
     c, s = math.cos(theta), math.sin(theta)
@@ -247,7 +251,7 @@ def segment_clearance(
         box: (x, y, theta, length, width) in the same frame, m and rad.
 
     Returns:
-        Distance, m; 0 if they meet.
+        Distance, m; 0 if the segment meets the rectangle.
     """
     c, s = math.cos(box[2]), math.sin(box[2])
     dx, dy = start[0] - box[0], start[1] - box[1]
@@ -255,7 +259,8 @@ def segment_clearance(
     dx, dy = end[0] - start[0], end[1] - start[1]
     along_x, along_y = c * dx + s * dy, c * dy - s * dx
     half_x, half_y = box[3] / 2.0, box[4] / 2.0
-    # The segment meets the rectangle if it is within both slabs of it at the same time.
+    # Each pair of opposite sides bounds a slab. The segment meets the rectangle if one
+    # of its points is in both slabs.
     enter, leave = 0.0, 1.0
     for at, along, half in ((x, along_x, half_x), (y, along_y, half_y)):
         safe = along if abs(along) >= 1e-12 else 1e-12
@@ -282,11 +287,12 @@ def segment_clearance(
 def contact_time(
     a: NDArray[np.float64], b: NDArray[np.float64], vx: float, vy: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the time until two rectangles touch. The first moves without turning.
+    """Computes the time until two rectangles touch. Neither rectangle turns.
 
-    Along the normal of each side, the projections of both rectangles overlap during one
-    interval of time. Convex shapes touch as long as all projections overlap. Therefore
-    the time of contact is the start of the intersection of all intervals.
+    The function projects both rectangles onto the normal of each side. On each normal,
+    the two projections overlap during one interval of time. The rectangles are in
+    contact at a time that is in all intervals. Therefore the first contact is at the
+    start of the intersection of all intervals.
 
     Args:
         a: (5,) first rectangle.
@@ -317,21 +323,22 @@ def first_overlap(
     """Computes when two moving rectangles first overlap during a step.
 
     The first rectangle moves straight and turns evenly during the whole step. The
-    second one moves in the same way in each part of the step, from one of its poses to
-    the next. An overlap at the end of a part counts from that end.
+    poses of the second rectangle divide the step into equal parts. In each part, the
+    second rectangle moves straight and turns evenly from one pose to the next. If the
+    rectangles overlap at the end of a part, the function returns the time of that end.
 
-    Within a part, the function uses conservative advancement. It computes the clearance
-    and the time in which no point can move farther than the clearance. Nothing touches
-    in this time, so the function advances by it and repeats. It advances by at least
-    0.1 mm of motion. Therefore it misses no overlap deeper than 0.1 mm at any speed.
+    Otherwise the function uses conservative advancement within the part. It computes
+    the clearance, and the time in which no two points can approach each other by more
+    than the clearance. The rectangles cannot touch in this time. Therefore the function
+    advances by this time and repeats. Each advance allows at least 0.1 mm of approach.
+    Therefore the function misses no overlap deeper than 0.1 mm at any speed.
 
     Args:
         before: (x, y, theta) of the first rectangle before the step, m and rad.
         now: (x, y, theta) of the first rectangle after the step, m and rad.
         size: Length and width of the first rectangle, m.
-        poses: (n + 1, 3) x, y, theta of the second rectangle at even times over the
-            step, m and rad. With one pose the second rectangle is at
-            rest.
+        poses: (n + 1, 3) x, y, theta of the second rectangle at equal intervals over
+            the step, m and rad. With one pose the second rectangle is at rest.
         other_size: Length and width of the second rectangle, m.
 
     Returns:
@@ -341,7 +348,8 @@ def first_overlap(
     a[3], a[4], b[3], b[4] = size[0], size[1], other_size[0], other_size[1]
     reach_a, reach_b = 0.5 * math.hypot(a[3], a[4]), 0.5 * math.hypot(b[3], b[4])
     parts, last = max(len(poses) - 1, 1), len(poses) - 1
-    # Motion of both rectangles in each part, and the largest approach of two points, m.
+    # Motion of both rectangles in each part, and the largest distance in m by which two
+    # of their points can approach each other.
     ways_a, ways_b, nearing = np.empty(3), np.zeros((parts, 3)), np.empty(parts)
     for j in range(3):
         ways_a[j] = (now[j] - before[j]) / parts
@@ -367,7 +375,7 @@ def first_overlap(
         if _clearance_after(1.0, a, b, ways_a, ways_b[k]) < 0.0:
             return (k + 1) / parts
         clearance, t = rectangle_clearance(a, b), 0.0
-        # An overlap at the start of a part was found at the end of the part before.
+        # An overlap at the start of a part was found at the end of the previous part.
         while clearance >= 0.0 and nearing[k] > 0.0:
             t += max(clearance, _SHALLOW_M) / nearing[k]
             if t >= 1.0:
@@ -382,7 +390,7 @@ def first_overlap(
 def _clearance_after(
     part: float, a: Any, b: Any, way_a: Any, way_b: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """Returns the clearance of two rectangles after a share of their motions, m."""
+    """Returns the clearance, m, of two rectangles after a share of their motions."""
     a, b = a.copy(), b.copy()
     for j in range(3):
         a[j] += part * way_a[j]

@@ -35,7 +35,7 @@ def poses_on(
         half = 0.5 * curvature * chord
         c, s = cosines[k], sines[k]
         if half != 0.0:
-            # Chord of the arc. It approaches the arc as the curvature goes to 0.
+            # Replace the arc length by the chord, which points along the mean heading.
             chord *= math.sin(half) / half
             c, s = math.cos(theta + half), math.sin(theta + half)
         poses[i, 0] = x + chord * c

@@ -1,9 +1,9 @@
 """Path of a body that moves through waypoints.
 
-Circular arcs round the corners. The speed rises and falls with a limited acceleration.
-Position and velocity are continuous and have closed forms. The yaw rate jumps at the
-ends of an arc. A robot with wheels cannot do this. For such a robot see
-``systems/base/carrier.py``.
+Circular arcs replace the corners. The speed rises and falls with a limited
+acceleration. Position and velocity are continuous and have closed forms. The yaw rate
+jumps at the ends of an arc. The yaw rate of a robot with wheels cannot jump, so
+``systems/base/carrier.py`` computes the motion of such a robot.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ AtEnd = Literal["stop", "shuttle"]
 
 #: Default acceleration of obstacles and of the leader, m/s^2 (not printed, our choice).
 #: It is a tenth of the acceleration at which wheels slip on a floor. A body reaches
-#: 0.3 m/s after 45 mm, and is 0.15 s behind a body that starts at this speed at once.
+#: 0.3 m/s after 45 mm. It is then 0.15 s behind a body that starts with 0.3 m/s.
 ACCELERATION_M_S2 = 1.0
 
 #: Speed below which a body is at rest, m/s.
@@ -58,19 +58,20 @@ class _Piece(NamedTuple):
 class WaypointPath:
     """Pose and velocity on a path through waypoints.
 
-    The motion starts and ends at rest. The speed along the path rises and falls with
-    the acceleration and is constant in between. On a short path it has no constant
-    part.
+    The motion starts and ends at rest. The speed along the path rises with the given
+    acceleration, stays constant, and falls with the same acceleration. On a short path
+    the phase of constant speed is missing.
 
     Args:
         waypoints: Points in W, m. With one point the body is at rest.
         speed: Speed along the path, m/s, >= 0.
         acceleration: Acceleration along the path, m/s^2, > 0.
-        corner_radius: Largest radius of the rounded corners, m, > 0. A corner takes at
-            most half of each neighboring leg.
+        corner_radius: Largest radius of the rounded corners, m, > 0. An arc replaces at
+            most half of each of the two lines that meet at the corner.
         start_time: Time until which the body rests at the first waypoint, s.
-        at_end: ``stop`` rests at the last waypoint. ``shuttle`` goes back and forth
-            without turning around, with an instant of rest at each end.
+        at_end: ``stop``: the body rests at the last waypoint. ``shuttle``: the body
+            goes back and forth between both ends. It stops for an instant at each end
+            and returns backward, without turning around.
         heading: Heading if there is one waypoint, rad. Otherwise the heading is the
             tangent of the path.
         top_yaw_rate: Largest yaw rate in corners, rad/s, > 0. It limits the speed on
@@ -148,12 +149,12 @@ class WaypointPath:
         return piece, distance, direction * (piece.speed + piece.acceleration * since)
 
     def pose(self, time: float) -> tuple[float, float, float]:
-        """Returns (x, y, theta) in W at a time in s, m and rad."""
+        """Returns (x, y, theta) in W, m and rad, at a time in s."""
         piece, s, _ = self._find(time)
         return _along(piece.x, piece.y, piece.theta, piece.curvature, s)
 
     def velocity(self, time: float) -> tuple[float, float, float]:
-        """Returns (vx, vy, omega) in W at a time in s, m/s and rad/s."""
+        """Returns (vx, vy, omega) in W, m/s and rad/s, at a time in s."""
         piece, s, rate = self._find(time)
         theta = piece.theta + piece.curvature * s
         return (
@@ -163,7 +164,7 @@ class WaypointPath:
         )
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Returns the (n, 3) poses in W at n times in s, m and rad; see ``pose``."""
+        """Returns the (n, 3) poses in W, m and rad, at n times in s; see ``pose``."""
         times = np.asarray(times, dtype=float)
         if not self._moves:
             return np.full((len(times), 3), self._pieces[0][1:4])
@@ -186,10 +187,10 @@ class WaypointPath:
         """Returns the speeds and yaw rates at both ends of each piece of the path.
 
         Within a piece the curvature is constant and the speed is linear in time.
-        Therefore every point of the body is fastest at one of the ends.
+        Therefore every point of the body is fastest at one end of the piece.
 
         Args:
-            until: Time up to which pieces count, s.
+            until: Time in s. Pieces that begin later are left out.
 
         Returns:
             (n, 2) forward speeds, m/s, and yaw rates, rad/s.
@@ -204,7 +205,7 @@ class WaypointPath:
         return np.reshape(rows, (-1, 2))
 
     def _elapsed(self, times: NDArray[np.float64]) -> tuple[Any, Any]:
-        """Returns times along the forward motion, s, and the direction, 1 or -1."""
+        """Returns the times in s on the forward motion, and the direction, 1 or -1."""
         elapsed = np.maximum(times - self._start_time, 0.0)
         if not self._shuttles:
             return elapsed, 1.0
@@ -235,10 +236,10 @@ def _pieces(
 ) -> tuple[list[_Piece], float]:
     """Computes the fastest motion along segments from rest to rest, and its duration.
 
-    The function works with squares of speeds, because these are linear in the distance.
-    It limits the squared speeds at the joints of segments in a forward pass (speeding
-    up) and a backward pass (braking). Then it splits each segment into up to three
-    pieces: speeding up, constant speed, and braking.
+    The function works with squared speeds, because they are linear in the distance. It
+    limits the squared speeds at the joints of segments in a forward pass (speeding up)
+    and a backward pass (braking). Then it splits each segment into up to three pieces:
+    speeding up, constant speed, and braking.
 
     Args:
         segments: Lines and arcs, end to end.
@@ -278,7 +279,7 @@ def _pieces(
 def _segments(
     waypoints: Sequence[tuple[float, float]], corner_radius: float
 ) -> list[_Segment]:
-    """Computes the lines between the waypoints and the arcs that join them."""
+    """Computes the lines between the waypoints, and the arcs that join the lines."""
     legs = []
     for (x0, y0), (x1, y1) in pairwise(waypoints):
         length = math.hypot(x1 - x0, y1 - y0)
@@ -334,7 +335,7 @@ def _segments(
 def _corner(
     turn: float, radius: float, room: float
 ) -> tuple[tuple[float, float] | None, float]:
-    """Returns ((curvature, arc length), length that a corner cuts off each leg)."""
+    """Returns (curvature, length) of the arc, and the length it cuts off each leg."""
     if abs(turn) < 1e-9:
         return None, 0.0
     half = math.tan(abs(turn) / 2.0)

@@ -3,8 +3,9 @@
 The checks of parameters use these functions. ``systems.world.geometry`` provides them
 to compiled code.
 
-A rectangle is (x, y, theta, length, width) in m and rad. The center and the heading are
-in the frame of the caller. The extents are along the rectangle's own x and y axes.
+A rectangle is (x, y, theta, length, width) in m and rad. The center (x, y) and the
+heading theta are in the frame of the caller. The length and the width are along the
+rectangle's own x and y axes.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from systems.framework.elementary import cos, sin
 def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """Transforms a vector from an inner frame, turned by theta, to the outer frame.
 
-    The function accepts floats and AutoDiffXd. It applies R = [[cos, -sin], [sin,
-    cos]], the transpose of the matrix that Han 2019, eq. 15 prints.
+    The function accepts floats and AutoDiffXd. It applies the matrix R = [[cos, -sin],
+    [sin, cos]]. Han 2019 prints the transpose of R in eq. 15.
 
     Args:
         theta: Angle of the inner frame in the outer frame, rad.
@@ -55,7 +56,8 @@ def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
 
     Args:
         point: (x, y), m; floats, AutoDiffXd, or arrays.
-        rectangle: (x, y, theta, length, width), m and rad; each may be an array.
+        rectangle: (x, y, theta, length, width), m and rad; each component may be an
+            array.
 
     Returns:
         (du, dv) along the rectangle's own axes, m; (0, 0) if the point is inside.
@@ -88,7 +90,7 @@ def beyond(u: Any, half: Any) -> Any:
         half: Half of the length of the interval, in the unit of u.
 
     Returns:
-        Distance in that unit, with the sign of u; 0 inside the interval.
+        Distance in the unit of u, with the sign of u; 0 inside the interval.
     """
     if u > half:
         return u - half
@@ -102,10 +104,11 @@ def beyond_each(u: NDArray[np.float64], half: ArrayLike) -> NDArray[np.float64]:
 
     Args:
         u: (...) coordinates in any unit.
-        half: (...) half lengths in the same unit, which broadcast with u.
+        half: (...) half lengths of the intervals, in the unit of u. The shape must
+            broadcast with the shape of u.
 
     Returns:
-        (...) distances in that unit.
+        (...) distances in the unit of u.
     """
     return u - np.clip(u, -np.asarray(half), half)
 
@@ -113,9 +116,10 @@ def beyond_each(u: NDArray[np.float64], half: ArrayLike) -> NDArray[np.float64]:
 def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Computes the distance between two rectangles, negative if they overlap.
 
-    The depth of an overlap comes from the separating-axis test. It is the shortest
-    motion that pushes the rectangles apart. If the rectangles do not overlap, the
-    nearest point is a corner of one of them.
+    If the rectangles overlap, the result is minus the depth of the overlap. The depth
+    is the length of the shortest motion that separates the rectangles (separating-axis
+    test). If the rectangles do not overlap, a corner of one rectangle is the point
+    nearest to the other rectangle.
 
     Args:
         a: (5,) first rectangle.
@@ -143,16 +147,17 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
 def side_normals(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> tuple[tuple[float, float, float, float], ...]:
-    """Computes the four normals of the sides of two rectangles, first those of a.
+    """Computes the side normals of two rectangles: two normals of a, then two of b.
 
     Args:
         a: (5,) first rectangle.
         b: (5,) second rectangle in the same frame.
 
     Returns:
-        (x, y, ahead, touching) per normal. (x, y) are its components. ``ahead`` is the
-        distance from the center of a to the center of b along the normal, m. At the
-        distance ``touching`` the projections of both rectangles just touch, m.
+        One tuple (x, y, ahead, touching) per normal. (x, y) is the unit normal.
+        ``ahead`` is the signed distance in m from the center of a to the center of b
+        along the normal. ``touching`` is the magnitude of this distance in m at which
+        the projections of both rectangles just touch.
     """
     ca, sa, cb, sb = math.cos(a[2]), math.sin(a[2]), math.cos(b[2]), math.sin(b[2])
     c, s = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)
@@ -169,15 +174,15 @@ def side_normals(
 def nearest_corner(
     u: float, v: float, c: float, s: float, corner: Any, half: Any
 ) -> float:
-    """Computes the squared least distance of a rectangle's corners from a box.
+    """Computes the squared distance from a box to the nearest corner of a rectangle.
 
     Args:
         u: Center of the rectangle in the axes of the box, first component, m.
         v: Center of the rectangle in the axes of the box, second component, m.
         c: Cosine of the angle of the rectangle in the axes of the box.
         s: Sine of this angle.
-        corner: Half of the extents of the rectangle, m.
-        half: Half of the extents of the box, m.
+        corner: Half of the length and half of the width of the rectangle, m.
+        half: Half of the length and half of the width of the box, m.
 
     Returns:
         Squared distance, m^2.

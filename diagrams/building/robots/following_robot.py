@@ -34,7 +34,7 @@ def following_blocks(
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         controller: The block of its law.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        others: Names of the sources that the robot does not follow.
+        others: Names of the sources and loudspeakers that the robot does not follow.
         seed_of: Returns the seed of a block, by its name.
 
     Returns:
@@ -88,7 +88,7 @@ def _tracker(scenario: Scenario) -> Any:
     """Makes the tracker for the kind of hearing.
 
     An ideal estimate is one tick old; an estimate from audio is older by half a frame.
-    The tracker of ideal estimates uses their exact covariance, and need not resolve
+    For ideal estimates, the tracker uses the exact covariance and does not resolve
     front and back.
     """
     tick, frame = scenario.tick_s, scenario.microphones.frame_s

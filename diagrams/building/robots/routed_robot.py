@@ -52,7 +52,7 @@ def make_trajectory_controller(scenario: Scenario) -> Any:
 
 
 def trajectory_command(scenario: Scenario) -> Any | None:
-    """Makes the safety filter of a robot with a route, which drives its wheels.
+    """Makes the safety filter that drives the wheels of a robot with a route.
 
     Args:
         scenario: Scenario of this robot alone.
@@ -81,7 +81,7 @@ def routed_blocks(
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Numbers of those bodies that are robots.
+        robots: Indices of the bodies that are robots.
         seed_of: Returns the seed of a block, by its name.
 
     Returns:

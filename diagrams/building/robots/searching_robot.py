@@ -25,7 +25,7 @@ def search_controller(scenario: Scenario) -> Any:
     """Makes the block of the search.
 
     Args:
-        scenario: Scenario of this robot alone, which searches.
+        scenario: Scenario of this searching robot alone.
 
     Returns:
         The block.

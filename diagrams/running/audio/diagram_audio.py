@@ -15,16 +15,16 @@ from systems.hearing.audio_port import read_audio
 class DiagramAudio:
     """Reads the sound at the microphones and loudspeakers of a diagram at every tick.
 
-    The monitor of the simulator calls this object before the updates of a tick. It
-    therefore reads the same values as the updates, and Drake computes them only once.
-    The diagram itself does not change.
+    The monitor of the simulator calls this object before the updates of a tick. The
+    object therefore reads the same values as the updates, and Drake computes these
+    values only once. The diagram itself does not change.
 
     Args:
         follower: The diagram.
         audio: Open files for the sound.
 
     Raises:
-        InputError: A robot that listens has no block with a port ``audio``.
+        InputError: A robot that listens has no block with an input port ``audio``.
     """
 
     def __init__(self, follower: SoundFollower, audio: RunAudio) -> None:
@@ -41,12 +41,12 @@ class DiagramAudio:
         }
 
     def __call__(self, context: Any) -> None:
-        """Saves the sound. The simulator calls this after every step.
+        """Saves the sound; the simulator calls this method after every step.
 
         Steps may be shorter than ticks; this method ignores the instants between ticks.
 
         Raises:
-            InputError: A port carries something other than a frame of these
+            InputError: A port carries something other than a frame of the robot's
                 microphones.
             OSError: The disk is full, or fails.
         """

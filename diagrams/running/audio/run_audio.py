@@ -25,7 +25,8 @@ from systems.sound.wav_writer import (
     pcm_of_pressure,
 )
 
-#: Port by which a block reports whether the robot listens. Without it, it always does.
+#: Port by which a block reports whether the robot listens. A robot without such a port
+#: always listens.
 LISTENING = "listening"
 
 
@@ -64,15 +65,15 @@ class _Played(NamedTuple):
 class RunAudio:
     """Files with the sound of one run; they grow during the run.
 
-    ``heard.wav`` has one channel per microphone. It has the sample rate of the
-    converter, and holds its counts times a power of two. ``array.yaml`` contains the
-    positions of the microphones. ``played.wav`` contains the sound of the loudspeaker,
-    at 100 kHz. If there are several robots or loudspeakers, file names begin with the
-    name of the robot or source and a dot. Time in the files is time in the run: frames
-    are silent while a robot does not listen.
+    ``heard.wav`` has one channel per microphone and the sample rate of the converter.
+    Its samples are the counts of the converter times a power of two. ``array.yaml``
+    contains the positions of the microphones. ``played.wav`` contains the sound of the
+    loudspeaker, at 100 kHz. If there are several robots or loudspeakers, file names
+    begin with the name of the robot or source and a dot. The time in a file equals the
+    time in the run. While a robot does not listen, its file contains silence.
 
-    This class is a context manager. On exit it closes the files, and removes them if
-    nothing was written. ``simulate`` fills them.
+    This class is a context manager. ``simulate`` fills the files. On exit, the class
+    closes the files, and removes them if nothing was written.
 
     Args:
         scenario: The scenario to run.
@@ -165,7 +166,7 @@ class RunAudio:
             scenario: The scenario to run.
 
         Raises:
-            InputError: The scenario is another one, or something was written.
+            InputError: The files belong to another scenario, or contain sound already.
         """
         if scenario != self.scenario or self.until_s > 0.0:
             raise InputError(
@@ -176,7 +177,7 @@ class RunAudio:
 
     @property
     def frame_ticks(self) -> dict[str, int]:
-        """Number of ticks per audio frame, by robot that listens."""
+        """Number of ticks per audio frame, by name of each robot that listens."""
         return {
             name: round(heard.microphones.frame_s / self._tick_s)
             for name, heard in self._heard.items()
@@ -203,7 +204,7 @@ class RunAudio:
                 listen.
 
         Raises:
-            InputError: The frame does not fit these microphones.
+            InputError: The frame does not fit the robot's microphones.
             OSError: The disk is full, or fails.
         """
         if tick == 0:
@@ -241,7 +242,7 @@ class RunAudio:
         self.until_s = tick * self._tick_s
 
     def facts(self) -> Mapping[str, Any]:
-        """Returns the contents of each file as plain values; names lack directories."""
+        """Returns facts about each file as plain values; names have no directory."""
         heard = {
             name: {
                 "file": own.writer.path.name,

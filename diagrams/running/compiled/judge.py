@@ -33,17 +33,17 @@ class Contacts(NamedTuple):
     sizes: NDArray[np.float64]
     """(n, 2) length and width of the bodies, m."""
     reach: NDArray[np.float64]
-    """(n,) the robot and a body cannot touch if their centers are farther apart, m."""
+    """(n,) distances of the centers, m, beyond which robot and body cannot touch."""
     steps: NDArray[np.float64]
     """(n,) upper bounds of the distances that the bodies move in a tick on their own
     paths, m."""
     robots: NDArray[np.int64]
-    """(n,) number of the robot that the body is; -1 for other bodies."""
+    """(n,) number of the robot, if the body is a robot; otherwise -1."""
     parts: int
     """Number of parts per tick."""
     poses: NDArray[np.float64]
-    """(n, parts ticks + 1, 3) poses of the bodies that are not robots, at the ticks and
-    at the parts between them."""
+    """(n, parts * ticks + 1, 3) poses of the bodies at the ends of all parts of the
+    ticks; rows of robots are not filled."""
 
 
 def contacts_of(
@@ -94,10 +94,10 @@ def judge_all(
 ) -> bool:  # pragma: no cover  (compiled)
     """Judges all robots at a tick, in the same way as ``RunRules``.
 
-    For each robot, a contact comes first. It does not count if a contact switch is
-    closed by a body. A robot without a contact and without a cause is then judged by
-    ``judge_search`` or ``judge_tick``. If the run continues, the present poses become
-    the poses at the previous tick.
+    For each robot, the function first looks for a contact, unless a body closes a
+    contact switch of the robot. If there is no contact and the robot has no cause yet,
+    ``judge_search`` or ``judge_tick`` judges the robot. If the run continues, the
+    function saves the present poses as the poses at the previous tick.
 
     Args:
         tick: Number of the tick.

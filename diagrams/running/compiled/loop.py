@@ -1,14 +1,14 @@
 """The blocks of a scenario in one compiled loop over ticks.
 
 Drake's diagram remains the model. The loop calls the same functions, which are the
-``Step`` of each block. Names of ports determine their order. The integrator and the
-random numbers are the same, and the loop logs the same columns.
+``Step`` of each block. The names of the ports determine the order of the calls. The
+integrator and the random numbers are the same, and the loop logs the same columns.
 
 Each tick has the following order, which is the same as in Drake:
 
 1. The outputs that are part of a state are already published.
-2. The blocks with other outputs do their steps. Each follows the blocks whose outputs
-   it reads.
+2. The blocks with other outputs do their steps. Each block follows the blocks whose
+   outputs it reads.
 3. The stop rules judge.
 4. The blocks with state outputs do their steps, except plants, and publish their
    outputs.
@@ -48,7 +48,7 @@ class CompiledLoop:
     rules: RunRules
     """Stop rules; they know why the run ended."""
     columns: Mapping[str, Mapping[str, int]]
-    """Numbers of the columns in the log by name, for each robot and the world."""
+    """Indices of the columns in the log, by robot or world, and by column name."""
     plan: LoopPlan
     """The parts of a tick."""
     over: bool = False

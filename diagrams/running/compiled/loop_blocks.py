@@ -21,7 +21,8 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step
 from systems.framework.input_error import InputError
 
-#: Inputs from outside: those of a robot from the world, and of the world from robots.
+#: Inputs from outside: inputs of a robot that come from the world, and inputs of the
+#: world that come from robots.
 _WORLD = *OUTSIDE, "frames"
 #: Fields of a scenario that do not affect how blocks are made. ``RunFacts`` provides
 #: the values of a run that blocks need.
@@ -41,7 +42,7 @@ _NO_BLOCKS = {
     "wind",
     "odor",
 }
-#: Shared blocks by the values that they were made from; the last used ones are last.
+#: Shared blocks by the values that they were made from, most recently used last.
 _SHARED: dict[str, LoopBlocks] = {}
 _MOST_SHARED = 64
 
@@ -93,8 +94,8 @@ class LoopBlocks:
             run: Facts about the run.
 
         Returns:
-            The steps by part; and functions from the tick to the object that a port
-            carries, by port, including ports from outside.
+            The steps, by part. Also, for each port that carries an object, a function
+            that returns this object at a tick. Ports from outside are included.
 
         Raises:
             InputError: A user's own block has no step.
@@ -146,10 +147,11 @@ def _step_for(block: Any, run: RunFacts) -> Step:
 
 
 def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
-    """Returns blocks for a compiled loop, and reuses those of earlier scenarios.
+    """Returns blocks for a compiled loop, and reuses blocks of earlier scenarios.
 
-    Blocks are reused if the scenarios differ only in layout, start and seed. Reuse
-    matters because Drake never frees blocks written in Python.
+    Blocks are reused if the scenarios differ only in fields that do not affect the
+    blocks, such as layout, start and seed. Reuse matters because Drake never frees
+    blocks written in Python.
 
     Args:
         scenario: The scenario to run.
@@ -182,7 +184,7 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
 
 
 def shared_world(scenario: Scenario) -> LoopBlocks | None:
-    """Returns the blocks that all robots share; like ``shared_blocks``, it reuses them.
+    """Returns the blocks that all robots share, and reuses blocks of earlier scenarios.
 
     Args:
         scenario: The scenario to run.

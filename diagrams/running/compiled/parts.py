@@ -123,9 +123,9 @@ def run_parts(
 ) -> tuple[int, bool]:  # pragma: no cover  (compiled)
     """Runs ticks of a compiled loop.
 
-    At the start of the run it publishes the state outputs. Each tick then runs the
-    first parts, the judge, and the parts before the log. It logs one row. Unless the
-    run is over, it runs the parts after the log.
+    At the start of the run, the function publishes the state outputs. In each tick, it
+    runs the first parts, the judge, and the parts before the log. It then logs one row.
+    Unless the run is over, it also runs the parts after the log.
 
     Args:
         begin: First tick.
@@ -133,10 +133,10 @@ def run_parts(
         log: (ticks, columns) rows to fill.
         logged: (n, 2) addresses of the logged values, and their numbers of elements.
         parts: (m, 2) addresses of functions and of their words.
-        plan: Numbers of parts, in five entries: those that publish at the start of the
-            run; those that come first in a tick; the judge; (k, 2) those before the
-            log; and (m, 2) those after it. The second column states whether the part
-            publishes.
+        plan: Five entries with indices of parts: the parts that publish at the start of
+            the run; the first parts of a tick; the judge; a table (k, 2) of the parts
+            before the log; and a table (j, 2) of the parts after the log. The second
+            column of the tables is 1 if the part publishes, and 0 if it does its step.
 
     Returns:
         The tick after the last logged one, and whether the run is over.

@@ -161,7 +161,8 @@ class LoopPlan:
 
         Args:
             name: Name of the robot.
-            function: Takes the pose and velocity of the robot, and whether it calls.
+            function: Takes the tick, and the pose and velocity of the robot, followed
+                by whether the robot calls (0 or 1).
         """
         ports = "pose_WB", "velocity_WB", "calling"
         motion = tuple(map(self._robots[name].view, ports))
@@ -171,11 +172,11 @@ class LoopPlan:
     def show(
         self, view: NDArray[np.float64], function: HostFunction, period_ticks: int
     ) -> None:
-        """Passes values to a Python function, after the steps before the stop rules.
+        """Passes values to a Python function, directly before the stop rules judge.
 
         Args:
             view: (n,) values of a port.
-            function: Takes the values.
+            function: Takes the tick and the values.
             period_ticks: Period of the calls, ticks.
         """
         step = host_step(function, len(view), 0, period_ticks)
@@ -186,9 +187,9 @@ class LoopPlan:
     ) -> int:
         """Adds the part of a block, as generated source, and returns its number.
 
-        A part of a block with state outputs does either its step or, when called with
-        ``PUBLISH``, the publication. The part of any other block sets its outputs to
-        zero before the step fills them.
+        If the block has state outputs, its part normally does the step. If the part is
+        called with ``PUBLISH``, it publishes these outputs instead. The part of any
+        other block sets the outputs to zero, and then the step fills them.
         """
         if step.host is not None:
             self.hosts.append(step.host)
@@ -270,7 +271,7 @@ class LoopPlan:
 
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
-        """The arguments of ``run_parts`` after the log; this compiles the parts."""
+        """Arguments of ``run_parts`` after ``log``; the first use compiles parts."""
         self._kept = [
             (compiled_part(text, part.names), part.words())
             for part, text in self._parts

@@ -25,8 +25,9 @@ class Sounds(NamedTuple):
     """Emission at a tick, by robot and input port; empty for a robot that hears no
     sound waves."""
     carried: dict[str, HostFunction]
-    """For each robot with a loudspeaker: a function that records its pose and velocity.
-    The loop calls it at every tick before any robot hears the loudspeaker."""
+    """For each robot with a loudspeaker: a function that records the pose and velocity
+    of the robot. At every tick, the loop calls this function before any robot hears the
+    loudspeaker."""
     played: dict[str, Callable[[int], Emission]]
     """Emission at a tick, by source or robot with a loudspeaker; empty if no robot
     hears sound waves."""
@@ -43,7 +44,7 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
         times: (n,) times of the ticks, s.
 
     Returns:
-        Functions of ticks below n.
+        The sounds; their functions accept ticks below n.
 
     Raises:
         InputError: A sound file cannot be played.
@@ -85,13 +86,13 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
 
 
 class CalledOn:
-    """The time at which a loudspeaker was called on."""
+    """Time of the first call of a robot, which turns on its loudspeaker."""
 
     def __init__(self) -> None:
         self.time_s: float | None = None
 
     def since(self) -> float | None:
-        """The time, s; None if there was no call yet."""
+        """Returns the time, s; None before the first call."""
         return self.time_s
 
 

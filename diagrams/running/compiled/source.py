@@ -34,7 +34,7 @@ from systems.framework.compiling import cache_folder, njit, source_digest
 from systems.framework.input_error import InputError, shortened
 from systems.framework.parameters import Parameters
 
-#: Generated files that were not used for this time are removed, s.
+#: Time without use after which a generated file is removed, s.
 _KEPT_S = 30 * 86_400.0
 
 _LOGGER = logging.getLogger("phonotaxis")
@@ -128,7 +128,8 @@ class LoopPart:
         Address and shape are words. The source therefore serves all layouts.
         """
         if id(value) not in self._arrays:
-            # An empty list becomes an array of pairs; a scalar, an array of one number.
+            # An empty list becomes an array of pairs. A scalar becomes an array with
+            # one number.
             empty = isinstance(value, list) and not value
             whole = np.ascontiguousarray(np.empty((0, 2)) if empty else value)
             if whole.dtype not in ARRAYS:
@@ -166,9 +167,9 @@ def _tuple_type(model: type[Parameters]) -> Any:
 def _compilable(function: FunctionType) -> Any:
     """Makes a function callable from compiled code, without the checks that wrap it.
 
-    numba knows the function by its type alone. A compiled function in a named tuple
-    would be a pointer, and numba does not cache code with pointers. The plain functions
-    in a user's own modules that it calls are registered, too.
+    numba identifies the function by its type alone. A compiled function in a named
+    tuple would be a pointer, and numba does not cache code with pointers. If the
+    function calls plain functions in a user's own modules, these are registered, too.
     """
     plain = inspect.unwrap(function)
     for called in _users_helpers(plain, set()):
@@ -273,7 +274,7 @@ def _is_known(value: Any) -> bool:
     if module is None:
         return False
     if isinstance(function, FunctionType):
-        # A user's module that was loaded again differs from that of an older function.
+        # A function is stale if its module has been loaded again since.
         stale = function.__globals__ is not vars(module)
         if function.__closure__ or stale:
             return False
@@ -286,7 +287,7 @@ def _is_ours(function: Any) -> bool:
 
 
 def _origins(names: Mapping[str, Any]) -> Iterator[str]:
-    """Yields the origin of each name, and digests of all files that it depends on."""
+    """Yields the origins of the names, and digests of all files that define them."""
     files = {Path(__file__)}
     for name, value in names.items():
         function = getattr(value, "py_func", value)

@@ -1,4 +1,4 @@
-"""Checks whether robots with routes can reach their goals, judged by positions."""
+"""Checks by positions whether robots with routes can reach their goals."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ def check_goals(robots: Mapping[str, FollowerParameters], farthest_m: float) -> 
         farthest_m: ``stop.diverged_range_m``, m.
 
     Raises:
-        InputError: A goal is so far from the start that the run counts as diverged, the
-            bodies of two robots would overlap at their goals, or a guard is set.
+        InputError: A goal is so far from the start that the run counts as diverged; the
+            bodies of two robots would overlap at their goals; or a robot with a route
+            has a guard.
     """
     routed = {prefix: robot for prefix, robot in robots.items() if robot.route}
     for prefix, robot in routed.items():

@@ -81,9 +81,9 @@ def _check_memory(
 ) -> None:
     """Refuses a place error that is too small for the braking distance.
 
-    A body that is a braking distance ahead must stay on the map until the robot has
-    stopped. Meanwhile odometry adds an error to its position, which ``place_error_m``
-    must cover.
+    A body at the braking distance ahead must stay on the map until the robot has
+    stopped. Meanwhile odometry adds an error to the position of the body on the map.
+    ``place_error_m`` must cover this error.
     """
     known, body = robot.free_space, robot.robot
     stopping = stopping_way(guard, body, robot.plant, tick_s)

@@ -32,7 +32,8 @@ def check_searches(
         run: Fields of the run.
 
     Raises:
-        InputError: Names the field and the remedy.
+        InputError: A searching robot lacks its source or a sensor, has a guard, or has
+            the address of another robot. The error names the field and the remedy.
     """
     searching = {name: each for name, each in robots.items() if each[1].searches}
     taken: dict[int, str] = {}

@@ -47,10 +47,11 @@ def single_faults(
         model: Model of the changed group.
         data: Changed fields.
         schema: JSON Schema of a scenario.
-        place: Group and name of the changes in the scenario.
+        place: Group of the changes in the scenario (``robots`` or ``sources``), and the
+            name in this group.
 
     Returns:
-        Faults; the field of each begins with the name.
+        The faults. Each path of a field begins with the name, without the group.
     """
     try:
         model.model_validate(data)
@@ -76,7 +77,7 @@ def _faults(
     what: str,
     above: tuple[str, ...] = (),
 ) -> Iterator[InputError]:
-    """Yields the faults; ``above`` is the place of the data, without its group."""
+    """Yields the faults of data at the place ``above``; paths omit its group."""
     below = [str(part) for part in details["loc"] if part != "[key]"]
     place = [*above, *below]
     field, kind = ".".join([*above[1:], *below]), details["type"]

@@ -26,14 +26,14 @@ class Field:
     """A field of a scenario."""
 
     path: str
-    """Dotted path, as for ``--set``; 0 stands for any element of a list, and NAME for
-    any name."""
+    """Dotted path, as for ``--set``. In a path, 0 represents any element of a list, and
+    NAME any name."""
     kind: str
     """Type of the values, in words."""
     unit: str
     """Unit of a number; empty: none."""
     default: Any
-    """A plain value; also None for a group that is always present."""
+    """Plain value of the default; None for a group that is always present."""
     range: str
     """Legal values; empty: all values of the kind."""
     meaning: str
@@ -53,12 +53,13 @@ def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
 
 
 def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
-    """Finds fields by their path or meaning; matches of the path come first.
+    """Finds fields by their path or meaning; fields with a matching path come first.
 
     Args:
         schema: JSON Schema of a scenario.
-        pattern: A part of the path or meaning; with ``*``, ``?`` or ``[...]`` a pattern
-            for the whole path. Upper and lower case are equal. Empty: all fields.
+        pattern: A part of the path or meaning. With a wildcard (``*``, ``?`` or
+            ``[...]``), the pattern must match the whole path or a part of the meaning.
+            Case does not matter. Empty: all fields.
 
     Returns:
         One or more fields.

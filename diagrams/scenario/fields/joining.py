@@ -13,8 +13,8 @@ def begins_anew(changes: Mapping[str, Any]) -> bool:
         changes: Plain values by field.
 
     Returns:
-        True if ``preset`` is a text. A robot or source with the name ``preset`` is a
-        mapping, so it does not count.
+        True if the value of ``preset`` is a text. If ``preset`` is the name of a robot
+        or source, its value is a mapping, and the result is False.
     """
     return isinstance(changes.get("preset"), str)
 
@@ -24,8 +24,8 @@ def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
 
     Args:
         base: The tree.
-        changes: A tree of the leaves to change or add. A group that chooses a preset
-            replaces the whole group.
+        changes: A tree that contains only the leaves to change or add. Changes that
+            choose a preset for a group replace the whole group.
 
     Returns:
         A new tree; the arguments stay unchanged.

@@ -37,16 +37,17 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
 
 
 def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
-    """Suggests a field for an unknown one, see ``did_you_mean``.
+    """Suggests a field instead of an unknown field, see ``did_you_mean``.
 
     Args:
         schema: JSON Schema of the whole data.
         place: Parts of the path of the unknown field.
 
     Returns:
-        A field at the same place with similar letters or the same meaning. Otherwise a
-        field with the same name below that place, or else anywhere. The text is empty
-        if there is none.
+        A text that suggests the first of these that exists: a field in the same group
+        with a similar name; one in the same group with the same meaning; one in a lower
+        group with the same name; one anywhere with the same name. Empty if there is
+        none.
     """
     *parents, last = place
     siblings = at_place(schema, parents)

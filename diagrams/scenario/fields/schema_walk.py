@@ -16,8 +16,8 @@ def resolved(schema: Schema, node: Schema) -> Schema:
         node: A part of it.
 
     Returns:
-        The referenced node, with the entries of the node itself; without a reference
-        the node.
+        The referenced node, extended by the entries of the node itself. A node without
+        a reference is returned as it is.
     """
     if "$ref" not in node:
         return node
@@ -71,7 +71,7 @@ def _below(node: Schema, part: str) -> Iterator[Schema]:
 
 
 def leaf_paths(schema: Schema, place: Sequence[str] = ()) -> Iterator[tuple[str, ...]]:
-    """Yields the paths of all fields and groups; lists count as one element.
+    """Yields the paths of all fields and groups; 0 is any element of a list.
 
     Args:
         schema: The whole schema.

@@ -19,8 +19,8 @@ def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
         robot: Name of a robot in it.
 
     Returns:
-        Speeds by name until the end of the run, m/s. For another robot it is the
-        greatest speed that its wheels allow.
+        Greatest speeds in the run, m/s, by name of the body. The speed of another robot
+        is the greatest that its wheels allow.
     """
     until = scenario.duration_s
     speeds = {
@@ -40,7 +40,7 @@ def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
 def _corner_speed(
     path: WaypointPath | DrivenPath, size: tuple[float, float], until: float
 ) -> float:
-    """Greatest corner speed of a rectangle on a path up to a time in s, m/s."""
+    """Greatest corner speed, m/s, of a rectangle on a path until a time, s."""
     length, width = size
     ahead, turn = np.abs(path.extreme_twists(until)).T
     corners = np.hypot(ahead + 0.5 * width * turn, 0.5 * length * turn)
@@ -50,7 +50,8 @@ def _corner_speed(
 def _reachable_speed(robot: FollowerParameters) -> float:
     """Greatest possible speed of a corner of a robot, m/s.
 
-    Either both wheels run ahead, or one wheel runs ahead and the other back.
+    It is the greater of two speeds: when the robot drives straight ahead at top speed,
+    and when it turns on the spot with both wheels at top speed.
     """
     body, faster = robot.robot, 1.0 + max(map(abs, robot.plant.slip))
     lever = 2.0 * body_radius(body) / body.wheel_separation_m

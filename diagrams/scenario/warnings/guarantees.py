@@ -32,7 +32,7 @@ from systems.world.plane import beyond_rectangle
 _LAGS = 6.0
 #: Spacing of the directions that sample the view, deg.
 _STEP_DEG = 0.25
-#: Largest gap of a view that counts as a view in all directions, deg.
+#: Greatest gap, deg, with which a view still counts as a view in all directions.
 _GAP_DEG = 1.0
 #: Tolerance for rounding errors, in the units of the values.
 _ROUNDING = 1e-9
@@ -48,8 +48,8 @@ class Assumption:
     """The value in words."""
     value: float
     limit: float
-    """Greatest value with which the assumption holds; the least value with
-    ``at_least``."""
+    """Greatest value with which the assumption holds. If ``at_least`` is set, the least
+    such value."""
     unit: str
     at_least: bool = False
     field: str = "guard"
@@ -87,11 +87,11 @@ class Guarantees:
     obstacle_speed_m_s: float
     """Greatest speed of bodies, m/s; 0: all bodies must be at rest."""
     seen_angle_deg: float
-    """Angle that the sensors see in total, of 360 deg."""
+    """Total angle that the sensors see, deg, 0 to 360."""
     seen_way_m: float
     """Distance ahead of the axle up to which the floor can be seen as free, m."""
     needed_way_m: float
-    """Free distance ahead of the axle that top speed needs, m."""
+    """Free distance ahead of the axle that the guard needs for top speed, m."""
     assumptions: tuple[Assumption, ...]
 
     @property
@@ -117,10 +117,11 @@ class Guarantees:
 def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
     """Returns the clear distance ahead of the axle that the guard needs for a speed.
 
-    It contains the body radius with margin and place error, and the range error. It
-    also contains the motion of two ticks, of the lag, and of braking. For bodies at
-    rest it adds the diagonal of a cell and the motion during four rounds of readings.
-    For moving bodies it adds their approach until the robot has stopped.
+    The distance is a sum. It contains the body radius, the margin of the guard, the
+    place error and the range error. It also contains the motion of the robot during two
+    ticks, the motor lag and braking. If all bodies are at rest, the sum also contains
+    the diagonal of a cell and the motion of the robot during four rounds of readings.
+    Otherwise it contains the approach of the bodies until the robot has stopped.
 
     Args:
         scenario: Scenario of one robot; its guard defines braking and margin.
@@ -145,7 +146,7 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
     age = scenario.ultrasonic.round_ticks(tick_s) * tick_s
     way = speed**2 / (2.0 * guard.braking_m_s2) + speed * (lag + 2.0 * tick_s)
     if body_speed == 0.0:
-        # A cell counts as a whole, and a reading updates only every fourth row.
+        # A cell is free only as a whole. One reading updates only every fourth row.
         cells = math.sqrt(2.0) * known.cell_m + 4.0 * age * speed
         return keep + way + error + cells
     time = speed / guard.braking_m_s2 + 2.0 * tick_s + _LAGS * lag
@@ -259,7 +260,7 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A2: no body is nearer than a range reading, less the margin."""
+    """A2: no body is nearer than a range reading minus the margin."""
     sensors, c = scenario.ultrasonic, scenario.acoustics.c
     stretch = (sensors.assumed_sound_speed_m_s or c) / c
     excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m

@@ -1,4 +1,4 @@
-"""Checks whether the gains let a robot on a route come to rest, clear of obstacles."""
+"""Checks whether the gains of a robot on a route are stable and avoid obstacles."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _STEPS, _STEP_M = 2_000, 1e-6
 def route_warnings(
     prefix: str, robot: FollowerParameters, tick_s: float
 ) -> list[ScenarioWarning]:
-    """Warns of gains with which a robot does not come to rest, or can hit obstacles.
+    """Warns if a robot cannot come to rest with its gains, or can hit obstacles.
 
     Args:
         prefix: Prefix of the robot's fields in messages.
@@ -157,13 +157,19 @@ def goal_warnings(
     resting: Mapping[str, NDArray[np.float64]],
     margin_m: float,
 ) -> list[ScenarioWarning]:
-    """Warns of a goal that obstacles at rest keep the robot from.
+    """Warns if obstacles at rest keep the robot away from its goal.
 
-    P comes to rest where the pull to the goal and the pushes of obstacles balance: K
-    (p_d - p) + sum of K_e (S - d_j) n_j = 0. For a goal at distance b from one wall, P
-    rests (S - b) K_e/(K + K_e) off the goal. An iteration starts at the goal and
-    follows the force until its steps are tiny. Adaptive gains have their initial
-    values.
+    P comes to rest where the pull of the goal and the pushes of the obstacles balance::
+
+        K (p_d - p) + sum of K_e (S - d_j) n_j = 0
+
+    p is the position of P, and p_d is the goal. d_j is the distance of P from obstacle
+    j, and n_j is the direction away from this obstacle. If the goal is at distance b
+    from a single wall, P comes to rest at distance (S - b) K_e/(K + K_e) from the goal.
+
+    The function finds the equilibrium by an iteration. It starts at the goal and
+    follows the force until the steps are tiny. It uses the initial values of adaptive
+    gains.
 
     Args:
         prefix: Prefix of the robot's fields in messages.
@@ -172,7 +178,8 @@ def goal_warnings(
         margin_m: ``stop.goal_margin_m``, m.
 
     Returns:
-        A warning if P comes to rest farther than the margin from the goal.
+        One warning if P comes to rest farther than the margin from the goal; otherwise
+        an empty list.
     """
     law = LAWS.get(robot.law)
     if robot.route is None or law is None or not law.on_route:

@@ -12,7 +12,7 @@ class ScenarioWarning:
     field: str
     """Dotted path of the field to change; reports count runs by this field."""
     message: str
-    """The problem of its value, and the consequence."""
+    """The problem of the field's value, and the consequence."""
 
     def __str__(self) -> str:
         return f"{self.field}: {self.message}"

@@ -20,12 +20,12 @@ from systems.world.plane import beyond_rectangle, control_point
 def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
     """Returns the warnings about a scenario that can still be run.
 
-    The warnings about each robot concern:
+    For each robot, the function warns if:
 
-    - assumptions of its guard's theorems that the scenario violates;
-    - a start within the clearance of its route;
-    - gains with which it does not come to rest;
-    - a goal that obstacles keep it from.
+    - the scenario violates an assumption of the theorems about the robot's guard;
+    - P starts nearer to a known obstacle than the clearance of the robot's route;
+    - the robot cannot come to rest with its gains, or can hit obstacles;
+    - obstacles at rest keep the robot away from its goal.
 
     Args:
         scenario: Any scenario.
@@ -62,9 +62,9 @@ def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
 def _of_the_start(
     prefix: str, robot: FollowerParameters, known: NDArray[np.float64]
 ) -> Iterator[ScenarioWarning]:
-    """Warns if P starts within the clearance of an obstacle on its map.
+    """Warns if P starts nearer to a known obstacle than the clearance of its route.
 
-    ``known`` holds (k, 5) rectangles of the obstacles in W.
+    ``known`` contains the (k, 5) rectangles of the known obstacles in W.
     """
     assert robot.route is not None
     place = control_point(robot.start.pose, robot.robot.control_point_m)

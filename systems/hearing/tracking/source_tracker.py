@@ -27,16 +27,17 @@ def SourceTracker_(T):
         """Tracks the source from the estimates of its position.
 
         The block contains a Kalman filter in W
-        (``systems.hearing.tracking.target_filter``). It converts a new estimate to W
-        with the odometry pose at the moment of the measurement, ``measurement_age_s``
-        ago. An estimate without range is used only across its bearing. An estimate that
-        no source can have reached is rejected unless several in a row agree.
+        (``systems.hearing.tracking.target_filter``). The block converts a new estimate
+        to W with the odometry pose at the moment of the measurement,
+        ``measurement_age_s`` ago. An estimate without a range corrects the position
+        only across the bearing. If a source cannot have moved to the place of an
+        estimate, the estimate is rejected, unless several consecutive estimates agree.
 
         Between bursts, the target stays at its place in W, moves with the robot, or
         moves on with its velocity. ``hold`` selects the rule. The covariance includes
         the distance between this target and the expected position of the source.
-        ``target_valid`` is 0 if nothing was heard yet, or not for longer than
-        ``maximum_age_s``. The controllers then stop the robot.
+        ``target_valid`` is 0 if nothing was heard yet, or if the source was last heard
+        more than ``maximum_age_s`` ago. The controllers then stop the robot.
 
         Discrete state, updated every tick: past poses and the tracks, see
         ``track_step``. The outputs include the present estimate, so there is no
@@ -47,8 +48,8 @@ def SourceTracker_(T):
             robot: Position of P, and microphones.
             tracker: ``TrackerParameters``.
             measurement_age_s: Time from the moment of a measurement to the arrival of
-                its estimate, s, at most 2 s. It is one tick for the ideal sensor. It is
-                one tick and half a frame for the audio chain.
+                its estimate, s. It is at most 2 s. It is one tick for the ideal sensor,
+                and one tick and half a frame for the audio chain.
             frame_s: Period of the estimates, s.
             initial_pose: (x, y, theta) before time zero, m and rad.
             tick_s: Period of the robot, s.

@@ -13,21 +13,21 @@ covariances. When the robot moves, the mirror image moves too, which is unlikely
 a source.
 
 All functions use only flat arrays and numbers. numba therefore compiles them for
-floats, and ``fold.py_func`` and ``expected.py_func`` run them with AutoDiffXd. The
-functions change their first argument.
+floats, and ``fold.py_func`` and ``expected.py_func`` run them with AutoDiffXd. ``fold``
+and its helper functions change arrays in place.
 
 Layouts (m, s, in W):
 - track, 16: age of its last estimate; position (2), velocity (2), covariance of the
-  position (xx, xy, yy), of position and velocity (xx, xy, yx, yy), of the velocity (xx,
-  xy, yy), all at the moment of that estimate; and the scatter, the factor between the
-  actual variance of sightings and their covariances
-- hypothesis, 34: cost, number of consecutive outliers that agree, track, and the track
-  of these outliers
+  position (xx, xy, yy), of position and velocity (xx, xy, yx, yy), and of the velocity
+  (xx, xy, yy), all at the moment of that estimate; and the scatter, which is the ratio
+  of the actual variance of sightings to their stated covariance
+- hypothesis, 34: cost, number of consecutive outliers that agree, track, and track of
+  these outliers
 - memory: index of the chosen hypothesis, then one hypothesis, or two if front and back
   are to be distinguished
 - sighting, 10: position of the source (or the unit vector to it, if there is no range),
-  its covariance (xx, xy, yy), center of the microphones (2), the normal of their row,
-  ahead (2), and 1 if there is a range
+  its covariance (xx, xy, yy), center of the microphones (2), unit normal of their row,
+  which points ahead (2), and 1 if there is a range
 """
 
 from __future__ import annotations
@@ -54,22 +54,22 @@ NEVER_HEARD_S = 1e6
 #: Squared normalized innovation in two dimensions that chance exceeds in 1 % of the
 #: cases.
 GATE = 9.21
-#: Innovations agree with the covariances up to this ratio of variances. Above it,
+#: Innovations agree with the covariances up to this ratio of variances.
 SCATTER_MARGIN = 1.5
-#: this share of the excess raises the scatter with each sighting. A burst has 20
-#: sightings.
+#: Each sighting changes the scatter by this share of the relative excess over
+#: ``SCATTER_MARGIN``. A burst has 20 sightings.
 SCATTER_RATE = 0.05
-#: Most that one sighting can add to the cost of a hypothesis, nepers. A single wrong
-#: frame says little, whatever its covariance.
+#: Largest cost that one sighting can add to a hypothesis, nepers. A single wrong frame
+#: says little, whatever its covariance.
 LARGEST_STEP = 1.0
-#: The same limit for the first sighting after a silence of more than ``SILENCE_S``, s.
-#: That sighting is independent of the previous ones.
+#: The same limit for a sighting after a silence of more than ``SILENCE_S`` seconds,
+#: nepers. Such a sighting is independent of the previous ones.
 LARGEST_FRESH_STEP = 4.0
 SILENCE_S = 0.5
 #: Lead in cost, in nepers, that the other hypothesis needs before the choice changes.
 SWITCH_MARGIN = 3.0
-#: Largest cost of a hypothesis, nepers. Errors of the model then cannot exclude a
-#: hypothesis for ever.
+#: Largest cost of a hypothesis, nepers. Because of this limit, errors of the model
+#: cannot exclude a hypothesis forever.
 LARGEST_COST = 12.0
 
 
@@ -83,11 +83,13 @@ class FilterSettings(NamedTuple):
     floor: float
     """Standard deviation of errors that are not in the covariance of an estimate, m."""
     gate_floor: float
-    """Standard deviation that the gate adds to the covariances, m."""
+    """Standard deviation that is added to the covariances in the test for outliers,
+    m."""
     believed_outliers: int
-    """Number of consecutive outliers after which they are accepted if they agree."""
+    """Number of consecutive outliers that are accepted if they agree with each
+    other."""
     assumed_range: float
-    """Assumed range of a target of which only the bearing is known, m."""
+    """Assumed range of a target if only its bearing is known, m."""
     measurement_age: float
     """Time from the moment of a sighting to its arrival, s."""
 
@@ -169,7 +171,7 @@ def _innovation(
     """Compares a sighting with a track.
 
     With a range, the innovation is the difference of the positions. Without a range, it
-    is the distance of the track from the line of the bearing.
+    is the offset from the track to the line of the bearing.
 
     Args:
         track: Track at the moment of the sighting.
@@ -179,10 +181,10 @@ def _innovation(
         extra: Variance added to that of the innovation, m^2.
 
     Returns:
-        Innovation (2); the inverse of its covariance (xx, xy, yy), which has rank one
-        without a range; the squared normalized innovation, infinite if the track is in
-        the opposite direction of a bearing; and the logarithm of the determinant of the
-        covariance.
+        Innovation (2); the inverse of its covariance (xx, xy, yy); the squared
+        normalized innovation; and the logarithm of the determinant of the covariance.
+        Without a range, the inverse has rank one. The squared innovation is infinite if
+        the track is in the direction opposite to the bearing.
     """
     zx, zy, rxx, rxy, ryy, ox, oy, _, _, ranged = sighting
     _, x, y, _, _, axx, axy, ayy = track[:8]
@@ -213,9 +215,9 @@ def _robust_innovation(
 ) -> tuple[bool, Any, tuple[Any, ...]]:
     """Computes the innovation that the filter uses.
 
-    An innovation above ``GATE`` does not agree with the model. Its sighting gets a
-    larger covariance, so that its effect stays bounded (Huber's weight). Outside the
-    gate that ``gate_floor`` widens, the sighting is rejected.
+    An innovation above ``GATE`` does not agree with the model. Such a sighting gets a
+    larger covariance, so that its effect stays bounded (Huber's weight). A sighting is
+    rejected if it is also outside a second gate, which ``gate_floor`` widens.
 
     Returns:
         Whether the sighting is accepted; the squared normalized innovation before the
@@ -238,8 +240,8 @@ def _learn_scatter(track: NDArray[Any], squared: Any, dimensions: Any) -> None:
     """Adapts the scatter of a track to the innovations.
 
     Reflections scatter estimates far more than noise does. Innovations above
-    ``SCATTER_MARGIN`` times their covariance raise the scatter, others lower it. The
-    scatter follows within about ``1 / SCATTER_RATE`` sightings.
+    ``SCATTER_MARGIN`` times their covariance raise the scatter, and smaller innovations
+    lower it. The scatter adapts within about ``1 / SCATTER_RATE`` sightings.
     """
     excess = min(squared, GATE) / (dimensions * SCATTER_MARGIN)
     track[15] = max(1.0, track[15] * (1.0 + SCATTER_RATE * (excess - 1.0)))
@@ -283,7 +285,8 @@ def _begin(
         track[1], track[2] = zx, zy
         track[5], track[6], track[7] = rxx, rxy, ryy
     else:
-        # The range 0 and twice the assumed range are two standard deviations away.
+        # The ranges 0 and twice the assumed range are two standard deviations from the
+        # assumed range.
         distance, along = settings.assumed_range, settings.assumed_range**2 / 4.0
         track[1], track[2] = ox + distance * zx, oy + distance * zy
         track[5] = distance**2 * rxx + along * zx * zx
@@ -302,8 +305,8 @@ def _follow(
     """Updates one track with a sighting, if it is accepted.
 
     Returns:
-        Whether the sighting is accepted (else the track is unchanged), and the cost
-        that it adds.
+        Whether the sighting is accepted, and the cost that it adds. If it is rejected,
+        the track is unchanged.
     """
     moved = track.copy()
     seconds = track[0] - settings.measurement_age
@@ -351,7 +354,7 @@ def _inherit(
         memory: Memory; its hypothesis ``index`` is changed.
         before: Copy of the memory before the sighting.
         index: Index of the hypothesis.
-        candidate: The sighting for this hypothesis: as it is, or mirrored.
+        candidate: The sighting for hypothesis 0, or its mirror image for hypothesis 1.
         settings: ``FilterSettings``.
 
     Returns:
@@ -391,14 +394,14 @@ def _choose(
 ) -> None:
     """Updates the costs and the choice from the results of ``_inherit``.
 
-    The lead is the cost of hypothesis 0 less that of hypothesis 1. The choice changes
-    if the lead exceeds ``SWITCH_MARGIN`` against the chosen hypothesis.
+    The lead is the cost of hypothesis 0 minus the cost of hypothesis 1. The choice
+    changes if the chosen hypothesis costs more than the other one by ``SWITCH_MARGIN``.
 
     Args:
         memory: Memory, changed.
         front: Cost, added cost and history of hypothesis 0.
         back: Cost, added cost and history of hypothesis 1.
-        largest: Most that this sighting can add to the cost of one hypothesis, nepers.
+        largest: Largest cost that this sighting can add to one hypothesis, nepers.
     """
     lead = front[0] - back[0]
     least = min(front[1], back[1])

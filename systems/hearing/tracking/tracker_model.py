@@ -37,13 +37,13 @@ class _Microphones(NamedTuple):
     control_point: float
     """Distance of P ahead of the origin of B."""
     centre_x: float
-    """x of their centroid from P in B axes."""
+    """x of the centroid of the microphones relative to P, in B axes."""
     centre_y: float
-    """y of their centroid from P in B axes."""
+    """y of the centroid of the microphones relative to P, in B axes."""
     ahead_x: float
-    """x of the normal of their row in B; without a row it has no effect."""
+    """x of the normal of the row, in B axes. It has no effect without a row."""
     ahead_y: float
-    """y of the normal of their row in B."""
+    """y of the normal of the row, in B axes."""
 
 
 class TrackerNumbers(NamedTuple):
@@ -61,7 +61,8 @@ class TrackerNumbers(NamedTuple):
     microphones: _Microphones
     settings: FilterSettings
     older: NDArray[np.float64]
-    """(n,) what each tick adds to the memory of the filter: a tick to each age, s."""
+    """(n,) vector that each tick adds to the memory of the filter. It contains the tick
+    for each age, s, and zeros for all other elements."""
 
 
 def tracker_numbers(
@@ -152,7 +153,7 @@ def _hypotheses(numbers: TrackerNumbers) -> int:
 
 
 def _for_scalars(function: Any) -> Any:
-    """Makes a compiled function also accept AutoDiffXd, which Python then computes."""
+    """Makes a compiled function accept AutoDiffXd, too; it then runs in Python."""
 
     def call(*arguments: Any) -> Any:
         differentiated = arguments[0].dtype.hasobject
@@ -171,7 +172,7 @@ def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
 
     Args:
         pose: (3,) present x, y, theta in W, m and rad; floats or AutoDiffXd.
-        past: (3 n,) x, y, theta at the last n ticks, the last one first.
+        past: (3 n,) x, y, theta at the last n ticks, most recent first, m and rad.
         ticks: Number of ticks, 0 to n, not necessarily whole.
 
     Returns:
@@ -208,7 +209,8 @@ def _sighting(
     ``_sighting.py_func`` accepts AutoDiffXd.
 
     Args:
-        p_PS_B: (2,) source from P, m; a unit vector if only the bearing is known.
+        p_PS_B: (2,) position of the source relative to P, m; a unit vector if only the
+            bearing is known.
         covariance: (4,) covariance of p_PS_B, row by row, m^2.
         ranged: 1 if the range is known, otherwise 0.
         pose: Pose of the robot at the moment of the measurement, m and rad.
@@ -269,8 +271,8 @@ def track_step(
     A new estimate is converted to W and updates the filter. The outputs follow from the
     chosen track and the rule of ``hold``. The state then shifts by one tick.
 
-    The state contains the odometry poses at the last ticks, the last one first; the
-    pose at the moment of the last accepted estimate; and the memory of the filter.
+    The state contains the odometry poses at the last ticks, most recent first; the pose
+    at the moment of the last accepted estimate; and the memory of the filter.
     """
     p_PS_B, covariance, detected, range_valid, pose = inputs
     position, velocity, covariance_W, age, valid = outputs

@@ -33,7 +33,7 @@ _REACH_M = 2.5
 
 
 class WindowNumbers(NamedTuple):
-    """Constants of a choice in the window; see ``DynamicWindowParameters``."""
+    """Constants of the choice of a motion; see ``DynamicWindowParameters``."""
 
     gains: tuple[float, float, float]
     """Weights of heading, distance, and speed."""
@@ -65,8 +65,8 @@ def time_to_contact(
     """Computes when a body that continues on its arc first covers a point.
 
     The computation is in the frame of the body. In this frame the points move: straight
-    back if the yaw rate is zero, otherwise on circles around the center of the arc. A
-    circle that does not meet the rectangle of the body is skipped.
+    back if the yaw rate is zero, otherwise on circles around the center of the arc. The
+    function skips circles that do not meet the rectangle of the body.
 
     Args:
         places: (n, 2) points that the body must not cover, in B, m.
@@ -173,8 +173,8 @@ def choose_in_window(
         numbers: Weights and limits.
 
     Returns:
-        Speed, m/s, and yaw rate, rad/s. If no motion is admissible, the lowest speed of
-        the window and the yaw rate nearest to zero.
+        Speed, m/s, and yaw rate, rad/s. If no motion is admissible, these are the
+        lowest speed of the window and the yaw rate nearest to zero.
     """
     # The window.
     heading_gain, distance_gain, speed_gain = numbers.gains
@@ -198,7 +198,8 @@ def choose_in_window(
             # the clearance must stay outside the body.
             contact = time_to_contact(around, (v, w), wide)
             contact = min(contact, time_to_contact(near, (v, w), body))
-            # The paper's v <= sqrt(2 dist a) with dist = v t, likewise for the turn.
+            # The paper requires v <= sqrt(2 dist a). With dist = v t this condition is
+            # t >= v/(2 a). The yaw rate has the same condition.
             stops = max(abs(v) / braking, abs(w) / turn_braking)
             if contact < 0.5 * stops:
                 continue
@@ -237,15 +238,15 @@ class DynamicWindowController(BaselineController):
     """Chooses a motion that the robot can reach, and from which it can stop in time.
 
     Every ``period_s`` the block considers the speeds and yaw rates that the robot can
-    reach with its accelerations. It keeps those from which the robot can brake before
-    its rectangle covers a cell with echoes. Of these it chooses the motion with the
-    largest weighted sum of heading, distance, and speed.
+    reach with its accelerations. It keeps the motions from which the robot can brake
+    before its rectangle covers a cell with echoes. From these motions it chooses the
+    one with the largest weighted sum of heading, distance, and speed.
 
-    The block differs from the paper in two points. The speed term is the nearness to
+    The block differs from the paper in two points. The speed term rewards speeds near
     the wanted speed, because a follower must not arrive at full speed. The obstacles
-    are cells with echoes that were not seen free since, instead of lines.
+    are not lines, but cells that gave echoes and that no sensor has seen free since.
 
-    Discrete state: the last motion. There is no latency.
+    The discrete state has the last motion. There is no latency.
 
     Args:
         robot: Size of the body, and position of P.

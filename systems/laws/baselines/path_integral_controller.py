@@ -31,12 +31,13 @@ from systems.safety.parameters import FreeSpaceParameters
 
 #: Half side of the window of the distance field, m. A sequence stays within it.
 _WINDOW_M = 2.5
-#: Number of plans with different random numbers. Then the numbers repeat.
+#: Number of plans after which the random numbers repeat.
 _ROUNDS = 16
 #: Number of discs that cover the body from side to side.
 _DISCS = 3
-#: A route that is longer than the straight line by more than this factor is a detour.
-#: On a detour the robot heads for a point of the route up to this distance away, m.
+#: A route is a detour if it is longer than the straight line by more than the factor
+#: ``_DETOUR``. On a detour the robot heads for a point of the route, which is at most
+#: ``_LOOK_AHEAD_M`` away, m.
 _DETOUR, _LOOK_AHEAD_M = 1.15, 1.5
 #: Length of a step to a diagonal neighbor, in cells.
 _ACROSS = math.sqrt(2.0)
@@ -81,7 +82,7 @@ class PathIntegralState(NamedTuple):
     plan: NDArray[np.float64]
     """(steps, 2) speed, m/s, and yaw rate, rad/s, of each step."""
     way: Way
-    """Memory for the route, which is planned anew each time."""
+    """Memory for the route. Each plan computes a new route."""
 
 
 @njit(cache=True)
@@ -101,8 +102,9 @@ def distance_field(
         cell: Side of a cell, m.
 
     Returns:
-        (m, m) distances, m, along steps between neighbors. They are at most 8 % longer
-        than straight lines. Without occupied cells they are 1e6.
+        (m, m) distances along steps between neighboring cells, m. Such a distance is at
+        most 8 % longer than the straight line. Without occupied cells all distances are
+        1e6.
     """
     size = 2 * math.ceil(half / cell) + 1
     field = np.full((size, size), 1e6)
@@ -139,16 +141,16 @@ def roll_out(
     cell: float,
     numbers: RollNumbers,
 ) -> None:  # pragma: no cover  (compiled)
-    """Replaces a sequence by the mean of noisy sequences, weighted by their costs.
+    """Replaces a sequence of motions by a weighted mean of noisy sequences.
 
-    The weight of a sequence is exp(-cost/temperature).
+    The weight of a noisy sequence is exp(-cost/temperature).
 
     Args:
         controls: (steps, 2) speed, m/s, and yaw rate, rad/s. The function changes it.
         noise: Random numbers, see ``PathIntegralNumbers``.
         first: Index of the first sequence of noise.
         pose: (x, y, theta) of the axle in W, m and rad.
-        goal: (x, y, vx, vy): wanted position of P and its velocity in W, m and m/s.
+        goal: (x, y, vx, vy): moving position in W that P should reach, m and m/s.
         field: Result of ``distance_field`` around the axle, m.
         cell: Side of a cell of the field, m.
         numbers: Spreads, limits, and costs.
@@ -184,11 +186,11 @@ def _cost(
 ) -> float:  # pragma: no cover  (compiled)
     """Computes one noisy sequence (``tried``) and returns its cost.
 
-    Each step adds noise to the planned motion, limits it, and integrates the pose. A
-    step costs more if it drives backward, if a disc of the body is near an occupied
-    cell, or if P is far from the moving goal or turned away from it. The sum also has
-    the control cost of the deviation from the plan. Positions x and y are relative to
-    the axle at the start, in the axes of W.
+    Each step adds noise to the planned motion, limits the sum, and integrates the pose.
+    A step costs more if the robot drives backward, if a disc of the body is near an
+    occupied cell, if P is far from the moving goal, or if the robot does not point to
+    the goal. The total also has the control cost of the deviation from the plan.
+    Positions x and y are relative to the axle at the start, in the axes of W.
     """
     least, most, turn = numbers.limits
     to_goal, to_angle, forward, obstacle, collision = numbers.gains
@@ -246,7 +248,7 @@ def path_integral_step(
     steps = len(plan)
     if tick % numbers.period_ticks == 0:
         controls = np.zeros((steps, 2))
-        # Start from the rest of the last plan, with its last motion repeated.
+        # Start from the remaining steps of the last plan, and repeat its last step.
         for k in range(steps):
             last = min(k + 1, steps - 1)
             controls[k, 0], controls[k, 1] = plan[last, 0], plan[last, 1]
@@ -268,9 +270,9 @@ def path_integral_step(
 def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-untyped-def]
     """Computes the wanted position of P, m, and its velocity, m/s, both in W.
 
-    The function plans a route to the target. It heads straight for the target, or for a
-    point of the route if the route is a detour. The goal lies in this direction. Its
-    distance and speed are chosen so that P approaches it with the wanted speed.
+    The function plans a route to the target. The goal lies in the direction of the
+    target, or of a point of the route if the route is a detour. The function chooses
+    distance and speed of the goal so that P approaches with the wanted speed.
     """
     ahead = numbers.follow.control_point_m
     px, py = at[0] + ahead * math.cos(at[2]), at[1] + ahead * math.sin(at[2])
@@ -302,13 +304,13 @@ class PathIntegralController(BaselineController):
     Every ``step_s`` the block makes a new plan:
 
     1. It plans a route to the target on the map with ``find_way``, like the guarded
-       law. On this route it places a goal that moves with the target.
+       law. In the direction of the route it places a goal that moves with the target.
     2. It draws ``samples`` sequences around the last plan. The cost of a sequence
        depends on the distance and angle to the goal, on driving backward, and on
        occupied cells near the body. Three discs cover the body.
     3. The new plan is the mean of the sequences with weights exp(-cost/temperature).
 
-    State: the plan, and the memory for the route. There is no latency.
+    The state has the plan, and the memory for the route. There is no latency.
 
     Args:
         robot: Size of the body, and position of P.
@@ -320,7 +322,8 @@ class PathIntegralController(BaselineController):
         tick_s: Period of the controller, s.
 
     Reference: Williams et al., Information theoretic model predictive control, IEEE
-    Trans. on Robotics 34 (6), 2018; critics of Nav2's MPPI controller.
+    Trans. on Robotics 34 (6), 2018. The cost terms are those of Nav2's MPPI controller
+    (its critics).
     """
 
     inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))

@@ -56,22 +56,24 @@ def avoid_body(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Computes the half plane of velocities that ORCA permits (van den Berg, eq. 3).
 
-    The velocity obstacle is the set of relative velocities that lead to a contact of a
-    disc with a rectangle within the horizon. It is a cone with two legs. Its tip is cut
-    off by the rounded rectangle, divided by the horizon. The function finds the point
-    of its border that is nearest to the present relative velocity. The border of the
-    half plane is the tangent at this point.
+    The velocity obstacle is the set of relative velocities with which the disc touches
+    the rectangle within the horizon. This set is a cone with two legs and without a
+    tip. In place of the tip there is the cut-off: the rectangle, rounded by the radius
+    of the disc, divided by the horizon. The function finds the point of the border of
+    the set that is nearest to the present relative velocity. The tangent at this point
+    is the border of the half plane.
 
     Args:
-        relative: Position of the body from the center of the disc, m, and heading, rad.
+        relative: (x, y, theta). (x, y) is the position of the body relative to the
+            center of the disc, m. theta is the heading of the body, rad.
         half: Half of the body's length and width, m.
         radius: Radius of the disc, m.
         velocity: Velocity of the disc relative to the body, m/s.
         horizon: Time for which contacts are avoided, s.
 
     Returns:
-        Unit normal n (x, y) and offset, m/s. Permitted relative velocities v have
-        n . v >= offset.
+        x and y of the unit normal n, and the offset, m/s. A relative velocity v is
+        permitted if n . v >= offset.
     """
     # In the axes of the rectangle. Its center is at (px, py), the disc at (0, 0).
     c, s = math.cos(relative[2]), math.sin(relative[2])
@@ -83,14 +85,14 @@ def avoid_body(
     gap = math.hypot(gx, gy)
     inside = gap <= radius
     time = _OUT_S if inside else horizon
-    # The cut-off: the point of its rim that is nearest to the velocity.
+    # Find the point of the rim of the cut-off that is nearest to the velocity.
     fx, fy = _beyond(vx * time - px, vy * time - py, a, b)
     far = math.hypot(fx, fy)
     if far > 1e-9:
         nx, ny = fx / far, fy / far
         signed = (far - radius) / time
     else:
-        # The center of the disc would be in the rectangle: leave by the nearest side.
+        # The center of the disc would be in the rectangle. Leave by the nearest side.
         dx, dy = vx * time - px, vy * time - py
         left_x, left_y = a - abs(dx), b - abs(dy)
         nx, ny = (
@@ -125,7 +127,8 @@ def _legs(
     for velocities beyond its point of contact with the cut-off.
 
     Returns:
-        Signed distance from the border, m/s, negative inside, and unit normal.
+        Signed distance from the border, m/s, and x and y of the unit normal. The
+        distance is negative inside the velocity obstacle.
     """
     (px, py), (vx, vy) = place, velocity
     middle = math.atan2(py, px)
@@ -166,11 +169,11 @@ def reciprocal_avoidance_step(
 ) -> None:
     """Computes the twist.
 
-    The state is the velocity of the point in W, m/s, and the poses of the bodies one
-    tick ago. The step estimates the velocity of each body from its last two poses and
-    makes one half plane per near body. It takes the velocity in all half planes that is
-    nearest to the preferred velocity. The point ahead of the axle then determines the
-    twist.
+    The state has the velocity in W, m/s, of the point ``offset_m`` ahead of the axle,
+    and the poses of the bodies one tick ago. The step estimates the velocity of each
+    body from its last two poses. It makes one half plane for each near body. From the
+    velocities that lie in all half planes, it chooses the velocity nearest to the
+    preferred velocity. Then it converts this velocity of the point to a twist.
     """
     own, pose, poses, sizes = numbers.own, inputs[4], inputs[5], inputs[6]
     twist, count = outputs[0], len(inputs[6]) // 2
@@ -194,7 +197,7 @@ def reciprocal_avoidance_step(
         nx, ny, offset = avoid_body(
             relative, half, numbers.radius_m, velocity, own.horizon_s
         )
-        # The bodies do not avoid the robot. Therefore it makes the whole change.
+        # The bodies do not avoid the robot, so the robot makes the whole change.
         planes[used, 0], planes[used, 1] = nx, ny
         planes[used, 2] = offset + nx * ux + ny * uy
         used += 1
@@ -211,8 +214,9 @@ def reciprocal_avoidance_step(
     turn = (c * vy - s * vx) / own.offset_m
     limit = numbers.follow.own.turn_rate_rad_s
     twist[0], twist[1] = c * vx + s * vy, min(max(turn, -limit), limit)
-    # The robot turns to the target if it is at rest, or if it backs off freely. The
-    # twist above would turn it away until it rests. Then it would turn back, and so on.
+    # The robot turns to the target if it is at rest, or if it backs off freely. While
+    # it backs off, the twist above would turn it away from the target. At rest it would
+    # turn back, and so on.
     changed = math.hypot(vx - preferred[0], vy - preferred[1])
     backs = wanted < 0.0 and changed < _UNCHANGED_M_S
     if inputs[2][0] > 0.5 and (backs or math.hypot(vx, vy) < _RESTS_M_S):
@@ -220,17 +224,18 @@ def reciprocal_avoidance_step(
 
 
 class ReciprocalAvoidanceController(BaselineController):
-    """Drives the velocity nearest to the wanted one that avoids contacts for a time.
+    """Changes the wanted velocity only as much as needed to avoid contacts for a time.
 
-    The block knows the positions, sizes, and velocities of all bodies except that of
-    the target. It shows what a robot can do that sees everything but plans no route.
-    Bodies are rectangles. They do not avoid the robot, so the robot makes the whole
-    change of velocity (the paper's non-cooperative agents). The velocity is that of a
-    point ahead of the axle. A disc around this point contains the body. If no velocity
-    obeys all constraints, the block takes the velocity with the least violation.
+    The block knows the positions, sizes, and velocities of all bodies except the body
+    of the target. The block shows how well a robot drives if it knows all bodies but
+    does not plan a route. Bodies are rectangles. They do not avoid the robot, so the
+    robot makes the whole change of velocity (the paper's non-cooperative agents). The
+    velocity is that of a point ahead of the axle. A disc around this point contains the
+    body. If no velocity obeys all constraints, the block takes the velocity with the
+    least violation.
 
-    Discrete state: the velocity of the point, and the poses of the bodies one tick ago.
-    There is no latency.
+    The discrete state has the velocity of the point, and the poses of the bodies one
+    tick ago. There is no latency.
 
     Args:
         robot: Size of the body, and position of P.

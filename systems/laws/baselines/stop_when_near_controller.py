@@ -32,7 +32,7 @@ class StopNumbers(NamedTuple):
 def stop_when_near_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: StopNumbers
 ) -> None:
-    """Computes the twist. An echo nearer than ``stop_m`` forbids to drive forward."""
+    """Computes the twist. An echo nearer than ``stop_m`` prevents driving forward."""
     own, twist = numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
     ranges, echo = inputs[4], inputs[5]
@@ -43,7 +43,7 @@ def stop_when_near_step(
 
 
 class StopWhenNearController(BaselineController):
-    """Turns to the target and drives. Does not drive forward while an echo is near.
+    """Drives to the target, but does not drive forward while an echo is near.
 
     This is the simplest law. It has no state and no latency.
 

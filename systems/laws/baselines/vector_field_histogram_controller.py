@@ -24,15 +24,15 @@ from systems.planning.occupied import list_occupied
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards, wrapped
 
-#: Number of sectors (5 deg each, as in the paper). Valleys of more sectors than the
-#: second number are wide.
+#: Number of sectors (5 deg each, as in the paper), and largest number of sectors of a
+#: narrow valley.
 _SECTORS, _WIDE = 72, 16
-#: Direction that means that no direction was chosen.
+#: Value of the direction if no direction was chosen.
 _NONE = -1.0
 
 
 class HistogramNumbers(NamedTuple):
-    """Constants of a choice; see ``VectorFieldHistogramParameters``."""
+    """Constants for choosing a direction; see ``VectorFieldHistogramParameters``."""
 
     window_m: float
     radius_m: float
@@ -64,8 +64,9 @@ def polar_histogram(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the primary polar histogram, the obstacle density (eqs 1-6).
 
-    Each occupied cell is enlarged by the radius of the robot. It adds its magnitude to
-    all sectors that it then covers. Near cells and certain cells add more.
+    The function enlarges each occupied cell by the radius of the robot. The enlarged
+    cell adds its magnitude to all sectors that it covers. The magnitude is larger if
+    the cell is nearer or more certain to be occupied.
 
     Args:
         places: (n, 3) occupied cells: x and y in W, m; certainty from 0 to 1.
@@ -103,8 +104,9 @@ def _mask(
 ) -> None:  # pragma: no cover  (compiled)
     """Blocks the directions to which the robot cannot turn while it moves (eqs 8-13).
 
-    The robot turns on two circles of radius ``circle``, one on each side. A cell that
-    meets such a circle blocks all directions beyond the cell on this side.
+    At its speed the robot can turn on two circles of radius ``circle``, one on each
+    side. If an enlarged cell meets the circle of a side, it blocks all directions
+    beyond the cell on this side.
     """
     x, y, theta = pose
     left = right = math.pi
@@ -139,14 +141,15 @@ def choose_direction(
     """Chooses the candidate direction of least cost (eqs 14-18).
 
     A valley is a run of free sectors. A narrow valley has one candidate, its middle. A
-    wide valley has one candidate near each edge; the target direction is a third one if
-    it lies between these. Without blocked sectors the target is the only candidate.
+    wide valley has one candidate near each edge. If the target direction lies between
+    these two, it is a third candidate. Without blocked sectors the target direction is
+    the only candidate.
 
     Args:
         blocked: (72,) whether each sector is blocked.
         target: Direction of the target, sectors.
         heading: Heading of the robot, sectors.
-        previous: Direction that was chosen before, sectors; negative if there is none.
+        previous: Previously chosen direction, sectors; negative if there is none.
         gains: Weights of the angles to the target, heading, and previous direction.
 
     Returns:
@@ -159,7 +162,7 @@ def choose_direction(
     candidates, count = np.empty(3 * _SECTORS), 0
     if anywhere:
         candidates[0], count = target, 1
-    # One turn from a blocked sector, valley by valley.
+    # Go around once, valley by valley, from a blocked sector.
     k = begin + 1
     while not anywhere and k < begin + _SECTORS:
         if blocked[k % _SECTORS]:
@@ -201,9 +204,10 @@ def _steer(
     circle: float,
     numbers: HistogramNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Returns the direction, rad in W, and its density; NaN if all is blocked.
+    """Returns the chosen direction, rad in W, and its density.
 
-    Updates the state: the blocked sectors by the two thresholds, and the direction.
+    The direction is NaN if all sectors are blocked. The function also updates the
+    state: which sectors are blocked according to the thresholds, and the direction.
     """
     density = polar_histogram(places, pose[0], pose[1], numbers)
     blocked = np.empty(_SECTORS, dtype=np.bool_)
@@ -234,8 +238,8 @@ def vector_field_histogram_step(
 ) -> None:
     """Computes the twist.
 
-    The state is whether each sector is blocked (0 or 1), the last direction in sectors,
-    and the last speed, m/s.
+    The state has one number for each sector (1 if it is blocked, else 0), the last
+    direction in sectors, and the last speed in m/s.
     """
     target, pose, own, twist = inputs[0], inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
@@ -248,7 +252,8 @@ def vector_field_histogram_step(
     circle = abs(memory[_SECTORS + 1]) / numbers.follow.own.turn_rate_rad_s
     direction, density = _steer(memory, places, at, bearing, circle, numbers.histogram)
     if math.isnan(direction):
-        # All directions are blocked: the robot stops and turns to the target.
+        # All directions are blocked. The robot does not drive forward, and turns to the
+        # target.
         wanted, direction = min(wanted, 0.0), bearing
     elif wanted > 0.0:
         wanted *= max(1.0 - density / own.slow_density, 0.0)
@@ -261,22 +266,22 @@ def vector_field_histogram_step(
 class VectorFieldHistogramController(BaselineController):
     """Steers into the best valley of a polar histogram of obstacles.
 
-    The obstacles are cells with echoes that were not seen free since. At every tick the
-    block follows the stages of the paper:
+    The obstacles are cells that gave echoes and that no sensor has seen free since. At
+    every tick the block follows the stages of the paper:
 
-    1. The primary histogram has the density of each direction. Each cell is enlarged by
-       the radius of the robot.
+    1. The primary histogram has the density of obstacles in each direction. The block
+       enlarges each cell by the radius of the robot.
     2. The binary histogram marks blocked directions by two thresholds.
     3. The masked histogram also blocks directions to which the robot cannot turn at its
        speed.
     4. The block chooses the candidate direction of least cost.
 
-    The speed falls with the density in this direction, as in the first paper
-    (Borenstein and Koren 1991). If all directions are blocked, the robot stops and
-    turns to the target.
+    The speed is lower if the density in this direction is higher, as in the first paper
+    (Borenstein and Koren 1991). If all directions are blocked, the robot does not drive
+    forward, and turns to the target.
 
-    Discrete state: blocked sectors, last direction, and last speed. There is no
-    latency.
+    The discrete state has the blocked sectors, the last direction, and the last speed.
+    There is no latency.
 
     Args:
         robot: Size of the body, and position of P.

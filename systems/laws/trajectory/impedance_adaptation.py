@@ -44,7 +44,7 @@ class AdaptationNumbers(NamedTuple):
     velocity_weight: float
     """Weight tau_v^2 of velocity errors, s^2."""
     penalty: tuple[float, float]
-    """Weight lambda and distance d_sec of the safety term, 1 and m."""
+    """Weight lambda, without unit, and distance d_sec, m, of the safety term."""
     normalised: bool
     least_square: float
     """Constant m_0 of the normalization."""
@@ -71,13 +71,14 @@ def adaptation_step(
 ) -> None:
     """Adapts K, D, and K_e by one tick.
 
-    The state has K, D, and K_e. Then it has the sensitivities dp/dq and dv/dq (x and y
-    each) for each of these gains q.
+    The state begins with K, D, and K_e. For each of these gains q, the sensitivities
+    dp/dq and dv/dq (x and y each) follow.
 
     For each gain the step computes the gradient of the error, either by the Lyapunov
-    rule or from the sensitivities. It divides the gradient by the normalization. Then
-    it moves the gain against the gradient and toward its nominal value, and limits it.
-    The outputs have the gains from before this change.
+    rule or from the sensitivities. If normalization is on, it divides the gradient by
+    the normalization. Then it moves the gain against the gradient and toward its
+    nominal value. Finally it limits the gain. The output has the gains from before this
+    change.
     """
     target, reference, pose, v_WP, objects = inputs
     for k in range(3):
@@ -134,15 +135,17 @@ class ImpedanceAdaptation(Block):
 
     There are two rules. The rule ``lyapunov`` is K' = (gamma/M) e_v . (p - p_d) and
     D' = (gamma/M) e_v . (v - v_d) with e_v = v - v_ref. The printed eq. 40 to 42 amount
-    to this rule. Without contacts a Lyapunov function falls under it.
+    to this rule. Without contacts, this rule makes a Lyapunov function fall.
 
-    The rule ``sensitivity`` is q' = -gamma dJ/dq for each gain q. J is that of eq. 27,
-    with velocities weighted by tau_v and with a hinge as its penalty. The sensitivities
-    are those of eq. 34, with the left side read as a time derivative.
+    The rule ``sensitivity`` is q' = -gamma dJ/dq for each gain q. J is the cost of eq.
+    27 with two changes: the weight tau_v multiplies velocities, and a hinge function
+    replaces the penalty. The sensitivities are the solution of eq. 34, if its left side
+    is a time derivative.
 
-    Discrete state, every tick: K, D, K_e, and four sensitivities of each. The output
-    ``impedance`` is state, so a gradient changes it from the next tick on. The output
-    ``adaptation_active`` depends on the present input.
+    The discrete state has K, D, K_e, and four sensitivities of each gain. It is updated
+    every tick. The output ``impedance`` is part of the state, so it shows a change of
+    the gains from the next tick on. The output ``adaptation_active`` depends on the
+    present input.
 
     Args:
         parameters: ``AdaptationParameters``.

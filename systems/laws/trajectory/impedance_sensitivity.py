@@ -1,4 +1,4 @@
-"""Sensitivity of the motion of P to its impedance over time (eq. 28 to 41)."""
+"""Sensitivities of the motion of P to the gains K, D, and K_e (eq. 28 to 41)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Impedance(NamedTuple):
 
 
 class Sensitivities(NamedTuple):
-    """Partial derivatives of the acceleration by K, D, and K_e; (x, y) each."""
+    """Partial derivatives (x, y) of the acceleration with respect to K, D, and K_e."""
 
     stiffness: tuple[Any, Any]
     damping: tuple[Any, Any]
@@ -32,7 +32,9 @@ class Sensitivities(NamedTuple):
 def sensitivity_sources(
     p_WP: Any, v_WP: Any, target: Any, contacts: Any, mass: Any
 ) -> Any:
-    """Computes the source terms dA/dp X + dB/dp u of eq. 34 (eq. 35 to 41).
+    """Computes the source terms dA/dq X + dB/dq u of eq. 34 for the gains q.
+
+    Eq. 35 to 41 are these terms for q = K, D, and K_e.
 
     Args:
         p_WP: Position (x, y) of P in W, m.
@@ -73,10 +75,11 @@ def advance_sensitivity(
 ) -> None:
     """Advances the sensitivities by one tick of d/dt X_q = A X_q + source.
 
-    This is eq. 34 with its left side and its term A X_q restored. X_q has dp/dq and
-    dv/dq of one gain q. A is the exact linearization of the loop. A contact with a
-    point has the stiffness K_e along n and -K_e (S - d)/d across n. If the damping
-    fades with the distance d, the matrix -(D_e/S) (v - v_j) n' adds to this stiffness.
+    This is eq. 34 with two corrections: the left side is a time derivative, and the
+    right side contains the term A X_q. X_q has dp/dq and dv/dq of one gain q. A is the
+    exact linearization of the loop. A contact with a point has the stiffness K_e along
+    n and the stiffness -K_e (S - d)/d across n. If the damping fades with the distance
+    d, the function adds the matrix -(D_e/S) (v - v_j) n^T to this stiffness.
 
     The function updates the velocity first, and then the position with the new
     velocity. The virtual mass moves in the same order.
@@ -84,7 +87,7 @@ def advance_sensitivity(
     Args:
         state: State of the block. The function changes four numbers from ``begin`` on:
             dp/dq (x and y) and dv/dq (x and y).
-        begin: Index of the first number.
+        begin: Index in the state of the first of these four numbers.
         source: (x, y) of ``sensitivity_sources``.
         contacts: Result of ``contacts_of_objects``.
         loop: ``SensitivityNumbers``.
@@ -128,7 +131,7 @@ def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
         penalty: Weight lambda.
 
     Returns:
-        (x, y): derivative of the penalty by the position of P, m.
+        (x, y): derivative of the penalty with respect to the position of P, m.
     """
     gx = gy = 0.0
     for contact in contacts:

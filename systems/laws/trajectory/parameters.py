@@ -44,12 +44,13 @@ class TrajectoryImpedanceParameters(Parameters):
     """Distance R, m (tables 1 and 2). It has an effect only with ``zone`` envelope or
     jump."""
     zone: Literal["security", "envelope", "jump"] = "security"
-    """Compression of the spring of a contact at the distance d: ``security`` is S - d
-    within S, ``envelope`` is R - d within R, ``jump`` is R - d within S. These are
-    three readings of eq. 4, eq. 5, and section 6."""
+    """Compression of the spring of a contact at the distance d. ``security``: S - d if
+    d < S. ``envelope``: R - d if d < R. ``jump``: R - d if d < S. These are three
+    readings of eq. 4, eq. 5, and section 6."""
     damping_fades: bool = True
-    """Whether the damping of a contact grows from 0 at the edge of the zone (our
-    choice). If not, it is switched on there (as in the paper)."""
+    """Whether the damping of a contact is 0 at the edge of the zone and grows toward
+    the object (our choice). If false, the full damping acts in the whole zone (as in
+    the paper)."""
     reading: Literal["restored", "printed_force", "printed_state"] = "restored"
     """Signs of the contact forces. ``restored``: signs that follow from a potential.
     ``printed_force``: signs of eq. 4 and 5, with which the damping drives the motion.
@@ -58,10 +59,10 @@ class TrajectoryImpedanceParameters(Parameters):
     acceleration_limit_m_s2: Acceleration = 2.5
     """Largest acceleration of the virtual mass, m/s^2."""
     block_distance_m: Length | None = None
-    """Distance L_block of eq. 6, m. P stops if its next step would end nearer to an
-    object than this without leading away from it. null: eq. 6 is off. The paper prints
-    no value. 0.2 m is enough for ``turtlebot3_burger``, whose corners are 0.174 m from
-    P."""
+    """Distance L_block of eq. 6, m. P stops if its next step would end within this
+    distance of an object and would not lead away from the object. null: eq. 6 is off.
+    The paper prints no value. 0.2 m is enough for ``turtlebot3_burger``, whose rear
+    corners are 0.174 m from P."""
 
 
 class AdaptationParameters(Parameters):
@@ -81,15 +82,15 @@ class AdaptationParameters(Parameters):
     penalty: NonNegative = 0.0
     """Weight lambda of the safety term of eq. 27. With 0 the term is off. Eq. 27 prints
     lambda/2 (d_sec^2 - d^2) for each object. Here the term is lambda/2 max(0, d_sec -
-    d)^2, so lambda has no unit, and the gradient is -lambda (d_sec - d) n. It has an
-    effect only with ``rule`` sensitivity. Without it the robot collides more often than
-    with fixed gains."""
+    d)^2, so lambda has no unit, and the gradient is -lambda (d_sec - d) n. The term has
+    an effect only with ``rule: sensitivity``. Without the term, a robot that adapts its
+    gains collides more often than a robot with fixed gains."""
     penalty_distance_m: Length = 0.5
     """Distance d_sec of the safety term, m. Objects count only within the zone of
     contacts. Therefore values above ``security_zone_m`` have no further effect."""
     normalisation: Positive | None = None
-    """Constant m_0 of the normalization: m_0 plus the squared sensitivity divides each
-    rate. none: no division."""
+    """Constant m_0 of the normalization. The rate of each gain is divided by the sum of
+    m_0 and the squared sensitivity. none: no division."""
     projected: bool = False
     """Whether K, D, and K_e stay between their least and greatest values."""
     stiffness_box_n_m: tuple[Positive, Positive] = Field(
@@ -107,8 +108,8 @@ class AdaptationParameters(Parameters):
     leakage: NonNegative = 0.0
     """Rate sigma at which all gains return to their nominal values, 1/s."""
     freezes: bool = False
-    """Whether the adaptation stops during a contact. The return by ``leakage``
-    continues."""
+    """Whether the adaptation stops during a contact. The return to the nominal gains by
+    ``leakage`` continues."""
 
     @model_validator(mode="after")
     def _check(self) -> AdaptationParameters:
@@ -123,7 +124,7 @@ class AdaptationParameters(Parameters):
 
 
 class ReferenceModelParameters(Parameters):
-    """Poles of the reference model. none: the pole of the nominal impedance."""
+    """Poles of the reference model. none: the value from the nominal impedance."""
 
     natural_frequency_rad_s: Positive | None = None
     """Natural frequency w_n, rad/s (not printed)."""
@@ -156,8 +157,8 @@ class ConventionalTrajectoryParameters(TrajectoryImpedanceParameters):
     security_zone_m: Length = 1.0
     """Distance S from P at which contacts begin, m."""
     damping_fades: bool = False
-    """Whether the damping of a contact grows from 0 at the edge of the zone. If not, it
-    is switched on there, as printed."""
+    """Whether the damping of a contact is 0 at the edge of the zone and grows toward
+    the object. If false, the full damping acts in the whole zone, as printed."""
 
 
 class PrintedAdaptationParameters(AdaptationParameters):
@@ -177,11 +178,11 @@ class AdaptiveTrajectoryParameters(ConventionalTrajectoryParameters):
     reference: ReferenceModelParameters = ReferenceModelParameters()
     """Reference model of the adaptation."""
     safety_filter: SafetyFilterParameters | None = None
-    """Filter that keeps P away from objects with any impedance. null: no filter."""
+    """Filter that keeps P away from objects, whatever the gains. null: no filter."""
 
 
 class FilteredTrajectoryParameters(TrajectoryImpedanceParameters):
     """This project's variant: a narrower and stiffer zone, and a safety filter."""
 
     safety_filter: SafetyFilterParameters = SafetyFilterParameters()
-    """Filter that keeps P away from objects with any impedance."""
+    """Filter that keeps P away from objects, whatever the gains."""

@@ -1,4 +1,4 @@
-"""The reference motion of the adaptation: a second-order model after the target."""
+"""The reference motion of the adaptation: a second-order model follows the target."""
 
 from __future__ import annotations
 
@@ -61,13 +61,14 @@ def reference_step(
 
 
 class ReferenceModel(Block):
-    """Computes the motion that P should have after the target.
+    """Computes the motion with which P should follow the target.
 
     At the first tick the model starts at the target. The model has no contacts.
     Therefore the motion of P away from an obstacle counts as an error.
 
-    Discrete state, every tick: position and velocity, exact for a target held over the
-    tick. A target acts from the next tick on.
+    The discrete state has position and velocity. It is updated every tick. The update
+    is exact if the target stays constant during the tick. A new target changes the
+    output from the next tick on.
 
     Args:
         frequency: Natural frequency w_n, rad/s.

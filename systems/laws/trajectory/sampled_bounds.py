@@ -23,7 +23,7 @@ _HALVINGS = 60
 
 
 class SampledMass(NamedTuple):
-    """Virtual mass and motors, between the force of the law and the position of P."""
+    """Virtual mass and motors, which turn the force of the law into motion of P."""
 
     mass_kg: float
     """Virtual mass M, kg."""
@@ -37,10 +37,12 @@ class SampledMass(NamedTuple):
 def sampled_matrix(
     stiffness: float, damping: float, of: SampledMass
 ) -> NDArray[np.float64]:
-    """Computes A of x+ = A x for one axis with a fixed spring and a damper over a tick.
+    """Computes the matrix A that advances one axis by one tick, x+ = A x.
 
-    The velocity v of the virtual mass commands the wheels. The damper acts on v at
-    once. The wheel speed w moves P::
+    A spring K to a fixed point and a damper D act on the virtual mass. The damper acts
+    without delay. With ``late_ticks``, the spring uses an earlier position instead of
+    p. The velocity v of the virtual mass commands the wheels. The wheel speed w moves
+    P::
 
         v+ = v - T/M (K p + D v),  w+ = a w + (1 - a) v+,  a = exp(-T/lag)
         p+ = p + lag (1 - a) w + (T - lag (1 - a)) v+
@@ -115,13 +117,13 @@ def damping_bound(of: SampledMass) -> float:
 
 
 def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
-    """Computes the lag K_e S/K at which the target pulls P through a contact.
+    """Computes the lag of P at which its target pulls P through a contact.
 
     Args:
         own: Parameters of the law.
 
     Returns:
-        Lag, m; 1 m if K_e is 0.
+        Lag K_e S/K of P behind its target, m; 1 m if K_e is 0.
     """
     lag = own.contact_stiffness_n_m * own.security_zone_m / own.stiffness_n_m
     return lag or 1.0

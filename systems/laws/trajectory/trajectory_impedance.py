@@ -22,7 +22,8 @@ class ContactNumbers(NamedTuple):
     rest_m: float
     """Distance at which the spring of a contact has no force, m."""
     fades: bool
-    """Whether the damping grows from 0 at the distance ``begins_m``."""
+    """Whether the damping is 0 at the distance ``begins_m`` and grows toward the
+    object."""
     spring_sign: float
     damper_sign: float
 
@@ -90,7 +91,7 @@ def target_force(
 
 @register_jitable
 def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
-    """Lists the contacts: the objects that have P in their zone.
+    """Lists the contacts, which are the objects whose zone contains P.
 
     Args:
         objects: Vector of the port ``objects_W``. Positions are relative to P.
@@ -114,7 +115,7 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
         if numbers.fades:
             share = 1.0 - distance / numbers.begins_m
         n = -x / distance, -y / distance
-        # Eq. 10 has the obstacle itself instead of the envelope point.
+        # In eq. 10 the spring pulls to the obstacle, not to the envelope point.
         attracts = numbers.spring_sign < 0.0
         overlap = distance if attracts else numbers.rest_m - distance
         found.append(Contact(n, distance, overlap, v_relative, share))
@@ -125,7 +126,8 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
 def contact_force(contacts: Any, stiffness: Any, damping: Any, numbers: Any) -> Any:
     """Computes the force of all contacts, V = sum of K_e overlap n - D_e (v - v_j).
 
-    These are eq. 4 and 5 with restored signs, unless ``numbers`` has other signs.
+    This is the force of eq. 4 and 5 with restored signs. ``numbers`` may select other
+    signs.
 
     Args:
         contacts: Result of ``contacts_of_objects``.
@@ -152,8 +154,8 @@ def step_is_blocked(objects: Any, step: Any, block_m: Any) -> Any:
     Eq. 6 allows a new position if its distance from every object is greater than
     L_block. Otherwise the robot stays at its position. This function also allows a step
     that ends within L_block but leads away from the object. A robot with momentum comes
-    to rest up to v (T + motor lag) farther on. Without this exception it could never
-    leave such a position.
+    to rest up to v (T + motor lag) farther on, so it may rest within L_block. Without
+    the exception it could never leave such a position.
 
     Args:
         objects: Vector of the port ``objects_W``, with the present positions.
@@ -182,8 +184,8 @@ def state_matrices(
     """Computes A, B1, and B2j of eq. 11 to 14 for one axis with restored signs.
 
     The state is (p, v). The inputs are u_d = (p_d, v_d) and X_j = (x_e, v_e) of each
-    object j. x_e is the envelope point at the distance S from the object, v_e its
-    velocity.
+    object j. x_e is the envelope point at the distance S from the object, and v_e is
+    the velocity of this point.
 
     Args:
         mass: Virtual mass M, kg.

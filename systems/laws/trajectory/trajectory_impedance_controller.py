@@ -28,7 +28,7 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
-#: If a target moves straight back faster than this, its velocity turns aside, m/s.
+#: Speed in m/s. If a target moves straight back faster, its velocity turns aside.
 _BACK_M_S = 0.05
 
 
@@ -36,7 +36,7 @@ class TrajectoryNumbers(NamedTuple):
     """Constants of the step of ``TrajectoryImpedanceController``."""
 
     impedance: tuple[float, float, float]
-    """K, N/m, D, N s/m, and K_e, N/m, without adaptation."""
+    """Gains without adaptation: K in N/m, D in N s/m, and K_e in N/m."""
     contact_damping: float
     """Contact damping D_e, N s/m."""
     contacts: ContactNumbers
@@ -71,8 +71,8 @@ def _command(
         T = numbers.tick_s
         vx, vy = integrate_velocity(v_WP, (ax, ay), T, numbers.top_speed)
         if step_is_blocked(objects, (T * vx, T * vy), numbers.block_m):
-            # The wheel command integrates this acceleration to a velocity of zero. It
-            # may exceed the acceleration limit, because P has to stop at once. The lag
+            # The wheel command integrates this acceleration to a velocity of zero. The
+            # acceleration may exceed its limit, because P has to stop at once. The lag
             # of the motors still smooths the motion.
             ax, ay = -v_WP[0] / T, -v_WP[1] / T
     outputs[0][0], outputs[0][1] = ax, ay
@@ -99,21 +99,22 @@ def adapted_impedance_step(
 @define_for_scalars("TrajectoryImpedanceController_", __name__)
 def TrajectoryImpedanceController_(T):
     class Impl(Block_[T]):
-        """Pulls P to a moving target and pushes it off robots and obstacles.
+        """Pulls P to a moving target and pushes it away from robots and obstacles.
 
-        M p'' = -K (p - p_d) - D (v - v_d) + sum of K_e (S - d) n - D_e (v - v_j). The
-        sum is over the objects j that are nearer to P than S. n is the unit vector from
-        object j to P. With ``adapts`` there is an input port ``impedance``. Its K, D,
-        and K_e replace those of the parameters. The outputs are functions of the
-        present input. There is no state and no latency.
+        The law is M p'' = -K (p - p_d) - D (v - v_d) + V. V is the sum over all
+        contacts of K_e (S - d) n - D_e (v - v_j). The contacts are the objects j whose
+        distance d from P is below S. n is the unit vector from object j to P. With
+        ``adapts`` there is an input port ``impedance``. Its K, D, and K_e replace those
+        of the parameters. The outputs are functions of the present input. There is no
+        state and no latency.
 
-        ``block_distance_m`` switches eq. 6 on. It applies if the next step would end
+        ``block_distance_m`` switches eq. 6 on. Eq. 6 applies if the next step would end
         within this distance of an object and would not lead away from the object. Then
         the acceleration is -v/T, which stops the virtual mass at once.
 
         At most eight objects count. The sampled loop is unstable if the sum of D_e over
-        all contacts exceeds 2M/T (80 N s/m for 1 kg). Therefore the robot reduces a
-        scan to objects first.
+        all contacts exceeds 2M/T (80 N s/m for 1 kg). Therefore another block first
+        reduces the points of a scan to a few objects.
 
         Args:
             parameters: ``TrajectoryImpedanceParameters``.
@@ -122,7 +123,7 @@ def TrajectoryImpedanceController_(T):
             tick_s: Period, s.
 
         Reference: Engelbrecht, Steyn and Djouani (2021), eq. 1 to 6, with the signs
-        that their text requires. docs/errata.md lists the differences.
+        that the text of the paper requires. docs/errata.md lists the differences.
         """
 
         inputs = (
