@@ -357,7 +357,7 @@ def DiffDrivePlant_(T):
             Port(
                 "slip_velocities",
                 3,
-                "m/s, left and right rim less its ground, sideways",
+                "m/s, slip of left rim, right rim, and sideways",
             ),
         )
         states = (

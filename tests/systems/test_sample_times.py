@@ -46,14 +46,15 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "SoundSearch": {},
     "WindField": {},
 }
-# What plans remembers more than numbers: its update is none of a discrete state; what
-# stops when something is near, or is pulled and pushed, remembers nothing.
+# The state of the laws that plan is one of arrays, which Drake updates otherwise. The
+# laws that only stop, or are only pulled and pushed, have no state.
 LAWS = {
     name
     for name in systems.__all__
     if name.endswith("Controller") and inspect.isclass(getattr(systems, name))
 } - {
     "GuardedController",
+    "PathIntegralController",
     "StopWhenNearController",
     "TrajectoryImpedanceController",
 }
