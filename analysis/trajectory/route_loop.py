@@ -19,7 +19,7 @@ from systems import DiffDrivePlant
 from systems.base.parameters import OdometryParameters
 from systems.base.wheel_odometry import WheelOdometry_
 from systems.base.wheel_speed_command import WheelCommand_
-from systems.framework.block import Block
+from systems.framework.block import Block, part_of
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
@@ -268,8 +268,9 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
 
 
 def _named(block: Block, model: LinearModel) -> LinearModel:
-    states = tuple(f"{block.part}.{name}" for name in block.states)
-    return replace(model, name=block.part, state_names=states if len(model.A) else ())
+    part = part_of(block)
+    states = tuple(f"{part}.{name}" for name in block.states)
+    return replace(model, name=part, state_names=states if len(model.A) else ())
 
 
 def _push(own: TrajectoryImpedanceParameters, distance_m: float) -> float:

@@ -109,7 +109,7 @@ def ages(hypotheses: int) -> NDArray[np.float64]:
 @register_jitable
 def chosen_track(memory: NDArray[Any]) -> NDArray[Any]:
     """Returns the track of the chosen hypothesis, a view."""
-    start = 3 if memory[0] <= 0.0 else 3 + HYPOTHESIS
+    start = 3 if memory[0] < 0.5 else 3 + HYPOTHESIS
     return memory[start : start + TRACK]
 
 

@@ -151,7 +151,7 @@ def test_it_runs_from_left_to_right(picture):
         "tdoa estimator",
         "source tracker",
         "active impedance controller",
-        "wheel speed command",
+        "wheel command",
         "diff drive plant",
         "wheel odometry",
     )
