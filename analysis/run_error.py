@@ -1,4 +1,4 @@
-"""Failures that are no bad input, and how a command tells of them."""
+"""Failures that are not bad input, and how a command reports them."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What an array tells of sounds: directions, ranges, sources, and their errors."""
+"""Directions, ranges and sources of sounds from microphone arrays, and their errors."""

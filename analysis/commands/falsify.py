@@ -1,4 +1,4 @@
-"""``phonotaxis falsify``: tries to make a guarded robot collide with what rests."""
+"""``phonotaxis falsify``: makes a guarded robot try to hit obstacles at rest."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def warning_texts(cells: Sequence[LawCell]) -> list[str]:
     """The warnings of a scenario's runs.
 
     Args:
-        cells: Of all laws.
+        cells: Cells of all laws.
 
     Returns:
         For each field one line: how many runs of which law, and the first message.

@@ -1,4 +1,4 @@
-"""The pictures of a film of a run: what moves is drawn anew on what rests."""
+"""The frames of a film: moving bodies are drawn over a background at rest."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
 
 
 def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
-    """What one screen tells of a run, as words by name.
+    """The rows of the terminal summary of a run, by name.
 
     Args:
         result: The run.

@@ -1,4 +1,4 @@
-"""Layouts and drivers that try to make a guarded robot touch what rests."""
+"""Layouts and drivers that try to make a guarded robot touch obstacles at rest."""
 
 from __future__ import annotations
 
@@ -421,7 +421,7 @@ def draw_trial(
     """A trial by chance.
 
     Args:
-        seed: Of all trials.
+        seed: Seed of all trials.
         number: Of this one.
         drivers: Names of ``DRIVERS``, or laws, of which one is drawn.
         setting: Name of the robot's settings in ``SETTINGS``; with None, the number
@@ -451,7 +451,7 @@ def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
     """A trial by chance with bodies that cross near the start.
 
     Args:
-        seed: Of all trials.
+        seed: Seed of all trials.
         number: Of this one.
         bodies: How many move; six at most.
         speed: Of theirs, m/s.

@@ -1,4 +1,4 @@
-"""Tries to make the guard collide with what rests: by chance, and by a directed search.
+"""Tries to make a guarded robot hit obstacles at rest, at random and by a search.
 
 Runs of 10 s by compiled loops: layouts and drivers of ``driver_trials``, then SciPy's
 differential evolution over places of posts and commands, which lessens the clearance
@@ -55,7 +55,7 @@ def by_chance(
     """Runs trials drawn by chance.
 
     Args:
-        seed: Of all trials.
+        seed: Seed of all trials.
         numbers: Of these.
         drivers: As of ``draw_trial``.
 
@@ -95,7 +95,7 @@ def by_search(runs: int, seed: int) -> list[Found]:
 
     Args:
         runs: About how many runs it may take.
-        seed: Of the search.
+        seed: Seed of the search.
 
     Returns:
         What each run came to.
@@ -151,7 +151,7 @@ def falsify(
     Args:
         runs: Trials by chance.
         search: About how many runs the searches may take together.
-        seed: Of all that is drawn.
+        seed: Seed of all random numbers.
         workers: Number of processes.
         drivers: As of ``draw_trial``.
         progress: Called with the number of runs that are done.

@@ -95,7 +95,7 @@ def trial_summary(trial: Trial, outcome: Outcome, seed: int) -> dict[str, Any]:
     Args:
         trial: The trial that was run again.
         outcome: What it came to.
-        seed: Of all trials.
+        seed: Seed of all trials.
 
     Returns:
         Plain values; clearances in m, commands as fields of ``Row``.

@@ -274,7 +274,7 @@ def _named(block: Block, model: LinearModel) -> LinearModel:
 
 
 def _push(own: TrajectoryImpedanceParameters, distance_m: float) -> float:
-    """Of the spring of a contact with what rests, N."""
+    """Force of the spring of a contact with an obstacle at rest, N."""
     numbers = contact_numbers(own)
     attracts = numbers.spring_sign < 0.0
     overlap = distance_m if attracts else numbers.rest_m - distance_m
