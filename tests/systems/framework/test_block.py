@@ -175,6 +175,8 @@ def test_arrays_are_done_once_a_tick_and_carried():
     diagram.GetInputPort("value").FixValue(context, [4.0])
     for ticks in range(1, 4):
         simulator.AdvanceTo(0.1 * ticks)
+        # After the update of this tick, its outputs still hold.
+        simulator.AdvancePendingEvents()
         own = memory.GetMyContextFromRoot(simulator.get_context())
         counts = [value(memory, "count", own) for _ in range(3)]
         assert counts == [ticks + 1.0] * 3
