@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic_core import ValidationError
 
 from diagrams.scenario.fields.explain import explain
-from diagrams.scenario.fields.joining import begins_anew
 from diagrams.scenario.fields.near_miss import did_you_mean
 from diagrams.scenario.fields.shipped import SCHEMA_FILE, scenario_schema
+from diagrams.scenario.shorthand import as_written, begins_anew, require_effect
 from diagrams.scenario.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
 
@@ -55,8 +56,19 @@ def load_scenario(
     data = read_mapping(path)
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
-    set_fields(data, _settings(overrides))
+    settings = list(_settings(overrides))
+    set_fields(data, settings)
+    require_effect(data, [key for key, _ in settings])
     resolve_sound(data, Path.cwd())
+    return scenario_from_mapping(data)
+
+
+def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    """Returns a copy of a scenario with changes, see ``Scenario.with_``."""
+    data = scenario.model_dump(mode="json")
+    settings = list(_settings(changes))
+    set_fields(data, settings)
+    require_effect(data, [key for key, _ in settings])
     return scenario_from_mapping(data)
 
 
@@ -91,7 +103,8 @@ def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise explain(error, scenario_schema(), "a scenario") from None
+        written = partial(as_written, data=data)
+        raise explain(error, scenario_schema(), "a scenario", written) from None
 
 
 def dump_scenario(scenario: Scenario) -> str:

@@ -1,11 +1,23 @@
-"""The fields of each robot and of each source in a scenario."""
+"""The fields of each robot and of each source in a scenario.
+
+The law of a robot decides its kind, and each kind has only the fields that it uses.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, Strict, field_validator, model_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from diagrams.scenario.fields.near_miss import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
@@ -25,7 +37,6 @@ from systems.hearing.parameters import (
 )
 from systems.laws.catalogue import LAWS
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.odor.parameters import AirflowParameters, GasSensorParameters
 from systems.planning.parameters import FollowingParameters
 from systems.ranging.parameters import (
@@ -39,6 +50,9 @@ from systems.routes.parameters import RouteParameters
 from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
 from systems.sound.parameters import MicArrayParameters, SoundParameters, channel_skew
+
+#: Law of a robot that states none.
+DEFAULT_LAW = "active"
 
 
 class StartParameters(Parameters):
@@ -55,55 +69,54 @@ class StartParameters(Parameters):
         return (*self.position_m, math.radians(self.heading_deg))
 
 
-class FollowerParameters(Parameters):
-    """One robot: its law, hearing, sensors and body."""
+if TYPE_CHECKING:
 
-    law: str = Field(default="active", min_length=1)
+    class LawGains(Parameters):
+        """Stub for type checkers, which cannot see the fields from the catalog."""
+
+        def __getattr__(self, name: str) -> Any: ...
+
+else:
+    LawGains = create_model(
+        "LawGains",
+        __base__=Parameters,
+        __module__=__name__,
+        __doc__="Gains by law. Only the gains of the robot's law have an effect.",
+        **{
+            law.name: (
+                law.gains | None,
+                Field(None, description=f"Gains of ``law: {law.name}``."),
+            )
+            for law in LAWS.values()
+            if law.gains is not None
+        },
+    )
+
+
+class Robot(Parameters):
+    """The fields that robots of all kinds have: law, body, wheels and start."""
+
+    kind: ClassVar[str] = "robot"
+    """Name of the kind, see ``KINDS``."""
+    searches: ClassVar[Literal["odor", "sound"] | None] = None
+    """What the robot searches for step by step; None: it does not search."""
+    has_goal: ClassVar[bool] = False
+    """Whether the target is silent: the goal of a route, or an odor source."""
+
+    law: str = Field(default=DEFAULT_LAW, min_length=1)
     """Name of a law in the list of ``phonotaxis laws``; or a user's own law, as
-    ``package.module:Name`` or ``path/to/file.py:Name``."""
-    hearing: Literal["audio", "ideal"] = "audio"
-    """``audio``: sound waves and microphones; ``ideal``: exact positions."""
-    obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
-    """``ultrasonic``: sensors with cones; ``ideal``: exact nearest points."""
+    ``package.module:Name`` or ``path/to/file.py:Name``. The law decides the kind of the
+    robot."""
     blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
     """A user's own blocks, as ``package.module:Name`` or ``path/to/file.py:Name``. Each
     replaces the robot's block with the same part; a block with a new part is added."""
-    follows: str = ""
-    """Name of the source or the leader to follow; empty: the first source."""
     loudspeaker: SoundParameters | None = None
     """Sound that the robot itself plays at the origin of B, so that other robots can
-    follow it."""
+    follow it. Fields that are missing are those of ``sound``."""
     start: StartParameters = StartParameters()
-    microphones: MicArrayParameters = MicArrayParameters()
-    tdoa: TDOAParameters = TDOAParameters()
-    ideal_hearing: IdealHearingParameters = IdealHearingParameters()
-    tracker: TrackerParameters = TrackerParameters()
-    ultrasonic: UltrasonicParameters = UltrasonicParameters()
-    collision_vector: CollisionVectorParameters = CollisionVectorParameters()
-    attraction: AttractionParameters = AttractionParameters()
-    repulsion: RepulsionParameters = RepulsionParameters()
-    following: FollowingParameters = FollowingParameters()
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
-    route: RouteParameters | None = None
-    """Goal and planner of a robot that drives on a planned route; null: the robot does
-    not drive on a route."""
-    objects: ObjectSensorParameters = ObjectSensorParameters()
-    detector: ObjectDetectorParameters = ObjectDetectorParameters()
-    guard: GuardParameters | None = None
-    """The guard works with any law and keeps the robot in space that its sensors have
-    seen as free; null: no guard, unless the law is ``guarded``."""
-    free_space: FreeSpaceParameters = FreeSpaceParameters()
-    search: PlumeSearchParameters = PlumeSearchParameters()
-    gas_sensors: GasSensorParameters = GasSensorParameters()
-    airflow_sensors: AirflowParameters = AirflowParameters()
-    contact_switches: ContactParameters = ContactParameters()
-    sound_search: SoundSearchParameters = SoundSearchParameters()
-    cross_power: CrossPowerParameters = CrossPowerParameters()
-    compass: CompassParameters = CompassParameters()
-    heading_control: HeadingControlParameters = HeadingControlParameters()
-    motor_driver: MotorDriverParameters = MotorDriverParameters()
 
     @field_validator("law")
     @classmethod
@@ -112,10 +125,61 @@ class FollowerParameters(Parameters):
             raise unknown_law(law, LAWS)
         return law
 
+    @property
+    def own_guard(self) -> GuardParameters | None:
+        """The guard of the robot, or None."""
+        return None
+
+    @property
+    def listens(self) -> bool:
+        """Whether the robot hears sound waves."""
+        return False
+
+    @property
+    def follow_distance_m(self) -> float:
+        """Distance between P and the target, m."""
+        return 0.0
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Length and width of the robot, m."""
+        return self.robot.length_m, self.robot.width_m
+
+
+class Follower(Robot):
+    """A robot that follows a sound and avoids obstacles."""
+
+    kind: ClassVar[str] = "follower"
+
+    hearing: Literal["audio", "ideal"] = "audio"
+    """``audio``: sound waves and microphones; ``ideal``: exact positions."""
+    obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
+    """``ultrasonic``: sensors with cones; ``ideal``: exact nearest points."""
+    follows: str = ""
+    """Name of the source or the leader to follow; empty: the first source."""
+    microphones: MicArrayParameters = MicArrayParameters()
+    tdoa: TDOAParameters = TDOAParameters()
+    ideal_hearing: IdealHearingParameters = IdealHearingParameters()
+    tracker: TrackerParameters = TrackerParameters()
+    ultrasonic: UltrasonicParameters = UltrasonicParameters()
+    collision_vector: CollisionVectorParameters = CollisionVectorParameters()
+    attraction: AttractionParameters = AttractionParameters()
+    laws: LawGains = LawGains()
+    following: FollowingParameters = FollowingParameters()
+    guard: GuardParameters | None = None
+    """The guard works with any law and keeps the robot in space that its sensors have
+    seen as free; null: no guard, unless the law is ``guarded``."""
+    free_space: FreeSpaceParameters = FreeSpaceParameters()
+
     @model_validator(mode="after")
-    def _check_channels(self) -> FollowerParameters:
+    def _check_channels(self) -> Follower:
         channel_skew(self.microphones, len(self.robot.microphones_m))
         return self
+
+    @property
+    def gains(self) -> Any:
+        """Gains of the robot's law; None for a law without gains."""
+        return gains_of(self.laws, self.law)
 
     @property
     def own_guard(self) -> GuardParameters | None:
@@ -127,27 +191,124 @@ class FollowerParameters(Parameters):
     @property
     def listens(self) -> bool:
         """Whether the robot hears sound waves."""
-        return self.hearing == "audio" and not self.has_goal
-
-    @property
-    def searches(self) -> Literal["odor", "sound"] | None:
-        """What the robot searches for; None: it follows a source or a route."""
-        return LAWS[self.law].searches if self.law in LAWS else None
-
-    @property
-    def has_goal(self) -> bool:
-        """Whether the target is silent: the goal of a route, or an odor source."""
-        return self.route is not None or self.searches == "odor"
+        return self.hearing == "audio"
 
     @property
     def follow_distance_m(self) -> float:
-        """Distance between P and the target, m; 0 with a route."""
-        return self.attraction.follow_distance_m if self.route is None else 0.0
+        """Distance between P and the target, m."""
+        return self.attraction.follow_distance_m
+
+
+class Router(Robot):
+    """A robot that drives to a goal on a planned route."""
+
+    kind: ClassVar[str] = "router"
+    has_goal: ClassVar[bool] = True
+
+    obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
+    """``ultrasonic``: sensors with cones; ``ideal``: exact objects."""
+    ultrasonic: UltrasonicParameters = UltrasonicParameters()
+    route: RouteParameters
+    laws: LawGains = LawGains()
+    objects: ObjectSensorParameters = ObjectSensorParameters()
+    detector: ObjectDetectorParameters = ObjectDetectorParameters()
 
     @property
-    def size(self) -> tuple[float, float]:
-        """Length and width of the robot, m."""
-        return self.robot.length_m, self.robot.width_m
+    def gains(self) -> Any:
+        """Gains of the robot's law; None for a law without gains."""
+        return gains_of(self.laws, self.law)
+
+
+class OdorSearcher(Robot):
+    """A robot that searches for a source of odor."""
+
+    kind: ClassVar[str] = "odor_searcher"
+    searches: ClassVar[Literal["odor", "sound"] | None] = "odor"
+    has_goal: ClassVar[bool] = True
+
+    search: PlumeSearchParameters = PlumeSearchParameters()
+    gas_sensors: GasSensorParameters = GasSensorParameters()
+    airflow_sensors: AirflowParameters = AirflowParameters()
+    contact_switches: ContactParameters = ContactParameters()
+    compass: CompassParameters = CompassParameters()
+    heading_control: HeadingControlParameters = HeadingControlParameters()
+    motor_driver: MotorDriverParameters = MotorDriverParameters()
+
+
+class SoundSearcher(Robot):
+    """A robot that searches for a sound step by step."""
+
+    kind: ClassVar[str] = "sound_searcher"
+    searches: ClassVar[Literal["odor", "sound"] | None] = "sound"
+
+    follows: str = ""
+    """Name of the source or the robot to search for; empty: the first source."""
+    microphones: MicArrayParameters = MicArrayParameters()
+    sound_search: SoundSearchParameters = SoundSearchParameters()
+    cross_power: CrossPowerParameters = CrossPowerParameters()
+    compass: CompassParameters = CompassParameters()
+    heading_control: HeadingControlParameters = HeadingControlParameters()
+    motor_driver: MotorDriverParameters = MotorDriverParameters()
+
+    @model_validator(mode="after")
+    def _check_channels(self) -> SoundSearcher:
+        channel_skew(self.microphones, len(self.robot.microphones_m))
+        return self
+
+    @property
+    def listens(self) -> bool:
+        """Whether the robot hears sound waves."""
+        return True
+
+
+#: Models of the kinds of robots, by name.
+KINDS: Mapping[str, type[Robot]] = {
+    model.kind: model for model in (Follower, Router, OdorSearcher, SoundSearcher)
+}
+
+
+def kind_of(robot: Any) -> str:
+    """Returns the kind of a robot, which follows from its law.
+
+    Args:
+        robot: The fields of a robot, as a model or as plain values. A user's own law
+            is the law of a router if the fields contain a route.
+
+    Returns:
+        A key of ``KINDS``.
+    """
+    if isinstance(robot, Robot):
+        return robot.kind
+    fields = robot if isinstance(robot, Mapping) else {}
+    law = fields.get("law", DEFAULT_LAW)
+    if isinstance(law, str) and law in LAWS:
+        return LAWS[law].robot
+    return "follower" if fields.get("route") is None else "router"
+
+
+#: A robot of any kind.
+AnyRobot = Annotated[
+    Annotated[Follower, Tag("follower")]
+    | Annotated[Router, Tag("router")]
+    | Annotated[OdorSearcher, Tag("odor_searcher")]
+    | Annotated[SoundSearcher, Tag("sound_searcher")],
+    Discriminator(kind_of),
+]
+
+
+def gains_of(laws: LawGains, law: str) -> Any:
+    """Returns the gains of a law, by default those of its model.
+
+    Args:
+        laws: Gains that are set.
+        law: Name of a law.
+
+    Returns:
+        The gains; None for a law without gains, and for a user's own law.
+    """
+    if law not in LAWS or (model := LAWS[law].gains) is None:
+        return None
+    return getattr(laws, law) or model()
 
 
 class SourceParameters(SourceRobotParameters):

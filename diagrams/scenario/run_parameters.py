@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, Strict, StringConstraints
+from pydantic import Field, Strict
 
-from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.parameters import (
     Duration,
     Fraction,
@@ -21,7 +20,7 @@ from systems.framework.signals import TICK_S
 from systems.odor.parameters import OdorParameters, WindParameters
 from systems.radio.parameters import RadioParameters
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.parameters import RoomParameters, SoundParameters
+from systems.sound.parameters import RoomParameters
 from systems.world.parameters import ObstacleParameters
 
 #: The engine that simulates a run.
@@ -29,10 +28,6 @@ Engine = Literal["drake", "compiled"]
 
 #: Number of runs from which ``auto`` selects the compiled engine.
 MANY_RUNS = 100
-
-#: Names of robots and sources, which also appear in names of files.
-_Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=64)]
-_Participants = Annotated[dict[_Name, dict[str, Any]], Field(max_length=16)]
 
 
 class StopParameters(Parameters):
@@ -113,15 +108,6 @@ class RunParameters(Parameters):
     """Longest simulated time, s; at most one hour."""
     arena_m: Size = (7.0, 7.0)
     """Extents of the floor in pictures, m; the arena has no walls."""
-    robots: _Participants = Field(default={})
-    """Robots by name, each with the fields that differ from those of the scenario;
-    empty: one robot, named ``robot``, with the fields of the scenario."""
-    sources: _Participants = Field(default={})
-    """Sources by name, each with the fields that differ from ``source`` and ``sound``;
-    empty: one source, named ``source``. A source that no robot follows is an
-    interferer."""
-    source: SourceRobotParameters = SourceRobotParameters()
-    sound: SoundParameters = SoundParameters()
     obstacles: Annotated[
         tuple[ObstacleParameters, ...], Strict(False), Field(max_length=100)
     ] = ()

@@ -7,16 +7,16 @@ name, one default and one legal range. ``load_scenario`` reads a scenario from Y
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 from itertools import combinations
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
-    ValidationError,
-    ValidationInfo,
-    field_validator,
+    Field,
+    SerializerFunctionWrapHandler,
+    StringConstraints,
+    model_serializer,
     model_validator,
 )
 
@@ -31,22 +31,23 @@ from diagrams.scenario.bodies import (
 from diagrams.scenario.checks.goal_checks import check_goals
 from diagrams.scenario.checks.guard_checks import check_guard
 from diagrams.scenario.checks.search_checks import check_searches
-from diagrams.scenario.fields.explain import explain, single_faults
-from diagrams.scenario.fields.joining import joined
-from diagrams.scenario.fields.shipped import scenario_schema
-from diagrams.scenario.participants import FollowerParameters, SourceParameters
+from diagrams.scenario.participants import (
+    AnyRobot,
+    Follower,
+    Robot,
+    Router,
+    SoundSearcher,
+    SourceParameters,
+)
 from diagrams.scenario.run_parameters import RunParameters
-from systems.base.carrier_parameters import SourceRobotParameters
+from diagrams.scenario.shorthand import SOURCE, file_form, resolved
 from systems.framework.input_error import InputError
-from systems.framework.parameters import NonNegative, Parameters
+from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
-from systems.laws.catalogue import LAWS
 from systems.sound.parameters import SoundParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
 
-#: Names of the only robot and of the only source.
-ROBOT, SOURCE = "robot", "source"
 #: Name of the target of a robot with a route.
 GOAL = "goal"
 #: Name of the diagram that all robots share.
@@ -54,127 +55,161 @@ WORLD = "world"
 #: Name of the source of odor.
 ODOR = "odor"
 
-_P = TypeVar("_P", bound=Parameters)
+#: Names of robots and sources, which also appear in names of files.
+_Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=64)]
+_R = TypeVar("_R", bound=Robot)
 
 
-class Scenario(FollowerParameters, RunParameters):
+class Scenario(RunParameters):
     """One run. Every field has a default: the default scenario is complete.
 
-    The fields of a robot apply to all robots, unless ``robots`` sets them for one
-    robot. ``source`` and ``sound`` apply to all sources, unless ``sources`` sets them
-    for one source.
+    A file may state fields of robots and of sources at the top level. They apply to all
+    robots, or to all sources, that do not set them (``diagrams.scenario.shorthand``).
     """
 
-    @cached_property
-    def all_robots(self) -> dict[str, FollowerParameters]:
-        """Complete fields of each robot, by name."""
-        fields = FollowerParameters.model_fields
-        if not self.robots:
-            values = {key: getattr(self, key) for key in fields}
-            return {ROBOT: FollowerParameters.model_construct(**values)}
-        base, robots = self.model_dump(include=set(fields)), {}
-        for name, changes in self.robots.items():
-            own = joined(base, changes)
-            if isinstance(played := changes.get("loudspeaker"), Mapping):
-                own["loudspeaker"] = joined(self.sound.model_dump(), played)
-            robots[name] = _validated(FollowerParameters, own, f"robots.{name}")
-        return robots
+    robots: Annotated[dict[_Name, AnyRobot], Field(min_length=1, max_length=16)]
+    """Robots by name. In a file, each has the fields that differ from those of the
+    scenario; empty: one robot, named ``robot``."""
+    sources: Annotated[dict[_Name, SourceParameters], Field(max_length=16)]
+    """Sources by name. In a file, each has the fields that differ from ``source`` and
+    ``sound``; empty: one source, named ``source``, if a robot follows it. A source that
+    no robot follows is an interferer."""
 
-    @cached_property
-    def all_sources(self) -> dict[str, SourceParameters]:
-        """Complete fields of each source, by name."""
-        robots = self.all_robots.values()
-        if not self.sources and all(
-            r.has_goal or r.follows in self.robots for r in robots
-        ):
-            return {}
-        base = self.source.model_dump() | {"sound": self.sound.model_dump()}
-        return {
-            name: _validated(SourceParameters, joined(base, own), f"sources.{name}")
-            for name, own in (self.sources or {SOURCE: {}}).items()
-        }
+    def __init__(self, **fields: Any) -> None:
+        super().__init__(**fields)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _resolve(cls, data: Any) -> Any:
+        return resolved(data) if isinstance(data, Mapping) else data
+
+    @property
+    def only(self) -> Robot:
+        """The only robot.
+
+        Raises:
+            InputError: There are several robots.
+        """
+        if len(self.robots) > 1:
+            raise InputError(
+                "robots",
+                f"there are {len(self.robots)}: {', '.join(self.robots)}; select one",
+            )
+        return next(iter(self.robots.values()))
+
+    @property
+    def follower(self) -> Follower:
+        """The only robot, which follows a sound.
+
+        Raises:
+            InputError: There are several robots, or the robot is of another kind.
+        """
+        return self._of_kind(Follower, "follows a sound")
+
+    @property
+    def router(self) -> Router:
+        """The only robot, which drives on a route.
+
+        Raises:
+            InputError: There are several robots, or the robot is of another kind.
+        """
+        return self._of_kind(Router, "drives on a route")
+
+    def _of_kind(self, kind: type[_R], what: str) -> _R:
+        robot = self.only
+        if not isinstance(robot, kind):
+            raise InputError(
+                "law", f"is {robot.law!r}, but this needs a robot that {what}"
+            )
+        return robot
+
+    @property
+    def source(self) -> SourceParameters:
+        """The source that the only robot follows.
+
+        Raises:
+            InputError: The robot does not follow a source, or there are several robots.
+        """
+        if (target := self.target(next(iter(self.robots)))) not in self.sources:
+            raise InputError("source", "there is none: no robot follows a source")
+        return self.sources[target]
 
     def sounds(self) -> dict[str, SoundParameters]:
         """The sound of each source and loudspeaker, by name of the source or robot."""
-        played = {name: source.sound for name, source in self.all_sources.items()}
-        for name, robot in self.all_robots.items():
+        played = {name: source.sound for name, source in self.sources.items()}
+        for name, robot in self.robots.items():
             if robot.loudspeaker is not None:
                 played[name] = robot.loudspeaker
         return played
 
-    def sound_field(self, name: str) -> str:
-        """Returns the field of a sound, for messages.
-
-        Args:
-            name: A name from ``sounds``.
-
-        Returns:
-            Dotted path of the field.
-        """
-        if name in self.all_robots:
-            return f"robots.{name}.loudspeaker" if self.robots else "loudspeaker"
-        return (
-            f"sources.{name}.sound"
-            if "sound" in self.sources.get(name, {})
-            else "sound"
-        )
-
-    def robot_fields(self) -> Iterator[tuple[str, FollowerParameters]]:
-        """Yields each robot, with the prefix of its fields in messages."""
-        for name, robot in self.all_robots.items():
-            yield (f"robots.{name}." if self.robots else ""), robot
-
     @property
     def longest_frame_s(self) -> float:
-        """Longest audio frame of all robots, s."""
-        return max(robot.microphones.frame_s for robot in self.all_robots.values())
+        """Longest audio frame of all robots with microphones, s; 0 without any."""
+        return max(map(frame_of, self.robots.values()))
 
     def target(self, robot: str) -> str:
         """Name of the target of a robot: a source, a leader, its goal, or the odor."""
-        own = self.all_robots[robot]
-        if own.has_goal:
-            return GOAL if own.route is not None else ODOR
-        return own.follows or next(iter(self.all_sources))
+        own = self.robots[robot]
+        if isinstance(own, Router):
+            return GOAL
+        if isinstance(own, Follower | SoundSearcher):
+            return own.follows or next(iter(self.sources))
+        return ODOR
 
     def of_robot(self, name: str) -> Scenario:
         """Returns the scenario of one robot and of the source that it follows.
 
-        If the robot follows a leader, ``source`` is at rest at the start pose of this
-        leader.
+        If the robot follows a leader, the source has the name, size and sound of this
+        leader and is at rest at the leader's start pose.
         """
-        if not self.robots and not self.sources:
-            return self
-        robot, target = self.all_robots[name], self.target(name)
-        own = {key: getattr(robot, key) for key in FollowerParameters.model_fields}
+        robot, target = self.robots[name], self.target(name)
         if robot.has_goal:
-            return self.model_copy(update=own | {"robots": {}, "sources": {}})
-        if target in self.all_sources:
-            fields = SourceRobotParameters.model_fields
-            data = self.all_sources[target].model_dump(include=set(fields))
+            sources = {}
+        elif target in self.sources:
+            sources = {target: self.sources[target]}
         else:
-            leader = self.all_robots[target]
+            leader = self.robots[target]
             length, width = leader.size
-            data = {
-                "waypoints_m": (leader.start.position_m,),
-                "heading_deg": leader.start.heading_deg,
-                "length_m": length,
-                "width_m": width,
-            }
-        source = SourceRobotParameters.model_validate(data)
-        own |= {"source": source, "sound": self.sounds()[target], "follows": ""}
-        return self.model_copy(update=own | {"robots": {}, "sources": {}})
+            assert leader.loudspeaker is not None
+            at_rest = SourceParameters(
+                waypoints_m=(leader.start.position_m,),
+                heading_deg=leader.start.heading_deg,
+                length_m=length,
+                width_m=width,
+                sound=leader.loudspeaker,
+            )
+            sources = {target: at_rest}
+        if self.robots.keys() == {name} and self.sources == sources:
+            return self
+        return self.model_copy(update={"robots": {name: robot}, "sources": sources})
+
+    def with_(self, changes: Mapping[str, Any]) -> Scenario:
+        """Returns a copy with some fields changed, which is validated.
+
+        Args:
+            changes: Plain values by dotted path, as for ``load_scenario``.
+
+        Returns:
+            The new scenario.
+
+        Raises:
+            InputError: See ``load_scenario``.
+        """
+        from diagrams.scenario.loading import changed
+
+        return changed(self, changes)
 
     def require_one_robot(self, purpose: str) -> None:
-        """Refuses named robots and sources.
+        """Refuses several robots or sources.
 
         Args:
             purpose: What needs one robot, for example 'a linear model'.
 
         Raises:
-            InputError: The scenario names robots or sources.
+            InputError: The scenario has several robots or sources.
         """
         for field, named in (("robots", self.robots), ("sources", self.sources)):
-            if named:
+            if len(named) > 1:
                 raise InputError(
                     field,
                     f"has {', '.join(named)}, but {purpose} needs one robot and "
@@ -190,10 +225,7 @@ class Scenario(FollowerParameters, RunParameters):
         Raises:
             InputError: A period differs from the tick.
         """
-        for field, period in (
-            ("microphones.frame_s", self.microphones.frame_s),
-            ("ultrasonic.period_s", self.ultrasonic.period_s),
-        ):
+        for field, period in _periods(self.follower):
             if period != self.tick_s:
                 raise InputError(
                     field,
@@ -215,22 +247,23 @@ class Scenario(FollowerParameters, RunParameters):
             The bodies by name, and the target. If the target has a body, this body is
             the last one.
         """
-        robot = robot or next(iter(self.all_robots))
+        robot = robot or next(iter(self.robots))
         target, paths = self.target(robot), paths or {}
         bodies = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
-        for name, other in self.all_robots.items():
+        for name, other in self.robots.items():
             if name != robot:
                 path = paths.get(name) or LivePath(other.start.pose)
                 bodies[name] = Body(path, other.size)
-        for name, source in self.all_sources.items():
+        for name, source in self.sources.items():
             if source.body:
                 bodies[name] = Body(source.path(), (source.length_m, source.width_m))
         if self.odor is not None:
             still = WaypointPath((self.odor.position_m,), speed=0.0)
             bodies[ODOR] = Body(still, self.odor.container_m)
-        route = self.all_robots[robot].route
-        if route is not None:
-            return Surroundings(bodies, GOAL, WaypointPath((route.goal_m,), speed=0.0))
+        own = self.robots[robot]
+        if isinstance(own, Router):
+            goal = WaypointPath((own.route.goal_m,), speed=0.0)
+            return Surroundings(bodies, GOAL, goal)
         bodies[target] = bodies.pop(target)
         return Surroundings(bodies, target)
 
@@ -241,7 +274,7 @@ class Scenario(FollowerParameters, RunParameters):
     def robots_seen(self, robot: str) -> tuple[int, ...]:
         """Indices of the other robots in ``surroundings(robot).obstacles``."""
         names = enumerate(self.surroundings(robot).obstacles)
-        return tuple(number for number, name in names if name in self.all_robots)
+        return tuple(number for number, name in names if name in self.robots)
 
     def mapped(self) -> NDArray[np.float64]:
         """(n, 5) rectangles of the known obstacles at rest, m and rad."""
@@ -270,34 +303,21 @@ class Scenario(FollowerParameters, RunParameters):
                 the following band, and otherwise by the goal margin.
         """
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
-        return self.follow_distance_m + margin
+        return self.only.follow_distance_m + margin
 
-    @field_validator("robots", "sources")
-    @classmethod
-    def _check_changes(cls, named: Any, info: ValidationInfo) -> Any:
-        robots = info.field_name == "robots"
-        model = FollowerParameters if robots else SourceParameters
-        faults = [
-            fault
-            for name, changes in named.items()
-            for fault in single_faults(
-                model, changes, scenario_schema(), (str(info.field_name), name)
-            )
-        ]
-        if faults:
-            raise InputError.joined(faults)
-        return named
+    @model_serializer(mode="wrap")
+    def _dump(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return file_form(dump(self))
 
     @model_validator(mode="after")
     def _check(self) -> Scenario:
         # All further checks assume that these three checks pass.
         self._check_names()
         self._check_targets()
-        self._check_searches()
+        check_searches(self.robots, self)
         faults = []
         for check in (
-            self._check_routes,
-            self._check_goals,
+            lambda: check_goals(self.robots, self.stop.diverged_range_m),
             self._check_rates,
             self._check_step,
             self._check_room,
@@ -314,14 +334,14 @@ class Scenario(FollowerParameters, RunParameters):
 
     def _check_names(self) -> None:
         taken = [ODOR] if self.odor is not None else []
-        for name in self.all_robots:
+        for name in self.robots:
             if name in (WORLD, *taken):
                 raise InputError(
                     "robots", f"the name {name!r} is taken; give the robot another one"
                 )
-        taken += self.all_robots
+        taken += self.robots
         for field, names in (
-            ("sources", self.all_sources),
+            ("sources", self.sources),
             ("obstacles", [obstacle.name for obstacle in self.obstacles]),
         ):
             for name in names:
@@ -334,11 +354,11 @@ class Scenario(FollowerParameters, RunParameters):
                 taken.append(name)
 
     def _check_targets(self) -> None:
-        played, sources = self.sounds(), self.all_sources
-        for name, robot in self.all_robots.items():
+        played, sources = self.sounds(), self.sources
+        for name, robot in self.robots.items():
             if robot.has_goal:
                 continue
-            field = f"robots.{name}.follows" if self.robots else "follows"
+            field = f"robots.{name}.follows"
             target = self.target(name)
             if target not in played or target == name:
                 can = [each for each in played if each != name]
@@ -353,51 +373,36 @@ class Scenario(FollowerParameters, RunParameters):
                     f"is off, but robot {name!r} follows it; what is followed has a "
                     "body: set it to true",
                 )
-            if robot.tdoa.schedule_known and robot.listens:
+            if (
+                isinstance(robot, Follower)
+                and robot.listens
+                and robot.tdoa.schedule_known
+            ):
                 _check_schedule(field, target, played)
         self._check_heard(played)
 
     def _check_heard(self, played: Mapping[str, SoundParameters]) -> None:
-        robots = self.all_robots
+        robots = self.robots
         if any(robot.listens for robot in robots.values()):
             return
         followed = {self.target(name) for name in robots}
         # The default source need not be heard: it may serve as a body only.
-        named = [each for each in played if each in robots or each in self.sources]
+        named = [
+            each for each in played if each in robots or [*self.sources] != [SOURCE]
+        ]
         for name in named:
             if name not in followed:
-                field = f"robots.{name}.loudspeaker" if self.robots else "loudspeaker"
+                group = (
+                    f"robots.{name}.loudspeaker"
+                    if name in robots
+                    else f"sources.{name}"
+                )
                 raise InputError(
-                    field if name in robots else f"sources.{name}",
+                    group,
                     "no robot hears its sound: no robot follows it, and none has "
                     "hearing 'audio'; let a robot follow it, or make it an "
                     "obstacle",
                 )
-
-    def _check_routes(self) -> None:
-        for prefix, robot in self.robot_fields():
-            law = LAWS.get(robot.law)
-            if robot.route is not None:
-                if law is not None and not law.on_route:
-                    can = [name for name, each in LAWS.items() if each.on_route]
-                    raise InputError(
-                        f"{prefix}law",
-                        f"is {robot.law!r}, which follows a sound, but the robot has a "
-                        f"route; use {', '.join(can)}, or leave route out",
-                    )
-            elif law is not None and law.on_route:
-                raise InputError(
-                    f"{prefix}route",
-                    f"is missing, and law {robot.law!r} drives on one; set "
-                    f"{prefix}route.goal_m",
-                )
-
-    def _check_goals(self) -> None:
-        check_goals(dict(self.robot_fields()), self.stop.diverged_range_m)
-
-    def _check_searches(self) -> None:
-        robots = dict(zip(self.all_robots, self.robot_fields(), strict=True))
-        check_searches(robots, self)
 
     def _check_rates(self) -> None:
         tick = self.tick_s
@@ -408,13 +413,10 @@ class Scenario(FollowerParameters, RunParameters):
                 "one sample of sound; round it",
             )
         periods = []
-        for prefix, robot in self.robot_fields():
-            periods += [
-                (f"{prefix}microphones.frame_s", robot.microphones.frame_s),
-                (f"{prefix}ultrasonic.period_s", robot.ultrasonic.period_s),
-            ]
+        for name, robot in self.robots.items():
+            periods += [(f"robots.{name}.{f}", p) for f, p in _periods(robot)]
             if self.room and robot.listens:
-                self.room.update_frames(robot.microphones.frame_s)
+                self.room.update_frames(frame_of(robot))
         for field, period in periods:
             if not whole(period / tick):
                 ticks = max(1, round(period / tick))
@@ -429,11 +431,11 @@ class Scenario(FollowerParameters, RunParameters):
         # scheme amplifies a solution that should decay.
         limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
         step = self.integrator.step_s
-        for prefix, robot in self.robot_fields():
+        for name, robot in self.robots.items():
             lag = robot.plant.motor_lag_s
             if lag < step / limits[self.integrator.scheme]:
                 raise InputError(
-                    f"{prefix}plant.motor_lag_s",
+                    f"robots.{name}.plant.motor_lag_s",
                     f"{lag} s is too short for steps of {step} s, which "
                     f"would be unstable; set integrator.step_s to {lag:g} or less",
                 )
@@ -443,12 +445,11 @@ class Scenario(FollowerParameters, RunParameters):
             return
         self.room.walls(self.acoustics.c)
         places: dict[str, Any] = {}
-        for name, source in self.all_sources.items():
-            group = f"sources.{name}" if self.sources else "source"
-            places[f"{group}.waypoints_m"] = source.waypoints_m
-        for prefix, robot in self.robot_fields():
+        for name, source in self.sources.items():
+            places[f"sources.{name}.waypoints_m"] = source.waypoints_m
+        for name, robot in self.robots.items():
             microphones = microphones_W(robot.start.pose, robot.robot)
-            places[f"{prefix}start.position_m"] = microphones
+            places[f"robots.{name}.start.position_m"] = microphones
         for field, points in places.items():
             what = ", a microphone," if field.endswith("start.position_m") else ""
             for point in points:
@@ -462,40 +463,51 @@ class Scenario(FollowerParameters, RunParameters):
 
     def _check_start(self) -> None:
         footprints = {
-            name: (prefix, robot, robot_rectangle(robot.start.pose, robot.robot))
-            for name, (prefix, robot) in zip(
-                self.all_robots, self.robot_fields(), strict=True
-            )
+            name: robot_rectangle(robot.start.pose, robot.robot)
+            for name, robot in self.robots.items()
         }
-        for (first, (_, _, a)), (second, (prefix, robot, b)) in combinations(
-            footprints.items(), 2
-        ):
+        for (first, a), (second, b) in combinations(footprints.items(), 2):
             if rectangle_clearance(a, b) < 0.0:
                 raise InputError(
-                    f"{prefix}start.position_m",
-                    f"robot {second!r} at {robot.start.position_m} overlaps "
-                    f"robot {first!r}; move one of them",
+                    f"robots.{second}.start.position_m",
+                    f"robot {second!r} at {self.robots[second].start.position_m} "
+                    f"overlaps robot {first!r}; move one of them",
                 )
         still = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
         fields = [f"obstacles.{k}" for k in range(len(self.obstacles))]
-        for name, source in self.all_sources.items():
+        for name, source in self.sources.items():
             if source.body:
                 still[name] = Body(source.path(), (source.length_m, source.width_m))
-                fields.append(f"sources.{name}" if self.sources else "source")
-        for prefix, robot, footprint in footprints.values():
+                fields.append(f"sources.{name}")
+        for robot, footprint in footprints.items():
             for field, (name, body) in zip(fields, still.items(), strict=True):
                 if rectangle_clearance(footprint, body.rectangle(0.0)) < 0.0:
                     raise InputError(
                         field,
                         f"{name!r} is on the robot's start at "
-                        f"{robot.start.position_m}; move its first waypoint or "
-                        f"{prefix}start.position_m",
+                        f"{self.robots[robot].start.position_m}; move its first "
+                        f"waypoint or start.position_m of the robot",
                     )
 
     def _check_guards(self) -> None:
-        robots = zip(self.all_robots, self.robot_fields(), strict=True)
-        for name, (prefix, robot) in robots:
-            check_guard(prefix, robot, self.surroundings(name).bodies, self.tick_s)
+        for name, robot in self.robots.items():
+            if isinstance(robot, Follower):
+                bodies = self.surroundings(name).bodies
+                check_guard(f"robots.{name}.", robot, bodies, self.tick_s)
+
+
+def frame_of(robot: Robot) -> float:
+    """Returns the audio frame of a robot, s; 0 without microphones."""
+    has_ears = isinstance(robot, Follower | SoundSearcher)
+    return robot.microphones.frame_s if has_ears else 0.0
+
+
+def _periods(robot: Robot) -> Iterator[tuple[str, float]]:
+    """Yields the periods, s, of the sensors of a robot, by field."""
+    if isinstance(robot, Follower | SoundSearcher):
+        yield "microphones.frame_s", robot.microphones.frame_s
+    if isinstance(robot, Follower | Router):
+        yield "ultrasonic.period_s", robot.ultrasonic.period_s
 
 
 def _check_schedule(
@@ -509,12 +521,3 @@ def _check_schedule(
             f"{target!r} sounds without a pause, so that its schedule has no "
             "effect; set it to false",
         )
-
-
-def _validated(model: type[_P], data: dict[str, Any], where: str) -> _P:
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        what = f"one of {where.split('.', maxsplit=1)[0]}"
-        found = explain(error, model.model_json_schema(), what)
-        raise InputError.joined([found], below=where) from None

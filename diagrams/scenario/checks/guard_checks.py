@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from diagrams.scenario.bodies import Body
-from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.participants import Follower
 from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
 from systems.safety.parameters import GuardParameters
@@ -22,7 +22,7 @@ from systems.world.plane import beyond_rectangle
 
 
 def check_guard(
-    prefix: str, robot: FollowerParameters, bodies: Mapping[str, Body], tick_s: float
+    prefix: str, robot: Follower, bodies: Mapping[str, Body], tick_s: float
 ) -> None:
     """Refuses a guarded robot that could never start, or never drive ahead.
 
@@ -64,7 +64,7 @@ def check_guard(
             )
 
 
-def _check_view(prefix: str, robot: FollowerParameters) -> None:
+def _check_view(prefix: str, robot: Follower) -> None:
     sectors = sensor_sectors(robot.ultrasonic, robot.robot.control_point_m)
     turns = sectors.right[:, :1] + np.array([-math.tau, 0.0, math.tau])
     ahead = (turns < 0.0) & (turns + sectors.left - sectors.right > 0.0)
@@ -77,7 +77,7 @@ def _check_view(prefix: str, robot: FollowerParameters) -> None:
 
 
 def _check_memory(
-    prefix: str, robot: FollowerParameters, guard: GuardParameters, tick_s: float
+    prefix: str, robot: Follower, guard: GuardParameters, tick_s: float
 ) -> None:
     """Refuses a place error that is too small for the braking distance.
 

@@ -4,66 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.participants import OdorSearcher, Robot, SoundSearcher
 from diagrams.scenario.run_parameters import RunParameters
 from systems.framework.input_error import InputError
 
 
-def address_of_robot(robot: FollowerParameters) -> int:
-    """Returns the address of a searching robot in its radio frames.
-
-    Args:
-        robot: A robot that searches.
-
-    Returns:
-        1 to 3.
-    """
-    smells = robot.searches == "odor"
-    return robot.search.address if smells else robot.sound_search.address
+def address_of_robot(robot: OdorSearcher | SoundSearcher) -> int:
+    """Returns the address of a searching robot in its radio frames, 1 to 3."""
+    own = robot.search if isinstance(robot, OdorSearcher) else robot.sound_search
+    return own.address
 
 
-def check_searches(
-    robots: Mapping[str, tuple[str, FollowerParameters]], run: RunParameters
-) -> None:
+def check_searches(robots: Mapping[str, Robot], run: RunParameters) -> None:
     """Refuses searches without a source, or without the necessary sensors.
 
     Args:
-        robots: Robots by name, each with the prefix of its fields in messages.
+        robots: Robots by name.
         run: Fields of the run.
 
     Raises:
-        InputError: A searching robot lacks its source or a sensor, has a guard, or has
-            the address of another robot. The error names the field and the remedy.
+        InputError: A searching robot lacks its source or a sensor, or has the address
+            of another robot. The error names the field and the remedy.
     """
-    searching = {name: each for name, each in robots.items() if each[1].searches}
     taken: dict[int, str] = {}
-    for name, (prefix, robot) in searching.items():
-        group = "search" if robot.searches == "odor" else "sound_search"
-        if robot.searches == "odor":
-            _check_odor(prefix, run)
+    for name, robot in robots.items():
+        if isinstance(robot, OdorSearcher):
+            group = "search"
+            _check_odor(run)
+        elif isinstance(robot, SoundSearcher):
+            group = "sound_search"
+            _check_sound(f"robots.{name}.", robot, robots)
         else:
-            _check_sound(prefix, robot, robots)
-        if robot.guard is not None:
-            raise InputError(
-                f"{prefix}guard",
-                f"is set, but law {robot.law!r} drives the motors itself; leave guard "
-                "out",
-            )
+            continue
         address = address_of_robot(robot)
         if address in taken:
             raise InputError(
-                f"{prefix}{group}.address",
+                f"robots.{name}.{group}.address",
                 f"{address} is that of robot {taken[address]!r}; give each robot "
                 "its own address, 1 to 3",
             )
         taken[address] = name
 
 
-def _check_odor(prefix: str, run: RunParameters) -> None:
+def _check_odor(run: RunParameters) -> None:
     if run.odor is None:
         raise InputError(
             "odor",
-            f"is missing, and {prefix}law 'plume_search' searches for one; set "
+            "is missing, and law 'plume_search' searches for one; set "
             "odor.position_m",
         )
     if run.room is not None and not run.room.contains(run.odor.position_m):
@@ -77,16 +64,8 @@ def _check_odor(prefix: str, run: RunParameters) -> None:
 
 
 def _check_sound(
-    prefix: str,
-    robot: FollowerParameters,
-    robots: Mapping[str, tuple[str, FollowerParameters]],
+    prefix: str, robot: SoundSearcher, robots: Mapping[str, Robot]
 ) -> None:
-    if robot.hearing != "audio":
-        raise InputError(
-            f"{prefix}hearing",
-            f"is {robot.hearing!r}, but law 'sound_search' needs the sound waves "
-            "for cross-power spectra; set it to audio",
-        )
     if len(robot.robot.microphones_m) < 4:
         raise InputError(
             f"{prefix}robot.microphones_m",
@@ -97,8 +76,8 @@ def _check_sound(
     if robot.sound_search.await_call:
         callers = [
             name
-            for name, (_, other) in robots.items()
-            if other.searches == "odor"
+            for name, other in robots.items()
+            if isinstance(other, OdorSearcher)
             and other.search.address == robot.sound_search.caller
         ]
         if not callers:

@@ -1,0 +1,270 @@
+"""The shorthand of scenario files, and the resolved tree of robots and sources.
+
+A file may state fields of robots at the top level. They then apply to all robots of the
+kinds that have these fields, unless ``robots`` sets them for one robot. In the same
+way, ``source`` and ``sound`` apply to all sources. ``resolved`` expands this shorthand,
+and ``file_form`` makes it from a resolved tree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel
+
+from diagrams.scenario.participants import DEFAULT_LAW, KINDS, Robot, kind_of
+from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
+
+#: Names of the only robot and of the only source.
+ROBOT, SOURCE = "robot", "source"
+
+#: Kinds of robots that have a field, by name of the field.
+ROBOT_FIELDS: dict[str, tuple[str, ...]] = {}
+for _kind, _model in KINDS.items():
+    for _name in _model.model_fields:
+        ROBOT_FIELDS[_name] = (*ROBOT_FIELDS.get(_name, ()), _kind)
+
+
+def begins_anew(changes: Mapping[str, Any]) -> bool:
+    """Whether changes to a group choose a preset, which clears the other fields.
+
+    Args:
+        changes: Plain values by field.
+
+    Returns:
+        True if the value of ``preset`` is a text. If ``preset`` is the name of a robot
+        or source, its value is a mapping, and the result is False.
+    """
+    return isinstance(changes.get("preset"), str)
+
+
+def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a tree of plain values with changes applied.
+
+    Args:
+        base: The tree.
+        changes: A tree that contains only the leaves to change or add. Changes that
+            choose a preset for a group replace the whole group.
+
+    Returns:
+        A new tree; the arguments stay unchanged.
+    """
+    result = {} if begins_anew(changes) else dict(base)
+    for key, value in changes.items():
+        before = _plain(result.get(key))
+        if isinstance(value, Mapping) and isinstance(before, Mapping):
+            result[key] = joined(before, value)
+        else:
+            result[key] = value
+    return result
+
+
+def _plain(value: Any) -> Any:
+    return value.model_dump() if isinstance(value, BaseModel) else value
+
+
+def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Expands the shorthand of a scenario.
+
+    Args:
+        data: Fields of a scenario, as in a file.
+
+    Returns:
+        Fields of the run, with complete ``robots`` and ``sources``. Values of a wrong
+        type stay as they are, for the validator.
+    """
+    run = {key: value for key, value in data.items() if key not in ROBOT_FIELDS}
+    shared = {key: value for key, value in data.items() if key in ROBOT_FIELDS}
+    source, sound = _plain(run.pop("source", {})), _plain(run.pop("sound", {}))
+    robots = run.get("robots") or {ROBOT: {}}
+    if isinstance(robots, Mapping):
+        robots = _robots(robots, shared, sound)
+        run["robots"] = robots
+    if not isinstance(source, Mapping) or not isinstance(sound, Mapping):
+        return run | {"sources": {SOURCE: {**_group(source), "sound": sound}}}
+    base = joined({"sound": sound}, source)
+    sources = run.get("sources") or {}
+    if isinstance(robots, Mapping) and not sources:
+        follows = any(_follows_a_source(each, robots) for each in robots.values())
+        sources = {SOURCE: {}} if follows else {}
+    if isinstance(sources, Mapping):
+        run["sources"] = {
+            name: joined(base, own) if isinstance(own, Mapping) else own
+            for name, own in sources.items()
+        }
+    return run
+
+
+def _group(value: Any) -> dict[str, Any]:
+    return dict(value) if isinstance(value, Mapping) else {}
+
+
+def _robots(
+    robots: Mapping[str, Any], shared: Mapping[str, Any], sound: Any
+) -> dict[str, Any]:
+    """Applies shared fields to the robots that have them.
+
+    A shared field that no robot has goes to all robots, so that the validator refuses
+    it.
+    """
+    kinds = {
+        name: own.kind if isinstance(own, Robot) else kind_of({**shared, **_group(own)})
+        for name, own in robots.items()
+    }
+    nowhere = {
+        field
+        for field in shared
+        if not set(ROBOT_FIELDS[field]).intersection(kinds.values())
+    }
+    found = {}
+    for name, own in robots.items():
+        if not isinstance(own, Mapping):
+            found[name] = own
+            continue
+        base = {
+            field: value
+            for field, value in shared.items()
+            if kinds[name] in ROBOT_FIELDS[field] or field in nowhere
+        }
+        fields = joined(base, own)
+        law = fields.get("law", DEFAULT_LAW)
+        gains = fields.get("laws", {})
+        known = isinstance(law, str) and law in LAWS and LAWS[law].gains is not None
+        if known and isinstance(gains, Mapping) and kinds[name] in ROBOT_FIELDS["laws"]:
+            fields["laws"] = joined({law: {}}, gains)
+        played = fields.get("loudspeaker")
+        if isinstance(played, Mapping) and isinstance(sound, Mapping):
+            fields["loudspeaker"] = joined(sound, played)
+        found[name] = fields
+    return found
+
+
+def _follows_a_source(robot: Any, robots: Mapping[str, Any]) -> bool:
+    if KINDS[kind_of(robot)].has_goal:
+        return False
+    follows = robot.get("follows") if isinstance(robot, Mapping) else robot.follows
+    return follows not in robots
+
+
+def as_written(place: Sequence[str], data: Mapping[str, Any]) -> list[str]:
+    """Returns the place of a field in a file, where the user wrote it.
+
+    Args:
+        place: Parts of the path of a field in the resolved tree. The name of a kind may
+            follow the name of a robot, as in errors of pydantic.
+        data: Fields of the scenario, as in the file.
+
+    Returns:
+        Parts of the path in the file.
+    """
+    if len(place) < 3 or place[0] not in ("robots", "sources"):
+        return list(place)
+    group, name, *rest = place
+    if group == "robots" and rest[0] in KINDS:
+        rest = rest[1:]
+    short = rest
+    if group == "sources" and rest[:1] != ["sound"]:
+        short = ["source", *rest]
+    own = _group(data.get(group)).get(name)
+    if not data.get(group) or (not _has(own, rest) and _has(data, short)):
+        return short
+    return [group, name, *rest]
+
+
+def _has(data: Any, place: Sequence[str]) -> bool:
+    for part in place:
+        if not isinstance(data, Mapping) or part not in data:
+            return False
+        data = data[part]
+    return True
+
+
+def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
+    """Refuses shorthand that every robot or every source overrides.
+
+    Args:
+        data: Fields of a scenario, as in a file.
+        fields: Dotted paths that a user has set.
+
+    Raises:
+        InputError: A path has no effect.
+    """
+    for field in fields:
+        place = field.split(".")
+        if place[0] in ROBOT_FIELDS:
+            group, below = "robots", place
+        elif place[0] in ("source", "sound"):
+            group, below = "sources", place[1:] if place[0] == "source" else place
+        else:
+            continue
+        named = _group(data.get(group))
+        if below and named and all(_has(own, below) for own in named.values()):
+            names = ", ".join(f"{group}.{name}.{'.'.join(below)}" for name in named)
+            raise InputError(
+                field, f"has no effect, because {names} are set; set these instead"
+            )
+
+
+def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a resolved tree in the form of a file, which is as short as possible.
+
+    Args:
+        dump: Plain values of a scenario.
+
+    Returns:
+        A tree that ``resolved`` turns into the same tree again. Fields that are equal
+        in all robots are at the top level.
+    """
+    run = dict(dump)
+    robots, sources = run.pop("robots"), run.pop("sources")
+    shared, robots = _hoisted(robots)
+    if [*robots] != [ROBOT]:
+        run["robots"] = robots
+    run |= shared
+    if sources:
+        base, sources = _hoisted(sources)
+        run["sound"] = base.pop("sound", {})
+        run["source"] = base
+        if [*sources] != [SOURCE]:
+            run["sources"] = sources
+    return run
+
+
+def _hoisted(
+    trees: Mapping[str, Mapping[str, Any]],
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Separates what all trees have in common from what remains in each tree."""
+    shared = _common(list(trees.values()))
+    return shared, {name: _without(tree, shared) for name, tree in trees.items()}
+
+
+def _common(trees: Sequence[Mapping[str, Any]], depth: int = 0) -> dict[str, Any]:
+    """Returns leaves that are equal in all trees.
+
+    At the top, trees without the field do not count, because robots of another kind
+    lack it. A group with different presets has nothing in common.
+    """
+    found: dict[str, Any] = {}
+    for key in dict.fromkeys(key for tree in trees for key in tree):
+        values = [tree[key] for tree in trees if key in tree]
+        if depth and len(values) < len(trees):
+            continue
+        if all(value == values[0] for value in values):
+            found[key] = values[0]
+        elif all(isinstance(value, Mapping) for value in values) and (
+            len({value.get("preset") for value in values}) == 1
+        ):
+            found[key] = _common(values, depth + 1)
+    return found
+
+
+def _without(tree: Mapping[str, Any], shared: Mapping[str, Any]) -> dict[str, Any]:
+    left = {}
+    for key, value in tree.items():
+        if key not in shared:
+            left[key] = value
+        elif shared[key] != value:
+            left[key] = _without(value, shared[key])
+    return left
