@@ -132,7 +132,10 @@ class FollowerParameters(Parameters):
     @property
     def searches(self) -> Literal["odor", "sound"] | None:
         """What the robot searches for; None: it follows a source or a route."""
-        return LAWS[self.law].searches if self.law in LAWS else None
+        kind = LAWS[self.law].robot if self.law in LAWS else "follower"
+        if kind == "odor_searcher":
+            return "odor"
+        return "sound" if kind == "sound_searcher" else None
 
     @property
     def has_goal(self) -> bool:

@@ -40,7 +40,7 @@ from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
-from systems.laws.catalogue import LAWS
+from systems.laws.catalogue import LAWS, ROUTE_LAWS
 from systems.sound.parameters import SoundParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
@@ -376,16 +376,14 @@ class Scenario(FollowerParameters, RunParameters):
 
     def _check_routes(self) -> None:
         for prefix, robot in self.robot_fields():
-            law = LAWS.get(robot.law)
             if robot.route is not None:
-                if law is not None and not law.on_route:
-                    can = [name for name, each in LAWS.items() if each.on_route]
+                if robot.law in LAWS and robot.law not in ROUTE_LAWS:
                     raise InputError(
                         f"{prefix}law",
                         f"is {robot.law!r}, which follows a sound, but the robot has a "
-                        f"route; use {', '.join(can)}, or leave route out",
+                        f"route; use {', '.join(ROUTE_LAWS)}, or leave route out",
                     )
-            elif law is not None and law.on_route:
+            elif robot.law in ROUTE_LAWS:
                 raise InputError(
                     f"{prefix}route",
                     f"is missing, and law {robot.law!r} drives on one; set "
