@@ -63,7 +63,6 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         "sensors": sensors,
     }
     more = {
-        "following": scenario.following,
         "known": scenario.free_space,
         "bodies": bodies,
         "seed": seed,

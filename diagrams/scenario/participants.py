@@ -27,7 +27,6 @@ from systems.laws.catalogue import LAWS
 from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.odor.parameters import AirflowParameters, GasSensorParameters
-from systems.planning.parameters import FollowingParameters
 from systems.ranging.parameters import (
     CollisionVectorParameters,
     ContactParameters,
@@ -82,7 +81,6 @@ class FollowerParameters(Parameters):
     collision_vector: CollisionVectorParameters = CollisionVectorParameters()
     attraction: AttractionParameters = AttractionParameters()
     repulsion: RepulsionParameters = RepulsionParameters()
-    following: FollowingParameters = FollowingParameters()
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
