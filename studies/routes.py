@@ -16,7 +16,7 @@ from analysis.reporting.intervals import wilson_interval
 from analysis.sweeps.plan import load_sweep
 from diagrams import simulate
 from studies.tables import Table
-from systems.laws.catalogue import LAWS
+from systems.laws.catalogue import ROUTE_LAWS
 
 #: Of the layouts.
 SEED = 2026
@@ -78,14 +78,13 @@ def routes_table(runs: int) -> Table:
     Returns:
         A row a scenario: collisions, % with 95 % intervals, then goals reached, %.
     """
-    laws = [name for name, law in LAWS.items() if law.on_route]
 
     def rows() -> Iterator[Sequence[str]]:
         for scenario in SCENARIOS:
-            found = [outcomes(scenario, law, runs) for law in laws]
+            found = [outcomes(scenario, law, runs) for law in ROUTE_LAWS]
             yield f"`{scenario}`", *(outcomes_cell(each, runs) for each in found)
 
-    return Table("routes", ["layouts", *(f"`{law}`" for law in laws)], rows())
+    return Table("routes", ["layouts", *(f"`{law}`" for law in ROUTE_LAWS)], rows())
 
 
 def outcomes_cell(causes: Counter[str], runs: int) -> str:

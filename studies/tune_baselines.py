@@ -36,7 +36,7 @@ FAMILIES = (
 #: Fields of ``repulsion.<law>``, or of another part of the scenario where they have a
 #: dot, and between what they are looked for, by ratio.
 RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "stop_when_near": {"stop_m": (0.15, 1.2), "following.turn_gain": (1.0, 6.0)},
+    "stop_when_near": {"stop_m": (0.15, 1.2)},
     "dwa": {
         "heading_gain": (0.2, 4.0),
         "distance_gain": (0.1, 4.0),

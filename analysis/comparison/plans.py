@@ -19,7 +19,7 @@ from diagrams.scenario.loading import (
 )
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS, LAWS
+from systems.laws.catalogue import FORCE_LAWS, ROUTE_LAWS
 
 #: The papers' experiments.
 EXPERIMENTS = (
@@ -71,9 +71,8 @@ def comparison_plan(
     base = scenario_from_mapping(plan.base)
     _require_one_law(base)
     if laws is None:
-        on_route = [name for name, law in LAWS.items() if law.on_route]
         routed = any(robot.route for robot in base.all_robots.values())
-        laws = on_route if routed else FORCE_LAWS
+        laws = ROUTE_LAWS if routed else FORCE_LAWS
     for key, values in (grid or {}).items():
         if isinstance(values, str):  # it would be read letter by letter
             raise InputError(f"grid.{key}", f"is {values!r}; give a list of values")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from diagrams.scenario.loading import scenario_from_mapping
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS, LAWS
+from systems.laws.catalogue import FORCE_LAWS, LAWS, ROUTE_LAWS
 
 
 def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...]:
@@ -25,11 +25,9 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
         InputError: There is no such law.
     """
     routed = scenario.route is not None
-    every = [
-        name
-        for name, law in LAWS.items()
-        if (law.on_route if routed else name in FORCE_LAWS and name != "none")
-    ]
+    every = list(ROUTE_LAWS if routed else FORCE_LAWS)
+    if not routed:
+        every.remove("none")
     if scenario.searches is not None:
         every = [scenario.law]
     laws = [law for name in names for law in (every if name == "all" else [name])]
@@ -47,7 +45,7 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
                     "leave --law out",
                 )
             continue
-        if not routed and law in LAWS and LAWS[law].plans:
+        if not routed and law in LAWS and law not in FORCE_LAWS:
             raise InputError(
                 "law",
                 f"{law!r} plans and decides, so that it has no linear model; use "

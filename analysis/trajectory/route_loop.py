@@ -21,7 +21,7 @@ from systems.base.wheel_odometry import WheelOdometry_
 from systems.base.wheel_speed_command import WheelCommand_
 from systems.framework.block import Block, part_of
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import LAWS
+from systems.laws.catalogue import ROUTE_LAWS
 from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.trajectory_impedance import contact_numbers
 from systems.laws.trajectory.trajectory_impedance_controller import (
@@ -55,13 +55,11 @@ def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
     Raises:
         InputError: It has another law.
     """
-    law = LAWS.get(scenario.law)
-    if scenario.route is None or law is None or not law.on_route:
-        names = ", ".join(name for name, each in LAWS.items() if each.on_route)
+    if scenario.route is None or scenario.law not in ROUTE_LAWS:
         raise InputError(
             "law",
             f"is {scenario.law!r}, but frozen gains need a robot with a route and one "
-            f"of the laws {names}; use one of these",
+            f"of the laws {', '.join(ROUTE_LAWS)}; use one of these",
         )
     own: TrajectoryImpedanceParameters = getattr(scenario.repulsion, scenario.law)
     return own

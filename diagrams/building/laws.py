@@ -17,7 +17,7 @@ from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import COMMANDS
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
-from systems.laws.catalogue import LAWS
+from systems.laws.catalogue import LAWS, ROUTE_LAWS
 from systems.ranging.collision_vector import SLOTS
 
 #: Optional output ports of a law for the log, with sizes.
@@ -63,21 +63,20 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         "sensors": sensors,
     }
     more = {
-        "following": scenario.following,
         "known": scenario.free_space,
         "bodies": bodies,
         "seed": seed,
     }
     name = scenario.law
-    if name in LAWS and LAWS[name].searches:
+    if scenario.searches is not None:
         return search_controller(scenario)
-    if name in LAWS and LAWS[name].on_route:
+    if name in ROUTE_LAWS:
         return make_trajectory_controller(scenario)
     if name in LAWS:
         law, controller = LAWS[name], LAWS[name].controller
         if controller is None:
             return RadialLawController(law=law, **parts)
-        if law.plans:
+        if law.force is None:
             parts = asked_for(controller, {**parts, **more})
         return controller(**parts)
     law = import_own(name, "law")

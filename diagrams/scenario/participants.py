@@ -38,7 +38,6 @@ from systems.hearing.parameters import (
 from systems.laws.catalogue import LAWS
 from systems.laws.parameters import AttractionParameters
 from systems.odor.parameters import AirflowParameters, GasSensorParameters
-from systems.planning.parameters import FollowingParameters
 from systems.ranging.parameters import (
     CollisionVectorParameters,
     ContactParameters,
@@ -165,7 +164,6 @@ class Follower(Robot):
     collision_vector: CollisionVectorParameters = CollisionVectorParameters()
     attraction: AttractionParameters = AttractionParameters()
     laws: LawGains = LawGains()
-    following: FollowingParameters = FollowingParameters()
     guard: GuardParameters | None = None
     """The guard works with any law and keeps the robot in space that its sensors have
     seen as free; null: no guard, unless the law is ``guarded``."""

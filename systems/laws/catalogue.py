@@ -47,7 +47,9 @@ LAWS: Mapping[str, Law] = {
 }
 
 #: Names of the laws that are forces on the virtual mass. The analyses compare them.
-FORCE_LAWS = tuple(name for name, law in LAWS.items() if not law.plans)
+FORCE_LAWS = tuple(name for name, law in LAWS.items() if law.force is not None)
+#: Names of the laws of robots on planned routes.
+ROUTE_LAWS = tuple(name for name, law in LAWS.items() if law.robot == "router")
 
 
 def law_title(name: str) -> str:

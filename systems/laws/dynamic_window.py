@@ -50,5 +50,4 @@ DWA = Law(
     ),
     controller_name="DynamicWindowController",
     gains=DynamicWindowParameters,
-    plans=True,
 )

@@ -73,6 +73,5 @@ GUARDED = Law(
     ),
     controller_name="GuardedController",
     gains=GuardedParameters,
-    plans=True,
     guarded=True,
 )

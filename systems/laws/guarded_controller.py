@@ -27,7 +27,6 @@ from systems.planning.guarded_drive import (
     drive_guarded,
 )
 from systems.planning.hazards import HazardSensors, make_hazards
-from systems.planning.parameters import FollowingParameters
 from systems.planning.way import make_way
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import FreeSpaceParameters
@@ -80,7 +79,6 @@ class GuardedController(Block):
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``guarded``.
-        following: Speeds and gains of driving and turning.
         sensors: Parameters of the range sensors.
         known: Parameters of the map.
         tick_s: Period of the controller, s.
@@ -116,7 +114,6 @@ class GuardedController(Block):
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
         repulsion: RepulsionParameters = RepulsionParameters(),
-        following: FollowingParameters = FollowingParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
         known: FreeSpaceParameters = FreeSpaceParameters(),
         tick_s: float = TICK_S,
@@ -126,15 +123,11 @@ class GuardedController(Block):
         own = repulsion.guarded
         numbers = DriveNumbers(
             own,
-            following,
             attraction.follow_distance_m,
             robot.control_point_m,
             hazard_sensors(sensors, robot, known, own, tick_s),
             EvasionNumbers(
-                following.turn_gain,
-                following.turn_rate_rad_s,
                 (0.5 * robot.length_m, 0.5 * robot.width_m),
-                following.cruise_speed_m_s,
                 own.risk_gain,
                 own.watch_gain,
             ),

@@ -12,6 +12,9 @@ from systems.framework.parameters import Parameters
 #: Columns of the port ``forces_W`` of a law's block.
 FORCE_COLUMNS = "attraction_x", "attraction_y", "repulsion_x", "repulsion_y"
 
+#: Kinds of robots; each law belongs to one.
+RobotKind = Literal["follower", "router", "odor_searcher", "sound_searcher"]
+
 
 @dataclass(frozen=True)
 class Equation:
@@ -71,7 +74,9 @@ class Law:
 
     The function takes a distance in m and a speed in m/s, floats or AutoDiffXd. Its
     part f(c, 0) has a potential energy. None: the block of the law decides on a motion
-    instead of a force."""
+    instead of a force, so that the law has no linear model. The class of such a block
+    may also take the arguments ``following``, ``known`` (parameters of the map),
+    ``bodies`` (number of bodies), and ``seed``."""
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
@@ -83,18 +88,9 @@ class Law:
     """Names of the gains of the distance term and the velocity term, for root loci."""
     tuning: Tuning | None = None
     """How the design chooses the gains. None: there are no gains to choose."""
-    plans: bool = False
-    """Whether the block decides on a motion instead of a force.
-
-    Such a block has no linear model. Its class may also take the arguments
-    ``following``, ``known`` (parameters of the map), ``bodies`` (number of bodies), and
-    ``seed``."""
-    on_route: bool = False
-    """Whether the robot drives to a goal on a planned route instead of following a
-    sound. Such a law also has ``plans``."""
-    searches: Literal["odor", "sound"] | None = None
-    """What the robot searches for step by step instead of following a sound. Such a
-    law also has ``plans``."""
+    robot: RobotKind = "follower"
+    """Kind of the robot that runs the law. A ``follower`` follows a sound, a ``router``
+    drives to a goal on a planned route, and a searcher searches step by step."""
     guarded: bool = False
     """Whether the robot of this law always has the guard."""
     colour: str | None = None

@@ -68,5 +68,4 @@ MPPI = Law(
     ),
     controller_name="PathIntegralController",
     gains=PathIntegralParameters,
-    plans=True,
 )

@@ -33,5 +33,4 @@ ORCA = Law(
     ),
     controller_name="ReciprocalAvoidanceController",
     gains=ReciprocalAvoidanceParameters,
-    plans=True,
 )

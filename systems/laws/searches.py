@@ -15,8 +15,7 @@ PLUME_SEARCH = Law(
             "beta = alpha + psi_up + clip(k ln(C1/C3), 45 deg)",
         ),
     ),
-    plans=True,
-    searches="odor",
+    robot="odor_searcher",
 )
 
 SOUND_SEARCH = Law(
@@ -30,6 +29,5 @@ SOUND_SEARCH = Law(
             "beta = alpha + theta",
         ),
     ),
-    plans=True,
-    searches="sound",
+    robot="sound_searcher",
 )

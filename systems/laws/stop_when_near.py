@@ -27,5 +27,4 @@ STOP_WHEN_NEAR = Law(
     ),
     controller_name="StopWhenNearController",
     gains=StopWhenNearParameters,
-    plans=True,
 )

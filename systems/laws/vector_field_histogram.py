@@ -62,5 +62,4 @@ VFH_PLUS = Law(
     ),
     controller_name="VectorFieldHistogramController",
     gains=VectorFieldHistogramParameters,
-    plans=True,
 )

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from systems.framework.compiling import njit
+from systems.planning.following import CRUISE_SPEED_M_S
 from systems.planning.hazards import AGE_S, SPREAD, VX, VY, WEIGHT, X, Y
-from systems.planning.turning import wrapped
+from systems.planning.turning import TURN_GAIN, TURN_RATE_RAD_S, wrapped
 
 #: Duration of the prediction of motions, s, and its time step, s.
 _AHEAD_S, _STEP_S = 4.0, 0.2
@@ -57,13 +58,8 @@ _HELD_RAD = 0.6
 class EvasionNumbers(NamedTuple):
     """Constants of ``choose_motion``."""
 
-    turn_gain: float
-    """Yaw rate per heading error, 1/s."""
-    turn_rate_rad_s: float
-    """Largest yaw rate, rad/s."""
     half_size: tuple[float, float]
     """Half of the body's length and width, m."""
-    top_speed_m_s: float
     risk_gain: float
     """Price of a predicted contact with a body, m/s."""
     watch_gain: float
@@ -163,8 +159,8 @@ def _risk_along(
     x, y, theta = pose[0], pose[1], pose[2]
     worst = np.zeros(count)
     for k in range(steps):
-        omega = numbers.turn_gain * wrapped(heading - theta)
-        omega = min(max(omega, -numbers.turn_rate_rad_s), numbers.turn_rate_rad_s)
+        omega = TURN_GAIN * wrapped(heading - theta)
+        omega = min(max(omega, -TURN_RATE_RAD_S), TURN_RATE_RAD_S)
         v, now, time = speed, k * _STEP_S, (k + 1) * _STEP_S
         guarded = held_rad_s < np.inf
         if (guarded or not held) and _is_held(
@@ -334,7 +330,7 @@ def choose_motion(
             price = base + math.hypot(
                 wanted[0] - speed * math.cos(off), speed * math.sin(off)
             )
-            if speed > numbers.top_speed_m_s or price >= best:
+            if speed > CRUISE_SPEED_M_S or price >= best:
                 continue
             ahead = abs(wrapped(heading - pose[2])) < _HELD_RAD
             # The guard has just refused such a motion.

@@ -7,13 +7,21 @@ from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 
-from systems.planning.parameters import FollowingParameters
+from systems.planning.turning import TURN_RATE_RAD_S
+
+#: Largest wanted speed, and speed of backing off, m/s.
+CRUISE_SPEED_M_S, BACK_SPEED_M_S = 0.62, 0.15
+#: Wanted speed per remaining distance, 1/s, and share of the target's speed that is
+#: added to the wanted speed.
+APPROACH_GAIN, SOURCE_SHARE = 1.2, 0.8
+#: Least and largest speed, m/s, and largest yaw rate, rad/s, of laws that command
+#: motions instead of forces.
+SPEED_LIMITS = -BACK_SPEED_M_S, CRUISE_SPEED_M_S, TURN_RATE_RAD_S
 
 
 class FollowNumbers(NamedTuple):
     """Constants of following."""
 
-    own: FollowingParameters
     distance_m: float
     """Distance that P should keep from the target, m."""
     control_point_m: float
@@ -21,19 +29,18 @@ class FollowNumbers(NamedTuple):
 
 
 @register_jitable
-def wanted_speed(left: float, along: float, own: Any) -> float:
+def wanted_speed(left: float, along: float) -> float:
     """Computes the wanted speed.
 
     Args:
         left: Distance from the target minus the follow distance, m.
         along: Speed of the target in the direction of travel, m/s.
-        own: ``FollowingParameters``.
 
     Returns:
         Wanted speed, m/s. If it is negative, the robot backs off.
     """
-    wanted = own.approach_gain * left + own.source_share * along
-    return min(max(wanted, -own.back_speed_m_s), own.cruise_speed_m_s)
+    wanted = APPROACH_GAIN * left + SOURCE_SHARE * along
+    return min(max(wanted, -BACK_SPEED_M_S), CRUISE_SPEED_M_S)
 
 
 @register_jitable
@@ -58,4 +65,4 @@ def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
     py = dy - follow.control_point_m * math.sin(pose[2])
     along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
     left = math.hypot(px, py) - follow.distance_m
-    return wanted_speed(left, along, follow.own), bearing
+    return wanted_speed(left, along), bearing

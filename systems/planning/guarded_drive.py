@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.planning.carrot import find_carrot
 from systems.planning.evasion import EvasionNumbers, choose_motion
-from systems.planning.following import wanted_speed
+from systems.planning.following import BACK_SPEED_M_S, wanted_speed
 from systems.planning.hazards import (
     MOVED_S,
     Hazards,
@@ -28,7 +28,7 @@ from systems.planning.hazards import (
     pick_hazards,
     track_hazards,
 )
-from systems.planning.turning import turn_towards, wrapped
+from systems.planning.turning import TURN_GAIN, TURN_RATE_RAD_S, turn_towards, wrapped
 from systems.planning.way import NEAR, OCCUPIED, TIGHT, Way, find_way, mark_blocked
 from systems.safety.braking import TURNED
 from systems.safety.free_space import ROLLED, FreeSpace, edge_cells
@@ -111,8 +111,6 @@ class DriveNumbers(NamedTuple):
 
     own: Any
     """``GuardedParameters``."""
-    following: Any
-    """``FollowingParameters``."""
     follow_distance_m: float
     control_point_m: float
     """Distance of P ahead of the axle, m."""
@@ -204,7 +202,7 @@ def drive_guarded(
         mark_blocked(state.way, place, time + own.mark_s)
         m[0, MODE], m[0, BACKED_S], m[0, PLANNED_S] = BACKING, time, -np.inf
     if m[0, MODE] == BACKING:
-        m[0, SPEED] = -numbers.following.back_speed_m_s
+        m[0, SPEED] = -BACK_SPEED_M_S
         if time - m[0, BACKED_S] > _BACKING_S:
             m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
             _stays(m, pose, time)
@@ -237,7 +235,7 @@ def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untype
     if count == 0:
         return
     # The current yaw rate is the gain times the error of the weaving heading.
-    weaving = pose[2] + m[0, TURN] / numbers.following.turn_gain
+    weaving = pose[2] + m[0, TURN] / TURN_GAIN
     way = wanted, pose[2] + error, weaving
     speed, heading, watched = choose_motion(
         hazards.picked, count, pose, way, m[0, HELD], numbers.evasion
@@ -247,7 +245,7 @@ def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untype
     if m[0, MODE] == LOOKING and m[0, HAS_LOOKED] > 0.5:
         m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
     m[0, SPEED] = speed
-    m[0, TURN] = turn_towards(0.0, heading, pose[2], numbers.following)[1]
+    m[0, TURN] = turn_towards(0.0, heading, pose[2])[1]
 
 
 @njit(cache=True)
@@ -299,7 +297,7 @@ def _find_heading(  # type: ignore[no-untyped-def]
     bearing = math.atan2(carrot[1] - y, carrot[0] - x)
     # Speed of the target away from the robot.
     along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
-    wanted = wanted_speed(left - follow, along, numbers.following)
+    wanted = wanted_speed(left - follow, along)
     rests = math.hypot(velocity[0], velocity[1]) < _RESTS_M_S
     m[0, CARROT_X], m[0, CARROT_Y], m[0, WAY_LEFT] = carrot[0], carrot[1], left
     return wanted, wrapped(bearing - theta), rests and abs(left - follow) < _THERE_M
@@ -346,7 +344,7 @@ def _look(time, pose, report, state, numbers):  # type: ignore[no-untyped-def]
     first = m[0, HAS_LOOKED] < 0.5
     heading = m[0, FIRST_LOOK] if m[0, LOOKS_DONE] < 0.5 else m[0, SECOND_LOOK]
     to = wrapped(heading - pose[2])
-    m[0, TURN] = _within(_LOOK_GAIN * to, numbers.following.turn_rate_rad_s)
+    m[0, TURN] = _within(_LOOK_GAIN * to, TURN_RATE_RAD_S)
     if abs(to) < _LOOKED_RAD:
         m[0, LOOKS_DONE] += 1.0
     seen = not first and report[1] > _ROOM_M
@@ -393,7 +391,7 @@ def _drive(  # type: ignore[no-untyped-def]
     """
     m, own = state.memory, numbers.own
     if there:
-        m[0, SPEED], m[0, TURN] = wanted, 0.5 * numbers.following.turn_gain * error
+        m[0, SPEED], m[0, TURN] = wanted, 0.5 * TURN_GAIN * error
         return
     weave = 0.0
     if wanted > 0.0:
@@ -408,8 +406,8 @@ def _drive(  # type: ignore[no-untyped-def]
             width = own.search_rad * (1.0 - own.search_less * part)
             period = own.search_period_s
         weave = width * math.sin(math.tau * time / period)
-    turn = numbers.following.turn_gain * wrapped(error + weave)
-    m[0, TURN] = _within(turn, numbers.following.turn_rate_rad_s)
+    turn = TURN_GAIN * wrapped(error + weave)
+    m[0, TURN] = _within(turn, TURN_RATE_RAD_S)
     m[0, SPEED] = wanted
     if wanted > 0.0:
         m[0, SPEED] *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0

@@ -1,4 +1,4 @@
-"""Parameters of following and of the safety filter."""
+"""Parameters of the safety filter."""
 
 from __future__ import annotations
 
@@ -6,10 +6,7 @@ from pydantic import Field
 
 from systems.framework.parameters import (
     NonNegativeLength,
-    NonNegativeSpeed,
     Parameters,
-    Positive,
-    Speed,
 )
 
 
@@ -25,20 +22,3 @@ class SafetyFilterParameters(Parameters):
     horizon_s: float = Field(default=4.0, ge=0.1, le=60.0)
     """Duration of the prediction, s. Later contacts with moving objects do not
     count."""
-
-
-class FollowingParameters(Parameters):
-    """Following and turning of laws that command motions instead of forces."""
-
-    cruise_speed_m_s: Speed = 0.62
-    """Largest wanted speed, m/s."""
-    back_speed_m_s: NonNegativeSpeed = 0.15
-    """Speed of backing off, m/s."""
-    approach_gain: Positive = 1.2
-    """Wanted speed per remaining distance, 1/s."""
-    source_share: float = Field(default=0.8, ge=0.0, le=1.0)
-    """Share of the target's speed that is added to the wanted speed."""
-    turn_gain: Positive = 3.0
-    """Yaw rate per error of the heading, 1/s."""
-    turn_rate_rad_s: float = Field(default=2.0, gt=0.0, le=20.0)
-    """Largest wanted yaw rate, rad/s."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from numba.extending import register_jitable
 
+#: Yaw rate per error of the heading, 1/s, and largest wanted yaw rate, rad/s.
+TURN_GAIN, TURN_RATE_RAD_S = 3.0, 2.0
 #: If the heading error is larger than this angle, rad, the robot turns before it
 #: drives.
 _TURN_FIRST_RAD = 1.0
@@ -19,9 +20,7 @@ def wrapped(angle: float) -> float:
 
 
 @register_jitable
-def turn_towards(
-    speed: float, heading: float, theta: float, own: Any
-) -> tuple[float, float]:
+def turn_towards(speed: float, heading: float, theta: float) -> tuple[float, float]:
     """Computes the motion that turns a robot to a heading while it drives.
 
     Args:
@@ -29,14 +28,12 @@ def turn_towards(
             reduced to 0.
         heading: Wanted heading in W, rad.
         theta: Heading of the robot in W, rad.
-        own: ``FollowingParameters``.
 
     Returns:
         Forward speed, m/s, and yaw rate, rad/s.
     """
     error = wrapped(heading - theta)
-    limit = own.turn_rate_rad_s
-    turn = min(max(own.turn_gain * error, -limit), limit)
+    turn = min(max(TURN_GAIN * error, -TURN_RATE_RAD_S), TURN_RATE_RAD_S)
     if speed > 0.0:
         speed *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0
     return speed, turn

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagrams.scenario.participants import FollowerParameters
 from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
-from systems.laws.catalogue import LAWS
+from systems.laws.catalogue import ROUTE_LAWS
 from systems.laws.trajectory.parameters import (
     AdaptationParameters,
     TrajectoryImpedanceParameters,
@@ -43,8 +43,7 @@ def route_warnings(
     Returns:
         One warning for each violated bound; its message states the bound.
     """
-    law = LAWS.get(robot.law)
-    if law is None or not law.on_route:
+    if robot.law not in ROUTE_LAWS:
         return []
     own = getattr(robot.repulsion, robot.law)
     of = SampledMass(robot.robot.mass_kg, robot.plant.motor_lag_s, tick_s)
@@ -181,8 +180,7 @@ def goal_warnings(
         One warning if P comes to rest farther than the margin from the goal; otherwise
         an empty list.
     """
-    law = LAWS.get(robot.law)
-    if robot.route is None or law is None or not law.on_route:
+    if robot.route is None or robot.law not in ROUTE_LAWS:
         return []
     own = getattr(robot.repulsion, robot.law)
     if own.reading != "restored":

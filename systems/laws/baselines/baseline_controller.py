@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port
-from systems.planning.parameters import FollowingParameters
 
 
 class BaselineController(Block):
@@ -24,8 +23,3 @@ class BaselineController(Block):
 def half_size(robot: RobotParameters) -> tuple[float, float]:
     """Returns half of the body's length and width, m."""
     return 0.5 * robot.length_m, 0.5 * robot.width_m
-
-
-def speed_limits(own: FollowingParameters) -> tuple[float, float, float]:
-    """Returns the least and largest speed, m/s, and the largest yaw rate, rad/s."""
-    return -own.back_speed_m_s, own.cruise_speed_m_s, own.turn_rate_rad_s

@@ -16,14 +16,12 @@ from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
     half_size,
-    speed_limits,
 )
 from systems.laws.dynamic_window import DynamicWindowParameters
 from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
-from systems.planning.following import FollowNumbers, approach
+from systems.planning.following import SPEED_LIMITS, FollowNumbers, approach
 from systems.planning.occupied import list_occupied
-from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import wrapped
 
 #: Numbers of speeds and of yaw rates in the grid over a window.
@@ -252,7 +250,6 @@ class DynamicWindowController(BaselineController):
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``dwa``.
-        following: Speeds and gains of driving and turning.
         tick_s: Period of the controller, s.
 
     Reference: Fox, Burgard and Thrun, The dynamic window approach to collision
@@ -267,7 +264,6 @@ class DynamicWindowController(BaselineController):
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
         repulsion: RepulsionParameters = RepulsionParameters(),
-        following: FollowingParameters = FollowingParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
@@ -276,7 +272,7 @@ class DynamicWindowController(BaselineController):
         window = WindowNumbers(
             (own.heading_gain, own.distance_gain, own.speed_gain),
             (own.acceleration_m_s2, own.turn_acceleration_rad_s2),
-            speed_limits(following),
+            SPEED_LIMITS,
             own.period_s,
             own.farthest_m,
             half_size(robot),
@@ -285,9 +281,7 @@ class DynamicWindowController(BaselineController):
         numbers = DynamicWindowNumbers(
             own,
             window,
-            FollowNumbers(
-                following, attraction.follow_distance_m, robot.control_point_m
-            ),
+            FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
             max(round(own.period_s / tick_s), 1),
         )
         step = Step(dynamic_window_step, numbers, [0.0, 0.0])

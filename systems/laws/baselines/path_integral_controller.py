@@ -16,15 +16,19 @@ from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
     half_size,
-    speed_limits,
 )
 from systems.laws.parameters import AttractionParameters
 from systems.laws.path_integral import PathIntegralParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.planning.carrot import find_carrot
-from systems.planning.following import FollowNumbers, wanted_speed
+from systems.planning.following import (
+    APPROACH_GAIN,
+    SOURCE_SHARE,
+    SPEED_LIMITS,
+    FollowNumbers,
+    wanted_speed,
+)
 from systems.planning.occupied import list_occupied
-from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import wrapped
 from systems.planning.way import Way, find_way, make_way
 from systems.safety.parameters import FreeSpaceParameters
@@ -292,9 +296,9 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
     far = max(math.hypot(dx, dy), 1e-9)
     ux, uy = dx / far, dy / far
     along = speed[0] * ux + speed[1] * uy
-    goes = wanted_speed(left - follow.distance_m, along, follow.own)
-    moves = min(follow.own.source_share * along, goes) if goes > 0.0 else 0.0
-    rest = (goes - moves) / follow.own.approach_gain
+    goes = wanted_speed(left - follow.distance_m, along)
+    moves = min(SOURCE_SHARE * along, goes) if goes > 0.0 else 0.0
+    rest = (goes - moves) / APPROACH_GAIN
     return px + rest * ux, py + rest * uy, moves * ux, moves * uy
 
 
@@ -316,7 +320,6 @@ class PathIntegralController(BaselineController):
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``mppi``.
-        following: Speeds and gains of driving and turning.
         known: Parameters of the map.
         seed: Seed of the random sequences.
         tick_s: Period of the controller, s.
@@ -334,7 +337,6 @@ class PathIntegralController(BaselineController):
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
         repulsion: RepulsionParameters = RepulsionParameters(),
-        following: FollowingParameters = FollowingParameters(),
         known: FreeSpaceParameters = FreeSpaceParameters(),
         seed: int = 0,
         tick_s: float = TICK_S,
@@ -344,10 +346,8 @@ class PathIntegralController(BaselineController):
         own = repulsion.mppi
         numbers = PathIntegralNumbers(
             own,
-            _roll_numbers(own, robot, following),
-            FollowNumbers(
-                following, attraction.follow_distance_m, robot.control_point_m
-            ),
+            _roll_numbers(own, robot),
+            FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
             body_radius(robot) + own.clearance_m,
             max(round(own.step_s / tick_s), 1),
             _noise(own, seed),
@@ -365,7 +365,6 @@ class PathIntegralController(BaselineController):
 def _roll_numbers(
     own: PathIntegralParameters,
     robot: RobotParameters,
-    following: FollowingParameters,
 ) -> RollNumbers:
     length, width = half_size(robot)
     # Each disc covers a third of the width.
@@ -374,7 +373,7 @@ def _roll_numbers(
         own.samples,
         own.step_s,
         (own.speed_spread_m_s, own.turn_spread_rad_s),
-        speed_limits(following),
+        SPEED_LIMITS,
         own.temperature,
         own.control_gain,
         (

@@ -19,10 +19,9 @@ from systems.laws.baselines.baseline_controller import (
 from systems.laws.parameters import AttractionParameters
 from systems.laws.reciprocal_avoidance import ReciprocalAvoidanceParameters
 from systems.laws.repulsion import RepulsionParameters
-from systems.planning.following import FollowNumbers, approach
+from systems.planning.following import CRUISE_SPEED_M_S, FollowNumbers, approach
 from systems.planning.half_planes import nearest_velocity
-from systems.planning.parameters import FollowingParameters
-from systems.planning.turning import turn_towards, wrapped
+from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
 #: Time within which the robot must leave a contact, s.
 _OUT_S = 0.1
@@ -207,12 +206,10 @@ def reciprocal_avoidance_step(
         pose[2],
         _RESTS_M_S,
     )
-    vx, vy, _ = nearest_velocity(
-        planes[:used], preferred, numbers.follow.own.cruise_speed_m_s, 0
-    )
+    vx, vy, _ = nearest_velocity(planes[:used], preferred, CRUISE_SPEED_M_S, 0)
     state[0], state[1] = vx, vy
     turn = (c * vy - s * vx) / own.offset_m
-    limit = numbers.follow.own.turn_rate_rad_s
+    limit = TURN_RATE_RAD_S
     twist[0], twist[1] = c * vx + s * vy, min(max(turn, -limit), limit)
     # The robot turns to the target if it is at rest, or if it backs off freely. While
     # it backs off, the twist above would turn it away from the target. At rest it would
@@ -220,7 +217,7 @@ def reciprocal_avoidance_step(
     changed = math.hypot(vx - preferred[0], vy - preferred[1])
     backs = wanted < 0.0 and changed < _UNCHANGED_M_S
     if inputs[2][0] > 0.5 and (backs or math.hypot(vx, vy) < _RESTS_M_S):
-        twist[1] = turn_towards(0.0, bearing, pose[2], numbers.follow.own)[1]
+        twist[1] = turn_towards(0.0, bearing, pose[2])[1]
 
 
 class ReciprocalAvoidanceController(BaselineController):
@@ -241,7 +238,6 @@ class ReciprocalAvoidanceController(BaselineController):
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``orca``.
-        following: Speeds and gains of driving and turning.
         bodies: Number of bodies.
         tick_s: Period of the controller, s.
 
@@ -262,7 +258,6 @@ class ReciprocalAvoidanceController(BaselineController):
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
         repulsion: RepulsionParameters = RepulsionParameters(),
-        following: FollowingParameters = FollowingParameters(),
         bodies: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
@@ -271,9 +266,7 @@ class ReciprocalAvoidanceController(BaselineController):
         own = repulsion.orca
         numbers = AvoidanceNumbers(
             own,
-            FollowNumbers(
-                following, attraction.follow_distance_m, robot.control_point_m
-            ),
+            FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
             body_radius(robot) + own.offset_m + own.clearance_m,
             tick_s,
         )

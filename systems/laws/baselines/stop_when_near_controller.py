@@ -16,7 +16,6 @@ from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.laws.stop_when_near import StopWhenNearParameters
 from systems.planning.following import FollowNumbers, approach
-from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards
 from systems.ranging.parameters import UltrasonicParameters
 
@@ -39,7 +38,7 @@ def stop_when_near_step(
     for k in range(len(ranges)):
         if echo[k] > 0.5 and ranges[k] < own.stop_m:
             wanted = min(wanted, 0.0)
-    twist[0], twist[1] = turn_towards(wanted, bearing, inputs[3][2], numbers.follow.own)
+    twist[0], twist[1] = turn_towards(wanted, bearing, inputs[3][2])
 
 
 class StopWhenNearController(BaselineController):
@@ -51,7 +50,6 @@ class StopWhenNearController(BaselineController):
         robot: Robot, for the position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``stop_when_near``.
-        following: Speeds and gains of driving and turning.
         sensors: Range sensors; uses their number.
         tick_s: Period of the controller, s.
 
@@ -70,7 +68,6 @@ class StopWhenNearController(BaselineController):
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
         repulsion: RepulsionParameters = RepulsionParameters(),
-        following: FollowingParameters = FollowingParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
         tick_s: float = TICK_S,
     ) -> None:
@@ -78,9 +75,7 @@ class StopWhenNearController(BaselineController):
         self.set_name("stop_when_near_controller")
         numbers = StopNumbers(
             repulsion.stop_when_near,
-            FollowNumbers(
-                following, attraction.follow_distance_m, robot.control_point_m
-            ),
+            FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
         )
         self.declare(
             Step(stop_when_near_step, numbers),

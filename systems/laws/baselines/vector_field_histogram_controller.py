@@ -21,8 +21,7 @@ from systems.laws.repulsion import RepulsionParameters
 from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.occupied import list_occupied
-from systems.planning.parameters import FollowingParameters
-from systems.planning.turning import turn_towards, wrapped
+from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
 #: Number of sectors (5 deg each, as in the paper), and largest number of sectors of a
 #: narrow valley.
@@ -249,7 +248,7 @@ def vector_field_histogram_step(
     for k in range(len(memory)):
         memory[k] = state[k]
     at = pose[0], pose[1], pose[2]
-    circle = abs(memory[_SECTORS + 1]) / numbers.follow.own.turn_rate_rad_s
+    circle = abs(memory[_SECTORS + 1]) / TURN_RATE_RAD_S
     direction, density = _steer(memory, places, at, bearing, circle, numbers.histogram)
     if math.isnan(direction):
         # All directions are blocked. The robot does not drive forward, and turns to the
@@ -257,7 +256,7 @@ def vector_field_histogram_step(
         wanted, direction = min(wanted, 0.0), bearing
     elif wanted > 0.0:
         wanted *= max(1.0 - density / own.slow_density, 0.0)
-    twist[0], twist[1] = turn_towards(wanted, direction, pose[2], numbers.follow.own)
+    twist[0], twist[1] = turn_towards(wanted, direction, pose[2])
     memory[_SECTORS + 1] = twist[0]
     for k in range(len(memory)):
         state[k] = memory[k]
@@ -287,7 +286,6 @@ class VectorFieldHistogramController(BaselineController):
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
         repulsion: ``RepulsionParameters``; uses ``vfh_plus``.
-        following: Speeds and gains of driving and turning.
         tick_s: Period of the controller, s.
 
     Reference: Ulrich and Borenstein, VFH+: reliable obstacle avoidance for fast mobile
@@ -302,7 +300,6 @@ class VectorFieldHistogramController(BaselineController):
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
         repulsion: RepulsionParameters = RepulsionParameters(),
-        following: FollowingParameters = FollowingParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
@@ -317,9 +314,7 @@ class VectorFieldHistogramController(BaselineController):
         numbers = VectorFieldHistogramNumbers(
             own,
             histogram,
-            FollowNumbers(
-                following, attraction.follow_distance_m, robot.control_point_m
-            ),
+            FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
         )
         state = [*[0.0] * _SECTORS, _NONE, 0.0]
         self.declare(Step(vector_field_histogram_step, numbers, state), tick_s=tick_s)

@@ -31,8 +31,7 @@ def _law(
         equations=(_IMPEDANCE, *more),
         gains=gains,
         controller_name="TrajectoryImpedanceController",
-        plans=True,
-        on_route=True,
+        robot="router",
     )
 
 

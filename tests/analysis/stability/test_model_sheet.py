@@ -44,9 +44,13 @@ def test_fingerprint_is_of_everything_in_the_scenario() -> None:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_every_law_has_its_equations(law: str) -> None:
-    searched = {"odor": "odor_search", "sound": "sound_search", None: "default"}
-    name = "unknown_block" if LAWS[law].on_route else searched[LAWS[law].searches]
-    sheet = model_sheet(load_scenario(name, [f"law={law}"]))
+    scenarios = {
+        "follower": "default",
+        "router": "unknown_block",
+        "odor_searcher": "odor_search",
+        "sound_searcher": "sound_search",
+    }
+    sheet = model_sheet(load_scenario(scenarios[LAWS[law].robot], [f"law={law}"]))
     assert sheet.law_equations
     for k, formula in enumerate((*sheet.motion, *sheet.law_equations)):
         assert "<svg" in equation(formula.tex, f"e{k}", formula.text)

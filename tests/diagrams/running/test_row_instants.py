@@ -25,11 +25,11 @@ BOX = "obstacles=[{name: box, size_m: [0.2, 0.2], waypoints_m: [[1.4, 0.5]]}]"
 MOVING = {
     name: ("one_moving_obstacle", HEARING)
     for name, law in LAWS.items()
-    if not law.on_route and law.searches is None
+    if law.robot == "follower"
 } | {
     name: ("unknown_block", ("duration_s=3",))
     for name, law in LAWS.items()
-    if law.on_route
+    if law.robot == "router"
 }
 MOVING |= {
     "plume_search": ("odor_search", ("search.wait_s=0.5", "duration_s=6")),

@@ -13,7 +13,6 @@ from systems.laws.baselines.path_integral_controller import (
     roll_out,
 )
 from systems.laws.path_integral import PathIntegralParameters
-from systems.planning.parameters import FollowingParameters
 
 CELL_M = 0.05
 START = 0.0, 0.0, 0.0
@@ -38,7 +37,7 @@ def test_places_are_where_they_are():
 def rolled(own, noise, goal, *, field=None, rounds=1):
     """The plan after some rounds, each from the plan of the last."""
     controls = np.zeros((own.steps, 2))
-    numbers = _roll_numbers(own, RobotParameters(), FollowingParameters())
+    numbers = _roll_numbers(own, RobotParameters())
     if field is None:
         field = distance_field(np.empty((0, 3)), 0.0, 0.0, 2.5, CELL_M)
     for k in range(rounds):
@@ -103,7 +102,7 @@ def test_it_does_not_drive_into_a_wall():
 def test_discs_cover_the_body(width):
     robot = RobotParameters(width_m=width)
     own = PathIntegralParameters(clearance_m=0.0)
-    aside, radius = _roll_numbers(own, robot, FollowingParameters()).discs
+    aside, radius = _roll_numbers(own, robot).discs
     x, y = np.meshgrid(np.linspace(-0.175, 0.175, 9), np.linspace(-0.5, 0.5, 41))
     y = y * width
     near = [np.hypot(x, y - aside * k) <= radius + 1e-9 for k in (-1, 0, 1)]

@@ -12,9 +12,8 @@ from systems.laws.baselines.stop_when_near_controller import (
 )
 from systems.laws.stop_when_near import StopWhenNearParameters
 from systems.planning.following import FollowNumbers, approach
-from systems.planning.parameters import FollowingParameters
 
-FOLLOW = FollowNumbers(FollowingParameters(), 1.2, 0.175)
+FOLLOW = FollowNumbers(1.2, 0.175)
 NUMBERS = StopNumbers(StopWhenNearParameters(stop_m=0.6), FOLLOW)
 
 
