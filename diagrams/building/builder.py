@@ -111,12 +111,12 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
         InputError: A sound file cannot be played.
     """
     builder = DiagramBuilder()
-    robots, audible = scenario.all_robots, set()
+    robots, audible = scenario.robots, set()
     if any(robot.listens for robot in robots.values()):
         audible = set(scenario.sounds())
     sources = {
         name: make_source(scenario, name, source, audible=name in audible)
-        for name, source in scenario.all_sources.items()
+        for name, source in scenario.sources.items()
     }
     obstacles = Obstacles(obstacles=scenario.obstacles)
     followers = {}
@@ -155,7 +155,10 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
 def _own(scenario: Scenario, name: str, *, audible: bool) -> Scenario:
     """A robot's own scenario, without a loudspeaker that no robot hears."""
     own = scenario.of_robot(name)
-    return own if audible else own.model_copy(update={"loudspeaker": None})
+    if audible or own.only.loudspeaker is None:
+        return own
+    robot = own.only.model_copy(update={"loudspeaker": None})
+    return own.model_copy(update={"robots": {name: robot}})
 
 
 @dataclass(frozen=True)

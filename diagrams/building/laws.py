@@ -11,6 +11,7 @@ from diagrams.building.own_laws import checked_law, try_law
 from diagrams.building.robots.routed_robot import make_trajectory_controller
 from diagrams.building.robots.searching_robot import search_controller
 from diagrams.scenario.own_code import asked_for, import_own, made
+from diagrams.scenario.participants import HasRangeSensors
 from diagrams.scenario.scenario import Scenario
 from systems import RadialLawController, WheelCommand
 from systems.base.robot import RobotParameters
@@ -18,7 +19,10 @@ from systems.base.wheel_speed_command import COMMANDS
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.laws.catalogue import LAWS, ROUTE_LAWS
+from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
 from systems.ranging.collision_vector import SLOTS
+from systems.ranging.parameters import CollisionVectorParameters
 
 #: Optional output ports of a law for the log, with sizes.
 _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
@@ -51,27 +55,30 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     Raises:
         InputError: The law does not exist, or does not have the form of a law.
     """
-    sensors = scenario.ultrasonic
-    if scenario.obstacle_sensing == "ideal":
+    robot = scenario.only
+    if robot.searches is not None:
+        return search_controller(scenario)
+    if robot.law in ROUTE_LAWS:
+        return make_trajectory_controller(scenario)
+    assert isinstance(robot, HasRangeSensors)
+    sensors = robot.ultrasonic
+    if robot.obstacle_sensing == "ideal":
         at_once = {"firing": "simultaneous", "period_s": scenario.tick_s}
         sensors = sensors.model_copy(update=at_once)
+    repulsion = _repulsion(robot)
     parts = {
-        "robot": scenario.robot,
-        "attraction": scenario.attraction,
-        "repulsion": scenario.repulsion,
+        "robot": robot.robot,
+        "attraction": getattr(robot, "attraction", AttractionParameters()),
+        "repulsion": repulsion,
         "tick_s": scenario.tick_s,
         "sensors": sensors,
     }
     more = {
-        "known": scenario.free_space,
+        "known": getattr(robot, "free_space", None),
         "bodies": bodies,
         "seed": seed,
     }
-    name = scenario.law
-    if scenario.searches is not None:
-        return search_controller(scenario)
-    if name in ROUTE_LAWS:
-        return make_trajectory_controller(scenario)
+    name = robot.law
     if name in LAWS:
         law, controller = LAWS[name], LAWS[name].controller
         if controller is None:
@@ -88,9 +95,16 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         wanted = {key: value for key, value in more.items() if key in named}
         return _own_block(name, law, {**parts, **wanted})
     function = checked_law(name, law)
-    reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
-    try_law(function, scenario.repulsion, reach, top_speed)
+    reach, top_speed = robot.ultrasonic.maximum_range_m, robot.robot.top_speed_m_s
+    try_law(function, repulsion, reach, top_speed)
     return RadialLawController(**parts, law=function)
+
+
+def _repulsion(robot: HasRangeSensors) -> RepulsionParameters:
+    own = robot.laws
+    fields = {n: getattr(own, n) for n in type(own).model_fields if getattr(own, n)}
+    term = getattr(robot, "collision_vector", CollisionVectorParameters()).velocity_term
+    return RepulsionParameters(velocity_term=term, **fields)
 
 
 def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:

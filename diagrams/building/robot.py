@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -20,8 +19,9 @@ from diagrams.building.robots.following_robot import following_blocks
 from diagrams.building.robots.routed_robot import routed_blocks, trajectory_command
 from diagrams.building.robots.searching_robot import search_command, searching_blocks
 from diagrams.building.world_blocks import world_blocks
-from diagrams.scenario.participants import SourceParameters
-from diagrams.scenario.scenario import ROBOT, SOURCE, WORLD, Scenario
+from diagrams.scenario.participants import Follower, Router, SourceParameters
+from diagrams.scenario.scenario import WORLD, Scenario
+from diagrams.scenario.shorthand import ROBOT, SOURCE, fields_of
 from systems import (
     DiffDrivePlant,
     MotionGuard,
@@ -178,37 +178,34 @@ def robot_blocks(
     Raises:
         InputError: See ``make_robot``.
     """
-    own_seed = partial(seed_of, scenario, owner=name)
+    robot, own_seed = scenario.only, partial(seed_of, scenario, owner=name)
     seed = own_seed("controller")
     controller = make_controller(scenario, bodies=bodies, seed=seed)
-    if scenario.searches is not None:
+    if robot.searches is not None:
         sensing = searching_blocks(
             scenario,
             bodies=bodies,
             others=others,
             seed_of=own_seed,
         )
-    elif scenario.route is None:
+    elif isinstance(robot, Follower):
         sensing = following_blocks(
             scenario, controller, bodies=bodies, others=others, seed_of=own_seed
         )
     else:
-        with _fields_of_robot(name):
+        with fields_of("robots", name):
             sensing = routed_blocks(
-                scenario,
-                bodies=bodies,
-                robots=robots,
-                seed_of=own_seed,
+                scenario, bodies=bodies, robots=robots, seed_of=own_seed
             )
     ours = [
         DiffDrivePlant(
-            robot=scenario.robot, plant=scenario.plant, initial_pose=scenario.start.pose
+            robot=robot.robot, plant=robot.plant, initial_pose=robot.start.pose
         ),
         WheelOdometry(
-            robot=scenario.robot,
-            odometry=scenario.odometry,
-            plant=scenario.plant,
-            initial_pose=scenario.start.pose,
+            robot=robot.robot,
+            odometry=robot.odometry,
+            plant=robot.plant,
+            initial_pose=robot.start.pose,
             tick_s=scenario.tick_s,
         ),
         *sensing,
@@ -217,10 +214,10 @@ def robot_blocks(
     ]
     return with_own_blocks(
         {part_of(block): block for block in ours},
-        scenario.blocks,
+        robot.blocks,
         {
             "scenario": scenario,
-            "robot": scenario.robot,
+            "robot": robot.robot,
             "bodies": bodies,
             "tick_s": scenario.tick_s,
             "seed": seed_of(scenario, "own_block", name),
@@ -275,13 +272,15 @@ def make_robot(
     connect_by_name(builder, blocks, OUTSIDE)
     for port in ("pose_WB", "velocity_WB"):
         builder.ExportOutput(plant.GetOutputPort(port), port)
-    if scenario.searches is not None:
+    robot = scenario.only
+    if robot.searches is not None:
         builder.ExportOutput(by_part["controller"].GetOutputPort("frames"), "frames")
-    if scenario.loudspeaker is not None:
-        calls = scenario.searches == "odor"
-        emitter = _emitter(
-            scenario, name, scenario.loudspeaker, listeners_frame_s, called=calls
-        )
+    if robot.loudspeaker is not None:
+        calls = robot.searches == "odor"
+        with fields_of("robots", name, sound="loudspeaker"):
+            emitter = _emitter(
+                scenario, name, robot.loudspeaker, listeners_frame_s, called=calls
+            )
         _carry_loudspeaker(builder, emitter, plant)
         if calls:
             calling = by_part["controller"].GetOutputPort("calling")
@@ -347,7 +346,9 @@ def make_source(
     robot = SourceRobot(source=source)
     blocks: list[Any] = [robot]
     if audible:
-        blocks.append(_emitter(scenario, name, source.sound, scenario.longest_frame_s))
+        with fields_of("sources", name):
+            frame_s = scenario.longest_frame_s
+            blocks.append(_emitter(scenario, name, source.sound, frame_s))
     builder = DiagramBuilder()
     for block in blocks:
         builder.AddNamedSystem(block.get_name(), block)
@@ -369,59 +370,15 @@ def _emitter(
     *,
     called: bool = False,
 ) -> SoundEmitter:
-    with naming_sounds(scenario, name, sound):
-        return SoundEmitter(
-            sound=sound,
-            acoustics=scenario.acoustics,
-            maximum_range_m=microphone_reach(scenario.room, scenario.acoustics),
-            frame_s=frame_s,
-            tick_s=scenario.tick_s,
-            seed=seed_of(scenario, "sound_emitter", name),
-            called=called,
-        )
-
-
-@contextmanager
-def _fields_of_robot(name: str) -> Iterator[None]:
-    """Makes errors of a route name the field of the robot in the scenario."""
-    try:
-        yield
-    except InputError as error:
-        if name == ROBOT or not error.field.startswith(("route.", "start.")):
-            raise
-        raise InputError(f"robots.{name}.{error.field}", error.message) from None
-
-
-@contextmanager
-def naming_sounds(
-    scenario: Scenario, name: str, sound: SoundParameters
-) -> Iterator[None]:
-    """Makes errors of a sound name the field of the sound in the scenario.
-
-    Args:
-        scenario: Scenario with the sound.
-        name: Name of the source or robot that plays it.
-        sound: The sound.
-
-    Yields:
-        Nothing.
-
-    Raises:
-        InputError: The sound cannot be played.
-    """
-    try:
-        yield
-    except InputError as error:
-        if not error.field.startswith("sound."):
-            raise
-        field = error.field.removeprefix("sound.")
-        if name in scenario.sources:
-            group = f"sources.{name}.sound."
-        elif scenario.loudspeaker is sound:
-            group = f"robots.{name}.loudspeaker."
-        else:
-            group = "sound."
-        raise InputError(f"{group}{field}", error.message) from None
+    return SoundEmitter(
+        sound=sound,
+        acoustics=scenario.acoustics,
+        maximum_range_m=microphone_reach(scenario.room, scenario.acoustics),
+        frame_s=frame_s,
+        tick_s=scenario.tick_s,
+        seed=seed_of(scenario, "sound_emitter", name),
+        called=called,
+    )
 
 
 def _carry_loudspeaker(builder: DiagramBuilder, emitter: Any, plant: Any) -> None:
@@ -434,19 +391,20 @@ def _carry_loudspeaker(builder: DiagramBuilder, emitter: Any, plant: Any) -> Non
 
 def _driving(scenario: Scenario, controller: Any) -> Any:
     """Makes the block that drives the wheels, with a guard or safety filter if set."""
-    if scenario.searches is not None:
+    robot = scenario.only
+    if robot.searches is not None:
         return search_command(scenario)
-    if scenario.route is not None:
+    if isinstance(robot, Router):
         filtering = trajectory_command(scenario)
         if filtering is not None:
             return filtering
-    if scenario.own_guard is None:
-        return make_command(controller, scenario.robot, scenario.tick_s)
+    if not isinstance(robot, Follower) or robot.own_guard is None:
+        return make_command(controller, robot.robot, scenario.tick_s)
     return MotionGuard(
-        parameters=scenario.own_guard,
-        known=scenario.free_space,
-        robot=scenario.robot,
-        plant=scenario.plant,
+        parameters=robot.own_guard,
+        known=robot.free_space,
+        robot=robot.robot,
+        plant=robot.plant,
         command=commanded(controller),
         tick_s=scenario.tick_s,
     )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagrams.scenario.checks.search_checks import address_of_robot
+from diagrams.scenario.participants import OdorSearcher, SoundSearcher
 from diagrams.scenario.scenario import Scenario
 from systems import OdorPlume, RadioChannel, SinkMonitor, WindField
 
@@ -21,8 +22,8 @@ def radio_nodes(scenario: Scenario) -> dict[str, int]:
     """
     return {
         name: address_of_robot(robot)
-        for name, robot in scenario.all_robots.items()
-        if robot.searches
+        for name, robot in scenario.robots.items()
+        if isinstance(robot, OdorSearcher | SoundSearcher)
     }
 
 

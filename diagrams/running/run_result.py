@@ -14,7 +14,8 @@ from diagrams.building.robot import Parts
 from diagrams.running.stop_rules import Collision, RobotRules, decisive_robot
 from diagrams.scenario.bodies import RecordedPath, Surroundings
 from diagrams.scenario.run_parameters import Engine
-from diagrams.scenario.scenario import ROBOT, Scenario
+from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.shorthand import ROBOT
 from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
 from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.search.search_ending import SEARCH_REASONS
@@ -238,7 +239,7 @@ def _completed(
     They contain the position of P, the true pose of the source, and the true and
     measured range and bearing of the source.
     """
-    offset, theta = scenario.robot.control_point_m, columns["theta_WB"]
+    offset, theta = scenario.only.robot.control_point_m, columns["theta_WB"]
     c, s = np.cos(theta), np.sin(theta)
     x_P = columns["p_WB_x"] + offset * c
     y_P = columns["p_WB_y"] + offset * s

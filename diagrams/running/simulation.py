@@ -174,7 +174,7 @@ def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> Compiled
     """
     loop = _new_loop(scenario, audio)
     loop.prepare()
-    listens = any(robot.listens for robot in scenario.all_robots.values())
+    listens = any(robot.listens for robot in scenario.robots.values())
     kind = "compiled", *_kind(scenario)
     if listens and kind not in _LOADED:
         # A short separate run compiles the functions that the loop calls in Python.
@@ -254,13 +254,12 @@ def _kind(scenario: Scenario) -> tuple[object, ...]:
     """The properties of a scenario that determine which compiled functions it needs."""
     return tuple(
         (
-            robot.hearing,
-            robot.obstacle_sensing,
             robot.law,
-            robot.tdoa.method,
+            robot.listens,
+            getattr(robot, "obstacle_sensing", ""),
             scenario.room is None,
             robot.plant.friction is None,
             robot.own_guard is None,
         )
-        for robot in scenario.all_robots.values()
+        for robot in scenario.robots.values()
     )

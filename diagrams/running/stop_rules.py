@@ -122,7 +122,7 @@ class RunRules:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        starts = {n: robot.start.pose for n, robot in scenario.all_robots.items()}
+        starts = {n: robot.start.pose for n, robot in scenario.robots.items()}
         self._paths = {name: LivePath(pose) for name, pose in starts.items()}
         self.robots = {
             name: RobotRules(
@@ -433,11 +433,11 @@ class RobotRules:
         self._source_rests = not self.surroundings.followed.path.moves
         self.numbers = RuleNumbers(
             scenario.stop,
-            scenario.robot.control_point_m,
-            scenario.follow_distance_m,
+            scenario.only.robot.control_point_m,
+            scenario.only.follow_distance_m,
             scenario.goal_radius(moves=not self._source_rests),
             self._source_rests,
-            {None: 0, "odor": 1, "sound": 2}[scenario.searches],
+            {None: 0, "odor": 1, "sound": 2}[scenario.only.searches],
         )
         self.parts, self.near = self._near_bodies()
 
@@ -447,7 +447,7 @@ class RobotRules:
         If a body is fast, ticks have more parts, so that the body moves at most
         ``_PART_M`` per part.
         """
-        size, tick_s = self.scenario.size, self.scenario.tick_s
+        size, tick_s = self.scenario.only.size, self.scenario.tick_s
         times = tick_s * np.arange(int(self.scenario.duration_s / tick_s + 1e-9) + 1.0)
         instants, farthest, near = instants_of(times, BETWEEN_TICKS), 0.0, []
         for name, body in self.surroundings.bodies.items():
@@ -555,7 +555,7 @@ class RobotRules:
                 continue
             instants = instants_of(np.array([self._time, time]), self.parts)
             poses = body.path.poses(instants if time > self._time else instants[:1])
-            size = self.scenario.size
+            size = self.scenario.only.size
             part = first_overlap(tuple(before), tuple(pose), size, poses, body.size)
             if part < first:
                 first, touched = part, near
@@ -594,4 +594,4 @@ class RobotRules:
         now = np.array(pose)
         before = now if self._pose is None else np.array(self._pose)
         part = (instant - self._time) / max(time - self._time, self.scenario.tick_s)
-        return robot_rectangle(before + part * (now - before), self.scenario.robot)
+        return robot_rectangle(before + part * (now - before), self.scenario.only.robot)

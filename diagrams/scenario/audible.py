@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from diagrams.scenario.participants import HasMicrophones
 from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.shorthand import field_in
 from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.wav_writer import LARGEST_WAV_BYTES
@@ -21,7 +23,7 @@ def check_audible(scenario: Scenario) -> None:
         InputError: No robot hears sound waves, a sample rate is not a whole number of
             Hz, or a file would exceed the maximum size of WAV files.
     """
-    robots = scenario.all_robots
+    robots = scenario.robots
     listening = [name for name, own in robots.items() if own.listens]
     if not listening:
         ideal = any(not own.has_goal for own in robots.values())
@@ -38,11 +40,11 @@ def check_audible(scenario: Scenario) -> None:
     _check_size("of loudspeakers", SAMPLE_RATE_HZ * PLAYED_BYTES, scenario.duration_s)
     for name in listening:
         own = robots[name]
+        assert isinstance(own, HasMicrophones)
         rate = own.microphones.sample_rate_hz
         if rate != round(rate):
-            field = f"robots.{name}." if scenario.robots else ""
             raise InputError(
-                f"{field}microphones.sample_rate_hz",
+                field_in("robots", name, "microphones.sample_rate_hz"),
                 f"{rate} Hz is not a whole number, which sound files need; use "
                 f"{round(rate)}, or leave --save-audio out",
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagrams.scenario.participants import HasMicrophones
 from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.yaml_text import dump_yaml
 from systems.base.robot import microphones_B
@@ -28,7 +29,8 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
         Nominal positions of the microphones in B, m, and the speed of sound. Comments
         describe the recording and the errors of the array.
     """
-    own = scenario.all_robots[robot]
+    own = scenario.robots[robot]
+    assert isinstance(own, HasMicrophones)
     places = np.round(microphones_B(own.robot), _DECIMALS).tolist()
     name = shortened(scenario.name, 60)
     comments = [

@@ -158,7 +158,7 @@ def loaded_digests(scenario: Scenario) -> dict[str, str]:
         InputError: See ``import_own``.
     """
     digests: dict[str, str] = {}
-    for robot in scenario.all_robots.values():
+    for robot in scenario.robots.values():
         names = [(robot.law, "law"), *((block, "blocks") for block in robot.blocks)]
         for name, field in names:
             if ":" in name:
@@ -189,7 +189,7 @@ def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[Non
     kept = [wanted.get(file, digest) == digest for file, digest in loaded.items()]
     _KEEPS = bool(wanted) and all(kept)
     try:
-        own_law = any(":" in robot.law for robot in scenario.all_robots.values())
+        own_law = any(":" in robot.law for robot in scenario.robots.values())
         for file, digest in loaded_digests(scenario).items():
             if wanted.get(file, digest) != digest:
                 raise InputError(

@@ -208,6 +208,7 @@ class Router(Robot):
     ultrasonic: UltrasonicParameters = UltrasonicParameters()
     route: RouteParameters
     laws: LawGains = LawGains()
+    """Gains by law. Only the gains of the robot's law have an effect."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
     detector: ObjectDetectorParameters = ObjectDetectorParameters()
 
@@ -258,6 +259,10 @@ class SoundSearcher(Robot):
         """Whether the robot hears sound waves."""
         return True
 
+
+#: The kinds of robots with microphones, and the kinds with range sensors.
+HasMicrophones = Follower | SoundSearcher
+HasRangeSensors = Follower | Router
 
 #: Models of the kinds of robots, by name.
 KINDS: Mapping[str, type[Robot]] = {

@@ -34,9 +34,10 @@ from diagrams.scenario.checks.search_checks import check_searches
 from diagrams.scenario.participants import (
     AnyRobot,
     Follower,
+    HasMicrophones,
+    HasRangeSensors,
     Robot,
     Router,
-    SoundSearcher,
     SourceParameters,
 )
 from diagrams.scenario.run_parameters import RunParameters
@@ -152,7 +153,7 @@ class Scenario(RunParameters):
         own = self.robots[robot]
         if isinstance(own, Router):
             return GOAL
-        if isinstance(own, Follower | SoundSearcher):
+        if isinstance(own, HasMicrophones):
             return own.follows or next(iter(self.sources))
         return ODOR
 
@@ -307,7 +308,8 @@ class Scenario(RunParameters):
 
     @model_serializer(mode="wrap")
     def _dump(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return file_form(dump(self))
+        found = dump(self)  # a part of the fields, if some are excluded
+        return file_form(found) if {"robots", "sources"} <= found.keys() else found
 
     @model_validator(mode="after")
     def _check(self) -> Scenario:
@@ -498,15 +500,16 @@ class Scenario(RunParameters):
 
 def frame_of(robot: Robot) -> float:
     """Returns the audio frame of a robot, s; 0 without microphones."""
-    has_ears = isinstance(robot, Follower | SoundSearcher)
-    return robot.microphones.frame_s if has_ears else 0.0
+    if isinstance(robot, HasMicrophones):
+        return robot.microphones.frame_s
+    return 0.0
 
 
 def _periods(robot: Robot) -> Iterator[tuple[str, float]]:
     """Yields the periods, s, of the sensors of a robot, by field."""
-    if isinstance(robot, Follower | SoundSearcher):
+    if isinstance(robot, HasMicrophones):
         yield "microphones.frame_s", robot.microphones.frame_s
-    if isinstance(robot, Follower | Router):
+    if isinstance(robot, HasRangeSensors):
         yield "ultrasonic.period_s", robot.ultrasonic.period_s
 
 

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from diagrams.scenario.own_code import import_own
+from diagrams.scenario.participants import HasMicrophones
+from diagrams.scenario.shorthand import field_in
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
@@ -33,18 +35,20 @@ def check_files(scenario: Scenario) -> None:
         if sound.kind == "wav":
             from systems.sound.sound_file import read_played
 
-            field = f"{scenario.sound_field(name)}.file"
+            robot = name in scenario.robots
+            group, sounds = ("robots", "loudspeaker") if robot else ("sources", "sound")
+            field = field_in(group, name, f"{sounds}.file")
             check(read_played, sound.file or "", sound.low_hz, field)
-    for prefix, robot in scenario.robot_fields():
-        noise = robot.microphones.ego_noise_file
-        if noise is not None and robot.listens:
+    for name, own in scenario.robots.items():
+        ears = own.microphones if isinstance(own, HasMicrophones) else None
+        if own.listens and ears is not None and ears.ego_noise_file is not None:
             from systems.sound.sound_file import read_noise
 
-            field = f"{prefix}microphones.ego_noise_file"
-            check(read_noise, noise, len(robot.robot.microphones_m), field)
-        if ":" in robot.law:
-            check(import_own, robot.law, f"{prefix}law")
-        for block in robot.blocks:
-            check(import_own, block, f"{prefix}blocks")
+            field = field_in("robots", name, "microphones.ego_noise_file")
+            check(read_noise, ears.ego_noise_file, len(own.robot.microphones_m), field)
+        if ":" in own.law:
+            check(import_own, own.law, field_in("robots", name, "law"))
+        for block in own.blocks:
+            check(import_own, block, field_in("robots", name, "blocks"))
     if faults:
         raise InputError.joined(faults)

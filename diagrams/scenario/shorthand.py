@@ -8,7 +8,8 @@ and ``file_form`` makes it from a resolved tree.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from pydantic import BaseModel
@@ -179,6 +180,49 @@ def _has(data: Any, place: Sequence[str]) -> bool:
             return False
         data = data[part]
     return True
+
+
+@contextmanager
+def fields_of(group: str, name: str, **renamed: str) -> Iterator[None]:
+    """Makes errors of a block name the field in the scenario.
+
+    Args:
+        group: ``robots`` or ``sources``.
+        name: Name of the robot or source that has the block.
+        **renamed: Names of groups in the scenario, by their names in the block.
+
+    Yields:
+        Nothing.
+
+    Raises:
+        InputError: The block raises this error.
+    """
+    try:
+        yield
+    except InputError as error:
+        first, *rest = error.field.split(".")
+        if first not in ROBOT_FIELDS and first != "sound":
+            raise
+        field = ".".join([renamed.get(first, first), *rest])
+        raise InputError(field_in(group, name, field), error.message) from None
+
+
+def field_in(group: str, name: str, field: str) -> str:
+    """Returns the path of a field of a robot or source, in its shortest form.
+
+    Args:
+        group: ``robots`` or ``sources``.
+        name: Name of the robot or source.
+        field: Path of the field below this name.
+
+    Returns:
+        Path of the field in the scenario.
+    """
+    if name == ROBOT:
+        return field
+    if name == SOURCE:
+        return field if field.startswith("sound") else f"source.{field}"
+    return f"{group}.{name}.{field}"
 
 
 def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:

@@ -223,6 +223,7 @@ class UltrasonicParameters(Parameters):
 
 
 Aggregation = Literal["paper", "nearest", "sum"]
+VelocityTerm = Literal["printed", "closing"]
 
 
 class CollisionVectorParameters(Parameters):
@@ -235,6 +236,9 @@ class CollisionVectorParameters(Parameters):
     nearest three vectors. The forces of the vectors are added."""
     pair_separation_m: NonNegativeLength = 0.5
     """Largest distance between two echoes of the same obstacle, m."""
+    velocity_term: VelocityTerm = "printed"
+    """Definition of the speed s of an obstacle in the laws: ``printed`` is |dC/dt|,
+    ``closing`` is the speed of approach only."""
 
 
 class ContactFaultParameters(Parameters):

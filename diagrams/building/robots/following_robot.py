@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from diagrams.scenario.participants import Follower
 from diagrams.scenario.scenario import Scenario
 from systems import (
     CollisionVector,
@@ -43,66 +44,70 @@ def following_blocks(
     Raises:
         InputError: The law reads ranges, but the robot has no range sensors.
     """
-    _check_sensing(scenario, controller)
-    mapped = scenario.own_guard is not None or "free_space" in _inputs(controller)
+    robot = scenario.follower
+    _check_sensing(robot, controller)
+    mapped = robot.own_guard is not None or "free_space" in _inputs(controller)
     return [
-        *_hearing(scenario, others, seed_of),
-        _tracker(scenario),
-        *_obstacle_sensing(scenario, bodies, seed_of, mapped=mapped),
+        *_hearing(scenario, robot, others, seed_of),
+        _tracker(scenario, robot),
+        *_obstacle_sensing(scenario, robot, bodies, seed_of, mapped=mapped),
     ]
 
 
 def _hearing(
-    scenario: Scenario, others: Sequence[str], seed_of: Callable[[str], int]
+    scenario: Scenario,
+    robot: Follower,
+    others: Sequence[str],
+    seed_of: Callable[[str], int],
 ) -> list[Any]:
-    if scenario.hearing == "ideal":
+    if robot.hearing == "ideal":
         return [
             IdealSourceSensor(
-                robot=scenario.robot,
-                hearing=scenario.ideal_hearing,
-                sound=scenario.sound,
-                frame_s=scenario.microphones.frame_s,
+                robot=robot.robot,
+                hearing=robot.ideal_hearing,
+                sound=scenario.source.sound,
+                frame_s=robot.microphones.frame_s,
                 seed=seed_of("ideal_source_sensor"),
             )
         ]
     return [
         MicArray(
-            parameters=scenario.microphones,
-            robot=scenario.robot,
+            parameters=robot.microphones,
+            robot=robot.robot,
             acoustics=scenario.acoustics,
             room=scenario.room,
             others=others,
             seed=seed_of("mic_array"),
         ),
         TDOAEstimator(
-            parameters=scenario.tdoa,
-            robot=scenario.robot,
+            parameters=robot.tdoa,
+            robot=robot.robot,
             acoustics=scenario.acoustics,
-            sound=scenario.sound,
-            microphones=scenario.microphones,
+            sound=scenario.source.sound,
+            microphones=robot.microphones,
         ),
     ]
 
 
-def _tracker(scenario: Scenario) -> Any:
+def _tracker(scenario: Scenario, robot: Follower) -> Any:
     """Makes the tracker for the kind of hearing.
 
     An ideal estimate is one tick old; an estimate from audio is older by half a frame.
     For ideal estimates, the tracker uses the exact covariance and does not resolve
     front and back.
     """
-    tick, frame = scenario.tick_s, scenario.microphones.frame_s
-    tracker, age = scenario.tracker, tick + 0.5 * frame
-    if scenario.hearing == "ideal":
+    tick, frame = scenario.tick_s, robot.microphones.frame_s
+    tracker, age = robot.tracker, tick + 0.5 * frame
+    if robot.hearing == "ideal":
         exact = {"resolve_front_back": False, "measurement_floor_m": 0.0}
         tracker = tracker.model_copy(update=exact)
         age = tick
     return SourceTracker(
-        robot=scenario.robot,
+        robot=robot.robot,
         tracker=tracker,
         measurement_age_s=age,
         frame_s=frame,
-        initial_pose=scenario.start.pose,
+        initial_pose=robot.start.pose,
         tick_s=tick,
     )
 
@@ -111,13 +116,13 @@ def _tracker(scenario: Scenario) -> Any:
 _OF_RANGES = {"ranges", "echo", "range_ages", "free_space"}
 
 
-def _check_sensing(scenario: Scenario, controller: Any) -> None:
+def _check_sensing(robot: Follower, controller: Any) -> None:
     """Refuses a law that reads ranges if the robot has no range sensors."""
     wanted = _OF_RANGES.intersection(_inputs(controller))
-    if wanted and scenario.obstacle_sensing != "ultrasonic" and not scenario.blocks:
+    if wanted and robot.obstacle_sensing != "ultrasonic" and not robot.blocks:
         raise InputError(
             "obstacle_sensing",
-            f"is {scenario.obstacle_sensing}, but law {scenario.law!r} reads "
+            f"is {robot.obstacle_sensing}, but law {robot.law!r} reads "
             f"{', '.join(sorted(wanted))}; set it to ultrasonic",
         )
 
@@ -128,50 +133,55 @@ def _inputs(block: Any) -> list[str]:
 
 
 def _obstacle_sensing(
-    scenario: Scenario, bodies: int, seed_of: Callable[[str], int], *, mapped: bool
+    scenario: Scenario,
+    robot: Follower,
+    bodies: int,
+    seed_of: Callable[[str], int],
+    *,
+    mapped: bool,
 ) -> list[Any]:
     seen: dict[str, Any] = {
-        "robot": scenario.robot,
+        "robot": robot.robot,
         "source_size": scenario.source_size,
         "obstacle_count": bodies,
     }
-    if scenario.obstacle_sensing == "ideal":
+    if robot.obstacle_sensing == "ideal":
         return [
             IdealObstacleSensor(
-                maximum_range_m=scenario.ultrasonic.maximum_range_m,
-                all_bodies=scenario.collision_vector.aggregation == "sum",
+                maximum_range_m=robot.ultrasonic.maximum_range_m,
+                all_bodies=robot.collision_vector.aggregation == "sum",
                 **seen,
             )
         ]
     sensing = [
         UltrasonicArray(
-            parameters=scenario.ultrasonic,
+            parameters=robot.ultrasonic,
             acoustics=scenario.acoustics,
             seed=seed_of("ultrasonic_array"),
             tick_s=scenario.tick_s,
             **seen,
         ),
         CollisionVector(
-            parameters=scenario.collision_vector,
-            sensors=scenario.ultrasonic,
-            robot=scenario.robot,
-            initial_pose=scenario.start.pose,
+            parameters=robot.collision_vector,
+            sensors=robot.ultrasonic,
+            robot=robot.robot,
+            initial_pose=robot.start.pose,
             tick_s=scenario.tick_s,
         ),
     ]
     if mapped:
         known = FreeSpaceMap(
-            parameters=scenario.free_space,
-            sensors=scenario.ultrasonic,
-            robot=scenario.robot,
-            odometry=scenario.odometry,
-            plant=scenario.plant,
+            parameters=robot.free_space,
+            sensors=robot.ultrasonic,
+            robot=robot.robot,
+            odometry=robot.odometry,
+            plant=robot.plant,
             tick_s=scenario.tick_s,
         )
         sensing.append(known)
-    if scenario.own_guard is not None:
+    if robot.own_guard is not None:
         monitor = SensingMonitor(
-            sensors=scenario.ultrasonic, robot=scenario.robot, tick_s=scenario.tick_s
+            sensors=robot.ultrasonic, robot=robot.robot, tick_s=scenario.tick_s
         )
         sensing.append(monitor)
     return sensing

@@ -23,13 +23,8 @@ from systems.laws.trajectory.parameters import (
 )
 
 
-def _gains(scenario: Scenario) -> Any:
-    return getattr(scenario.repulsion, scenario.law)
-
-
-def _adapting(scenario: Scenario) -> AdaptiveTrajectoryParameters | None:
-    """Parameters of the law if it adapts its gains; otherwise None."""
-    own = _gains(scenario)
+def _adapting(own: Any) -> AdaptiveTrajectoryParameters | None:
+    """The gains of a law if it adapts them; otherwise None."""
     adaptive = isinstance(own, AdaptiveTrajectoryParameters)
     return own if adaptive and own.adaptation.rule != "none" else None
 
@@ -43,10 +38,11 @@ def make_trajectory_controller(scenario: Scenario) -> Any:
     Returns:
         The block.
     """
+    router = scenario.router
     return TrajectoryImpedanceController(
-        parameters=_gains(scenario),
-        robot=scenario.robot,
-        adapts=_adapting(scenario) is not None,
+        parameters=router.gains,
+        robot=router.robot,
+        adapts=_adapting(router.gains) is not None,
         tick_s=scenario.tick_s,
     )
 
@@ -60,12 +56,13 @@ def trajectory_command(scenario: Scenario) -> Any | None:
     Returns:
         The block; None if the law has no safety filter.
     """
-    own = _gains(scenario)
+    router = scenario.router
+    own = router.gains
     filtered = AdaptiveTrajectoryParameters, FilteredTrajectoryParameters
     if not isinstance(own, filtered) or own.safety_filter is None:
         return None
     return SafetyFilter(
-        parameters=own.safety_filter, robot=scenario.robot, tick_s=scenario.tick_s
+        parameters=own.safety_filter, robot=router.robot, tick_s=scenario.tick_s
     )
 
 
@@ -90,17 +87,17 @@ def routed_blocks(
     Raises:
         InputError: No route leads to the goal.
     """
-    assert scenario.route is not None
-    robot, tick_s = scenario.robot, scenario.tick_s
+    router = scenario.router
+    robot, tick_s = router.robot, scenario.tick_s
     return [
         GlobalPlanner(
-            parameters=scenario.route,
+            parameters=router.route,
             known=scenario.mapped(),
-            initial_pose=scenario.start.pose,
+            initial_pose=router.start.pose,
             robot=robot,
             tick_s=tick_s,
         ),
-        PathTarget(parameters=scenario.route, robot=robot, tick_s=tick_s),
+        PathTarget(parameters=router.route, robot=robot, tick_s=tick_s),
         *_seen_objects(scenario, bodies, robots, seed_of),
         *_adaptation(scenario),
     ]
@@ -112,11 +109,12 @@ def _seen_objects(
     robots: Sequence[int],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    robot, tick_s = scenario.robot, scenario.tick_s
-    if scenario.obstacle_sensing == "ideal":
+    router, tick_s = scenario.router, scenario.tick_s
+    robot = router.robot
+    if router.obstacle_sensing == "ideal":
         return [
             IdealObjectSensor(
-                parameters=scenario.objects,
+                parameters=router.objects,
                 robot=robot,
                 bodies=bodies,
                 robots=robots,
@@ -126,7 +124,7 @@ def _seen_objects(
         ]
     return [
         UltrasonicArray(
-            parameters=scenario.ultrasonic,
+            parameters=router.ultrasonic,
             acoustics=scenario.acoustics,
             robot=robot,
             source_size=None,
@@ -135,8 +133,8 @@ def _seen_objects(
             tick_s=tick_s,
         ),
         ObjectDetector(
-            parameters=scenario.detector,
-            sensors=scenario.ultrasonic,
+            parameters=router.detector,
+            sensors=router.ultrasonic,
             robot=robot,
             tick_s=tick_s,
         ),
@@ -144,10 +142,10 @@ def _seen_objects(
 
 
 def _adaptation(scenario: Scenario) -> list[Any]:
-    own = _adapting(scenario)
+    own = _adapting(scenario.router.gains)
     if own is None:
         return []
-    robot, tick_s = scenario.robot, scenario.tick_s
+    robot, tick_s = scenario.router.robot, scenario.tick_s
     frequency, ratio = own.reference.poles(
         robot.mass_kg, own.stiffness_n_m, own.damping_n_s_m
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from diagrams.scenario.participants import OdorSearcher, SoundSearcher
 from diagrams.scenario.scenario import Scenario
 from systems import (
     AirflowSensors,
@@ -30,12 +31,14 @@ def search_controller(scenario: Scenario) -> Any:
     Returns:
         The block.
     """
-    if scenario.searches == "odor":
-        return PlumeSearch(parameters=scenario.search, tick_s=scenario.tick_s)
+    robot = scenario.only
+    if isinstance(robot, OdorSearcher):
+        return PlumeSearch(parameters=robot.search, tick_s=scenario.tick_s)
+    assert isinstance(robot, SoundSearcher)
     return SoundSearch(
-        parameters=scenario.sound_search,
+        parameters=robot.sound_search,
         radio=scenario.radio,
-        speed_m_s=scenario.motor_driver.full_speed_m_s,
+        speed_m_s=robot.motor_driver.full_speed_m_s,
         tick_s=scenario.tick_s,
     )
 
@@ -49,8 +52,10 @@ def search_command(scenario: Scenario) -> Any:
     Returns:
         The block.
     """
+    robot = scenario.only
+    assert isinstance(robot, OdorSearcher | SoundSearcher)
     return MotorDriver(
-        parameters=scenario.motor_driver, robot=scenario.robot, tick_s=scenario.tick_s
+        parameters=robot.motor_driver, robot=robot.robot, tick_s=scenario.tick_s
     )
 
 
@@ -72,37 +77,39 @@ def searching_blocks(
     Returns:
         Blocks, not yet in a diagram.
     """
-    tick_s = scenario.tick_s
+    robot, tick_s = scenario.only, scenario.tick_s
+    assert isinstance(robot, OdorSearcher | SoundSearcher)
     compass = MagneticHeading(
-        parameters=scenario.compass, seed=seed_of("magnetic_heading"), tick_s=tick_s
+        parameters=robot.compass, seed=seed_of("magnetic_heading"), tick_s=tick_s
     )
-    heading = HeadingController(parameters=scenario.heading_control, tick_s=tick_s)
-    senses = _smell if scenario.searches == "odor" else _ears
-    return [compass, heading, *senses(scenario, bodies, others, seed_of)]
+    heading = HeadingController(parameters=robot.heading_control, tick_s=tick_s)
+    if isinstance(robot, OdorSearcher):
+        return [compass, heading, *_smell(scenario, robot, bodies, seed_of)]
+    return [compass, heading, *_ears(scenario, robot, others, seed_of)]
 
 
 def _smell(
     scenario: Scenario,
+    robot: OdorSearcher,
     bodies: int,
-    others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
     assert scenario.odor is not None
     tick_s = scenario.tick_s
     return [
         GasSensorArray(
-            parameters=scenario.gas_sensors,
+            parameters=robot.gas_sensors,
             seed=seed_of("gas_sensor_array"),
             tick_s=tick_s,
         ),
         AirflowSensors(
-            parameters=scenario.airflow_sensors,
+            parameters=robot.airflow_sensors,
             seed=seed_of("airflow_sensors"),
             tick_s=tick_s,
         ),
         ContactSwitches(
-            parameters=scenario.contact_switches,
-            robot=scenario.robot,
+            parameters=robot.contact_switches,
+            robot=robot.robot,
             bodies=bodies,
             source_size=scenario.odor.container_m,
             tick_s=tick_s,
@@ -112,24 +119,24 @@ def _smell(
 
 def _ears(
     scenario: Scenario,
-    bodies: int,
+    robot: SoundSearcher,
     others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
     return [
         MicArray(
-            parameters=scenario.microphones,
-            robot=scenario.robot,
+            parameters=robot.microphones,
+            robot=robot.robot,
             acoustics=scenario.acoustics,
             room=scenario.room,
             others=others,
             seed=seed_of("mic_array"),
         ),
         CrossPowerEstimator(
-            parameters=scenario.cross_power,
-            robot=scenario.robot,
+            parameters=robot.cross_power,
+            robot=robot.robot,
             acoustics=scenario.acoustics,
-            microphones=scenario.microphones,
+            microphones=robot.microphones,
         ),
         RadioRange(
             parameters=scenario.radio,

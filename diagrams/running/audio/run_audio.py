@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from diagrams.scenario.audible import HEARD_BYTES, PLAYED_BYTES, check_audible
 from diagrams.scenario.geometry_file import geometry_text
+from diagrams.scenario.participants import HasMicrophones
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ, AudioFrame, Emission
@@ -108,9 +109,9 @@ class RunAudio:
 
     def _open(self) -> None:
         self.directory.mkdir(parents=True, exist_ok=True)
-        robots, sounds = self.scenario.all_robots, self.scenario.sounds()
+        robots, sounds = self.scenario.robots, self.scenario.sounds()
         for name, own in robots.items():
-            if own.listens:
+            if own.listens and isinstance(own, HasMicrophones):
                 prefix = f"{name}." if len(robots) > 1 else ""
                 channels = len(own.robot.microphones_m)
                 rate = round(own.microphones.sample_rate_hz)

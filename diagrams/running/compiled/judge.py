@@ -68,7 +68,7 @@ def contacts_of(
             row[:] = path.poses(instants if path.moves else instants[:1])
     return Contacts(
         rules.numbers,
-        rules.scenario.size,
+        rules.scenario.only.size,
         np.reshape([b.body.size for b in rules.near], (-1, 2)).astype(float),
         np.array([b.reach_m for b in rules.near]),
         np.array([b.step_m for b in rules.near]),

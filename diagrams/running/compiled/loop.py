@@ -87,7 +87,7 @@ class CompiledLoop:
             own = [
                 text
                 for rules in self.rules.robots.values()
-                for text in (rules.scenario.law, *rules.scenario.blocks)
+                for text in (rules.scenario.only.law, *rules.scenario.only.blocks)
                 if ":" in text
             ]
             if not own:

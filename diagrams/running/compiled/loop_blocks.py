@@ -17,6 +17,7 @@ from diagrams.building.robot import (
 )
 from diagrams.building.world_blocks import radio_nodes, world_blocks
 from diagrams.scenario.own_code import loaded_digests
+from diagrams.scenario.participants import Router
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step
 from systems.framework.input_error import InputError
@@ -24,7 +25,7 @@ from systems.framework.input_error import InputError
 #: Inputs from outside: inputs of a robot that come from the world, and inputs of the
 #: world that come from robots.
 _WORLD = *OUTSIDE, "frames"
-#: Fields of a scenario that do not affect how blocks are made. ``RunFacts`` provides
+#: Fields of a run that do not affect how blocks are made. ``RunFacts`` provides
 #: the values of a run that blocks need.
 _NO_BLOCKS = {
     "name",
@@ -33,12 +34,10 @@ _NO_BLOCKS = {
     "seed",
     "duration_s",
     "arena_m",
-    "start",
     "obstacles",
     "stop",
     "robots",
     "sources",
-    "source",
     "wind",
     "odor",
 }
@@ -163,7 +162,7 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
         InputError: See ``robot_blocks``.
     """
     blocks = {}
-    for name in scenario.all_robots:
+    for name in scenario.robots:
         own = scenario.of_robot(name)
         bodies = len(scenario.surroundings(name).obstacles)
         target = scenario.target(name)
@@ -172,13 +171,12 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
         made = partial(
             robot_blocks, own, name, bodies=bodies, robots=robots, others=others
         )
-        if own.blocks:  # a user's block may depend on the whole scenario
+        if own.only.blocks:  # a user's block may depend on the whole scenario
             blocks[name] = LoopBlocks(made())
             continue
-        made_from = _without_goal(own).model_dump_json(exclude=_NO_BLOCKS)
-        sizes = own.source_size, own.odor and own.odor.container_m
+        made_from = _made_from(own)
         code = loaded_digests(own)
-        key = f"{name} {bodies} {robots} {others} {sizes} {code} {made_from}"
+        key = f"{name} {bodies} {robots} {others} {code} {made_from}"
         blocks[name] = _shared(key, made)
     return blocks
 
@@ -210,9 +208,16 @@ def _shared(key: str, made: Callable[[], Mapping[str, Any]]) -> LoopBlocks:
     return found
 
 
-def _without_goal(own: Scenario) -> Scenario:
-    """Sets the goal to a fixed value; ``RunFacts`` has the goal of the run."""
-    if own.route is None:
-        return own
-    route = own.route.model_copy(update={"goal_m": (0.0, 0.0)})
-    return own.model_copy(update={"route": route})
+def _made_from(own: Scenario) -> str:
+    """Returns the values of all fields that affect the blocks of the only robot.
+
+    The goal does not affect them; ``RunFacts`` has the goal of the run.
+    """
+    robot = own.only
+    if isinstance(robot, Router):
+        route = robot.route.model_copy(update={"goal_m": (0.0, 0.0)})
+        robot = robot.model_copy(update={"route": route})
+    source = None if robot.has_goal else (own.source_size, own.source.sound)
+    odor = own.odor and own.odor.container_m
+    run = own.model_dump_json(exclude=_NO_BLOCKS)
+    return f"{robot.model_dump_json(exclude={'start'})} {source} {odor} {run}"

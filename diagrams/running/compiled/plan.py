@@ -23,6 +23,7 @@ from diagrams.running.stop_rules import (
     RunRules,
 )
 from diagrams.scenario.bodies import Surroundings
+from diagrams.scenario.participants import Router
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step, has_arrays
 from systems.framework.compiling import njit
@@ -78,7 +79,7 @@ class LoopRobot:
         heard: Mapping[str, Callable[[int], Any]],
         world: LoopWorld | None = None,
     ) -> None:
-        own = scenario.all_robots[name]
+        own = scenario.robots[name]
         self.facts = RunFacts(
             ticks,
             scenario.tick_s,
@@ -88,7 +89,7 @@ class LoopRobot:
             partial(seed_of, scenario, owner=name),
             {**heard},
             scenario.mapped(),
-            own.route.goal_m if own.route is not None else None,
+            own.route.goal_m if isinstance(own, Router) else None,
         )
         self.made, (self.steps, self.carried) = made, made.steps(self.facts)
         sizes = {**_WATCHED, **made.sizes}

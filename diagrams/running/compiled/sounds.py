@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.building.robot import naming_sounds, seed_of
+from diagrams.building.robot import seed_of
 from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.shorthand import fields_of
 from systems.framework.host_step import HostFunction
 from systems.framework.signals import Emission
 from systems.sound.mic_array import microphone_reach
@@ -49,7 +50,7 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
     Raises:
         InputError: A sound file cannot be played.
     """
-    robots = scenario.all_robots
+    robots = scenario.robots
     sounds = Sounds({name: {} for name in robots}, {}, {})
     hearing = [name for name, own in robots.items() if own.listens]
     ticks = history_ticks(
@@ -68,7 +69,7 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
             if robots[source].searches == "odor":
                 on_since = calls.since
         else:
-            path = scenario.all_sources[source].path()
+            path = scenario.sources[source].path()
             p_WS[ticks:] = path.poses(times)[:, :2]
             p_WS[:ticks] = p_WS[ticks]
             v_WS[ticks:] = [path.velocity(time)[:2] for time in times.tolist()]
@@ -115,5 +116,7 @@ def _remembering(
 def _waveform(
     scenario: Scenario, source: str, sound: SoundParameters
 ) -> NDArray[np.float32]:
-    with naming_sounds(scenario, source, sound):
+    robot = source in scenario.robots
+    group, field = ("robots", "loudspeaker") if robot else ("sources", "sound")
+    with fields_of(group, source, sound=field):
         return make_waveform(sound, seed_of(scenario, "sound_emitter", source))

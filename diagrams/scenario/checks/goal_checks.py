@@ -23,7 +23,9 @@ def check_goals(robots: Mapping[str, Robot], farthest_m: float) -> None:
         InputError: A goal is so far from the start that the run counts as diverged; the
             bodies of two robots would overlap at their goals.
     """
-    routed = {name: robot for name, robot in robots.items() if isinstance(robot, Router)}
+    routed = {
+        name: robot for name, robot in robots.items() if isinstance(robot, Router)
+    }
     for name, robot in routed.items():
         goal = robot.route.goal_m
         away = math.dist(goal, _start(robot))

@@ -50,8 +50,7 @@ def _check_odor(run: RunParameters) -> None:
     if run.odor is None:
         raise InputError(
             "odor",
-            "is missing, and law 'plume_search' searches for one; set "
-            "odor.position_m",
+            "is missing, and law 'plume_search' searches for one; set odor.position_m",
         )
     if run.room is not None and not run.room.contains(run.odor.position_m):
         x, y = run.odor.position_m

@@ -54,8 +54,9 @@ def _faults(
     elif kind == "value_error":
         # A validator of several fields names the field to correct.
         inner = details["ctx"]["error"]
-        faults = inner.all if isinstance(inner, InputError) else [InputError("", str(inner))]
-        for fault in faults:
+        if not isinstance(inner, InputError):
+            inner = InputError("", str(inner))
+        for fault in inner.all:
             below = [part for part in fault.field.split(".") if part]
             yield InputError(".".join(written([*loc, *below])), fault.message)
     else:
@@ -74,7 +75,7 @@ def _unknown(
     if kinds:
         laws = [name for name, law in LAWS.items() if law.robot in kinds]
         return (
-            f"is not a field of a {loc[2].replace('_', ' ')}, which the law of the "
-            f"robot makes it; remove it, or use one of the laws {', '.join(laws)}"
+            f"is not a field of a {loc[2].replace('_', ' ')}, and the law decides that "
+            f"the robot is one; remove it, or use one of the laws {', '.join(laws)}"
         )
     return f"is not a field of {what}; remove it{near_field(schema, place)}"

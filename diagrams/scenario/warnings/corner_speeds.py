@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.participants import Robot
 from diagrams.scenario.scenario import Scenario
 from systems.base.driven_path import DrivenPath
 from systems.base.robot import body_radius
@@ -27,11 +27,11 @@ def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
         each.name: _corner_speed(each.path(), each.size_m, until)
         for each in scenario.obstacles
     }
-    for name, source in scenario.all_sources.items():
+    for name, source in scenario.sources.items():
         if source.body:
             size = source.length_m, source.width_m
             speeds[name] = _corner_speed(source.path(), size, until)
-    for name, other in scenario.all_robots.items():
+    for name, other in scenario.robots.items():
         if name != robot:
             speeds[name] = _reachable_speed(other)
     return speeds
@@ -47,7 +47,7 @@ def _corner_speed(
     return float(np.max(corners, initial=0.0))
 
 
-def _reachable_speed(robot: FollowerParameters) -> float:
+def _reachable_speed(robot: Robot) -> float:
     """Greatest possible speed of a corner of a robot, m/s.
 
     It is the greater of two speeds: when the robot drives straight ahead at top speed,

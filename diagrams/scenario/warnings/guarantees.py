@@ -134,16 +134,19 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
     Raises:
         InputError: The robot has no guard.
     """
-    guard = scenario.own_guard
+    guard = scenario.follower.own_guard
     if guard is None:
         raise InputError(
             "guard", "is unset, so that there is no guard to promise anything; set it"
         )
-    known, tick_s = scenario.free_space, scenario.tick_s
-    keep = body_radius(scenario.robot) + known.place_error_m + guard.margin_m
-    error, lag = known.range_error(scenario.ultrasonic), scenario.plant.motor_lag_s
+    known, tick_s = scenario.follower.free_space, scenario.tick_s
+    keep = body_radius(scenario.only.robot) + known.place_error_m + guard.margin_m
+    error, lag = (
+        known.range_error(scenario.follower.ultrasonic),
+        scenario.only.plant.motor_lag_s,
+    )
     # A reading of a sensor is at most one round of readings old.
-    age = scenario.ultrasonic.round_ticks(tick_s) * tick_s
+    age = scenario.follower.ultrasonic.round_ticks(tick_s) * tick_s
     way = speed**2 / (2.0 * guard.braking_m_s2) + speed * (lag + 2.0 * tick_s)
     if body_speed == 0.0:
         # A cell is free only as a whole. One reading updates only every fourth row.
@@ -185,13 +188,13 @@ def guarantees(scenario: Scenario) -> Guarantees:
     Raises:
         InputError: The robot has no guard.
     """
-    (name,), guard = scenario.all_robots, scenario.own_guard
+    (name,), robot = scenario.robots, scenario.follower
     found = assumptions(scenario, name)
-    assert guard is not None
+    assert robot.own_guard is not None
     (view,) = (each for each in found if each.name == "view")
     return Guarantees(
-        guard.obstacle_speed_m_s,
-        seen_angle_deg(scenario.ultrasonic, scenario.robot.control_point_m),
+        robot.own_guard.obstacle_speed_m_s,
+        seen_angle_deg(robot.ultrasonic, robot.robot.control_point_m),
         view.limit,
         view.value,
         found,
@@ -212,13 +215,14 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
         InputError: The robot has no guard.
     """
     alone = scenario.of_robot(robot)
-    guard, sensors = alone.own_guard, alone.ultrasonic
+    own = alone.follower
+    guard, sensors, body = own.own_guard, own.ultrasonic, own.robot
     speed = 0.0 if guard is None else guard.obstacle_speed_m_s
-    needed = clear_way(alone, alone.robot.top_speed_m_s, speed)
+    needed = clear_way(alone, body.top_speed_m_s, speed)
     axes, places, half_angle = sensors.beams
     forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angle
     far = np.max(np.reshape(places, (-1, 2))[forward, 0], initial=-np.inf)
-    seen = alone.robot.control_point_m + float(far) + sensors.maximum_range_m
+    seen = body.control_point_m + float(far) + sensors.maximum_range_m
     return (
         _of_speeds(corner_speeds(scenario, robot), speed),
         *_of_ranges(alone),
@@ -248,23 +252,23 @@ def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
 
 def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
     """A3: no body is within the start bubble."""
-    place = scenario.start.position_m
+    place = scenario.only.start.position_m
     nearest = min(
         (math.hypot(*beyond_rectangle(place, body.rectangle(0.0))) for body in bodies),
         default=math.inf,
     )
     field = "free_space.start_bubble_m"
-    bubble = scenario.free_space.start_bubble_m
+    bubble = scenario.follower.free_space.start_bubble_m
     text = "nearest body at the start"
     return Assumption("A3", text, nearest, bubble, "m", at_least=True, field=field)
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
     """A2: no body is nearer than a range reading minus the margin."""
-    sensors, c = scenario.ultrasonic, scenario.acoustics.c
+    sensors, c = scenario.follower.ultrasonic, scenario.acoustics.c
     stretch = (sensors.assumed_sound_speed_m_s or c) / c
     excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m
-    margin = scenario.free_space.range_margin_m
+    margin = scenario.follower.free_space.range_margin_m
     blind = sum(fault.number == BLIND for fault in sensors.faults)
     return (
         Assumption(
@@ -291,15 +295,15 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
 
 def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
     """A4 and A5: errors of position and wheels are bounded, and the tires grip."""
-    guard, plant = scenario.own_guard, scenario.plant
+    own, tick_s = scenario.follower, scenario.tick_s
+    guard, robot, plant, known = own.own_guard, own.robot, own.plant, own.free_space
     assert guard is not None
-    robot, known, tick_s = scenario.robot, scenario.free_space, scenario.tick_s
     stopping = stopping_way(guard, robot, plant, tick_s)
-    error = PlaceError.of(known, robot, scenario.odometry)
+    error = PlaceError.of(known, robot, own.odometry)
     lost = place_error(body_radius(robot) + stopping, stopping, error)
     slip = max(map(abs, plant.slip))
     grip = math.inf if plant.friction is None else plant.friction
-    hardest = scenario.robot.top_speed_m_s / max(plant.motor_lag_s, scenario.tick_s)
+    hardest = robot.top_speed_m_s / max(plant.motor_lag_s, tick_s)
     return (
         Assumption(
             "A4",

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.participants import Router
 from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
 from systems.laws.catalogue import ROUTE_LAWS
 from systems.laws.trajectory.parameters import (
@@ -30,9 +30,7 @@ from systems.world.plane import beyond_rectangle, rotate
 _STEPS, _STEP_M = 2_000, 1e-6
 
 
-def route_warnings(
-    prefix: str, robot: FollowerParameters, tick_s: float
-) -> list[ScenarioWarning]:
+def route_warnings(prefix: str, robot: Router, tick_s: float) -> list[ScenarioWarning]:
     """Warns if a robot cannot come to rest with its gains, or can hit obstacles.
 
     Args:
@@ -45,9 +43,9 @@ def route_warnings(
     """
     if robot.law not in ROUTE_LAWS:
         return []
-    own = getattr(robot.repulsion, robot.law)
+    own = robot.gains
     of = SampledMass(robot.robot.mass_kg, robot.plant.motor_lag_s, tick_s)
-    field = f"{prefix}repulsion.{robot.law}"
+    field = f"{prefix}laws.{robot.law}"
     found = _of_damping(field, own, of) or _of_stiffness(field, own, of)
     body, block = robot.robot, own.block_distance_m
     reach = math.hypot(body.control_point_m + 0.5 * body.length_m, 0.5 * body.width_m)
@@ -152,7 +150,7 @@ def _of_adaptation(
 
 def goal_warnings(
     prefix: str,
-    robot: FollowerParameters,
+    robot: Router,
     resting: Mapping[str, NDArray[np.float64]],
     margin_m: float,
 ) -> list[ScenarioWarning]:
@@ -182,7 +180,7 @@ def goal_warnings(
     """
     if robot.route is None or robot.law not in ROUTE_LAWS:
         return []
-    own = getattr(robot.repulsion, robot.law)
+    own = robot.gains
     if own.reading != "restored":
         return []
     # Import compiled code only when it is used.
@@ -217,6 +215,6 @@ def goal_warnings(
         f"stop.goal_margin_m, {margin_m:g} m, so that the robot does not arrive; "
         f"move the goal (next to one wall {room:.2g} m away from it is enough), "
         "raise that margin, or lower "
-        f"{prefix}repulsion.{robot.law}.security_zone_m"
+        f"{prefix}laws.{robot.law}.security_zone_m"
     )
     return [ScenarioWarning(f"{prefix}route.goal_m", message)]

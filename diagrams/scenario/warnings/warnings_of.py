@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.scenario.bodies import Body
-from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.participants import Router
 from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.shorthand import field_in
 from diagrams.scenario.warnings.guarantees import assumptions
 from diagrams.scenario.warnings.route_gains import goal_warnings, route_warnings
 from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
@@ -34,15 +35,15 @@ def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
         The warnings, robot by robot; empty if there are none.
     """
     found: list[ScenarioWarning] = []
-    robots = zip(scenario.all_robots, scenario.robot_fields(), strict=True)
-    for name, (prefix, robot) in robots:
+    for name, robot in scenario.robots.items():
+        prefix = field_in("robots", name, "")
         if robot.own_guard is not None:
             found += (
                 ScenarioWarning(f"{prefix}{each.field}", each.complaint)
                 for each in assumptions(scenario, name)
                 if not each.holds
             )
-        if robot.route is not None:
+        if isinstance(robot, Router):
             found += _of_the_start(prefix, robot, scenario.mapped())
             found += route_warnings(prefix, robot, scenario.tick_s)
             margin_m = scenario.stop.goal_margin_m
@@ -60,13 +61,12 @@ def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
 
 
 def _of_the_start(
-    prefix: str, robot: FollowerParameters, known: NDArray[np.float64]
+    prefix: str, robot: Router, known: NDArray[np.float64]
 ) -> Iterator[ScenarioWarning]:
     """Warns if P starts nearer to a known obstacle than the clearance of its route.
 
     ``known`` contains the (k, 5) rectangles of the known obstacles in W.
     """
-    assert robot.route is not None
     place = control_point(robot.start.pose, robot.robot.control_point_m)
     off = (math.hypot(*beyond_rectangle(place, each)) for each in known)
     nearest, clearance = min(off, default=math.inf), robot.route.clearance_m
