@@ -68,29 +68,31 @@ class PlainLoop:
         self.obstacles = [o.path() for o in scenario.obstacles]
         self.sizes = np.array([e for o in scenario.obstacles for e in o.size_m])
         seed = block_seed(scenario.seed, "sound_emitter")
-        self.waveform = make_waveform(scenario.sound, seed)
+        self.waveform = make_waveform(scenario.source.sound, seed)
         self.ticks = history_ticks(MAXIMUM_RANGE_M, c)
         self.mic_seed = block_seed(scenario.seed, "mic_array")
-        microphones = scenario.microphones
+        microphones = scenario.follower.microphones
         errors = draw_tolerances(
             microphones,
-            len(scenario.robot.microphones_m),
+            len(scenario.only.robot.microphones_m),
             tick_generator(self.mic_seed, BEFORE_THE_RUN),
         )
-        p_BM = microphones_B(scenario.robot)
+        p_BM = microphones_B(scenario.only.robot)
         self.array = real_array(p_BM, microphones, errors, c)
-        self.tracker = tracker_numbers(scenario.tracker, scenario.robot, 1.5 * T)
+        self.tracker = tracker_numbers(
+            scenario.follower.tracker, scenario.only.robot, 1.5 * T
+        )
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
         self.localiser, self.p_PA_B = robot_localiser(
-            scenario.tdoa, scenario.robot, scenario.acoustics
+            scenario.follower.tdoa, scenario.only.robot, scenario.acoustics
         )
 
     def run(self) -> NDArray[np.float64]:
         """(ticks + 1, 7) states of the plant at every tick."""
         scenario = self.scenario
         self.memory = self.localiser.blank()
-        state = [*scenario.start.pose, 0.0, 0.0, 0.0, 0.0]
-        odometry, angles = list(scenario.start.pose), [0.0, 0.0]
+        state = [*scenario.only.start.pose, 0.0, 0.0, 0.0, 0.0]
+        odometry, angles = list(scenario.only.start.pose), [0.0, 0.0]
         self.track = blank_track(self.tracker, odometry)
         v_WP: tuple[float, float] = (0.0, 0.0)
         wheels: tuple[float, float] = (0.0, 0.0)
@@ -109,24 +111,24 @@ class PlainLoop:
             acceleration = self._law(odometry, v_WP, target, valid, vectors, before)
             before = {round(row[0]): row[1:] for row in vectors}
             v_WP = integrate_velocity(
-                v_WP, acceleration, T, scenario.robot.top_speed_m_s
+                v_WP, acceleration, T, scenario.only.robot.top_speed_m_s
             )
             v, omega = hand_position_twist(
-                v_WP, odometry[2], scenario.robot.control_point_m
+                v_WP, odometry[2], scenario.only.robot.control_point_m
             )
             fix, last = self._listen(time, state, history, last)
-            wheels = limited_wheel_speeds(v, omega, scenario.robot)
+            wheels = limited_wheel_speeds(v, omega, scenario.only.robot)
             state = self._drive(state, wheels)
             states.append(state)
         return np.array(states)
 
     def _odometry(self, pose: Any, angles: Any, true_angles: Any, wheels: Any) -> Any:
-        pulses = self.scenario.odometry.pulses_per_revolution
+        pulses = self.scenario.only.odometry.pulses_per_revolution
         now = [encoder_angle(angle, pulses) for angle in true_angles]
         steps = (now[0] - angles[0], now[1] - angles[1])
-        robot = self.scenario.robot
+        robot = self.scenario.only.robot
         steady = body_twist((T * wheels[0], T * wheels[1]), robot)
-        motion = lagged_motion(T, self.scenario.plant.motor_lag_s)
+        motion = lagged_motion(T, self.scenario.only.plant.motor_lag_s)
         return list(advance_pose(pose, body_twist(steps, robot), steady, motion)), now
 
     def _target(self, tick: int, fix: Any, pose: Any) -> Any:
@@ -143,19 +145,26 @@ class PlainLoop:
             poses, self.sizes, self.path.pose(time), scenario.source_size
         )
         true = cone_ranges(
-            state[:3], rectangles, scenario.ultrasonic, scenario.robot.control_point_m
+            state[:3],
+            rectangles,
+            scenario.follower.ultrasonic,
+            scenario.only.robot.control_point_m,
         )
         ranges, echo = measured_ranges(
             true,
-            scenario.ultrasonic,
+            scenario.follower.ultrasonic,
             scenario.acoustics.c,
             standard_normals(
-                (2, scenario.ultrasonic.count), self.ultrasonic_seed, tick
+                (2, scenario.follower.ultrasonic.count), self.ultrasonic_seed, tick
             ),
         )
-        points = echo_points(ranges.tolist(), echo.tolist(), scenario.ultrasonic)
+        points = echo_points(
+            ranges.tolist(), echo.tolist(), scenario.follower.ultrasonic
+        )
         vectors = collision_vectors(
-            points, scenario.collision_vector, scenario.ultrasonic.neighbours
+            points,
+            scenario.follower.collision_vector,
+            scenario.follower.ultrasonic.neighbours,
         )
         return [[feature, *rotate(theta, x, y)] for feature, x, y in vectors]
 
@@ -163,9 +172,11 @@ class PlainLoop:
         self, pose: Any, v_WP: Any, target: Any, valid: Any, vectors: Any, before: Any
     ) -> Any:
         scenario = self.scenario
-        p_WP = control_point(pose, scenario.robot.control_point_m)
-        mass = scenario.robot.mass_kg
-        F_m = attraction_force(p_WP, v_WP, target, valid, scenario.attraction, mass)
+        p_WP = control_point(pose, scenario.only.robot.control_point_m)
+        mass = scenario.only.robot.mass_kg
+        F_m = attraction_force(
+            p_WP, v_WP, target, valid, scenario.follower.attraction, mass
+        )
         closing = scenario.repulsion.velocity_term == "closing"
         gains = (scenario.repulsion.active,)
         Fx = Fy = 0.0
@@ -183,18 +194,20 @@ class PlainLoop:
         x, y, _ = self.path.pose(time)
         vx, vy, _ = self.path.velocity(time)
         history[0, -1], history[1, -1] = (x, y), (vx, vy)
-        v, omega = body_twist(state[5:], scenario.robot)
+        v, omega = body_twist(state[5:], scenario.only.robot)
         theta = state[2]
         velocity = np.array([v * np.cos(theta), v * np.sin(theta), omega])
         now = (np.array(state[:3]), velocity)
-        emission = make_emission(time, self.waveform, scenario.sound, *history.copy())
+        emission = make_emission(
+            time, self.waveform, scenario.source.sound, *history.copy()
+        )
         audio = record_frame(
             [emission],
             time,
             last,
             now,
             self.array,
-            parameters=scenario.microphones,
+            parameters=scenario.follower.microphones,
             seed=self.mic_seed,
         )
         history[:, :-1] = history[:, 1:]
@@ -203,7 +216,7 @@ class PlainLoop:
 
     def _drive(self, state: Any, wheels: Any) -> Any:
         """The steps of the scenario's integrator, those that Drake takes."""
-        numbers = PlantNumbers.of(self.scenario.robot, self.scenario.plant)
+        numbers = PlantNumbers.of(self.scenario.only.robot, self.scenario.only.plant)
         commanded, moved = np.array(wheels), np.array(state)
         integrator = self.scenario.integrator
         advance = SCHEMES[integrator.scheme]

@@ -99,7 +99,7 @@ def target_errors(result: RunResult) -> NDArray[np.float64]:
 
 def on_the_right_side(result: RunResult) -> NDArray[np.bool_]:
     """(n,) whether the target is nearer to the source than to its mirror image."""
-    columns, robot = result.columns, result.scenario.robot
+    columns, robot = result.columns, result.scenario.only.robot
     ahead = np.array([np.cos(columns["theta_WB"]), np.sin(columns["theta_WB"])])
     p_WP = np.array([columns["p_WB_x"], columns["p_WB_y"]])
     p_WP += robot.control_point_m * ahead

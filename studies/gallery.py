@@ -52,5 +52,5 @@ def _rows(pictures: Path | None) -> Iterator[list[str]]:
 
 
 def _follows_a_sound(scenario: Scenario) -> bool:
-    robots = scenario.all_robots.values()
+    robots = scenario.robots.values()
     return all(not robot.searches and not robot.has_goal for robot in robots)

@@ -100,7 +100,7 @@ def _draw_distances(axes: Axes, passed: Mapping[tuple[float, float], float]) -> 
 
 
 def _draw_views(axes: Axes) -> None:
-    robot = Scenario().robot
+    robot = Scenario().only.robot
     for column, name in enumerate(SENSOR_PRESETS):
         sensors = UltrasonicParameters.model_validate({"preset": name})
         x, half = _APART * column, sensors.beam_half_angle_deg
@@ -148,7 +148,7 @@ def run(options: argparse.Namespace) -> Iterator[Table]:
     rows = []
     for name in SENSOR_PRESETS:
         sensors = UltrasonicParameters.model_validate({"preset": name})
-        share = seen_angle_deg(sensors, Scenario().robot.control_point_m)
+        share = seen_angle_deg(sensors, Scenario().only.robot.control_point_m)
         kind = ", ".join(part for part in _against_movers(share) if part != "in view")
         rows.append([f"`{name}`", f"{share:.0f} deg", "yes", kind])
     names = ["sensors", "see", "static safety", "against what moves"]

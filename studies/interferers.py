@@ -148,8 +148,8 @@ def score_of(result: RunResult, others: NDArray[np.float64]) -> Score:
     columns, scenario = result.columns, result.scenario
     heading = columns["theta_WB"]
     cosine, sine = np.cos(heading), np.sin(heading)
-    x_P = columns["p_WB_x"] + scenario.robot.control_point_m * cosine
-    y_P = columns["p_WB_y"] + scenario.robot.control_point_m * sine
+    x_P = columns["p_WB_x"] + scenario.only.robot.control_point_m * cosine
+    y_P = columns["p_WB_y"] + scenario.only.robot.control_point_m * sine
 
     def seen(x: Any, y: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Bearing, in the half plane ahead, and range from P, amid the microphones."""
@@ -169,7 +169,9 @@ def score_of(result: RunResult, others: NDArray[np.float64]) -> Score:
     for place in others:
         beside |= np.abs(np.arctan2(y, x) - seen(*place)[0]) < limit
     astray = heard & ~near & beside
-    bursts = scenario.sound.sounds(result.time - 0.5 * scenario.microphones.frame_s)
+    bursts = scenario.source.sound.sounds(
+        result.time - 0.5 * scenario.follower.microphones.frame_s
+    )
     frames = bursts, right & bursts, heard, astray, heard & ~right & ~astray
     return Score(*(int(np.count_nonzero(each)) for each in frames))
 

@@ -250,7 +250,7 @@ def reach_and_ratio() -> Table:
         for law in NAMES:
             scenario = scenario_of(law)
             force = radial_law(scenario)
-            stiffness = scenario.attraction.stiffness_n_m
+            stiffness = scenario.follower.attraction.stiffness_n_m
             way = force.forces_n / stiffness - force.distances_m
             yield [
                 law,

@@ -10,13 +10,24 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic.json_schema import models_json_schema
+from pydantic import Field
 
-from diagrams.scenario.participants import FollowerParameters, SourceParameters
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.participants import (
+    Follower,
+    OdorSearcher,
+    Router,
+    SoundSearcher,
+    SourceParameters,
+)
+from diagrams.scenario.run_parameters import RunParameters
+from diagrams.scenario.scenario import Name
+from diagrams.scenario.shorthand import ROBOT_FIELDS
+from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
 from systems.laws.catalogue import LAWS
+from systems.routes.parameters import RouteParameters
+from systems.sound.parameters import SoundParameters
 
 #: Ends of names, the longest first, and units.
 _UNITS = {
@@ -49,28 +60,52 @@ _UNITS = {
 }
 
 
+class _Robot(Follower, Router, OdorSearcher, SoundSearcher):
+    """One robot; its law decides which of these fields it has."""
+
+    route: RouteParameters | None = None
+    """Goal and planner of a robot that drives on a planned route."""
+
+
+class _Source(SourceRobotParameters):
+    """One source: the leader that carries it."""
+
+    body: bool = True
+    """Whether the source has a body that robots can hit and see; false: the source is
+    only a sound."""
+
+
+class _File(_Robot, RunParameters):
+    """A run. The fields of a robot apply to all robots that do not set them."""
+
+    robots: dict[Name, _Robot] = Field(default={})
+    """Robots by name, each with the fields that differ from those of the scenario;
+    empty: one robot, named ``robot``, with the fields of the scenario."""
+    sources: dict[Name, SourceParameters] = Field(default={})
+    """Sources by name, each with the fields that differ from ``source`` and ``sound``;
+    empty: one source, named ``source``. A source that no robot follows is an
+    interferer."""
+    source: _Source = _Source()
+    sound: SoundParameters = SoundParameters()
+
+
 def make_schema() -> dict[str, Any]:
-    """The schema: types, ranges, defaults, meanings and units of all fields.
+    """The schema of scenario files: types, ranges, defaults, meanings and units.
 
     Returns:
-        The schema; see ``tidied``.
+        The schema; see ``tidied``. The keyword ``robots`` of a field of robots has the
+        kinds of robots that have this field.
     """
-    models = (Scenario, FollowerParameters, SourceParameters)
-    _, schema = models_json_schema([(model, "validation") for model in models])
-    definitions = schema["$defs"]
-    root = definitions.pop("Scenario")
-    for field, model in (
-        ("robots", FollowerParameters),
-        ("sources", SourceParameters),
-    ):
-        # The models keep them as they are written, to lay them over the others.
-        changes = root["properties"][field]["patternProperties"]
-        for name in changes:
-            changes[name] = {"$ref": f"#/$defs/{model.__name__}"}
-    for laws in (root, definitions["FollowerParameters"]):
+    schema = _File.model_json_schema()
+    for node in (schema, schema["$defs"]["_Robot"]):
         named = [{"const": law.name, "description": law.title} for law in LAWS.values()]
-        laws["properties"]["law"]["anyOf"] = [*named, {"pattern": ":"}]
-    return tidied({**root, "$defs": definitions}, "A scenario of phonotaxis")
+        node["properties"]["law"]["anyOf"] = [*named, {"pattern": ":"}]
+        for name, kinds in ROBOT_FIELDS.items():
+            node["properties"][name]["robots"] = list(kinds)
+    for gains in schema["$defs"]["LawGains"]["properties"].values():
+        gains["$ref"] = gains.pop("anyOf")[0]["$ref"]
+        del gains["default"]
+    return tidied(schema, "A scenario of phonotaxis")
 
 
 def tidied(schema: dict[str, Any], title: str) -> dict[str, Any]:

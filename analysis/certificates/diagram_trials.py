@@ -94,7 +94,7 @@ def try_diagram(
         InputError: No start is certified, the wheels can slip, or ``starts`` is
             wrong.
     """
-    require_rolling(certificate.scenario.plant)
+    require_rolling(certificate.scenario.only.plant)
     if starts < 1:
         raise InputError("starts", f"{starts} must be at least 1")
     scenario = frozen_scenario(certificate.scenario)
@@ -117,7 +117,7 @@ def _certified_starts(
     kept, poses, skipped = [], [], 0
     for state in states:
         pose = _pose(state, scenario)
-        footprint = robot_rectangle(pose, scenario.robot)
+        footprint = robot_rectangle(pose, scenario.only.robot)
         if min(rectangle_clearance(footprint, body) for body in bodies) <= 0.0:
             skipped += 1
             continue
@@ -137,7 +137,7 @@ def _certified_starts(
 def _pose(state: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
     """Pose of a robot whose P is at the start and which looks along its velocity."""
     theta = math.atan2(state[3], state[2])
-    offset = scenario.robot.control_point_m
+    offset = scenario.only.robot.control_point_m
     x, y = state[:2] - offset * np.array([math.cos(theta), math.sin(theta)])
     return np.array([x, y, theta])
 
@@ -146,7 +146,7 @@ def _run(
     follower: SoundFollower, state: NDArray[np.float64], pose: NDArray[np.float64]
 ) -> tuple[str, str]:
     """Cause, and the mechanism of a collision."""
-    scenario, robot = follower.scenario, follower.scenario.robot
+    scenario, robot = follower.scenario, follower.scenario.only.robot
     simulator = make_simulator(follower)
     rules = StopRules(follower)
     simulator.set_monitor(rules)
@@ -176,13 +176,15 @@ def _mechanism(
 ) -> str:
     """Where the contact lies: in the cones' fan before P, beside it, or behind."""
     body = scenario.bodies()[collision.object].rectangle(collision.time)
-    point = touching_point(robot_rectangle(pose, scenario.robot), body)
-    p_WP = control_point(pose, scenario.robot.control_point_m)
+    point = touching_point(robot_rectangle(pose, scenario.only.robot), body)
+    p_WP = control_point(pose, scenario.only.robot.control_point_m)
     x, y = rotate(-pose[2], point[0] - p_WP[0], point[1] - p_WP[1])
-    fan = max(map(abs, scenario.ultrasonic.axes_deg))
-    fan += scenario.ultrasonic.beam_half_angle_deg
+    fan = max(map(abs, scenario.follower.ultrasonic.axes_deg))
+    fan += scenario.follower.ultrasonic.beam_half_angle_deg
     if abs(math.degrees(math.atan2(y, x))) <= fan:
         return "ahead"
-    x_B = x + scenario.robot.control_point_m
-    at_an_end = abs(y) / scenario.robot.width_m >= -x_B / scenario.robot.length_m
+    x_B = x + scenario.only.robot.control_point_m
+    at_an_end = (
+        abs(y) / scenario.only.robot.width_m >= -x_B / scenario.only.robot.length_m
+    )
     return "beside" if at_an_end else "behind"

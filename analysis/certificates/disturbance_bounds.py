@@ -121,7 +121,7 @@ def disturbance_bounds(scenario: Scenario, *, runs: int = 200) -> DisturbanceBou
     rng = np.random.default_rng(scenario.seed)
     injection = velocity_term_passivity(scenario).largest_injection_n_s_m
     spare = model.damping_n_s_m - injection
-    contact = scenario.ultrasonic.minimum_range_m
+    contact = scenario.follower.ultrasonic.minimum_range_m
     obstacle = [
         _obstacle_bound(model, speed, spare, contact, rng, runs)
         for speed in (speeds if spare > 0.0 else ())

@@ -178,7 +178,7 @@ def certify_energy(
     """
     model = point_mass(scenario)
     if contact_m is None:
-        contact_m = scenario.ultrasonic.minimum_range_m
+        contact_m = scenario.follower.ultrasonic.minimum_range_m
     _check(model, cell_m, contact_m)
     low, high = _workspace(model)
     x, y = (

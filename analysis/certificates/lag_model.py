@@ -44,13 +44,16 @@ class LagModel:
     @property
     def scales(self) -> NDArray[np.float64]:
         """(3,) y = (x, v, w) / scales, m and m/s."""
-        top = self.contact.scenario.robot.top_speed_m_s
+        top = self.contact.scenario.only.robot.top_speed_m_s
         return np.array([max(map(abs, self.domain_m)), top, top])
 
     def rates(self, sign: float) -> list[Polynomial]:
         """y' as polynomials of y, with h off by ``sign`` times its error."""
         scenario = self.contact.scenario
-        mass, damping = scenario.robot.mass_kg, scenario.attraction.damping_n_s_m
+        mass, damping = (
+            scenario.only.robot.mass_kg,
+            scenario.follower.attraction.damping_n_s_m,
+        )
         a, b = float(self.scales[0]), float(self.scales[1])
         h = self.coefficients.copy()
         h[0] += sign * self.error_n_m
@@ -80,8 +83,14 @@ class LagModel:
             (n,) True where contact was made within that time.
         """
         scenario, law = self.contact.scenario, self.contact.law
-        mass, damping = scenario.robot.mass_kg, scenario.attraction.damping_n_s_m
-        top, stiffness = scenario.robot.top_speed_m_s, scenario.attraction.stiffness_n_m
+        mass, damping = (
+            scenario.only.robot.mass_kg,
+            scenario.follower.attraction.damping_n_s_m,
+        )
+        top, stiffness = (
+            scenario.only.robot.top_speed_m_s,
+            scenario.follower.attraction.stiffness_n_m,
+        )
         rest, to_go = self.contact.equilibrium_m, self.contact.to_go_m
         step = min(0.02, 0.4 * self.lag_s)
 
@@ -121,7 +130,7 @@ def lag_model(scenario: Scenario, *, to_go_m: float | None = None) -> LagModel:
         ValueError: There is no contact equilibrium.
     """
     contact = head_on(scenario, to_go_m=to_go_m)
-    nearest = scenario.ultrasonic.minimum_range_m - contact.equilibrium_m
+    nearest = scenario.follower.ultrasonic.minimum_range_m - contact.equilibrium_m
     far, near = _FARTHEST_M, nearest
     while True:
         coefficients, error = _fit(contact, (near, far))
@@ -135,7 +144,7 @@ def lag_model(scenario: Scenario, *, to_go_m: float | None = None) -> LagModel:
         else:
             near *= 0.9
     return LagModel(
-        contact, scenario.plant.motor_lag_s, (near, far), coefficients, error
+        contact, scenario.only.plant.motor_lag_s, (near, far), coefficients, error
     )
 
 
@@ -147,7 +156,7 @@ def _fit(
     x = x[np.abs(x) > 1e-3]
     c = contact.equilibrium_m + x
     f = contact.law.at_rest(c)
-    pull = contact.scenario.attraction.stiffness_n_m * (contact.to_go_m + c)
+    pull = contact.scenario.follower.attraction.stiffness_n_m * (contact.to_go_m + c)
     h = -(f - pull) / x
     scale = max(map(abs, domain))
     fitted = np.polynomial.Polynomial.fit(

@@ -136,7 +136,7 @@ def sos_region(
         name: solve(solver, solved.program)
         for name, solver in (("clarabel", ClarabelSolver()), ("csdp", CsdpSolver()))
     }
-    contact = scenario.ultrasonic.minimum_range_m
+    contact = scenario.follower.ultrasonic.minimum_range_m
     rng = np.random.default_rng(scenario.seed)
     inside = _draw_inside(model, P, starts, rng)
     low, high = np.array(box(model)).T

@@ -69,9 +69,9 @@ def comparison_plan(
     """
     plan = _layouts(scenario)
     base = scenario_from_mapping(plan.base)
-    _require_one_law(base)
+    _require_one_law(base, plan.base)
     if laws is None:
-        routed = any(robot.route for robot in base.all_robots.values())
+        routed = any(robot.kind == "router" for robot in base.robots.values())
         laws = ROUTE_LAWS if routed else FORCE_LAWS
     for key, values in (grid or {}).items():
         if isinstance(values, str):  # it would be read letter by letter
@@ -90,21 +90,21 @@ def comparison_plan(
         raise explain(error, SweepPlan.model_json_schema(), "a comparison") from None
 
 
-def _require_one_law(base: Scenario) -> None:
+def _require_one_law(base: Scenario, written: Mapping[str, Any]) -> None:
     """Refuses what a comparison could not set: all robots get its law."""
-    if base.searches is not None:
-        raise InputError(
-            "scenario",
-            f"{base.name!r} is a search by law {base.law!r}, and no other law can "
-            "replace it; sweep its fields instead, for example search.rules "
-            "(docs/searches.md)",
-        )
-    for name, changes in base.robots.items():
-        if "law" in changes:
+    for name, robot in base.robots.items():
+        if robot.searches is not None:
+            raise InputError(
+                "scenario",
+                f"{base.name!r} is a search by law {robot.law!r}, and no other law can "
+                "replace it; sweep its fields instead, for example search.rules "
+                "(docs/searches.md)",
+            )
+        if "law" in written.get("robots", {}).get(name, {}):
             raise InputError(
                 f"robots.{name}.law",
-                f"is {changes['law']!r}, but a comparison sets the laws of all "
-                "robots; leave it out",
+                f"is {robot.law!r}, but a comparison sets the laws of all robots; "
+                "leave it out",
             )
 
 

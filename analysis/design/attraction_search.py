@@ -71,7 +71,7 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
     overshoot = braking_overshoot(scenario)
     follow = follow_distance(scenario, requirements, overshoot)
     while True:
-        attraction = scenario.attraction.model_copy(
+        attraction = scenario.follower.attraction.model_copy(
             update={"follow_distance_m": round(follow, 2)}
         )
         scenario = scenario.model_copy(update={"attraction": attraction})
@@ -103,14 +103,16 @@ def attraction_damping_ratio(scenario: Scenario) -> float:
 
     Sampled, with the motors' lag; no obstacle.
     """
-    z = np.linalg.eigvals(contact_matrix(scenario, scenario.attraction.stiffness_n_m))
+    z = np.linalg.eigvals(
+        contact_matrix(scenario, scenario.follower.attraction.stiffness_n_m)
+    )
     s = np.log(z[np.abs(z) > 1e-6].astype(complex)) / scenario.tick_s
     return float(np.min(-s.real / np.abs(s)))
 
 
 def following_lag(scenario: Scenario) -> float:
     """How far P follows behind the follow point of a moving source, D_r v/K_r, m."""
-    attraction = scenario.attraction
+    attraction = scenario.follower.attraction
     time = attraction.damping_n_s_m / attraction.stiffness_n_m
     return time * scenario.source.speed_m_s
 
@@ -162,6 +164,7 @@ def with_attraction(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
         A copy.
     """
     attraction = AttractionParameters.model_validate(
-        scenario.attraction.model_dump() | {"stiffness_n_m": K_r, "damping_n_s_m": D_r}
+        scenario.follower.attraction.model_dump()
+        | {"stiffness_n_m": K_r, "damping_n_s_m": D_r}
     )
     return scenario.model_copy(update={"attraction": attraction})

@@ -33,8 +33,8 @@ def plot_design(study: DesignStudy) -> Figure:
 
 def _plot_balance(axes: Axes, study: DesignStudy) -> None:
     scenario, to_go = study.today.scenario, study.today.metres_to_go
-    nearest = scenario.ultrasonic.minimum_range_m
-    pull = scenario.attraction.stiffness_n_m * (_DISTANCE_M + to_go)
+    nearest = scenario.follower.ultrasonic.minimum_range_m
+    pull = scenario.follower.attraction.stiffness_n_m * (_DISTANCE_M + to_go)
     for law in DESIGNED_LAWS:
         colour, title = LAW_STYLES[law]
         push = spring(law, scenario)
@@ -58,7 +58,10 @@ def _plot_balance(axes: Axes, study: DesignStudy) -> None:
 
 def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
     scenario = study.today.scenario
-    attraction, spare = scenario.attraction, study.requirements.spare_latency_ticks
+    attraction, spare = (
+        scenario.follower.attraction,
+        study.requirements.spare_latency_ticks,
+    )
     lines = dict.fromkeys((0, spare), "-") | {spare: "--"}
     for ticks, line in lines.items():
         limits = [

@@ -59,7 +59,7 @@ class Alternative:
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         figures = {k: v for k, v in vars(self).items() if k != "scenario"}
-        return {"attraction": self.scenario.attraction, **figures}
+        return {"attraction": self.scenario.follower.attraction, **figures}
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def study_design(
     repulsion = search_gains(scenario, requirements)
     designed = scenario.model_copy(update={"repulsion": repulsion})
     better = search_attraction(scenario, requirements)
-    K_r = scenario.attraction.stiffness_n_m
+    K_r = scenario.follower.attraction.stiffness_n_m
 
     def later(done: float) -> None:
         if progress is not None:
@@ -159,7 +159,10 @@ def _alternative(
 
 
 def _barrier_row(scenario: Scenario, to_go: float) -> BarrierRow:
-    attraction, reach = scenario.attraction, scenario.repulsion.conventional.reach_m
+    attraction, reach = (
+        scenario.follower.attraction,
+        scenario.repulsion.conventional.reach_m,
+    )
     farther = DesignRequirements(
         source_range_m=to_go + attraction.follow_distance_m + reach
     )

@@ -38,7 +38,7 @@ def design_text(study: DesignStudy) -> str:
 
 
 def _alternative_lines(alternative: Alternative) -> list[str]:
-    attraction = alternative.scenario.attraction
+    attraction = alternative.scenario.follower.attraction
     gains = (
         f"  K_r {attraction.stiffness_n_m:g} N/m, D_r {attraction.damping_n_s_m:g} "
         f"N s/m, follow distance {attraction.follow_distance_m:g} m "

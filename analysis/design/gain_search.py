@@ -89,7 +89,7 @@ def gain_for_barrier(
 
     unit = with_gains(scenario, law, **{field: 1.0}, **also)
     c, push = sampled_push(spring(law, unit), scenario)
-    pull = scenario.attraction.stiffness_n_m * (c + to_go)
+    pull = scenario.follower.attraction.stiffness_n_m * (c + to_go)
 
     def missing(gain: float) -> float:
         return energy - largest_rise(gain * push - pull)
@@ -105,7 +105,7 @@ def _barrier_gains(
     assert gains is not None, f"{law} does not name the gains that tune it"
     spring_gain, damper_gain = gains
     # The secant of D_0 s is D_0: it puts back D_0/D_r.
-    D_r = scenario.attraction.damping_n_s_m
+    D_r = scenario.follower.attraction.damping_n_s_m
     damping = _rounded(requirements.injected_share * D_r)
     found = gain_for_barrier(scenario, law, spring_gain, requirements)
     found = _rounded(found, up=True)
@@ -131,9 +131,11 @@ def _matched_damper(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> Scenario:
     """d_ref from the offset by a far echo, D_0 from the energy put back."""
-    far = scenario.ultrasonic.maximum_range_m
+    far = scenario.follower.ultrasonic.maximum_range_m
     tail = spring(law, scenario)(far)
-    at_rest = requirements.far_offset_m * scenario.attraction.stiffness_n_m - tail
+    at_rest = (
+        requirements.far_offset_m * scenario.follower.attraction.stiffness_n_m - tail
+    )
     unit = {"reference_damping_n_s_m": 1.0, "matched_damping_n_s_m": 2.0}
     with_unit = with_gains(scenario, law, **unit)
     unit_term = law_force(law, with_unit)(far, 0.0) - spring(law, with_unit)(far)

@@ -45,8 +45,8 @@ def jam_runs(
     """
     settings = (
         f"tick_s={scenario.tick_s}",
-        f"microphones.frame_s={scenario.microphones.frame_s}",
-        f"ultrasonic.period_s={scenario.ultrasonic.period_s}",
+        f"microphones.frame_s={scenario.follower.microphones.frame_s}",
+        f"ultrasonic.period_s={scenario.follower.ultrasonic.period_s}",
         f"engine={scenario.engine}",
     )
     layout = load_scenario("two_static_obstacles", ["hearing=ideal", *settings])
@@ -54,18 +54,20 @@ def jam_runs(
     active = scenario.repulsion.active.model_copy(update={"speed_limit_m_s": static})
     repulsion = scenario.repulsion.model_copy(update={"active": active})
     done, found = 0, []
-    goal = layout.model_copy(update={"attraction": scenario.attraction}).goal_radius_m
+    goal = layout.model_copy(
+        update={"attraction": scenario.follower.attraction}
+    ).goal_radius_m
     for law in laws:
         causes: Counter[str] = Counter()
         jams = 0
         for start in JAM_STARTS_M:
-            place = layout.start.model_copy(update={"position_m": (0.0, start)})
+            place = layout.only.start.model_copy(update={"position_m": (0.0, start)})
             run = simulate(
                 layout.model_copy(
                     update={
                         "law": law,
                         "start": place,
-                        "attraction": scenario.attraction,
+                        "attraction": scenario.follower.attraction,
                         "repulsion": repulsion,
                     }
                 )

@@ -135,7 +135,7 @@ def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
     Raises:
         InputError: Nothing is left of the source's range.
     """
-    follow = scenario.attraction.follow_distance_m
+    follow = scenario.follower.attraction.follow_distance_m
     reach = scenario.repulsion.conventional.reach_m
     left = requirements.source_range_m - follow - reach
     if left <= 0.0:
@@ -160,7 +160,7 @@ def allowed_stiffness(scenario: Scenario, requirements: DesignRequirements) -> f
     total = largest_contact_stiffness(
         scenario, latency_ticks=requirements.spare_latency_ticks
     )
-    return total - scenario.attraction.stiffness_n_m
+    return total - scenario.follower.attraction.stiffness_n_m
 
 
 def check_law(

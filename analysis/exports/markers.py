@@ -38,10 +38,10 @@ def body_markers(scenario: Scenario, names: Mapping[str, str]) -> list[Message]:
 
 
 def _boxes(scenario: Scenario, names: Mapping[str, str]) -> Iterator[Message]:
-    for name, robot in scenario.all_robots.items():
+    for name, robot in scenario.robots.items():
         size, frame = (robot.robot.length_m, robot.robot.width_m), names[name]
         yield _box(f"{frame}/base_link", "robots", size, _ROBOT_M, "robot")
-    for name, source in scenario.all_sources.items():
+    for name, source in scenario.sources.items():
         if source.body:
             size = source.length_m, source.width_m
             yield _box(names[name], "sources", size, _BODY_M, "source")

@@ -25,7 +25,7 @@ from analysis.exports.ros2_values import (
     vector,
 )
 from diagrams import dump_scenario
-from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.participants import HasRangeSensors, Robot
 from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import InputError
 
@@ -84,7 +84,7 @@ def _write(writer: Any, run: RecordedRun) -> None:
     scenario = run.scenario
     about = {
         "scenario": scenario.name,
-        "law": scenario.law,
+        "law": scenario.only.law,
         "seed": str(scenario.seed),
         "warnings": "\n".join(map(str, warnings_of(scenario))),
     }
@@ -105,7 +105,7 @@ def _write(writer: Any, run: RecordedRun) -> None:
 def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
     """What is said at each tick."""
     scenario = run.scenario
-    bodies = scenario.all_sources | {each.name: each for each in scenario.obstacles}
+    bodies = scenario.sources | {each.name: each for each in scenario.obstacles}
     placed = {name: body.path().poses(run.time) for name, body in bodies.items()}
     once = {each.name for each in scenario.obstacles if not each.path().moves}
     names = _ros_names([*run.robots, *placed])
@@ -116,7 +116,7 @@ def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
             markers = {"markers": body_markers(scenario, names)}
             entries.append(("/markers", "visualization_msgs/MarkerArray", markers))
         for name, own in run.robots.items():
-            robot = scenario.all_robots[name]
+            robot = scenario.robots[name]
             frames += _robot_frames(names[name], own, robot, tick, time)
             entries += _robot_entries(names[name], own, robot, tick, time)
         for name, poses in placed.items():
@@ -145,10 +145,14 @@ def _plain(name: str) -> str:
     return plain if plain[:1].isalpha() else f"_{plain}"
 
 
+def _sensors(robot: Robot) -> int:
+    return robot.ultrasonic.count if isinstance(robot, HasRangeSensors) else 0
+
+
 def _robot_frames(
     name: str,
     own: Mapping[str, NDArray[np.float64]],
-    robot: FollowerParameters,
+    robot: Robot,
     tick: int,
     time: float,
 ) -> Iterator[Message]:
@@ -157,6 +161,8 @@ def _robot_frames(
     at = [float(own[key][tick]) for key in _POSES["pose"]]
     yield transform(time, WORLD_FRAME, base, at)
     yield transform(time, base, f"{name}/control_point", [ahead, 0.0, 0.0])
+    if not isinstance(robot, HasRangeSensors):
+        return
     sensors = robot.ultrasonic
     for k in range(1, sensors.count + 1):
         if f"range_{k}" in own:
@@ -168,7 +174,7 @@ def _robot_frames(
 def _robot_entries(
     name: str,
     own: Mapping[str, NDArray[np.float64]],
-    robot: FollowerParameters,
+    robot: Robot,
     tick: int,
     time: float,
 ) -> Iterator[_Entry]:
@@ -189,7 +195,7 @@ def _robot_entries(
         if valid > 0.5:
             message = stamped(time, WORLD_FRAME, point=vector(x, y))
             yield f"/{name}/source_estimate", "geometry_msgs/PointStamped", message
-    for k in range(1, robot.ultrasonic.count + 1):
+    for k in range(1, _sensors(robot) + 1):
         if f"range_{k}" in own:
             told.update((f"range_{k}", f"echo_{k}"))
             echo = own[f"echo_{k}"][tick] > 0.5
@@ -202,10 +208,9 @@ def _robot_entries(
             yield f"/{name}/{_plain(key)}", "std_msgs/Float64", {"data": value}
 
 
-def _range(
-    name: str, k: int, robot: FollowerParameters, time: float, distance: float
-) -> Message:
+def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Message:
     """A reading; infinite where there is no echo, as ROS has it."""
+    assert isinstance(robot, HasRangeSensors)
     sensors = robot.ultrasonic
     return stamped(
         time,

@@ -72,7 +72,7 @@ class RecordedRun:
     @cached_property
     def robots(self) -> dict[str, Mapping[str, NDArray[np.float64]]]:
         """(n,) columns by name, as if each robot were alone, by the robot's name."""
-        names = list(self.scenario.all_robots)
+        names = list(self.scenario.robots)
         columns = {
             str(name): self.table[name].to_numpy(dtype=float) for name in self.table
         }

@@ -58,12 +58,12 @@ class Listener:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._frame_s = scenario.microphones.frame_s
+        self._frame_s = scenario.follower.microphones.frame_s
         self._follower = build_sound_follower(scenario)
         seed = block_seed(scenario.seed, "sound_emitter")
-        self._waveform = make_waveform(scenario.sound, seed)
+        self._waveform = make_waveform(scenario.source.sound, seed)
         #: The microphones as stated.
-        self.shape = ArrayShape.of(scenario.robot.microphones_m)
+        self.shape = ArrayShape.of(scenario.only.robot.microphones_m)
 
     def listen(
         self,
@@ -116,7 +116,7 @@ class Listener:
     def _place_robot(self, root: Any, p_AS: NDArray[np.float64]) -> None:
         """Puts the robot, facing along x, where the source is at p_AS."""
         p_WS = self._scenario.source.path().pose(0.0)[:2]
-        p_BA = microphones_B(self._scenario.robot).mean(axis=0)
+        p_BA = microphones_B(self._scenario.only.robot).mean(axis=0)
         p_WB = p_WS - p_AS - p_BA
         plant = self._follower.blocks["plant"].GetMyMutableContextFromRoot(root)
         at_rest = np.zeros(plant.num_continuous_states() - len(p_WB))
@@ -125,7 +125,7 @@ class Listener:
     def _redraw_errors(self, root: Any, frame: int, speed_tolerance: float) -> None:
         scenario = self._scenario
         rng = tick_generator(block_seed(scenario.seed, "array_errors"), frame)
-        errors = draw_tolerances(scenario.microphones, self.shape.count, rng)
+        errors = draw_tolerances(scenario.follower.microphones, self.shape.count, rng)
         speed = 1.0 + speed_tolerance * rng.uniform(-1.0, 1.0)
         microphones = self._follower.blocks["microphones"]
         context = microphones.GetMyMutableContextFromRoot(root)
@@ -151,13 +151,15 @@ class Listener:
     ) -> LocalizationBound:
         """Of the frames that end then, rms."""
         scenario = self._scenario
-        microphones = scenario.microphones
+        microphones = scenario.follower.microphones
         first = round((ends[0] - 3 * self._frame_s) * SAMPLE_RATE_HZ)
         count = round(ends[-1] * SAMPLE_RATE_HZ) - first
-        samples = emitted_samples(self._waveform, scenario.sound, first, count)
+        samples = emitted_samples(self._waveform, scenario.source.sound, first, count)
         assert samples is not None
         energy = SlopeEnergy.of(samples, SAMPLE_RATE_HZ, first / SAMPLE_RATE_HZ)
-        noise_pa = scenario.sound.level_pa * 10.0 ** (-microphones.snr_db_at_1m / 20.0)
+        noise_pa = scenario.source.sound.level_pa * 10.0 ** (
+            -microphones.snr_db_at_1m / 20.0
+        )
         rounding_pa = 1.0 / microphones.counts_per_pa / math.sqrt(12.0)
         bounds = [
             position_bound(

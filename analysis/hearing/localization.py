@@ -139,13 +139,13 @@ class LocalizationExperiment:
     @property
     def shape(self) -> ArrayShape:
         """The microphones as stated."""
-        return ArrayShape.of(self.scenario.robot.microphones_m)
+        return ArrayShape.of(self.scenario.only.robot.microphones_m)
 
     @property
     def array_errors(self) -> ArrayErrors:
         """Standard deviations of errors that are uniform within the tolerances."""
         part = 1.0 / math.sqrt(3.0)
-        microphones = self.scenario.microphones
+        microphones = self.scenario.follower.microphones
         return ArrayErrors(
             position_m=part * microphones.position_tolerance_m,
             delay_s=part * microphones.delay_tolerance_s,
@@ -223,5 +223,5 @@ def prepare_localization(
 
 
 def _with_estimator(scenario: Scenario, name: str) -> Scenario:
-    tdoa = scenario.tdoa.model_copy(update=ESTIMATORS[name])
+    tdoa = scenario.follower.tdoa.model_copy(update=ESTIMATORS[name])
     return scenario.model_copy(update={"tdoa": tdoa})

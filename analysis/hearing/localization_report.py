@@ -38,14 +38,14 @@ def localization_summary(
         Plain values, to be written as JSON.
     """
     scenario, shape = experiment.scenario, experiment.shape
-    microphones, c = scenario.microphones, scenario.acoustics.c
+    microphones, c = scenario.follower.microphones, scenario.acoustics.c
     # Whatever the errors of the array do to a range is to be seen.
-    tdoa = scenario.tdoa.model_copy(update={"maximum_relative_range_std": 1e6})
+    tdoa = scenario.follower.tdoa.model_copy(update={"maximum_relative_range_std": 1e6})
     estimate = frame_estimator(tdoa, shape, c)
     return {
         "schema_version": SCHEMA_VERSION,
         "seed": scenario.seed,
-        "sound": scenario.sound.kind,
+        "sound": scenario.source.sound.kind,
         "snr_db_at_1m": microphones.snr_db_at_1m,
         "tolerances": {
             "position_m": microphones.position_tolerance_m,

@@ -60,7 +60,7 @@ class HeadOn:
     def slope(self, c: float) -> float:
         """df/dc - K_r at a distance and at rest, N/m; negative: P is pushed back."""
         slope, _ = self.law.gradient(c, 0.0)
-        return slope - self.scenario.attraction.stiffness_n_m
+        return slope - self.scenario.follower.attraction.stiffness_n_m
 
     def force(self, c: float, s: float = 0.0) -> float:
         """f(c, s) - K_r (L + c), N: what moves P away from the face.
@@ -72,7 +72,7 @@ class HeadOn:
         Returns:
             N, positive away from the face.
         """
-        pull = self.scenario.attraction.stiffness_n_m * (self.to_go_m + c)
+        pull = self.scenario.follower.attraction.stiffness_n_m * (self.to_go_m + c)
         return self.law.force(c, s) - pull
 
 
@@ -96,7 +96,7 @@ def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
     if to_go_m < 0.0:
         raise InputError("to_go_m", f"{to_go_m} must not be negative")
     law = radial_law(scenario)
-    stiffness = scenario.attraction.stiffness_n_m
+    stiffness = scenario.follower.attraction.stiffness_n_m
     pull = stiffness * (to_go_m + law.distances_m)
     return HeadOn(scenario, law, to_go_m, radial_equilibria(law, pull))
 
@@ -128,10 +128,10 @@ def radial_equilibria(law: RadialLaw, pull_n: NDArray[np.float64]) -> tuple[floa
 
 
 def _to_go(scenario: Scenario) -> float:
-    x, y = control_point(scenario.start.pose, scenario.robot.control_point_m)
+    x, y = control_point(scenario.only.start.pose, scenario.only.robot.control_point_m)
     sx, sy, _ = scenario.source.path().pose(0.0)
     way = max(math.hypot(sx - x, sy - y), 1e-9)
-    follow = scenario.attraction.follow_distance_m
+    follow = scenario.follower.attraction.follow_distance_m
     nearest, left = math.inf, 0.5 * (way - follow)
     for obstacle in scenario.obstacles:
         ox, oy, _ = obstacle.path().pose(0.0)

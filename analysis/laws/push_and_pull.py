@@ -71,7 +71,7 @@ def spring(law: str, scenario: Scenario) -> Push:
 
 def kinetic_energy(scenario: Scenario) -> float:
     """Of the virtual mass at top speed, J."""
-    robot = scenario.robot
+    robot = scenario.only.robot
     return 0.5 * robot.mass_kg * robot.top_speed_m_s**2
 
 
@@ -94,7 +94,9 @@ def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
         J; 0 where the push never prevails.
     """
     c, forces = sampled_push(push, scenario)
-    return largest_rise(forces - scenario.attraction.stiffness_n_m * (c + metres_to_go))
+    return largest_rise(
+        forces - scenario.follower.attraction.stiffness_n_m * (c + metres_to_go)
+    )
 
 
 def sampled_push(
@@ -109,7 +111,7 @@ def sampled_push(
     Returns:
         (n,) distances, m, and (n,) forces, N.
     """
-    c = np.arange(scenario.ultrasonic.minimum_range_m, _FARTHEST_M, _STEP_M)
+    c = np.arange(scenario.follower.ultrasonic.minimum_range_m, _FARTHEST_M, _STEP_M)
     return c, np.array([push(distance) for distance in c.tolist()])
 
 
@@ -136,7 +138,7 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
     Returns:
         N/m.
     """
-    K_r = scenario.attraction.stiffness_n_m
+    K_r = scenario.follower.attraction.stiffness_n_m
     reach = scenario.repulsion.conventional.reach_m
     work = K_r / 2.0 * ((metres_to_go + reach) ** 2 - metres_to_go**2)
     return 2.0 * (kinetic_energy(scenario) + work) / reach**2
@@ -153,7 +155,7 @@ def stiffest(law: str, scenario: Scenario) -> float:
         Largest -df/dc at rest, N/m.
     """
     gains = getattr(scenario.repulsion, law)
-    nearest = scenario.ultrasonic.minimum_range_m
+    nearest = scenario.follower.ultrasonic.minimum_range_m
     return DESIGNED_LAWS[law].stiffest(gains, nearest)
 
 
@@ -171,8 +173,8 @@ def rest_offset(law: str, scenario: Scenario) -> float:
     """
     force = law_force(law, scenario)
     K_r, follow = (
-        scenario.attraction.stiffness_n_m,
-        scenario.attraction.follow_distance_m,
+        scenario.follower.attraction.stiffness_n_m,
+        scenario.follower.attraction.follow_distance_m,
     )
     gap = follow - scenario.source.length_m / 2.0
 
@@ -197,8 +199,8 @@ def far_offset(law: str, scenario: Scenario) -> float:
         m, 0 where the law ends before.
     """
     force = law_force(law, scenario)
-    farthest = scenario.ultrasonic.maximum_range_m
-    return force(farthest, 0.0) / scenario.attraction.stiffness_n_m
+    farthest = scenario.follower.ultrasonic.maximum_range_m
+    return force(farthest, 0.0) / scenario.follower.attraction.stiffness_n_m
 
 
 def injected_share(law: str, scenario: Scenario) -> float:
@@ -217,6 +219,9 @@ def injected_share(law: str, scenario: Scenario) -> float:
     """
     force = law_force(law, scenario)
     within = 0.5 * scenario.repulsion.conventional.reach_m
-    speeds = scenario.robot.top_speed_m_s * _SPEEDS
+    speeds = scenario.only.robot.top_speed_m_s * _SPEEDS
     term = np.array([force(within, s) for s in speeds.tolist()]) - force(within, 0.0)
-    return float(np.max(np.abs(term) / speeds)) / scenario.attraction.damping_n_s_m
+    return (
+        float(np.max(np.abs(term) / speeds))
+        / scenario.follower.attraction.damping_n_s_m
+    )

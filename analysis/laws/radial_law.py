@@ -96,7 +96,7 @@ def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:
     if function is None:
         raise InputError(
             "law",
-            f"{scenario.law!r} is a block without a force f(c, s), which energy "
+            f"{scenario.only.law!r} is a block without a force f(c, s), which energy "
             "functions need; write it as a function law(c, s, repulsion)",
         )
     return function
@@ -111,11 +111,14 @@ def radial_law(scenario: Scenario) -> RadialLaw:
     """
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
     return _tabulate(
-        key.law,
+        key.only.law,
         str(loaded_digests(key)),
         key.repulsion.model_dump_json(),
-        (key.ultrasonic.minimum_range_m, key.ultrasonic.maximum_range_m),
-        key.robot.top_speed_m_s,
+        (
+            key.follower.ultrasonic.minimum_range_m,
+            key.follower.ultrasonic.maximum_range_m,
+        ),
+        key.only.robot.top_speed_m_s,
         _Scenario(key),
     )
 

@@ -118,7 +118,7 @@ def burst_cycle(
             there is no stable equilibrium.
     """
     point = point or follow_equilibrium(scenario)
-    sound = scenario.sound
+    sound = scenario.source.sound
     on = sound.on_s if on_s is None else on_s
     gap = sound.period_s - sound.on_s if gap_s is None else gap_s
     tick_s = scenario.tick_s
@@ -157,7 +157,7 @@ def _with_bursts(scenario: Scenario, hold: Hold, on: float, period: float) -> Sc
 def _settled(loop: IdealLoop, point: OperatingPoint, ticks: int) -> NDArray[np.float64]:
     """The state at rest when the robot has listened for some cycles."""
     x, y = control_point(
-        (*point.p_WP, point.theta_WB), -loop.scenario.robot.control_point_m
+        (*point.p_WP, point.theta_WB), -loop.scenario.only.robot.control_point_m
     )
     state, _ = loop.settled_state((x, y, point.theta_WB))
     still = {("command", "acceleration_W"): (0.0, 0.0)}

@@ -69,7 +69,7 @@ def gap_chart(
     gaps = np.arange(0.0, 4.01, 0.25) if gaps_s is None else np.asarray(gaps_s, float)
     tick_s = scenario.tick_s
     ticks = np.rint(gaps / tick_s).astype(int)
-    on = scenario.sound.on_s
+    on = scenario.source.sound.on_s
     heard, longest = round(on / tick_s), int(ticks.max()) * tick_s
     rows = []
     for hold in holds:
@@ -82,7 +82,7 @@ def gap_chart(
         gaps_s=ticks * tick_s,
         holds=tuple(holds),
         multiplier=np.array(rows),
-        today=(scenario.sound.period_s - on, scenario.tracker.hold),
+        today=(scenario.source.sound.period_s - on, scenario.follower.tracker.hold),
     )
 
 

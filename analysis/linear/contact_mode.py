@@ -64,11 +64,11 @@ def motion_chain(
     Raises:
         ValueError: The wheels can slip.
     """
-    plant = scenario.plant
+    plant = scenario.only.plant
     require_rolling(plant)
     if motor_lag_s is not None:
         plant = plant.model_copy(update={"motor_lag_s": motor_lag_s})
-    return _chain(scenario.robot, plant, period_s or scenario.tick_s)
+    return _chain(scenario.only.robot, plant, period_s or scenario.tick_s)
 
 
 @lru_cache(maxsize=256)
@@ -169,16 +169,16 @@ def contact_matrix(
     """
     damping = damping_n_s_m
     if damping is None:
-        damping = scenario.attraction.damping_n_s_m
+        damping = scenario.follower.attraction.damping_n_s_m
     chain = motion_chain(scenario, motor_lag_s=motor_lag_s, period_s=period_s)
     now = delayed_output(chain, "p_WP", latency_ticks)
-    law = np.array([[-stiffness_n_m, -damping]]) / scenario.robot.mass_kg
+    law = np.array([[-stiffness_n_m, -damping]]) / scenario.only.robot.mass_kg
     if approach_damping_n_s_m == 0.0:
         return now.A + now.B @ law @ now.C
     before = delayed_output(chain, "p_WP", latency_ticks + 1)
     # The longer chain holds the shorter one's position too, one place earlier.
     period = period_s or scenario.tick_s
-    speed = approach_damping_n_s_m / period / scenario.robot.mass_kg
+    speed = approach_damping_n_s_m / period / scenario.only.robot.mass_kg
     position = np.hstack([now.C[0], [0.0]])
     row = law[0, 0] * position + law[0, 1] * before.C[1]
     row = row - speed * (position - before.C[0])
@@ -279,7 +279,7 @@ def contact_limits(
     Returns:
         Gains of both laws, N/m, with K_r taken off.
     """
-    lags = sorted({*motor_lags_s, scenario.plant.motor_lag_s})
+    lags = sorted({*motor_lags_s, scenario.only.plant.motor_lag_s})
     total = np.array(
         [
             [
@@ -291,13 +291,13 @@ def contact_limits(
             for lag in lags
         ]
     )
-    left = total - scenario.attraction.stiffness_n_m
+    left = total - scenario.follower.attraction.stiffness_n_m
     return ContactLimits(
         motor_lags_s=tuple(lags),
         latency_ticks=tuple(latency_ticks),
         stiffness_n_m=left,
         reference_stiffness_n_m=left * math.e**2,
-        today=(scenario.plant.motor_lag_s, 0),
+        today=(scenario.only.plant.motor_lag_s, 0),
         stiffness_today_n_m=scenario.repulsion.conventional.stiffness_n_m,
         reference_stiffness_today_n_m=scenario.repulsion.active.reference_stiffness_n_m,
         tick_s=scenario.tick_s,

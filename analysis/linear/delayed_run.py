@@ -173,7 +173,7 @@ def offsets(
         (n,) m.
     """
     x, y, theta = np.array(poses_WB).T
-    epsilon = point.loop.scenario.robot.control_point_m
+    epsilon = point.loop.scenario.only.robot.control_point_m
     places = np.column_stack([x + epsilon * np.cos(theta), y + epsilon * np.sin(theta)])
     found: NDArray[np.float64] = (places - point.p_WP) @ axis
     return found
@@ -212,7 +212,7 @@ def _hearing_late(
     start = round(point.time_s / tick_s)
     late, part = divmod(delay_s, tick_s)
     pose_WS = loop.scenario.source.path().pose(0.0)
-    epsilon = loop.scenario.robot.control_point_m
+    epsilon = loop.scenario.only.robot.control_point_m
     hearing, plant = loop.indices("hearing")[:2], loop.indices("plant")[:3]
     run = loop.runner(state, point.time_s)
     measured = deque([state[hearing]] * (int(late) + 2), maxlen=int(late) + 2)

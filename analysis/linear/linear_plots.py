@@ -78,7 +78,7 @@ def plot_equilibria(search: EquilibriumSearch) -> Figure:
     axes.set_ylim(y0, y1)
     axes.set_xlabel("x in W (m)")
     axes.set_ylabel("y in W (m)")
-    axes.set_title(f"Forces on P at rest, law: {search.scenario.law}", fontsize=10)
+    axes.set_title(f"Forces on P at rest, law: {search.scenario.only.law}", fontsize=10)
     axes.legend(fontsize=8, loc="upper right", framealpha=1.0)
     return figure
 

@@ -40,7 +40,7 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     if stiffness <= 0.0:
         raise InputError(
             "law",
-            f"{scenario.law!r} does not push harder as an obstacle comes nearer, "
+            f"{scenario.only.law!r} does not push harder as an obstacle comes nearer, "
             "so that it has no contact mode; choose another law",
         )
     law = _share(
@@ -50,7 +50,7 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
 
 
 def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
-    gains, robot = scenario.attraction, scenario.robot
+    gains, robot = scenario.follower.attraction, scenario.only.robot
     printed = "printed without unit"
     lag_reason = "not printed; load, battery"
     shares = (
@@ -58,7 +58,7 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
         ("attraction.stiffness_n_m", "K_r", "N/m", gains.stiffness_n_m, 0.1, printed),
         ("attraction.damping_n_s_m", "D_r", "N s/m", gains.damping_n_s_m, 0.1, printed),
         (
-            "plant.motor_lag_s", "lag", "s", scenario.plant.motor_lag_s, 0.4,
+            "plant.motor_lag_s", "lag", "s", scenario.only.plant.motor_lag_s, 0.4,
             lag_reason,
         ),
     )  # fmt: skip
@@ -152,9 +152,9 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
     Returns:
         A ratio; 1 where the believed speed is the true one.
     """
-    k = (scenario.tdoa.sound_speed_m_s or scenario.acoustics.c) / true_speed
-    half = max(abs(y) for _, y in scenario.robot.microphones_m)
-    distance = scenario.attraction.follow_distance_m
+    k = (scenario.follower.tdoa.sound_speed_m_s or scenario.acoustics.c) / true_speed
+    half = max(abs(y) for _, y in scenario.only.robot.microphones_m)
+    distance = scenario.follower.attraction.follow_distance_m
     h = math.hypot(distance, half)
     return ((h + distance) / k + k * (h - distance)) / (2.0 * h)
 
@@ -169,7 +169,7 @@ def contact_poles(scenario: Scenario) -> PoleFunction:
 
     def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:
         changed = with_values(scenario, values)
-        stiffness = changed.attraction.stiffness_n_m + values.get(
+        stiffness = changed.follower.attraction.stiffness_n_m + values.get(
             "law_stiffness_n_m", 0.0
         )
         matrix = contact_matrix(

@@ -79,7 +79,7 @@ def contact_slopes(scenario: Scenario) -> ContactSlopes:
     if slope[stiffest] <= 0.0:
         raise InputError(
             "law",
-            f"{scenario.law!r} does not push off obstacles and has no contact "
+            f"{scenario.only.law!r} does not push off obstacles and has no contact "
             "mode; use another law",
         )
     c = float(_DISTANCES_M[stiffest])
@@ -88,7 +88,7 @@ def contact_slopes(scenario: Scenario) -> ContactSlopes:
 
 def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
     """Against K_r and D_r, and the gains of the law's two terms, if it has them."""
-    attraction = scenario.attraction
+    attraction = scenario.follower.attraction
     K, D = attraction.stiffness_n_m, attraction.damping_n_s_m
 
     def locus(
@@ -123,24 +123,24 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
             lambda value: contact_matrix(scenario, K, damping_n_s_m=value),
         ),
     )
-    record = LAWS.get(scenario.law)
+    record = LAWS.get(scenario.only.law)
     if record is None or record.loop_gains is None:
         return target
     slopes = contact_slopes(scenario)
     k, d = slopes.stiffness_n_m, slopes.approach_damping_n_s_m
-    law = getattr(scenario.repulsion, scenario.law)
+    law = getattr(scenario.repulsion, scenario.only.law)
     spring, damper = record.loop_gains
     today, strength = getattr(law, spring), getattr(law, damper)
     return (
         *target,
         locus(
-            f"repulsion.{scenario.law}.{spring}",
+            f"repulsion.{scenario.only.law}.{spring}",
             "contact",
             today,
             lambda value: contact_matrix(scenario, K + k * value / today),
         ),
         locus(
-            f"repulsion.{scenario.law}.{damper}",
+            f"repulsion.{scenario.only.law}.{damper}",
             "contact",
             strength,
             lambda value: contact_matrix(

@@ -150,7 +150,7 @@ def poles_against_period(
     periods = np.asarray(periods_s, dtype=float)
     stiffness = stiffness_n_m
     if stiffness is None:
-        stiffness = scenario.attraction.stiffness_n_m
+        stiffness = scenario.follower.attraction.stiffness_n_m
     poles = np.zeros((len(periods), 3), dtype=complex)
     for row, period in zip(poles, periods, strict=True):
         matrix = contact_matrix(scenario, stiffness, period_s=float(period))
@@ -221,7 +221,10 @@ def gain_chart(
     Returns:
         Growth of the slowest mode, (ny, nx) 1/s.
     """
-    K, D = scenario.attraction.stiffness_n_m, scenario.attraction.damping_n_s_m
+    K, D = (
+        scenario.follower.attraction.stiffness_n_m,
+        scenario.follower.attraction.damping_n_s_m,
+    )
     tick_s = scenario.tick_s
     x, y = np.asarray(stiffnesses_n_m, float), np.asarray(dampings_n_s_m, float)
     return StabilityChart(
@@ -268,5 +271,5 @@ def gain_delay_chart(
         growth_per_s=_growth(
             lambda n, k: contact_matrix(scenario, k, latency_ticks=n), ticks, y, tick_s
         ),
-        today=(0.0, scenario.attraction.stiffness_n_m),
+        today=(0.0, scenario.follower.attraction.stiffness_n_m),
     )

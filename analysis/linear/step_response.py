@@ -136,7 +136,7 @@ def _run(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Time, s, and distance of P from the source, m, after a start off the point."""
     ahead = np.array([math.cos(point.theta_WB), math.sin(point.theta_WB)])
-    epsilon = scenario.robot.control_point_m
+    epsilon = scenario.only.robot.control_point_m
     x, y = control_point((*(point.p_WP + step_m * ahead), point.theta_WB), -epsilon)
     start = {"position_m": [x, y], "heading_deg": math.degrees(point.theta_WB)}
     # No stop rules: a small step is slow enough to count as rest.

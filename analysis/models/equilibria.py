@@ -96,7 +96,7 @@ class EquilibriumSearch:
         Returns:
             m; infinite where there is no way.
         """
-        return self._way(point, self.scenario.robot.width_m / 2.0)
+        return self._way(point, self.scenario.only.robot.width_m / 2.0)
 
     def _way(self, point: OperatingPoint, radius: float) -> float:
         boxes = [body.rectangle(0.0) for body in self.scenario.bodies().values()]
@@ -106,8 +106,8 @@ class EquilibriumSearch:
     @property
     def _start(self) -> NDArray[np.float64]:
         """(2,) P at the start, m."""
-        epsilon = self.scenario.robot.control_point_m
-        return np.array(control_point(self.scenario.start.pose, epsilon))
+        epsilon = self.scenario.only.robot.control_point_m
+        return np.array(control_point(self.scenario.only.start.pose, epsilon))
 
     def follow_point(self) -> OperatingPoint:
         """The stable equilibrium nearest to the follow distance, in free reach.
@@ -235,7 +235,7 @@ def find_equilibria(
     search = CellSearch(field_)
     left, cells, edge = search.left_over(area, smallest_m)
     known = _KNOWN_CELLS * edge
-    found = _Found([], [], [], np.asarray(scenario.start.position_m))
+    found = _Found([], [], [], np.asarray(scenario.only.start.position_m))
     finest = edge
     groups: list[Leftover] = []
     for round_ in range(_ROUNDS):
@@ -364,8 +364,8 @@ class _Found:
 
 
 def _area(scenario: Scenario) -> SearchArea:
-    margin = scenario.attraction.follow_distance_m + 1.0
-    places = [np.array(scenario.start.position_m)[None]]
+    margin = scenario.follower.attraction.follow_distance_m + 1.0
+    places = [np.array(scenario.only.start.position_m)[None]]
     places += [rectangle_corners(b.rectangle(0.0)) for b in scenario.bodies().values()]
     everything = np.concatenate(places)
     low, high = everything.min(axis=0) - margin, everything.max(axis=0) + margin

@@ -134,9 +134,9 @@ class CellSearch:
     def __init__(self, field: ForceField) -> None:
         scenario = field.loop.scenario
         self.p_WS = field.p_WS
-        self._attraction = scenario.attraction
+        self._attraction = scenario.follower.attraction
         self._bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
-        adds = scenario.collision_vector.aggregation == "sum"
+        adds = scenario.follower.collision_vector.aggregation == "sum"
         self._slots = min(_SLOTS if adds else 1, len(self._bodies))
         farthest = field.reach_m + 1.0
         self._c, self._f, self._error = _sampled(field, farthest)

@@ -77,7 +77,7 @@ class ForceField:
     @cached_property
     def reach_m(self) -> float:
         """Beyond this distance no body is seen, m."""
-        return self.loop.scenario.ultrasonic.maximum_range_m
+        return self.loop.scenario.follower.ultrasonic.maximum_range_m
 
     def law(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) repulsion of one body at rest at distances in m, N."""
@@ -150,7 +150,7 @@ class ForceField:
     def _forces(self, p_WP: Any, *, twin: bool) -> Any:
         # With the source ahead: straight behind, it would pull aside.
         theta = 0.0 if float_of(p_WP[0]) <= self.p_WS[0] else math.pi
-        offset = self.loop.scenario.robot.control_point_m
+        offset = self.loop.scenario.only.robot.control_point_m
         x, y = p_WP[0] - offset * math.cos(theta), p_WP[1] - offset * math.sin(theta)
         pose = np.array([x, y, theta + 0.0 * p_WP[0]])
         sensor, own = self._sensor(twin=twin)

@@ -81,7 +81,7 @@ class IdealLoop:
         if twin is None:
             raise InputError(
                 "law",
-                f"the block of {scenario.law!r} has no AutoDiffXd form; write it "
+                f"the block of {scenario.only.law!r} has no AutoDiffXd form; write it "
                 "as a function law(c, s, repulsion) with pydrake.math, or as a "
                 "TemplateSystem of float and AutoDiffXd",
             )
@@ -110,14 +110,14 @@ class IdealLoop:
             if not block.HasOutputPort(port):
                 raise InputError(
                     "law",
-                    f"{self.scenario.law!r} has no output port {port}, and "
+                    f"{self.scenario.only.law!r} has no output port {port}, and "
                     "linear models need a law that pushes a virtual mass; use "
                     "such a law, or simulate",
                 )
 
     def _try_law(self) -> None:
         """Lets a law that is a user's own meet a variable before all else does."""
-        if ":" not in self.scenario.law:
+        if ":" not in self.scenario.only.law:
             return
         block = self.block("controller", twin=True)
         context = block.CreateDefaultContext()
@@ -139,7 +139,7 @@ class IdealLoop:
             own = error.__cause__ or error
             raise InputError(
                 "law",
-                f"{self.scenario.law!r} cannot be differentiated "
+                f"{self.scenario.only.law!r} cannot be differentiated "
                 f"({type(own).__name__}: {own}); write it with pydrake.math "
                 "(exp, sqrt, ...) instead of math and numpy",
             ) from error
@@ -308,7 +308,7 @@ class IdealLoop:
         context = self.follower.diagram.CreateDefaultContext()
         state = get_state(context)
         speed = math.hypot(*v_WP)
-        wheel = speed / self.scenario.robot.wheel_radius_m
+        wheel = speed / self.scenario.only.robot.wheel_radius_m
         still = [*pose_WB, 0.0, 0.0]
         state[self.indices("plant")] = [*still, wheel, wheel]
         state[self.indices("odometry")] = still

@@ -30,7 +30,7 @@ def ideal_scenario(scenario: Scenario) -> Scenario:
     Raises:
         ValueError: Its wheels can slip.
     """
-    require_rolling(scenario.plant)
+    require_rolling(scenario.only.plant)
     return changed(scenario, _ALL_IDEAL)
 
 
@@ -100,26 +100,26 @@ def require_ideal(scenario: Scenario) -> None:
     """
     scenario.require_one_robot("a linear model")
     scenario.require_one_rate("a linear model")
-    require_rolling(scenario.plant)
-    hearing = scenario.ideal_hearing
+    require_rolling(scenario.only.plant)
+    hearing = scenario.follower.ideal_hearing
     checks = (
         (
-            scenario.hearing == "ideal",
+            scenario.follower.hearing == "ideal",
             "hearing",
             "'audio' has no linear model, because a waveform has no equilibrium",
         ),
         (
-            scenario.obstacle_sensing == "ideal",
+            scenario.follower.obstacle_sensing == "ideal",
             "obstacle_sensing",
             "'ultrasonic' has no linear model, because ranges of cones jump",
         ),
         (
-            not scenario.odometry.rounding,
+            not scenario.only.odometry.rounding,
             "odometry.rounding",
             "a rounded wheel angle has no derivative",
         ),
         (
-            scenario.guard is None,
+            scenario.follower.guard is None,
             "guard",
             (
                 "the decisions of a guard have no derivative, and a guard that "

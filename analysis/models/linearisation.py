@@ -87,7 +87,7 @@ def blockwise_model(point: OperatingPoint) -> LinearModel:
 
 def _control_point(point: OperatingPoint) -> NDArray[np.float64]:
     """(7, 7) from pose_WB and what follows to p_WP and what follows."""
-    epsilon = point.loop.scenario.robot.control_point_m
+    epsilon = point.loop.scenario.only.robot.control_point_m
     matrix = np.eye(len(_OUTPUTS))
     matrix[0, 2] = -epsilon * math.sin(point.theta_WB)
     matrix[1, 2] = epsilon * math.cos(point.theta_WB)

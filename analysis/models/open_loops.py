@@ -162,13 +162,13 @@ def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
     Raises:
         InputError: There is no spring, hence no target loop.
     """
-    if scenario.attraction.stiffness_n_m == 0.0:
+    if scenario.follower.attraction.stiffness_n_m == 0.0:
         raise InputError(
             "attraction.stiffness_n_m",
             "is 0, and without a spring there is no loop to the target; set it above 0",
         )
     stiffness, damping = _attraction_slopes(scenario)
-    mass = scenario.robot.mass_kg
+    mass = scenario.only.robot.mass_kg
     A = np.array([[0.0, 1.0], [0.0, 0.0]])
     C = np.array([[stiffness, 0.0]]) / mass
     if at == "sensor":
@@ -189,7 +189,7 @@ def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
 
 def _attraction_slopes(scenario: Scenario) -> tuple[float, float]:
     """Stiffness, N/m, and damping, N s/m, towards a lone source at rest."""
-    distance = scenario.attraction.follow_distance_m + 2.0
+    distance = scenario.follower.attraction.follow_distance_m + 2.0
     alone = {
         "law": "none",
         "obstacles": [],

@@ -73,7 +73,10 @@ class OperatingPoint:
     @property
     def offset_m(self) -> float:
         """How much farther from the source than ``follow_distance_m``, m."""
-        return self.source_distance_m - self.loop.scenario.attraction.follow_distance_m
+        return (
+            self.source_distance_m
+            - self.loop.scenario.follower.attraction.follow_distance_m
+        )
 
     @property
     def axes(self) -> NDArray[np.float64]:
@@ -171,7 +174,7 @@ def motion_model(
     names = point.loop.state_names
     kick = [names.index(f"command.v_WP_{axis}") for axis in "xy"]
     x, y, theta = (names.index(f"plant.{name}") for name in ("x", "y", "theta"))
-    epsilon = point.loop.scenario.robot.control_point_m
+    epsilon = point.loop.scenario.only.robot.control_point_m
     C = np.zeros((3, len(A)))
     C[0, x] = C[1, y] = C[2, theta] = 1.0
     C[0, theta] = -epsilon * math.sin(point.theta_WB)
@@ -216,7 +219,7 @@ def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> Operating
         )
     to_source = field_.p_WS - p_WP
     theta = math.atan2(to_source[1], to_source[0])
-    x, y = control_point((*p_WP, theta), -loop.scenario.robot.control_point_m)
+    x, y = control_point((*p_WP, theta), -loop.scenario.only.robot.control_point_m)
     state, time_s = loop.settled_state((x, y, theta))
     return OperatingPoint(
         loop=loop,
@@ -249,7 +252,7 @@ def moving_equilibrium(
         InputError: The source is too fast or at rest, or no distance balances.
     """
     vx, vy = velocity_W or (scenario.source.speed_m_s, 0.0)
-    speed, top = math.hypot(vx, vy), scenario.robot.top_speed_m_s
+    speed, top = math.hypot(vx, vy), scenario.only.robot.top_speed_m_s
     if not 0.0 < speed < top:
         raise InputError(
             "velocity_W",
@@ -257,10 +260,10 @@ def moving_equilibrium(
             f"a speed above 0 and below robot.top_speed_m_s = {top:g} m/s",
         )
     loop = ideal_loop(_steady_scenario(scenario, vx, vy))
-    attraction = loop.scenario.attraction
+    attraction = loop.scenario.follower.attraction
     heading = np.array([vx, vy]) / speed
     theta = math.atan2(vy, vx)
-    epsilon = loop.scenario.robot.control_point_m
+    epsilon = loop.scenario.only.robot.control_point_m
 
     p_WS = np.array(loop.scenario.source.path().pose(_STEADY_S)[:2])
 
@@ -318,8 +321,10 @@ def _moving_point(
     read = [("controller", "acceleration_W")]
     found = loop.period_derivatives(state, time_s, outputs=read)
     pose = state[loop.indices("plant")[:3]]
-    p_WP = np.array(control_point(pose.tolist(), loop.scenario.robot.control_point_m))
-    mass = loop.scenario.robot.mass_kg
+    p_WP = np.array(
+        control_point(pose.tolist(), loop.scenario.only.robot.control_point_m)
+    )
+    mass = loop.scenario.only.robot.mass_kg
     return OperatingPoint(
         loop=loop,
         p_WP=p_WP,

@@ -199,7 +199,7 @@ def point_mass(scenario: Scenario) -> PointMass:
             more bodies than the controller takes.
     """
     bodies = scenario.bodies()
-    all_bodies = scenario.collision_vector.aggregation == "sum"
+    all_bodies = scenario.follower.collision_vector.aggregation == "sum"
     if all_bodies and len(bodies) > 3:
         raise InputError(
             "collision_vector.aggregation",
@@ -208,12 +208,12 @@ def point_mass(scenario: Scenario) -> PointMass:
             "obstacles",
         )
     rectangles = np.array([body.rectangle(0.0) for body in bodies.values()])
-    attraction, robot = scenario.attraction, scenario.robot
+    attraction, robot = scenario.follower.attraction, scenario.only.robot
     return PointMass(
         law=radial_law(scenario),
         rectangles=rectangles,
         p_WS=rectangles[-1, :2].copy(),
-        p_WP=np.array(control_point(scenario.start.pose, robot.control_point_m)),
+        p_WP=np.array(control_point(scenario.only.start.pose, robot.control_point_m)),
         stiffness_n_m=attraction.stiffness_n_m,
         damping_n_s_m=attraction.damping_n_s_m,
         follow_distance_m=attraction.follow_distance_m,

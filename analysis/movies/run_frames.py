@@ -74,7 +74,7 @@ class RunFrames:
         named = [(look.result.name, look.colour) for look in self._looks]
         named += [
             (name, COLOURS["source" if name in followed else "interferer"])
-            for name in scenario.all_sources
+            for name in scenario.sources
         ]
         if scenario.obstacles:
             named.append(("obstacles", COLOURS["obstacle"]))
@@ -148,7 +148,7 @@ class RunFrames:
         found: list[Any] = []
         scenario = self._result.full_scenario
         followed, sounds = followed_sources(scenario), scenario.sounds()
-        for name, source in scenario.all_sources.items():
+        for name, source in scenario.sources.items():
             role = "source" if name in followed else "interferer"
             pose = source.path().pose(time)
             if source.body:
@@ -188,12 +188,15 @@ class RunFrames:
         tick, scenario = tick_at(own, time), own.scenario
         pose = own.poses("WB")[tick]
         found: list[Any] = []
-        for sensor in range(scenario.ultrasonic.count):
+        for sensor in range(scenario.sensing.ultrasonic.count):
             if f"range_{sensor + 1}" not in own.columns:
                 continue
             echo = own.columns[f"echo_{sensor + 1}"][tick] > 0.5
             x, y, theta = compose(pose, sensor_pose(scenario, sensor))
-            half, axis = scenario.ultrasonic.beam_half_angle_deg, np.degrees(theta)
+            half, axis = (
+                scenario.sensing.ultrasonic.beam_half_angle_deg,
+                np.degrees(theta),
+            )
             cone = Wedge(
                 (float(x), float(y)),
                 float(own.columns[f"range_{sensor + 1}"][tick]),
@@ -205,10 +208,12 @@ class RunFrames:
         way = own.vector("p_WP")[:, : tick + 1]
         found += self._axes.plot(*way, color=colour, linewidth=1.6)
         found.append(
-            self._add_body(robot_rectangle(pose, scenario.robot), colour, alpha=0.55)
+            self._add_body(
+                robot_rectangle(pose, scenario.only.robot), colour, alpha=0.55
+            )
         )
-        if scenario.route is None and scenario.searches != "odor":
-            bar = microphones_W(pose, scenario.robot).T
+        if scenario.only.kind != "router" and scenario.only.searches != "odor":
+            bar = microphones_W(pose, scenario.only.robot).T
             found += self._axes.plot(*bar, "-o", color=colour, ms=3.2, lw=2.0)
         if "target_valid" in own.columns and own.columns["target_valid"][tick] > 0.5:
             x, y = own.vector("p_WS_estimated")[:, tick]

@@ -137,7 +137,7 @@ def simulate_oscillation(
         InputError: The law is not known.
     """
     result = simulate(_head_on_scenario(contact, term, start_m, duration_s))
-    face = contact.scenario.robot.control_point_m + start_m
+    face = contact.scenario.only.robot.control_point_m + start_m
     clearances = face - result.columns["p_WP_x"]
     cycles = _cycles(result.time, clearances)
     return OscillationRun(result.time, clearances, result.cause, *cycles)
@@ -148,9 +148,9 @@ def _head_on_scenario(
 ) -> Scenario:
     """P at rest ``start_m`` before a box, the goal ``to_go_m`` behind its face."""
     scenario = contact.scenario
-    face = scenario.robot.control_point_m + start_m
+    face = scenario.only.robot.control_point_m + start_m
     follow = max(
-        scenario.attraction.follow_distance_m,
+        scenario.follower.attraction.follow_distance_m,
         _BOX_M[0] + _ROOM_BEHIND_M - contact.to_go_m,
     )
     middle, far = face + 0.5 * _BOX_M[0], face + contact.to_go_m + follow

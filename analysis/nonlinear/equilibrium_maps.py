@@ -210,7 +210,7 @@ def _map(
         case = boxes_scenario(scenario, boxes(value), sensing)
         found = _end_of_run(case) if sensing == "cones" else _minima(case, cell_m)
         points += [RestPoint(value, x, y, outcome) for x, y, outcome in found]
-    return EquilibriumMap(scenario.law, parameter, sensing, values, tuple(points))
+    return EquilibriumMap(scenario.only.law, parameter, sensing, values, tuple(points))
 
 
 def _minima(case: Scenario, cell_m: float) -> list[tuple[float, float, str]]:

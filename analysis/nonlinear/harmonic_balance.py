@@ -84,7 +84,7 @@ def predict_oscillation(
         Centre, m, growth, 1/s, and frequency, rad/s, by amplitude, m.
     """
     chain = motion_chain(contact.scenario)
-    mass = contact.scenario.robot.mass_kg
+    mass = contact.scenario.only.robot.mass_kg
     frequency = np.sqrt(max(contact.stiffness_n_m, 1e-6) / mass)
     guess = np.array([contact.equilibrium_m, 0.0, frequency])
     rows = []
@@ -97,7 +97,7 @@ def predict_oscillation(
         guess = found.x
         rows.append([amplitude, *found.x])
     table = np.array(rows).reshape(-1, 4)
-    top = contact.scenario.robot.top_speed_m_s
+    top = contact.scenario.only.robot.top_speed_m_s
     below = table[table[:, 0] * table[:, 3] <= top, 0]
     return OscillationPrediction(
         amplitudes_m=table[:, 0],
@@ -131,7 +131,10 @@ def _imbalance(
     inverse = np.linalg.solve(z * np.eye(len(chain.A)) - chain.A, chain.B[:, 0])
     position, velocity = chain.C @ inverse
     scenario = contact.scenario
-    mass, damping = scenario.robot.mass_kg, scenario.attraction.damping_n_s_m
+    mass, damping = (
+        scenario.only.robot.mass_kg,
+        scenario.follower.attraction.damping_n_s_m,
+    )
     gap = mass + damping * velocity - harmonic * position
     gap = gap / (mass * abs(position))
     return np.array([force.mean(), gap.real, gap.imag])

@@ -72,7 +72,7 @@ def head_on_model(contact: HeadOn) -> PointMass:
     P is at x = -c, y = 0.
     """
     scenario = contact.scenario
-    follow = max(scenario.attraction.follow_distance_m, 1.0)
+    follow = max(scenario.follower.attraction.follow_distance_m, 1.0)
     p_WS = np.array([contact.to_go_m + follow, 0.0])
     depth = _FACE_M[1]
     return PointMass(
@@ -80,11 +80,11 @@ def head_on_model(contact: HeadOn) -> PointMass:
         rectangles=np.array([[0.5 * depth, 0.0, 0.0, depth, 2.0 * _FACE_M[0]]]),
         p_WS=p_WS,
         p_WP=np.array([-1.0, 0.0]),
-        stiffness_n_m=scenario.attraction.stiffness_n_m,
-        damping_n_s_m=scenario.attraction.damping_n_s_m,
+        stiffness_n_m=scenario.follower.attraction.stiffness_n_m,
+        damping_n_s_m=scenario.follower.attraction.damping_n_s_m,
         follow_distance_m=follow,
-        mass_kg=scenario.robot.mass_kg,
-        top_speed_m_s=scenario.robot.top_speed_m_s,
+        mass_kg=scenario.only.robot.mass_kg,
+        top_speed_m_s=scenario.only.robot.top_speed_m_s,
         all_bodies=False,
     )
 
@@ -114,7 +114,7 @@ def phase_portrait(
     contact = head_on(scenario, to_go_m=to_go_m)
     term = velocity_term or scenario.repulsion.velocity_term
     model = head_on_model(contact)
-    least = scenario.ultrasonic.minimum_range_m
+    least = scenario.follower.ultrasonic.minimum_range_m
     c = np.linspace(least + 0.005, 1.5, points)
     rate = np.linspace(-model.top_speed_m_s, model.top_speed_m_s, points)
     grid_c, grid_rate = np.meshgrid(c, rate, indexing="ij")

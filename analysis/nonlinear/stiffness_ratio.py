@@ -51,7 +51,7 @@ def stiffness_ratio_map(
     """
     contact = head_on(scenario.model_copy(update={"law": "active"}), to_go_m=to_go_m)
     gains = scenario.repulsion.active
-    stiffness = scenario.attraction.stiffness_n_m
+    stiffness = scenario.follower.attraction.stiffness_n_m
     c = np.arange(_RATIO_STEP_M, contact.law.range_m, _RATIO_STEP_M)
     pull = stiffness * (contact.to_go_m + c)
     outer, inner = [], []

@@ -170,7 +170,7 @@ def velocity_term_analysis(
     """
     contact = head_on(scenario, to_go_m=to_go_m)
     _, slope = contact.law.gradient(contact.equilibrium_m, 0.0)
-    damping = scenario.attraction.damping_n_s_m
+    damping = scenario.follower.attraction.damping_n_s_m
     variants: dict[str, VelocityTermVariant] = {}
     for term in VARIANTS:
         sides = [
@@ -178,7 +178,7 @@ def velocity_term_analysis(
                 direction,
                 contact.stiffness_n_m,
                 damping + added,
-                scenario.robot.mass_kg,
+                scenario.only.robot.mass_kg,
             )
             for direction, added in (
                 ("approaching", slope),
@@ -203,7 +203,7 @@ def describe_velocity_term(
     Returns:
         Bias, N, and damping, N s/m, by amplitude of the speed, m/s.
     """
-    top = contact.scenario.robot.top_speed_m_s
+    top = contact.scenario.only.robot.top_speed_m_s
     amplitudes = top * (np.arange(points) + 1.0) / points
     c = contact.equilibrium_m
     rest = contact.law.force(c)

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from analysis.reporting.palette import COLOURS
 from diagrams import RunResult
+from diagrams.scenario.participants import OdorSearcher
 
 #: Names of what a robot is at, by number, of each kind of search.
 _PHASES = {
@@ -27,7 +28,7 @@ def search_panels(result: RunResult) -> list[Callable[[Axes, RunResult], None]]:
     Returns:
         Panels, each called with its axes and the result.
     """
-    if result.scenario.searches == "odor":
+    if result.scenario.only.searches == "odor":
         return [_distance, _gas, _airflow, _heading, _phase]
     return [_distance, _bearing, _level, _heading, _phase]
 
@@ -51,7 +52,7 @@ def call_time(result: RunResult) -> float | None:
 
 def _distance(axes: Axes, result: RunResult) -> None:
     columns, stop = result.columns, result.scenario.stop
-    smells = result.scenario.searches == "odor"
+    smells = result.scenario.only.searches == "odor"
     away = np.hypot(*(result.vector("p_WB") - result.vector("p_WS")))
     axes.plot(result.time, away, color=COLOURS["source"], label="true")
     if "source_range" in columns:
@@ -91,8 +92,10 @@ def _airflow(axes: Axes, result: RunResult) -> None:
         ("airflow_right", "F2, right", "right"),
     )
     _curves(axes, result, sides, 0.7)
-    if result.scenario.search.rules == "song2011":
-        threshold = result.scenario.search.song2011.airflow_threshold
+    searcher = result.scenario.searcher
+    assert isinstance(searcher, OdorSearcher)
+    if searcher.search.rules == "song2011":
+        threshold = searcher.search.song2011.airflow_threshold
         axes.axhline(threshold, color="black", ls="--", lw=1.0, label="threshold")
     axes.set_ylabel("airflow")
     axes.set_ylim(bottom=0.0)
@@ -121,8 +124,9 @@ def _heading(axes: Axes, result: RunResult) -> None:
 
 
 def _phase(axes: Axes, result: RunResult) -> None:
-    smells = result.scenario.searches == "odor"
-    names = _PHASES[result.scenario.search.rules if smells else "sound"]
+    searcher = result.scenario.searcher
+    smells = isinstance(searcher, OdorSearcher)
+    names = _PHASES[searcher.search.rules if smells else "sound"]
     phase = result.columns["search_phase"]
     axes.plot(result.time, phase, color=COLOURS["robot"], lw=1.2, label="phase")
     shades = [("moves", result.columns["move"] > 0.5, "seen", 0.2)]

@@ -74,7 +74,7 @@ def record_searches(
     if result.full_scenario.odor is not None:
         _record_plume(meshcat, result)
     for name, own in result.robots.items():
-        if own.scenario.searches is not None:
+        if own.scenario.only.searches is not None:
             _record_lamp(meshcat, own, f"{paths[name]}/lamp")
             frames = result.world.get(f"{name}.frames")
             if frames is not None:

@@ -82,7 +82,7 @@ def arrows(own: RunResult, m_per_n: float | None) -> list[Arrow]:
 
 def _commanded(own: RunResult) -> NDArray[np.float64]:
     """(n, 2) velocity of P in W that the commanded wheel speeds would give, m/s."""
-    robot, theta = own.scenario.robot, own.columns["theta_WB"]
+    robot, theta = own.scenario.only.robot, own.columns["theta_WB"]
     left = robot.wheel_radius_m * own.columns["wheel_speed_left"]
     right = robot.wheel_radius_m * own.columns["wheel_speed_right"]
     aside = robot.control_point_m * (right - left) / robot.wheel_separation_m

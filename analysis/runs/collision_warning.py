@@ -45,7 +45,10 @@ def collision_warning(result: RunResult) -> dict[str, float | None]:
 def _echoes(result: RunResult, name: str) -> NDArray[np.bool_]:
     """(n,) whether any cone's echo was that body's, at the ticks."""
     scenario, columns = result.scenario, result.columns
-    sensors, control_point_m = scenario.ultrasonic, scenario.robot.control_point_m
+    sensors, control_point_m = (
+        scenario.sensing.ultrasonic,
+        scenario.only.robot.control_point_m,
+    )
     bodies = result.surroundings.bodies[name].rectangles(result.time)
     ranges = _cone_ranges(result.poses("WB"), bodies, *sensors.beams, control_point_m)
     numbers = range(1, sensors.count + 1)

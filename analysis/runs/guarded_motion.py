@@ -42,13 +42,13 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
         What it did; None without a guard.
     """
     columns, scenario = result.columns, result.scenario
-    if scenario.own_guard is None or "guard_action" not in columns:
+    if scenario.only.own_guard is None or "guard_action" not in columns:
         return None
     guard = MotionGuard(
-        parameters=scenario.own_guard,
-        known=scenario.free_space,
-        robot=scenario.robot,
-        plant=scenario.plant,
+        parameters=scenario.only.own_guard,
+        known=scenario.follower.free_space,
+        robot=scenario.only.robot,
+        plant=scenario.only.plant,
         tick_s=scenario.tick_s,
     )
     braking = guard.step.numbers.braking

@@ -70,9 +70,9 @@ def has_known_space(result: RunResult) -> bool:
         Whether it has a guard, and sensors and a map of ours.
     """
     scenario = result.scenario
-    if result.several or scenario.own_guard is None:
+    if result.several or scenario.only.own_guard is None:
         return False
-    own = {import_own(name, "blocks").part for name in scenario.blocks}
+    own = {import_own(name, "blocks").part for name in scenario.only.blocks}
     columns = {
         *_POSE,
         *_WHEELS,
@@ -92,20 +92,20 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
         The same map at every tick of the log, changed: copy what is to be kept.
     """
     scenario, tick_s = result.scenario, result.scenario.tick_s
-    sensors = scenario.ultrasonic
+    sensors = scenario.sensing.ultrasonic
     block = FreeSpaceMap(
-        parameters=scenario.free_space,
+        parameters=scenario.follower.free_space,
         sensors=sensors,
-        robot=scenario.robot,
-        odometry=scenario.odometry,
-        plant=scenario.plant,
+        robot=scenario.only.robot,
+        odometry=scenario.only.odometry,
+        plant=scenario.only.plant,
         tick_s=tick_s,
     )
     integrator = scenario.integrator
     run = RunFacts(
         len(result.time),
         tick_s,
-        scenario.start.pose,
+        scenario.only.start.pose,
         integrator.scheme,
         integrator.step_s,
         lambda _: 0,
@@ -129,7 +129,7 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
         the odometry, m and rad, and (2,) the wheel speeds commanded until then, rad/s.
     """
     scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
-    sensors = scenario.ultrasonic
+    sensors = scenario.sensing.ultrasonic
     ticks = np.rint(result.time / tick_s).astype(np.int64)
     # Of sensors that fire in turn the log does not tell which one has just fired.
     since = (ticks[:, None] - sensors.turns(tick_s)) % sensors.round_ticks(tick_s)
@@ -175,7 +175,7 @@ def known_space(result: RunResult, times: ArrayLike) -> KnownSpace | None:
 
 def _numbered(name: str, scenario: Scenario) -> list[str]:
     """Columns of a quantity of each sensor."""
-    return [f"{name}_{k}" for k in range(1, scenario.ultrasonic.count + 1)]
+    return [f"{name}_{k}" for k in range(1, scenario.sensing.ultrasonic.count + 1)]
 
 
 #: Of a map's cells that are known: the first one's i and j, which are free, and hits.

@@ -52,7 +52,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
             for metric, value in run_metrics(own).items()
         }
     proximity = Proximity(result)
-    if result.scenario.searches is not None:
+    if result.scenario.only.searches is not None:
         return search_metrics(proximity)
     return {
         **_proximity_metrics(proximity),
@@ -70,7 +70,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
 def following_error(result: RunResult) -> NDArray[np.float64]:
     """Distance of P from the source, less the follow distance, (n,) m."""
     distance = result.columns["source_range_true"]
-    return distance - result.scenario.follow_distance_m
+    return distance - result.scenario.only.follow_distance_m
 
 
 def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
@@ -119,7 +119,7 @@ def _speed_of_P(result: RunResult) -> NDArray[np.float64]:
     """(n,) m/s."""
     theta, turning = result.columns["theta_WB"], result.columns["omega_WB"]
     velocity = *result.vector("v_WB"), turning
-    offset = result.scenario.robot.control_point_m
+    offset = result.scenario.only.robot.control_point_m
     return _lengths(control_point_velocity(theta, velocity, offset))
 
 
@@ -129,11 +129,11 @@ def _shortest_path(result: RunResult) -> float | None:
     around = result.surroundings
     boxes = [b.rectangle(0.0) for b in around.obstacles.values() if not b.path.moves]
     length = shortest_path_length(
-        scenario.start.position_m,
+        scenario.only.start.position_m,
         around.followed.path.pose(0.0)[:2],
-        result.goal_radius_m + scenario.robot.control_point_m,
+        result.goal_radius_m + scenario.only.robot.control_point_m,
         boxes,
-        scenario.robot.width_m / 2.0,
+        scenario.only.robot.width_m / 2.0,
     )
     return length if np.isfinite(length) else None
 
@@ -151,14 +151,14 @@ def _spl(cause: str, length: float, shortest: float) -> float:
 
 def _way_metrics(proximity: Proximity) -> dict[str, float | None]:
     """Of a sound that is followed, or of a route."""
-    if proximity.result.scenario.route is None:
+    if proximity.result.scenario.only.kind != "router":
         return _following_metrics(proximity.result)
     return route_metrics(proximity)
 
 
 def _following_metrics(result: RunResult) -> dict[str, float | None]:
     """From the end of the second burst on; the share from the first detection on."""
-    sound, columns = result.scenario.sound, result.columns
+    sound, columns = result.scenario.source.sound, result.columns
     settled = result.time >= sound.start_s + sound.period_s + sound.on_s
     errors = np.abs(following_error(result))
     following = errors <= result.scenario.stop.following_band_m
@@ -206,7 +206,7 @@ def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
 
 def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     """What the law and the wheels were asked for."""
-    columns, robot = result.columns, result.scenario.robot
+    columns, robot = result.columns, result.scenario.only.robot
     wheels = np.array([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
     variation = np.mean(np.abs(np.diff(wheels))) if len(result.time) > 1 else 0.0
     pulling = _lengths(result.vector("v_WP"))
@@ -241,7 +241,7 @@ def _force_metrics(result: RunResult) -> dict[str, float | None]:
 
 def _impossible_speeds(result: RunResult) -> int | None:
     """Ticks at which the law took an obstacle to be faster than any can be."""
-    columns, top = result.columns, result.scenario.robot.top_speed_m_s
+    columns, top = result.columns, result.scenario.only.robot.top_speed_m_s
     if "obstacle_speed_1" not in columns:
         return None
     speeds = np.array([columns[f"obstacle_speed_{k}"] for k in (1, 2, 3)])
@@ -254,7 +254,7 @@ def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
     error = _lengths(result.vector("p_WB_estimated") - result.vector("p_WB"))
     turned = columns["theta_WB_estimated"] - columns["theta_WB"]
     slip = None
-    if result.scenario.plant.friction is not None:
+    if result.scenario.only.plant.friction is not None:
         wheels = np.stack([columns["slip_left"], columns["slip_right"]])
         speeds = _lengths((wheels, columns["slip_sideways"]))
         slip = float(np.sum(np.mean(speeds, axis=0))) * result.scenario.tick_s
@@ -351,20 +351,20 @@ def _sounding(result: RunResult) -> NDArray[np.bool_]:
     """(n,) whether the last frame held sound for half or more."""
     scenario, time = result.scenario, result.time
     travel = np.zeros(len(time))
-    if scenario.hearing == "audio":
+    if scenario.follower.hearing == "audio":
         # The distance as it is at the frame's end, half a frame too late.
         travel = result.columns["source_range_true"] / scenario.acoustics.c
-    elif not scenario.ideal_hearing.burst_gaps:
+    elif not scenario.follower.ideal_hearing.burst_gaps:
         return np.ones(len(time), dtype=bool)
-    middle = 0.5 * scenario.microphones.frame_s
-    sounds: NDArray[np.bool_] = scenario.sound.sounds(time - middle - travel)
+    middle = 0.5 * scenario.follower.microphones.frame_s
+    sounds: NDArray[np.bool_] = scenario.source.sound.sounds(time - middle - travel)
     return sounds
 
 
 def _new_frames(result: RunResult) -> NDArray[np.bool_]:
     """(n,) whether a frame of the run ends at a tick."""
     tick_s = result.scenario.tick_s
-    ticks_a_frame = round(result.scenario.microphones.frame_s / tick_s)
+    ticks_a_frame = round(result.scenario.follower.microphones.frame_s / tick_s)
     ticks = np.rint(result.time / tick_s).astype(int)
     fresh: NDArray[np.bool_] = (ticks > 0) & (ticks % ticks_a_frame == 0)
     return fresh

@@ -33,7 +33,7 @@ class Proximity:
     @cached_property
     def robot(self) -> NDArray[np.float64]:
         """(n, 5) the robot's rectangle at the ticks."""
-        return rectangles_at(self.result.poses("WB"), self.result.scenario.size)
+        return rectangles_at(self.result.poses("WB"), self.result.scenario.only.size)
 
     @cached_property
     def bodies(self) -> NDArray[np.float64]:
@@ -73,7 +73,7 @@ class Proximity:
         times = (time[ticks, None] + part * np.diff(time)[ticks, None]).ravel()
         step = np.diff(poses, axis=0)[ticks]
         between = poses[ticks, None] + part[:, None] * step[:, None]
-        robot = rectangles_at(between.reshape(-1, 3), self.result.scenario.size)
+        robot = rectangles_at(between.reshape(-1, 3), self.result.scenario.only.size)
         paths = self.result.surroundings.bodies.values()
         bodies = np.reshape(
             [body.rectangles(times) for body in paths], (-1, len(times), 5)

@@ -116,7 +116,7 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
     scenario = result.full_scenario
     paths = {name: robot_path(own, result) for name, own in result.robots.items()}
     estimates = {name: estimate_path(path) for name, path in paths.items()}
-    sources = [(source_path(scenario, name), name) for name in scenario.all_sources]
+    sources = [(source_path(scenario, name), name) for name in scenario.sources]
     obstacles = [(f"obstacles/{o.name}", o.name) for o in scenario.obstacles]
     robots = [(path, name) for name, path in paths.items()]
     return ReplayFacts(
@@ -171,7 +171,7 @@ def _build_scene(meshcat: Meshcat, result: RunResult) -> None:
     replay_scene.add_room(meshcat, scenario)
     replay_scene.add_obstacles(meshcat, scenario)
     followed = followed_sources(scenario)
-    for name, source in scenario.all_sources.items():
+    for name, source in scenario.sources.items():
         role = "source" if name in followed else "interferer"
         replay_scene.add_source(meshcat, source, source_path(scenario, name), role)
     for look in looks(result):
@@ -227,7 +227,7 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
         _record_estimate(meshcat, own, estimate_path(path))
         p_WP = own.vector("p_WP").T
         _record_trail(meshcat, own, f"trail/{path}", p_WP, look.colour)
-        if own.scenario.route is not None:
+        if own.scenario.only.kind == "router":
             _record_target(meshcat, own, path, frames, look.estimates)
             _record_gains(meshcat, own, path, frames)
         if own.name in sounds:
@@ -241,7 +241,7 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
     paths = {name: robot_path(own, result) for name, own in result.robots.items()}
     record_searches(meshcat, result, paths)
     followed = followed_sources(scenario)
-    for name, source in scenario.all_sources.items():
+    for name, source in scenario.sources.items():
         role = "source" if name in followed else "interferer"
         path = source_path(scenario, name)
         poses = source.path().poses(result.time)
@@ -258,9 +258,12 @@ def _record_follow_distance(
     meshcat: Meshcat, own: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
     """A ring about what is followed, on which P is to be."""
-    if own.scenario.searches is not None or not own.scenario.follow_distance_m:
+    if (
+        own.scenario.only.searches is not None
+        or not own.scenario.only.follow_distance_m
+    ):
         return
-    ring, radius = f"follow/{path}", own.scenario.follow_distance_m
+    ring, radius = f"follow/{path}", own.scenario.only.follow_distance_m
     replay_scene.add_disc_edge(meshcat, ring, radius, "law")
     seen = frames if own.target_moves else frames[:1]
     _record_path(meshcat, ring, seen, _at_frames(own, own.poses("WS"), seen))
@@ -307,7 +310,7 @@ def _record_robot(
         for time, angle in zip(frames, turned, strict=True):
             spin = upright(0.0, 0.0, 0.0, angle)
             meshcat.SetTransform(f"{path}/{side}/wheel", spin, float(time))
-    for number in range(1, result.scenario.ultrasonic.count + 1):
+    for number in range(1, result.scenario.sensing.ultrasonic.count + 1):
         if f"echo_{number}" in result.columns:
             echo = result.columns[f"echo_{number}"] > 0.5
             cone = f"{path}/cone_{number}"
@@ -317,7 +320,7 @@ def _record_robot(
 
 def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
     """Angles of wheels that roll without slip on the robot's path, (n,) rad."""
-    robot, path = result.scenario.robot, result.poses("WB")
+    robot, path = result.scenario.only.robot, result.poses("WB")
     theta = np.unwrap(path[:, 2])
     between = 0.5 * (theta[1:] + theta[:-1])
     steps = np.diff(path[:, :2], axis=0)
@@ -331,7 +334,7 @@ def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
 
 def _called_on(own: RunResult, sound: SoundParameters) -> SoundParameters:
     """The sound of a robot's loudspeaker, from its call on if it calls."""
-    if own.scenario.searches != "odor":
+    if own.scenario.only.searches != "odor":
         return sound
     since = call_time(own)
     start = own.simulated_s if since is None else since + sound.start_s
@@ -452,7 +455,7 @@ def known_times(result: RunResult) -> list[float]:
     Each half second, or so seldom that fine cells do not fill the memory.
     """
     end, scenario = result.simulated_s, result.scenario
-    most = max(2, MOST_CELLS // scenario.free_space.cells**2)
+    most = max(2, MOST_CELLS // scenario.follower.free_space.cells**2)
     period = max(KNOWN_PERIOD_S, end / most)
     first = min(FIRST_TICKS * scenario.tick_s, end)
     return [first, *np.arange(period, end, period).tolist(), end]

@@ -35,10 +35,10 @@ def replay_layers(
 def _bodies(result: RunResult) -> list[Layer]:
     scenario, followed = result.full_scenario, followed_sources(result.full_scenario)
     found = [
-        Layer(look.result.name, f"law {look.result.scenario.law}", (look.colour,))
+        Layer(look.result.name, f"law {look.result.scenario.only.law}", (look.colour,))
         for look in looks(result)
     ]
-    for name in scenario.all_sources:
+    for name in scenario.sources:
         if name in followed:
             found.append(Layer(name, "what is followed", (COLOURS["source"],)))
         else:
@@ -58,8 +58,8 @@ def _of_sensors(
     cones = [
         f"{paths[name]}/cone_{number}"
         for name, own in result.robots.items()
-        if own.scenario.searches is None
-        for number in range(1, own.scenario.ultrasonic.count + 1)
+        if own.scenario.only.searches is None
+        for number in range(1, own.scenario.sensing.ultrasonic.count + 1)
         if f"echo_{number}" in own.columns
     ]
     if cones:
@@ -69,12 +69,14 @@ def _of_sensors(
     balls = [
         estimates[name]
         for name, own in result.robots.items()
-        if own.scenario.searches is None
-        and ("p_WS_estimated_x" in own.columns or own.scenario.route is not None)
+        if own.scenario.only.searches is None
+        and ("p_WS_estimated_x" in own.columns or own.scenario.only.kind == "router")
     ]
     if balls:
         colours = tuple(look.estimates for look in looks(result))
-        routes = any(own.scenario.route for own in result.robots.values())
+        routes = any(
+            own.scenario.only.kind == "router" for own in result.robots.values()
+        )
         text = (
             "the target on the route"
             if routes
@@ -99,7 +101,7 @@ def _of_laws(result: RunResult, paths: dict[str, str]) -> list[Layer]:
         found.append(Layer("forces", text, colours, tuple(forces)))
     laws = tuple(arrow_path(path, "law") for path in paths.values())
     if any(
-        own.scenario.follow_distance_m and own.scenario.searches is None
+        own.scenario.only.follow_distance_m and own.scenario.only.searches is None
         for own in result.robots.values()
     ):
         text, laws = "path of 1 s at the command; follow distance", (*laws, "follow")
@@ -112,7 +114,7 @@ def _of_guards(result: RunResult, paths: dict[str, str]) -> list[Layer]:
     guarded = {
         name: own
         for name, own in result.robots.items()
-        if own.scenario.own_guard is not None
+        if own.scenario.only.own_guard is not None
     }
     if not guarded:
         return []
@@ -124,7 +126,7 @@ def _of_guards(result: RunResult, paths: dict[str, str]) -> list[Layer]:
         shades = tuple(lightened(look.seen, 0.35) for look in own_looks)
         floors = tuple(f"known/{paths[name]}" for name in guarded)
         found.append(Layer("known floor", "seen as free; dots: echoes", shades, floors))
-    if any(own.scenario.law == "guarded" for own in guarded.values()):
+    if any(own.scenario.only.law == "guarded" for own in guarded.values()):
         rings = tuple(f"tracked/{paths[name]}" for name in guarded)
         text = "bodies that the robot takes as moving"
         found.append(Layer("tracked", text, (COLOURS["tracked"],), rings))
@@ -142,7 +144,7 @@ def _of_world(result: RunResult, paths: dict[str, str]) -> list[Layer]:
     lamps = [
         path
         for name, robot in paths.items()
-        if result.robots[name].scenario.searches is not None
+        if result.robots[name].scenario.only.searches is not None
         for path in (f"{robot}/lamp", f"{robot}/radio")
     ]
     if lamps:
@@ -153,7 +155,7 @@ def _of_world(result: RunResult, paths: dict[str, str]) -> list[Layer]:
     adaptive = [
         f"{paths[name]}/{gain}"
         for name, own in result.robots.items()
-        if own.scenario.route is not None
+        if own.scenario.only.kind == "router"
         for gain in ("stiffness", "damping", "contact_stiffness")
         if gain in own.columns
     ]

@@ -175,7 +175,7 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
         estimate: Where the ball is that shows where it takes the source to be.
     """
     scenario = look.result.scenario
-    robot = scenario.robot
+    robot = scenario.only.robot
     width = BODY_WIDTH_FRACTION * robot.width_m
     body = Box(robot.length_m, width, ROBOT_HEIGHT_M - 0.04)
     middle = 0.5 * ROBOT_HEIGHT_M + 0.02
@@ -183,22 +183,25 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
     for side, y in (("left", 0.5), ("right", -0.5)):
         place = y * robot.wheel_separation_m
         _add_wheel(meshcat, scenario, f"{path}/{side}", place)
-    if not scenario.has_goal:
+    if not scenario.only.has_goal:
         _add_microphones(meshcat, scenario, path)
-    elif scenario.route is not None:
-        _add_goal(meshcat, scenario.route.goal_m, look.colour, path)
-    if scenario.obstacle_sensing == "ultrasonic" and scenario.searches is None:
-        for sensor in range(scenario.ultrasonic.count):
+    elif scenario.only.kind == "router":
+        _add_goal(meshcat, scenario.router.route.goal_m, look.colour, path)
+    if (
+        scenario.sensing.obstacle_sensing == "ultrasonic"
+        and scenario.only.searches is None
+    ):
+        for sensor in range(scenario.sensing.ultrasonic.count):
             _add_cone(meshcat, scenario, f"{path}/cone_{sensor + 1}", sensor)
-    if scenario.loudspeaker is not None:
+    if scenario.only.loudspeaker is not None:
         _add_loudspeaker(meshcat, path, ROBOT_HEIGHT_M, look.colour)
-    if scenario.searches is None:
+    if scenario.only.searches is None:
         meshcat.SetObject(estimate, Sphere(0.06), _colour(look.estimates))
 
 
 def _add_wheel(meshcat: Meshcat, scenario: Scenario, path: str, y: float) -> None:
     """A wheel that can be seen to turn: its axle is the z axis of ``wheel``."""
-    radius = scenario.robot.wheel_radius_m
+    radius = scenario.only.robot.wheel_radius_m
     meshcat.SetTransform(path, _placed(-0.5 * math.pi, 0.0, 0.0, [0.0, y, radius]))
     tyre = Cylinder(radius, WHEEL_WIDTH_M)
     meshcat.SetObject(f"{path}/wheel/tyre", tyre, Rgba(0.12, 0.12, 0.12))
@@ -215,7 +218,7 @@ def _add_goal(
 
 
 def _add_microphones(meshcat: Meshcat, scenario: Scenario, path: str) -> None:
-    robot = scenario.robot
+    robot = scenario.only.robot
     bar, grey = Box(0.02, robot.width_m, 0.02), Rgba(0.35, 0.35, 0.38)
     x, height = robot.control_point_m - 0.01, MICROPHONE_HEIGHT_M
     _put(meshcat, f"{path}/bar", bar, grey, x, 0.0, height - 0.03)
@@ -237,7 +240,9 @@ def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> N
     tilted = _placed(0.0, 0.5 * math.pi, axis, [x, y, SENSOR_HEIGHT_M])
     meshcat.SetTransform(path, tilted)
     length = 0.8
-    radius = length * math.tan(math.radians(scenario.ultrasonic.beam_half_angle_deg))
+    radius = length * math.tan(
+        math.radians(scenario.sensing.ultrasonic.beam_half_angle_deg)
+    )
     for look, role, alpha in (("echo", "echo", 0.55), ("empty", "empty", 0.18)):
         cone = MeshcatCone(length, 0.35 * radius, radius)
         meshcat.SetObject(f"{path}/{look}", cone, _colour(role, alpha))

@@ -123,10 +123,10 @@ def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
     Returns:
         From and to, s, of each burst; none of a robot that drives to a goal.
     """
-    if result.scenario.has_goal:
+    if result.scenario.only.has_goal:
         return []
-    sound, whole = result.scenario.sound, result.full_scenario
-    caller = whole.all_robots.get(whole.target(result.name))
+    sound, whole = result.scenario.source.sound, result.full_scenario
+    caller = whole.robots.get(whole.target(result.name))
     if caller is not None and caller.searches == "odor":
         since = call_time(result)
         if since is None:
@@ -182,7 +182,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     Raises:
         InputError: ``clearance`` has not one value a tick.
     """
-    hears = not result.scenario.has_goal
+    hears = not result.scenario.only.has_goal
     panels = time_panels(result)
     distance = None if clearance is None else np.asarray(clearance, dtype=float)
     if distance is not None and distance.shape != result.time.shape:
@@ -230,8 +230,10 @@ def time_panels(result: RunResult) -> list[Panel]:
     Returns:
         Panels, each called with its axes and the result.
     """
-    panels: list[Panel] = [_goal] if result.scenario.has_goal else [_range, _bearing]
-    if result.scenario.searches is not None:
+    panels: list[Panel] = (
+        [_goal] if result.scenario.only.has_goal else [_range, _bearing]
+    )
+    if result.scenario.only.searches is not None:
         panels = search_panels(result)
     if "attraction_x" in result.columns:  # a law may tell no forces
         panels.append(_forces)
@@ -263,7 +265,7 @@ def _heard(axes: Axes, result: RunResult, values: NDArray[np.float64]) -> None:
 
 def _range(axes: Axes, result: RunResult) -> None:
     columns = result.columns
-    follow = result.scenario.follow_distance_m
+    follow = result.scenario.only.follow_distance_m
     colour = COLOURS["source"]
     axes.plot(result.time, columns["source_range_true"], color=colour, label="true")
     if "source_range" in columns:
@@ -318,7 +320,7 @@ def _gains(axes: Axes, result: RunResult) -> None:
 
 
 def _speeds(axes: Axes, result: RunResult) -> None:
-    columns, robot = result.columns, result.scenario.robot
+    columns, robot = result.columns, result.scenario.only.robot
     theta = columns["theta_WB"]
     forward = columns["v_WB_x"] * np.cos(theta) + columns["v_WB_y"] * np.sin(theta)
     for side in ("left", "right"):
@@ -380,7 +382,7 @@ def _guard_distances(axes: Axes, result: RunResult) -> None:
     time, columns = result.time, result.columns
     spare, view = columns["guard_distance"], columns["guard_view_distance"]
     axes.plot(time, spare, color=COLOURS["robot"], label="to spare")
-    guard = result.scenario.own_guard
+    guard = result.scenario.only.own_guard
     if guard is not None and guard.obstacle_speed_m_s > 0.0:
         axes.plot(
             time,

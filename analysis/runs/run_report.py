@@ -33,7 +33,7 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
     document = {
         "schema_version": SCHEMA_VERSION,
         "scenario": result.full_scenario.name,
-        "law": result.full_scenario.law,
+        "law": result.full_scenario.only.law,
         "seed": result.full_scenario.seed,
         "engine": result.engine,
         **_outcome(result),
@@ -49,7 +49,7 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
     }
     if result.several:
         document["robots"] = {
-            name: {"law": own.scenario.law, **_outcome(own)}
+            name: {"law": own.scenario.only.law, **_outcome(own)}
             for name, own in result.several.items()
         }
     summary: dict[str, Any] = plain(document)
@@ -65,7 +65,7 @@ def _outcome(result: RunResult) -> dict[str, Any]:
         "collision": collision,
         "halts": halts,
     }
-    if result.scenario.searches is not None:
+    if result.scenario.only.searches is not None:
         faults = fault_names(result.columns["search_fault"][-1])
         ended |= {"reason": result.reason or None, "faults": faults}
     return ended
@@ -168,7 +168,7 @@ def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
         rows |= _robot_rows(result, summary["metrics"], "")
     rows["speed"] = f"{timing['real_time_factor']:.0f} times real time"
     for name, own in result.several.items():
-        rows |= {f"{name}": f"{_ended(own)}, law {own.scenario.law}"}
+        rows |= {f"{name}": f"{_ended(own)}, law {own.scenario.only.law}"}
         rows |= _robot_rows(own, summary["metrics"], f"{name}.")
     return rows
 
@@ -182,7 +182,7 @@ def _robot_rows(
     result: RunResult, metrics: dict[str, Any], prefix: str
 ) -> dict[str, str]:
     """What one robot did; names of rows and metrics begin with the prefix."""
-    attraction, stop = result.scenario.attraction, result.scenario.stop
+    attraction, stop = result.scenario.follower.attraction, result.scenario.stop
 
     def metric(name: str) -> Any:
         return metrics[f"{prefix}{name}"]
@@ -192,9 +192,9 @@ def _robot_rows(
         "distance at the end": _metres(metric("final_distance_m")),
         "path length": _metres(metric("path_length_m")),
     }
-    if result.scenario.searches is not None:
+    if result.scenario.only.searches is not None:
         rows |= _search_rows(result, metric)
-    elif result.scenario.route is None:
+    elif result.scenario.only.kind != "router":
         rows |= {
             "follow distance": _metres(attraction.follow_distance_m),
             "following": _percent(metric("following_fraction"))

@@ -76,7 +76,7 @@ def looks(result: RunResult) -> list[Look]:
     """Each robot of a run, in colours of its own where there are several."""
     if not result.several:
         look = Look(result, COLOURS["robot"], COLOURS["estimate"])
-        deaf = result.scenario.has_goal
+        deaf = result.scenario.only.has_goal
         return [look._replace(body_label="robot") if deaf else look]
     colours = cycle(ROBOT_COLOURS)
     return [
@@ -84,8 +84,10 @@ def looks(result: RunResult) -> list[Look]:
             own,
             colour,
             colour,
-            f"{name}, path of P" if own.scenario.route else f"path of P of {name}",
-            "" if own.scenario.has_goal else f"{name} with its microphones",
+            f"{name}, path of P"
+            if own.scenario.only.kind == "router"
+            else f"path of P of {name}",
+            "" if own.scenario.only.has_goal else f"{name} with its microphones",
             f"estimates of {name}; faint ones are early",
             colour,
             colour,
@@ -114,7 +116,9 @@ def run_title(result: RunResult) -> str:
     """What was run and how it ended, on one line."""
     told = result.several and result.cause not in SUCCESSFUL
     who = f"{result.name} " if told else ""
-    laws = ", ".join(dict.fromkeys(own.scenario.law for own in result.robots.values()))
+    laws = ", ".join(
+        dict.fromkeys(own.scenario.only.law for own in result.robots.values())
+    )
     return f"{result.full_scenario.name}, law {laws}: {who}{result.ending}"
 
 
@@ -142,9 +146,9 @@ def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
     Returns:
         x, y, theta of the sensor's frame U in B, m and rad.
     """
-    x, y = scenario.ultrasonic.places[sensor]
-    axis = math.radians(scenario.ultrasonic.axes_deg[sensor])
-    return scenario.robot.control_point_m + x, y, axis
+    x, y = scenario.sensing.ultrasonic.places[sensor]
+    axis = math.radians(scenario.sensing.ultrasonic.axes_deg[sensor])
+    return scenario.only.robot.control_point_m + x, y, axis
 
 
 def compose(
@@ -173,8 +177,8 @@ def moving_and_static(
 
 def followed_sources(scenario: Scenario) -> set[str]:
     """Names of the sources that a robot follows; the others interfere."""
-    return {scenario.target(name) for name in scenario.all_robots}.intersection(
-        scenario.all_sources
+    return {scenario.target(name) for name in scenario.robots}.intersection(
+        scenario.sources
     )
 
 
@@ -197,7 +201,7 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
         for own in result.robots.values()
         for body in ("WB", "WS")
     ]
-    paths: list[Path] = [each.path() for each in scenario.all_sources.values()]
+    paths: list[Path] = [each.path() for each in scenario.sources.values()]
     paths += [obstacle.path() for obstacle in scenario.obstacles]
     centres += [path.poses(times)[:, :2] for path in paths]
     points = np.concatenate(centres)
@@ -221,7 +225,7 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
         raise InputError("contact_point", f"the run ended by {result.cause!r}")
     body = result.surroundings.bodies[hit.object].rectangle(hit.time)
     pose = result.poses("WB")[tick_at(result, hit.time)]
-    footprint = robot_rectangle(pose, scenario.robot)
+    footprint = robot_rectangle(pose, scenario.only.robot)
     return touching_point(footprint, body)
 
 

@@ -50,14 +50,18 @@ def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
         for the sensors or the map.
     """
     scenario, columns = result.scenario, result.columns
-    if scenario.law != "guarded" or not has_known_space(result):
+    if scenario.only.law != "guarded" or not has_known_space(result):
         return None
     own, tick_s = scenario.repulsion.guarded, scenario.tick_s
     wanted = np.ravel(np.asarray(times, dtype=float))
     rows = np.unique(np.abs(result.time[:, None] - wanted).argmin(axis=0))
-    hazards = make_hazards(scenario.ultrasonic.count)
+    hazards = make_hazards(scenario.sensing.ultrasonic.count)
     sensors = hazard_sensors(
-        scenario.ultrasonic, scenario.robot, scenario.free_space, own, tick_s
+        scenario.sensing.ultrasonic,
+        scenario.only.robot,
+        scenario.follower.free_space,
+        own,
+        tick_s,
     )
     targets = result.vector("p_WS_estimated").T
     targets[columns["target_valid"] < 0.5] = np.inf

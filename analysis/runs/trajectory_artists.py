@@ -73,13 +73,13 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
         label=look.path_label,
         zorder=4,
     )
-    if scenario.route is not None:
+    if scenario.only.kind == "router":
         _draw_target(axes, look)
     for index, time in enumerate(times):
         pose = result.poses("WB")[tick_at(result, time)]
         _draw_body(
             axes,
-            robot_rectangle(pose, scenario.robot),
+            robot_rectangle(pose, scenario.only.robot),
             gid=f"robot at {time:g}",
             facecolor=(*to_rgb(colour), 0.10),
             edgecolor=colour,
@@ -87,10 +87,10 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
             label=(look.body_label or None) if index == 0 else None,
             zorder=3,
         )
-        if scenario.route is None and scenario.searches != "odor":
-            bar = microphones_W(pose, scenario.robot).T
+        if scenario.only.kind != "router" and scenario.only.searches != "odor":
+            bar = microphones_W(pose, scenario.only.robot).T
             axes.plot(*bar, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
-        _write_time(axes, robot_rectangle(pose, scenario.robot), time, colour)
+        _write_time(axes, robot_rectangle(pose, scenario.only.robot), time, colour)
 
 
 def _draw_target(axes: Axes, look: Look) -> None:
@@ -104,10 +104,8 @@ def _draw_target(axes: Axes, look: Look) -> None:
         label="paths of the targets" if several else "path of the target",
         zorder=3.5,
     )
-    route = look.result.scenario.route
-    assert route is not None
     axes.plot(
-        *route.goal_m,
+        *look.result.scenario.router.route.goal_m,
         "*",
         color=look.colour,
         markersize=11,
@@ -136,7 +134,7 @@ def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
         result: The run.
         times: Of the dots, s.
     """
-    sources = result.full_scenario.all_sources
+    sources = result.full_scenario.sources
     followed = followed_sources(result.full_scenario)
     for name, source in sources.items():
         what = "the source" if len(sources) == 1 else name
@@ -306,11 +304,11 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
     if "range_1" not in result.columns:
         return
     step = max(1, math.ceil(len(times) / CONE_INSTANTS))
-    half = result.scenario.ultrasonic.beam_half_angle_deg
+    half = result.scenario.sensing.ultrasonic.beam_half_angle_deg
     labelled: set[bool] = set()
     for time in times[::step]:
         tick = tick_at(result, time)
-        for sensor in range(result.scenario.ultrasonic.count):
+        for sensor in range(result.scenario.sensing.ultrasonic.count):
             echo = bool(result.columns[f"echo_{sensor + 1}"][tick] > 0.5)
             colour = to_rgb(COLOURS["echo" if echo else "empty"])
             pose = result.poses("WB")[tick]

@@ -556,7 +556,7 @@ def least_clearances(result: RunResult) -> tuple[float, float]:
     Returns:
         m each, by true poses, at ticks and half-way between; below 0 they overlap.
     """
-    robot = result.scenario.robot
+    robot = result.scenario.only.robot
     others = result.surroundings.bodies.values()
     boxes = np.array([body.rectangle(0.0) for body in others])
     size = np.array([robot.length_m, robot.width_m])

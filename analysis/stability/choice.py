@@ -24,24 +24,24 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
     Raises:
         InputError: There is no such law.
     """
-    routed = scenario.route is not None
+    routed = scenario.only.kind == "router"
     every = list(ROUTE_LAWS if routed else FORCE_LAWS)
     if not routed:
         every.remove("none")
-    if scenario.searches is not None:
-        every = [scenario.law]
+    if scenario.only.searches is not None:
+        every = [scenario.only.law]
     laws = [law for name in names for law in (every if name == "all" else [name])]
-    for law in laws or [scenario.law]:
+    for law in laws or [scenario.only.law]:
         if routed and law not in every:
             raise InputError(
                 "law",
                 f"is {law!r}, but the robot has a route; use {', '.join(every)}",
             )
-        if scenario.searches is not None:
-            if law != scenario.law:
+        if scenario.only.searches is not None:
+            if law != scenario.only.law:
                 raise InputError(
                     "law",
-                    f"is {law!r}, but the robot searches by law {scenario.law!r}; "
+                    f"is {law!r}, but the robot searches by law {scenario.only.law!r}; "
                     "leave --law out",
                 )
             continue
@@ -54,7 +54,7 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
             )
     return tuple(
         scenario_from_mapping({**scenario.model_dump(), "law": law})
-        for law in dict.fromkeys(laws or [scenario.law])
+        for law in dict.fromkeys(laws or [scenario.only.law])
     )
 
 
@@ -72,7 +72,7 @@ def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
     Raises:
         InputError: There is no such robot.
     """
-    names = list(scenario.all_robots)
+    names = list(scenario.robots)
     if name is not None and name not in names:
         raise InputError(
             "robot", f"{name!r} is not a robot of the scenario; use {', '.join(names)}"

@@ -93,7 +93,7 @@ class LawAnalysis:
     @property
     def law(self) -> str:
         """As the scenario names it."""
-        return self.scenario.law
+        return self.scenario.only.law
 
     @property
     def models(self) -> tuple[LinearModel, ...]:

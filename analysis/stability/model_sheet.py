@@ -13,13 +13,34 @@ from typing import Any
 
 from analysis.reporting.provenance import versions
 from diagrams import Scenario, dump_scenario
+from diagrams.scenario.participants import Follower, Router
 from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Equation
 
 #: Parts of a scenario that a loop with exact sensors depends on.
-_PARTS = ("attraction", "repulsion", "robot", "plant", "tracker", "sound")
+_PARTS = {
+    "follower": ("attraction", "collision_vector", "robot", "plant", "tracker"),
+    "router": ("robot", "plant", "route", "objects"),
+    "odor_searcher": (
+        "robot",
+        "plant",
+        "compass",
+        "heading_control",
+        "motor_driver",
+        "search",
+    ),
+    "sound_searcher": (
+        "robot",
+        "plant",
+        "compass",
+        "heading_control",
+        "motor_driver",
+        "sound_search",
+        "cross_power",
+    ),
+}
 #: Fields of theirs that it does not depend on.
 _OTHERS = frozenset(
     {
@@ -32,9 +53,6 @@ _OTHERS = frozenset(
         ),
     }
 )
-
-#: The same of a robot on a route.
-_ROUTE_PARTS = ("repulsion", "robot", "plant", "route", "objects")
 
 #: Conventions and assumptions, for every law.
 _CONVENTIONS = (
@@ -159,12 +177,12 @@ class ModelSheet:
 
 def model_sheet(scenario: Scenario) -> ModelSheet:
     """Collects the model sheet of a scenario's law."""
-    law, routed = LAWS.get(scenario.law), scenario.route is not None
+    law, routed = LAWS.get(scenario.only.law), scenario.only.kind == "router"
     motion: tuple[Equation, ...]
     assumptions: tuple[str, ...]
     envelope: tuple[Limit, ...]
     latencies: tuple[Latency, ...]
-    if scenario.searches is not None:
+    if scenario.only.searches is not None:
         motion = _SEARCH_MOTION
         envelope, latencies = _search_envelope(scenario), _search_latencies(scenario)
         assumptions = _SEARCH_ASSUMPTIONS
@@ -177,7 +195,7 @@ def model_sheet(scenario: Scenario) -> ModelSheet:
     return ModelSheet(
         scenario=scenario.name,
         description=scenario.description,
-        law=scenario.law,
+        law=scenario.only.law,
         seed=scenario.seed,
         scenario_sha256=hashlib.sha256(dump_scenario(scenario).encode()).hexdigest(),
         motion=motion,
@@ -191,12 +209,16 @@ def model_sheet(scenario: Scenario) -> ModelSheet:
 
 
 def _parameters(scenario: Scenario) -> Iterator[ParameterRow]:
-    others = {f"repulsion.{law}." for law in LAWS if law != scenario.law}
-    own = _ROUTE_PARTS if scenario.route is not None else _PARTS
-    for part in own if scenario.searches is None else _SEARCH_PARTS[scenario.searches]:
-        for row in _rows(getattr(scenario, part), f"{part}."):
-            if row.field not in _OTHERS and not row.field.startswith(tuple(others)):
-                yield row
+    robot = scenario.only
+    groups: dict[str, Parameters] = {
+        f"{part}.": getattr(robot, part) for part in _PARTS[robot.kind]
+    }
+    if isinstance(robot, Follower | Router) and robot.gains is not None:
+        groups[f"laws.{robot.law}."] = robot.gains
+    if isinstance(robot, Follower):
+        groups["sound."] = scenario.source.sound
+    for prefix, group in groups.items():
+        yield from (row for row in _rows(group, prefix) if row.field not in _OTHERS)
 
 
 def _rows(parameters: Parameters, prefix: str) -> Iterator[ParameterRow]:
@@ -218,7 +240,7 @@ def _one_line(text: str) -> str:
 
 
 def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
-    robot, sensors = scenario.robot, scenario.ultrasonic
+    robot, sensors = scenario.only.robot, scenario.follower.ultrasonic
     return (
         Limit("speed of P", robot.top_speed_m_s, "m/s", "limit of the state v_P"),
         Limit("wheel speed", robot.top_wheel_speed, "rad/s", "both scaled together"),
@@ -232,7 +254,7 @@ def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
         Limit("farthest echo", sensors.maximum_range_m, "m", "no echo beyond it"),
         Limit(
             "age of a target",
-            scenario.tracker.maximum_age_s,
+            scenario.follower.tracker.maximum_age_s,
             "s",
             "the robot brakes if it is older",
         ),
@@ -242,7 +264,7 @@ def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
 def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
     tick = scenario.tick_s
     half, frame = tick / 2.0, f"middle of a {tick * 1e3:g} ms frame"
-    sound, lag = scenario.sound, scenario.plant.motor_lag_s
+    sound, lag = scenario.source.sound, scenario.only.plant.motor_lag_s
     silent = max(sound.period_s - sound.on_s, 0.0)
     hold = Latency("source", "velocity held for one tick", half, "WheelCommand")
     motor = Latency("source", "motor lag", lag, "first order")
@@ -262,20 +284,6 @@ def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
         Latency("obstacle", motor.part, motor.mean_s, motor.remark),
     )
 
-
-#: What a searching robot's report shows of the scenario.
-_SEARCH_PARTS = {
-    "odor": ("robot", "plant", "compass", "heading_control", "motor_driver", "search"),
-    "sound": (
-        "robot",
-        "plant",
-        "compass",
-        "heading_control",
-        "motor_driver",
-        "sound_search",
-        "cross_power",
-    ),
-}
 
 _SEARCH_MOTION = (
     Equation(
@@ -302,8 +310,8 @@ _SEARCH_ASSUMPTIONS = (
 
 
 def _search_envelope(scenario: Scenario) -> tuple[Limit, ...]:
-    motors = scenario.motor_driver.full_speed_m_s
-    beyond = scenario.heading_control.turning_beyond_deg
+    motors = scenario.searcher.motor_driver.full_speed_m_s
+    beyond = scenario.searcher.heading_control.turning_beyond_deg
     return (
         Limit("speed of a wheel", motors, "m/s", "at full duty"),
         Limit(
@@ -316,24 +324,26 @@ def _search_latencies(scenario: Scenario) -> tuple[Latency, ...]:
     held = scenario.tick_s / 2.0
     return (
         Latency("heading", "duties held for one tick", held, "MotorDriver"),
-        Latency("heading", "motor lag", scenario.plant.motor_lag_s, "first order"),
+        Latency("heading", "motor lag", scenario.only.plant.motor_lag_s, "first order"),
     )
 
 
 def _route_envelope(scenario: Scenario) -> tuple[Limit, ...]:
-    assert scenario.route is not None
-    robot, target = scenario.robot, scenario.route
+    robot, target = scenario.only.robot, scenario.router.route
     return (
         Limit("speed of P", robot.top_speed_m_s, "m/s", "limit of the state v_P"),
         Limit("wheel speed", robot.top_wheel_speed, "rad/s", "both scaled together"),
         Limit("speed of the target", target.speed_m_s, "m/s", "along the route"),
-        Limit("objects seen", scenario.objects.maximum_range_m, "m", "from P"),
+        Limit("objects seen", scenario.router.objects.maximum_range_m, "m", "from P"),
     )
 
 
 def _route_latencies(scenario: Scenario) -> tuple[Latency, ...]:
     seen = Latency(
-        "obstacle", "objects seen", scenario.objects.latency_s, "objects.latency_s"
+        "obstacle",
+        "objects seen",
+        scenario.router.objects.latency_s,
+        "objects.latency_s",
     )
     held = scenario.tick_s / 2.0
     rows = [
@@ -341,7 +351,7 @@ def _route_latencies(scenario: Scenario) -> tuple[Latency, ...]:
         for path in ("target", "obstacle")
         for row in (
             Latency(path, "velocity held for one tick", held, "WheelCommand"),
-            Latency(path, "motor lag", scenario.plant.motor_lag_s, "first order"),
+            Latency(path, "motor lag", scenario.only.plant.motor_lag_s, "first order"),
         )
     ]
     return (*rows[:2], seen, *rows[2:])

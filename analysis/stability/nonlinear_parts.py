@@ -336,7 +336,7 @@ def _listed(values: tuple[float, ...]) -> str:
 
 
 def _ratio_map(study: Study) -> RatioMap:
-    if study.scenario.law != "active":
+    if study.scenario.only.law != "active":
         raise InputError(
             "law", "only the active law of 2019 has the ratio k_ref/K_0; choose active"
         )

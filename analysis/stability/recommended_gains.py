@@ -189,9 +189,9 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
         One input and one output, both accelerations, m/s^2.
     """
     chain = motion_chain(scenario)
-    mass = scenario.robot.mass_kg
-    spring = scenario.attraction.stiffness_n_m / mass * chain.C[:1]
-    damper = scenario.attraction.damping_n_s_m / mass * chain.C[1:]
+    mass = scenario.only.robot.mass_kg
+    spring = scenario.follower.attraction.stiffness_n_m / mass * chain.C[:1]
+    damper = scenario.follower.attraction.damping_n_s_m / mass * chain.C[1:]
     inner = chain.B @ damper if at == "sensor" else np.zeros_like(chain.A)
     return replace(
         chain,
@@ -214,7 +214,7 @@ def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
         Margins, lag, m, and settling, s.
     """
     margins = [loop_margins(attraction_loop(scenario, at)) for at in _CUTS]
-    K_r = scenario.attraction.stiffness_n_m
+    K_r = scenario.follower.attraction.stiffness_n_m
     z = np.linalg.eigvals(contact_matrix(scenario, K_r))
     slowest = -math.log(float(np.abs(z).max())) / scenario.tick_s
 
@@ -223,7 +223,7 @@ def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
 
     return GainFigures(
         stiffness_n_m=K_r,
-        damping_n_s_m=scenario.attraction.damping_n_s_m,
+        damping_n_s_m=scenario.follower.attraction.damping_n_s_m,
         damping_ratio=attraction_damping_ratio(scenario),
         phase_margin_deg=least("phase_margin_deg"),
         gain_margin_db=least("gain_margin_db"),
@@ -257,7 +257,7 @@ def recommend_gains(
         InputError: There is no spring.
     """
     thresholds = thresholds or GainThresholds()
-    today = scenario.attraction.stiffness_n_m
+    today = scenario.follower.attraction.stiffness_n_m
     if today == 0.0:
         raise InputError(
             "attraction.stiffness_n_m",
@@ -269,7 +269,7 @@ def recommend_gains(
     return RecommendedGains(
         thresholds,
         scenario.name if known else "scenario.yaml",
-        scenario.law,
+        scenario.only.law,
         gain_figures(scenario, thresholds),
         choices,
         best,
@@ -296,7 +296,7 @@ def _whole_loop(scenario: Scenario, gains: GainFigures) -> WholeLoop:
 
 
 def _choice(scenario: Scenario, K_r: float, thresholds: GainThresholds) -> GainChoice:
-    critical = 2.0 * math.sqrt(K_r * scenario.robot.mass_kg)
+    critical = 2.0 * math.sqrt(K_r * scenario.only.robot.mass_kg)
 
     def meets(D_r: float) -> bool:
         return _meets(with_attraction(scenario, K_r, D_r), thresholds)
@@ -337,7 +337,7 @@ def _meets(scenario: Scenario, thresholds: GainThresholds) -> bool:
 
 
 def _contact_radius(scenario: Scenario, thresholds: GainThresholds) -> float:
-    total = scenario.attraction.stiffness_n_m + law_stiffness(scenario)
+    total = scenario.follower.attraction.stiffness_n_m + law_stiffness(scenario)
     return contact_spectral_radius(
         scenario, total, latency_ticks=thresholds.spare_ticks
     )

@@ -57,9 +57,9 @@ def parts_for(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part, ...]:
     """
     return parts(
         full=full,
-        guarded=any(each.own_guard is not None for each in scenarios),
-        routed=scenarios[0].route is not None,
-        searching=scenarios[0].searches is not None,
+        guarded=any(each.only.own_guard is not None for each in scenarios),
+        routed=scenarios[0].only.kind == "router",
+        searching=scenarios[0].only.searches is not None,
     )
 
 

@@ -215,7 +215,7 @@ def _bursts(study: Study, count: int) -> BurstCycles:
     cycles = tuple(burst_cycle(study.scenario, hold, point=at) for hold in HOLDS)
     runs = tuple(simulate_burst_cycle(cycle, count) for cycle in cycles)
     gaps = gap_chart(study.scenario, point=at)
-    return BurstCycles(study.scenario.tracker.hold, cycles, runs, gaps)
+    return BurstCycles(study.scenario.follower.tracker.hold, cycles, runs, gaps)
 
 
 def _burst_document(data: BurstCycles) -> dict[str, Any]:

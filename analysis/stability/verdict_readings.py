@@ -91,7 +91,7 @@ def read_jams(study: Study) -> Reading:
     A run that ends there is stuck or out of time.
     """
     search, scenario = study.need("equilibria").search, study.scenario
-    margin = scenario.goal_radius_m - scenario.attraction.follow_distance_m
+    margin = scenario.goal_radius_m - scenario.follower.attraction.follow_distance_m
     p_WS = scenario.source.path().pose(0.0)[:2]
     jams = sum(p.stable and p.offset_m > margin for p in search.points)
     jams += sum(
@@ -120,7 +120,7 @@ def read_contact(study: Study, ticks: int) -> Reading:
     stiffness = law_stiffness(scenario)
     if stiffness <= 0.0:
         return "the law does not push off obstacles"
-    total = scenario.attraction.stiffness_n_m + stiffness
+    total = scenario.follower.attraction.stiffness_n_m + stiffness
     radius = contact_spectral_radius(scenario, total, latency_ticks=ticks)
     return math.log(radius) / scenario.tick_s
 

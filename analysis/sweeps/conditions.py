@@ -41,7 +41,7 @@ class Conditions(Parameters):
         if self == Conditions():
             return
         self._check_source(scenario)
-        for robot in scenario.all_robots:
+        for robot in scenario.robots:
             around = scenario.surroundings(robot)
             self._check_start(scenario, robot, around)
             self._check_way(scenario, robot, around)
@@ -51,7 +51,7 @@ class Conditions(Parameters):
     ) -> None:
         if not self.start_distance_m:
             return
-        start = scenario.all_robots[robot].start.position_m
+        start = scenario.robots[robot].start.position_m
         for name, body in around.bodies.items():
             away = math.hypot(*beyond_rectangle(start, body.rectangle(0.0)))
             if away < self.start_distance_m:
@@ -67,7 +67,7 @@ class Conditions(Parameters):
             return
         from analysis.runs.proximity import least_clearances  # compiled code
 
-        for name, source in scenario.all_sources.items():
+        for name, source in scenario.sources.items():
             # Where it is to be: it drives there within centimetres.
             plan = Body(source.plan(), (source.length_m, source.width_m))
             moves = any(body.path.moves for body in (plan, *obstacles))
@@ -88,7 +88,7 @@ class Conditions(Parameters):
     def _check_way(self, scenario: Scenario, robot: str, around: Surroundings) -> None:
         if self.way_radius_m is None:
             return
-        own = scenario.all_robots[robot]
+        own = scenario.robots[robot]
         goal = around.followed.path.pose(scenario.duration_s)[:2]
         reach = own.follow_distance_m + own.robot.control_point_m
         boxes = tuple(

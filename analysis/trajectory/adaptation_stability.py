@@ -185,16 +185,17 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
     ):
         raise InputError(
             "law",
-            f"{scenario.law!r} has no adaptation; use trajectory_adaptive with a rule",
+            f"{scenario.only.law!r} has no adaptation; use trajectory_adaptive with a "
+            "rule",
         )
-    mass, rule = scenario.robot.mass_kg, own.adaptation
+    mass, rule = scenario.only.robot.mass_kg, own.adaptation
     frequency, ratio = own.reference.poles(mass, own.stiffness_n_m, own.damping_n_s_m)
     loop = PointLoop(
         own,
         rule,
         (frequency, ratio),
-        scenario.robot,
-        scenario.plant.motor_lag_s,
+        scenario.only.robot,
+        scenario.only.plant.motor_lag_s,
         scenario.tick_s,
     )
     amplitude = pull_through_m(own)

@@ -150,8 +150,8 @@ def run_chain(
     Returns:
         (ticks, robots) places P, m.
     """
-    own, robot, tick_s = route_law(scenario), scenario.robot, scenario.tick_s
-    lag = scenario.plant.motor_lag_s
+    own, robot, tick_s = route_law(scenario), scenario.only.robot, scenario.tick_s
+    lag = scenario.only.plant.motor_lag_s
     kept = math.exp(-tick_s / lag)
     numbers = ChainNumbers(
         (
@@ -167,7 +167,7 @@ def run_chain(
         robot.mass_kg,
         (own.acceleration_limit_m_s2, robot.top_speed_m_s),
         (kept, lag * (1.0 - kept)),
-        round(scenario.objects.latency_s / tick_s),
+        round(scenario.router.objects.latency_s / tick_s),
         tick_s,
     )
     gaps = resting_gaps(scenario, spacing_m, robots)
@@ -204,7 +204,7 @@ def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
     Returns:
         Amplitudes of the last five of forty periods.
     """
-    natural = math.sqrt(route_law(scenario).stiffness_n_m / scenario.robot.mass_kg)
+    natural = math.sqrt(route_law(scenario).stiffness_n_m / scenario.only.robot.mass_kg)
     omega = peak.frequency_rad_s if peak.grows else natural
     period = math.tau / omega
     time = np.arange(0.0, _PERIODS * period, scenario.tick_s)
@@ -252,8 +252,10 @@ def brake_chain(
     Returns:
         Gaps between neighbours from the braking on.
     """
-    assert scenario.route is not None
-    speed, slope = scenario.route.speed_m_s, scenario.route.acceleration_m_s2
+    speed, slope = (
+        scenario.router.route.speed_m_s,
+        scenario.router.route.acceleration_m_s2,
+    )
     time = np.arange(-_DRIVEN_S, _WATCHED_S, scenario.tick_s)
     braking = np.clip(time, 0.0, speed / slope)
     first = speed * np.minimum(time, 0.0) + speed * braking - 0.5 * slope * braking**2

@@ -144,7 +144,7 @@ def gain_bounds(scenario: Scenario) -> GainBounds:
     """
     own = route_law(scenario)
     of = SampledMass(
-        scenario.robot.mass_kg, scenario.plant.motor_lag_s, scenario.tick_s
+        scenario.only.robot.mass_kg, scenario.only.plant.motor_lag_s, scenario.tick_s
     )
     most = _most_damping(scenario)
     dampings = np.geomspace(_LEAST_N_S_M, _MOST * most, _CHART_POINTS)

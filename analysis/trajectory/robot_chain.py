@@ -178,13 +178,13 @@ def disc_offsets(scenario: Scenario) -> tuple[float, float]:
     Returns:
         m: P is ahead of its axle, about which the disc is.
     """
-    disc = 0.5 * math.hypot(scenario.robot.length_m, scenario.robot.width_m)
-    epsilon = scenario.robot.control_point_m
+    disc = 0.5 * math.hypot(scenario.only.robot.length_m, scenario.only.robot.width_m)
+    epsilon = scenario.only.robot.control_point_m
     return disc + epsilon, disc - epsilon
 
 
 def _late(scenario: Scenario) -> int:
-    return round(scenario.objects.latency_s / scenario.tick_s)
+    return round(scenario.router.objects.latency_s / scenario.tick_s)
 
 
 def resting_gaps(
@@ -283,7 +283,7 @@ def chain_response(
         (k_a, d_a), (k_b, d_b) = link.ahead, link.behind
         # A contact is with what was seen, and P is where it is.
         matrix[:, i, i] = (
-            scenario.robot.mass_kg / G_p
+            scenario.only.robot.mass_kg / G_p
             + (link.stiffness + k_a + k_b)
             + (link.damping + d_a + d_b) * own_speed
         )
@@ -364,8 +364,8 @@ def chain_matrix(
         (n, n); states of each robot are those of ``sampled_matrix``, then as many
         earlier places as its neighbours need.
     """
-    tick_s, mass = scenario.tick_s, scenario.robot.mass_kg
-    of = SampledMass(mass, scenario.plant.motor_lag_s, tick_s)
+    tick_s, mass = scenario.tick_s, scenario.only.robot.mass_kg
+    of = SampledMass(mass, scenario.only.plant.motor_lag_s, tick_s)
     free = sampled_matrix(0.0, 0.0, of)
     late = links[0].late_ticks
     size = 3 + late + 1

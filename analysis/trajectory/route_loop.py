@@ -55,13 +55,13 @@ def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
     Raises:
         InputError: It has another law.
     """
-    if scenario.route is None or scenario.law not in ROUTE_LAWS:
+    if scenario.only.kind != "router" or scenario.only.law not in ROUTE_LAWS:
         raise InputError(
             "law",
-            f"is {scenario.law!r}, but frozen gains need a robot with a route and one "
-            f"of the laws {', '.join(ROUTE_LAWS)}; use one of these",
+            f"is {scenario.only.law!r}, but frozen gains need a robot with a route and "
+            f"one of the laws {', '.join(ROUTE_LAWS)}; use one of these",
         )
-    own: TrajectoryImpedanceParameters = getattr(scenario.repulsion, scenario.law)
+    own: TrajectoryImpedanceParameters = scenario.router.gains
     return own
 
 
@@ -75,9 +75,8 @@ def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
         Contacts only where the law has a spring or a damper for them.
     """
     own = route_law(scenario)
-    assert scenario.route is not None
     points = [
-        RoutePoint("on the route", speed_m_s=scenario.route.speed_m_s),
+        RoutePoint("on the route", speed_m_s=scenario.router.route.speed_m_s),
         RoutePoint("at rest"),
     ]
     if own.contact_stiffness_n_m > 0.0 or own.contact_damping_n_s_m > 0.0:
@@ -201,14 +200,14 @@ def _states(models: tuple[LinearModel, ...]) -> tuple[str, ...]:
 
 def _place_of_P(scenario: Scenario) -> NDArray[np.float64]:
     """(2, 3) from a small change of pose to one of P, at heading 0."""
-    epsilon = scenario.robot.control_point_m
+    epsilon = scenario.only.robot.control_point_m
     return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, epsilon]])
 
 
 def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
     own = route_law(scenario)
-    require_rolling(scenario.plant)
-    robot, tick_s, speed = scenario.robot, scenario.tick_s, point.speed_m_s
+    require_rolling(scenario.only.plant)
+    robot, tick_s, speed = scenario.only.robot, scenario.tick_s, point.speed_m_s
     wheel, p = speed / robot.wheel_radius_m, np.array([robot.control_point_m, 0.0])
     wheels, pose, v = np.full(2, wheel), np.zeros(3), np.array([speed, 0.0])
     objects = np.zeros(OBJECT_SLOTS * OBJECT_SIZE)
@@ -217,11 +216,11 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
         objects[[THERE, X, KNOWN]] = 1.0, point.wall_m, 1.0
         ahead = _push(own, point.wall_m) / own.stiffness_n_m
     target = np.array([p[0] + ahead, 0.0, speed, 0.0])
-    plant = DiffDrivePlant(robot=robot, plant=scenario.plant)
+    plant = DiffDrivePlant(robot=robot, plant=scenario.only.plant)
     config = simulator_config(scenario)
     unrounded = OdometryParameters(rounding=False)
     odometry = WheelOdometry_[AutoDiffXd](
-        robot=robot, odometry=unrounded, plant=scenario.plant, tick_s=tick_s
+        robot=robot, odometry=unrounded, plant=scenario.only.plant, tick_s=tick_s
     )
     command = WheelCommand_[AutoDiffXd](robot=robot, tick_s=tick_s)
     # Eq. 6, which stops P, has no linear model.
@@ -281,7 +280,7 @@ def _push(own: TrajectoryImpedanceParameters, distance_m: float) -> float:
 
 def _seen_wall(scenario: Scenario, point: RoutePoint) -> LinearModel:
     """How ``objects_W`` follows the pose: a face across x, seen a latency late."""
-    ticks = round(scenario.objects.latency_s / scenario.tick_s)
+    ticks = round(scenario.router.objects.latency_s / scenario.tick_s)
     away = -_place_of_P(scenario)[:1]
     if point.wall_m is None:
         away = 0.0 * away

@@ -36,8 +36,10 @@ from diagrams.scenario.participants import (
     Follower,
     HasMicrophones,
     HasRangeSensors,
+    OdorSearcher,
     Robot,
     Router,
+    SoundSearcher,
     SourceParameters,
 )
 from diagrams.scenario.run_parameters import RunParameters
@@ -57,7 +59,7 @@ WORLD = "world"
 ODOR = "odor"
 
 #: Names of robots and sources, which also appear in names of files.
-_Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=64)]
+Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=64)]
 _R = TypeVar("_R", bound=Robot)
 
 
@@ -68,10 +70,10 @@ class Scenario(RunParameters):
     robots, or to all sources, that do not set them (``diagrams.scenario.shorthand``).
     """
 
-    robots: Annotated[dict[_Name, AnyRobot], Field(min_length=1, max_length=16)]
+    robots: Annotated[dict[Name, AnyRobot], Field(min_length=1, max_length=16)]
     """Robots by name. In a file, each has the fields that differ from those of the
     scenario; empty: one robot, named ``robot``."""
-    sources: Annotated[dict[_Name, SourceParameters], Field(max_length=16)]
+    sources: Annotated[dict[Name, SourceParameters], Field(max_length=16)]
     """Sources by name. In a file, each has the fields that differ from ``source`` and
     ``sound``; empty: one source, named ``source``, if a robot follows it. A source that
     no robot follows is an interferer."""
@@ -115,6 +117,28 @@ class Scenario(RunParameters):
             InputError: There are several robots, or the robot is of another kind.
         """
         return self._of_kind(Router, "drives on a route")
+
+    @property
+    def sensing(self) -> Follower | Router:
+        """The only robot, which has range sensors or ideal obstacle sensing.
+
+        Raises:
+            InputError: There are several robots, or the robot is of another kind.
+        """
+        robot = self.only
+        return robot if isinstance(robot, Router) else self.follower
+
+    @property
+    def searcher(self) -> OdorSearcher | SoundSearcher:
+        """The only robot, which searches step by step.
+
+        Raises:
+            InputError: There are several robots, or the robot is of another kind.
+        """
+        robot = self.only
+        if isinstance(robot, OdorSearcher):
+            return robot
+        return self._of_kind(SoundSearcher, "searches step by step")
 
     def _of_kind(self, kind: type[_R], what: str) -> _R:
         robot = self.only

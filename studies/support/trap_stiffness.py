@@ -82,7 +82,7 @@ def trap_stiffness(
     contact = head_on(case, to_go_m=TO_GO_M + 0.5 * size[0])
     c, step = contact.equilibrium_m, 1e-4
     x = BOX_X_M - 0.5 * size[0] - c
-    law, epsilon = contact.law.function, scenario.robot.control_point_m
+    law, epsilon = contact.law.function, scenario.only.robot.control_point_m
 
     def force(dx: float, dy: float) -> tuple[float, float]:
         return _block_force(case, law, (x + dx, dy, dy / epsilon), sensing)
@@ -104,23 +104,25 @@ def _block_force(
     The place is x and y of P, and the heading.
     """
     x, y, theta = place
-    offset = case.robot.control_point_m
+    offset = case.only.robot.control_point_m
     pose = (x - offset * math.cos(theta), y - offset * math.sin(theta), theta)
     bodies = [body.rectangle(0.0) for body in case.bodies().values()]
     if sensing == "exact":
         vectors = nearest_vectors(
-            pose, bodies, offset, case.ultrasonic.maximum_range_m, 1
+            pose, bodies, offset, case.follower.ultrasonic.maximum_range_m, 1
         )
     else:
-        ranges = cone_ranges(np.array(pose), np.array(bodies), case.ultrasonic, offset)
-        echo = ranges <= case.ultrasonic.maximum_range_m
-        points = echo_points(ranges.tolist(), echo.tolist(), case.ultrasonic)
+        ranges = cone_ranges(
+            np.array(pose), np.array(bodies), case.follower.ultrasonic, offset
+        )
+        echo = ranges <= case.follower.ultrasonic.maximum_range_m
+        points = echo_points(ranges.tolist(), echo.tolist(), case.follower.ultrasonic)
         vectors = collision_vectors(
-            points, case.collision_vector, case.ultrasonic.neighbours
+            points, case.follower.collision_vector, case.follower.ultrasonic.neighbours
         )
     p_WP, p_WS = control_point(pose, offset), case.source.path().pose(0.0)[:2]
     F_m = attraction_force(
-        p_WP, (0.0, 0.0), p_WS, 1.0, case.attraction, case.robot.mass_kg
+        p_WP, (0.0, 0.0), p_WS, 1.0, case.follower.attraction, case.only.robot.mass_kg
     )
     pushes = [repulsion_force(rotate(theta, x, y), 0.0, law) for _, x, y in vectors]
     F_b = np.sum(pushes or [(0.0, 0.0)], axis=0)

@@ -28,15 +28,26 @@ def _add_arguments(parser: ArgumentParser) -> None:
         action="store_true",
         help="print the JSON Schema, for editors and other programs",
     )
+    parser.add_argument(
+        "--law",
+        metavar="NAME",
+        help="list only the fields of a robot with this law",
+    )
     take_json(parser)
 
 
 def _prepare(options: Namespace, take: Take) -> Job[list[Field]]:
-    from diagrams.scenario.fields.field_list import find_fields
+    from diagrams.scenario.fields.field_list import fields_of_law, find_fields
+    from diagrams.scenario.fields.near_miss import unknown_law
     from diagrams.scenario.fields.shipped import scenario_schema, schema_text
+    from systems.laws.catalogue import LAWS
 
     schema = scenario_schema()
     found = find_fields(schema, options.pattern)
+    if options.law is not None:
+        if options.law not in LAWS:
+            raise unknown_law(options.law, LAWS)
+        found = fields_of_law(found, options.law, LAWS[options.law].robot)
     if options.schema:
         return Job(
             run=lambda _: found,
@@ -77,6 +88,7 @@ COMMAND = Command(
     examples=(
         "fields room",
         "fields 'obstacles.*'",
+        "fields --law active",
         "fields reverberation --json",
         "fields --schema > scenario.schema.json",
     ),

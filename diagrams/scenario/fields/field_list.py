@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
@@ -38,6 +38,8 @@ class Field:
     """Legal values; empty: all values of the kind."""
     meaning: str
     """Description of the field."""
+    robots: tuple[str, ...] = ()
+    """Kinds of robots that have the field; empty: a field of the run."""
 
 
 def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
@@ -49,7 +51,27 @@ def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
     Yields:
         The fields.
     """
-    yield from _fields(schema, schema, "", None)
+    yield from _fields(schema, schema, "", None, ())
+
+
+def fields_of_law(fields: Iterable[Field], law: str, kind: str) -> list[Field]:
+    """Returns the fields that a robot with a certain law has.
+
+    Args:
+        fields: The fields to select from.
+        law: Name of a law.
+        kind: Kind of the robots that run the law.
+
+    Returns:
+        The fields of robots of this kind, without the gains of other laws and without
+        fields of the run.
+    """
+    return [
+        field
+        for field in fields
+        if kind in field.robots
+        and (not field.path.startswith("laws.") or field.path.split(".")[1] == law)
+    ]
 
 
 def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
@@ -89,18 +111,27 @@ def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
 
 
 def _fields(
-    schema: Mapping[str, Any], node: Mapping[str, Any], above: str, defaults: Any
+    schema: Mapping[str, Any],
+    node: Mapping[str, Any],
+    above: str,
+    defaults: Any,
+    robots: tuple[str, ...],
 ) -> Iterator[Field]:
     for name, field in node.get("properties", {}).items():
         # A group may override the defaults of its model.
         default = field.get("default")
         if isinstance(defaults, Mapping) and name in defaults:
             default = defaults[name]
-        yield from _field(schema, field, f"{above}{name}", default)
+        kinds = tuple(field.get("robots", robots))
+        yield from _field(schema, field, f"{above}{name}", default, kinds)
 
 
 def _field(
-    schema: Mapping[str, Any], node: Mapping[str, Any], path: str, default: Any
+    schema: Mapping[str, Any],
+    node: Mapping[str, Any],
+    path: str,
+    default: Any,
+    robots: tuple[str, ...],
 ) -> Iterator[Field]:
     choices = options(schema, node)
     null = any(each.get("type") == "null" for each in node.get("anyOf", ()))
@@ -112,12 +143,13 @@ def _field(
         default=None if groups and not null else default,
         range=" or ".join(filter(None, map(_range, choices))),
         meaning=node.get("description") or _meaning(schema, node),
+        robots=robots,
     )
     for each in groups:
-        yield from _fields(schema, each, f"{path}.", default)
+        yield from _fields(schema, each, f"{path}.", default, robots)
     for each in choices:
         if "properties" in (element := resolved(schema, each.get("items", {}))):
-            yield from _fields(schema, element, f"{path}.0.", None)
+            yield from _fields(schema, element, f"{path}.0.", None, robots)
         for changes in each.get("patternProperties", {}).values():
             named = resolved(schema, changes)
             what = f"{', '.join(named['properties'])}: see these fields of a scenario"
