@@ -28,11 +28,11 @@ from analysis.laws.push_and_pull import (
     spring,
     stiffest,
 )
+from diagrams.scenario.repulsion import RepulsionParameters
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.active import matched_share
 from systems.laws.catalogue import LAWS
-from systems.laws.repulsion import RepulsionParameters
 
 #: Gains are rounded to so many figures.
 _FIGURES = 3

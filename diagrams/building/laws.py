@@ -11,6 +11,7 @@ from diagrams.building.own_laws import checked_law, try_law
 from diagrams.building.robots.routed_robot import make_trajectory_controller
 from diagrams.building.robots.searching_robot import search_controller
 from diagrams.scenario.own_code import asked_for, import_own, made
+from diagrams.scenario.repulsion import RepulsionParameters
 from diagrams.scenario.scenario import Scenario
 from systems import RadialLawController, WheelCommand
 from systems.base.robot import RobotParameters
@@ -36,7 +37,8 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     the law at a few distances and speeds as a test.
 
     A class derives from LeafSystem. Its arguments may be ``robot``, ``attraction``,
-    ``repulsion``, ``sensors``, ``tick_s``, ``following``, ``known``, ``bodies`` and
+    ``repulsion``, ``gains`` (those of the law of the package from whose block the class
+    derives), ``velocity_term``, ``sensors``, ``tick_s``, ``known``, ``bodies`` and
     ``seed``. Each of its inputs has the name of an output port in the diagram. The
     class has exactly one of the outputs that ``make_command`` accepts.
 
@@ -55,42 +57,47 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     if scenario.obstacle_sensing == "ideal":
         at_once = {"firing": "simultaneous", "period_s": scenario.tick_s}
         sensors = sensors.model_copy(update=at_once)
+    name, repulsion = scenario.law, scenario.repulsion
     parts = {
+        "gains": getattr(repulsion, name, None),
+        "velocity_term": repulsion.velocity_term,
         "robot": scenario.robot,
         "attraction": scenario.attraction,
-        "repulsion": scenario.repulsion,
         "tick_s": scenario.tick_s,
         "sensors": sensors,
-    }
-    more = {
         "known": scenario.free_space,
         "bodies": bodies,
         "seed": seed,
     }
-    name = scenario.law
     if scenario.searches is not None:
         return search_controller(scenario)
     if name in ROUTE_LAWS:
         return make_trajectory_controller(scenario)
     if name in LAWS:
-        law, controller = LAWS[name], LAWS[name].controller
-        if controller is None:
-            return RadialLawController(law=law, **parts)
-        if law.force is None:
-            parts = asked_for(controller, {**parts, **more})
-        return controller(**parts)
+        controller = LAWS[name].controller
+        if controller is not None:
+            return controller(**asked_for(controller, parts))
+        return _radial(LAWS[name], parts)
     law = import_own(name, "law")
     if inspect.isclass(law):
-        # Pass only those arguments of ``more`` that the signature names. A law that
-        # accepts any keyword may pass all arguments on to a law of the package, which
-        # rejects some of them.
-        named = inspect.signature(getattr(law, "_construct", law)).parameters
-        wanted = {key: value for key, value in more.items() if key in named}
-        return _own_block(name, law, {**parts, **wanted})
+        gains = _gains_of_base(law, repulsion)
+        return _own_block(name, law, {**parts, "repulsion": repulsion, "gains": gains})
     function = checked_law(name, law)
     reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
-    try_law(function, scenario.repulsion, reach, top_speed)
-    return RadialLawController(**parts, law=function)
+    try_law(function, repulsion, reach, top_speed)
+    return _radial(function, {**parts, "gains": repulsion})
+
+
+def _radial(law: Any, parts: dict[str, Any]) -> Any:
+    return RadialLawController(law=law, **asked_for(RadialLawController, parts))
+
+
+def _gains_of_base(block: type, repulsion: RepulsionParameters) -> Any:
+    """Returns the gains of the law of the package whose block is a base of a class."""
+    for name, law in LAWS.items():
+        if law.controller is not None and issubclass(block, law.controller):
+            return getattr(repulsion, name)
+    return None
 
 
 def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:

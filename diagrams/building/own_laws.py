@@ -11,8 +11,8 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 
 from diagrams.scenario.own_code import is_interrupt, why
+from diagrams.scenario.repulsion import RepulsionParameters
 from systems.framework.input_error import InputError, shortened
-from systems.laws.repulsion import RepulsionParameters
 
 
 def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict, field_validator, model_validator
 
 from diagrams.scenario.fields.near_miss import unknown_law
+from diagrams.scenario.repulsion import RepulsionParameters
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
@@ -25,7 +26,6 @@ from systems.hearing.parameters import (
 )
 from systems.laws.catalogue import LAWS
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.odor.parameters import AirflowParameters, GasSensorParameters
 from systems.ranging.parameters import (
     CollisionVectorParameters,

@@ -18,8 +18,8 @@ from analysis.design.requirements import (
     metres_to_go,
 )
 from analysis.laws.push_and_pull import DESIGNED_LAWS
+from diagrams.scenario.repulsion import RepulsionParameters
 from diagrams.scenario.scenario import Scenario
-from systems.laws.repulsion import RepulsionParameters
 from tests.results import documented, numbers
 
 SCENARIO, REQUIREMENTS = Scenario(), DesignRequirements()

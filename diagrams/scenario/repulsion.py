@@ -11,8 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, create_model
 
+from systems.framework.parameters import Parameters
 from systems.laws.catalogue import LAWS
-from systems.laws.parameters import SharedRepulsion
+from systems.laws.parameters import VelocityTerm
+
+
+class SharedRepulsion(Parameters):
+    """Parameters that the pushes of all laws share."""
+
+    velocity_term: VelocityTerm = "printed"
+    """Definition of the speed s: ``printed`` is |dC/dt|, ``closing`` is the speed of
+    approach only."""
+
 
 if TYPE_CHECKING:
 
