@@ -177,8 +177,8 @@ class PlainLoop:
         F_m = attraction_force(
             p_WP, v_WP, target, valid, scenario.follower.attraction, mass
         )
-        closing = scenario.repulsion.velocity_term == "closing"
-        gains = (scenario.repulsion.active,)
+        closing = scenario.follower.collision_vector.velocity_term == "closing"
+        gains = (scenario.follower.laws.active,)
         Fx = Fy = 0.0
         for feature, *C_W in vectors:
             C_before = before.get(round(feature))

@@ -30,7 +30,7 @@ _CONVENTIONAL, _ADAPTIVE = "trajectory_conventional", "trajectory_adaptive"
 
 
 def _gains(law: str, **fields: Any) -> dict[str, Any]:
-    return {"law": law, "repulsion": {law: fields}}
+    return {"law": law, "laws": {law: fields}}
 
 
 def _gradient(

@@ -120,7 +120,7 @@ def try_setting(
         Score and shares.
     """
     fields = {
-        name if "." in name else f"repulsion.{law}.{name}": value
+        name if "." in name else f"laws.{law}.{name}": value
         for name, value in settings.items()
     }
     shares = []

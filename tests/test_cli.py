@@ -90,7 +90,7 @@ def test_laws_lists_names_and_titles(capsys):
         (["missing.yaml"], "scenario", "check the path"),
         (["--law", "magic"], "law", "conventional"),
         (["--law", "no_such_module:law"], "law", "cannot be imported"),
-        (["--velocity-term", "half"], "repulsion.velocity_term", "closing"),
+        (["--velocity-term", "half"], "collision_vector.velocity_term", "closing"),
         (["--set", "sourc.speed_m_s=1"], "sourc", "did you mean 'source'"),
         (["--set", "source.spee_m_s=1"], "source.spee_m_s", "did you mean"),
         (["--set", "duration_s=soon"], "duration_s", "number"),

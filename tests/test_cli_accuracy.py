@@ -24,7 +24,7 @@ def test_json_and_files(capsys, tmp_path):
     assert document["tolerances"]["position_m"] == 2e-4
     assert json.loads((out / "summary.json").read_text()) == document
     again = load_scenario(out / "scenario.yaml")
-    assert again.microphones.position_tolerance_m == 2e-4
+    assert again.follower.microphones.position_tolerance_m == 2e-4
     assert {path.name for path in out.iterdir()} == {
         "scenario.yaml", "scenario.schema.json", "summary.json", "localization.png"
     }  # fmt: skip

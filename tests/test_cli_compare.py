@@ -48,7 +48,7 @@ def test_compare_prints_one_document(capsys, tmp_path):
     [
         (["no_such"], "scenario", "phonotaxis scenarios"),
         (["--laws", "magic"], "law", "conventional"),
-        (["--velocity-term", "half"], "repulsion.velocity_term", "closing"),
+        (["--velocity-term", "half"], "collision_vector.velocity_term", "closing"),
         (["--set", "sourc.speed_m_s=1"], "sourc", "did you mean 'source'"),
         (["--runs", "0"], "runs", "1"),
         (["--runs", "many"], "command line", "--help"),

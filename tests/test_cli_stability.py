@@ -135,7 +135,7 @@ def test_table_on_the_terminal(quick, capsys, tmp_path):
             "attraction",
             "raise attraction.damp",
         ),
-        (["--velocity-term", "half"], "repulsion.velocity_term", "closing"),
+        (["--velocity-term", "half"], "collision_vector.velocity_term", "closing"),
         (["--out", "/dev/null/out"], "out", "name another"),
     ],
 )
@@ -164,7 +164,7 @@ def test_of_several_robots_one_is_analysed_alone(quick, capsys, tmp_path):
         documents.append(json.loads(printed))
         again = load_scenario(out / "scenario.yaml")
         assert not again.robots
-        assert again.start.position_m == [(-3.0, 0.0), (0.0, -3.0)][k]
+        assert again.only.start.position_m == [(-3.0, 0.0), (0.0, -3.0)][k]
     assert documents[0]["law"] == "trajectory_filtered"
     status, _, complaint = run(capsys, "robots_2", "--robot", "nobody")
     assert status == 2

@@ -29,7 +29,7 @@ draw: {source.speed_m_s: {uniform: [0.1, 0.5]}}
 """
 #: The same, of the kind that other tests compile.
 COMPILED = SWEEP.replace("obstacle_sensing: ideal, ", "").replace(
-    "law: [none, active]", "repulsion.velocity_term: [printed, closing]"
+    "law: [none, active]", "collision_vector.velocity_term: [printed, closing]"
 )
 
 

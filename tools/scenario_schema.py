@@ -63,7 +63,7 @@ _UNITS = {
 class _Robot(Follower, Router, OdorSearcher, SoundSearcher):
     """One robot; its law decides which of these fields it has."""
 
-    route: RouteParameters | None = None
+    route: RouteParameters | None = None  # type: ignore[assignment]
     """Goal and planner of a robot that drives on a planned route."""
 
 
@@ -102,9 +102,6 @@ def make_schema() -> dict[str, Any]:
         node["properties"]["law"]["anyOf"] = [*named, {"pattern": ":"}]
         for name, kinds in ROBOT_FIELDS.items():
             node["properties"][name]["robots"] = list(kinds)
-    for gains in schema["$defs"]["LawGains"]["properties"].values():
-        gains["$ref"] = gains.pop("anyOf")[0]["$ref"]
-        del gains["default"]
     return tidied(schema, "A scenario of phonotaxis")
 
 

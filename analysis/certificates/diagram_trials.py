@@ -98,7 +98,7 @@ def try_diagram(
     if starts < 1:
         raise InputError("starts", f"{starts} must be at least 1")
     scenario = frozen_scenario(certificate.scenario)
-    scenario = scenario.model_copy(update={"hearing": hearing})
+    scenario = scenario.with_robot(hearing=hearing)
     follower = build_sound_follower(scenario)
     states, poses, skipped = _certified_starts(certificate, scenario, starts)
     ends = [_run(follower, *start) for start in zip(states, poses, strict=True)]

@@ -71,7 +71,7 @@ def overrides(options: Namespace) -> list[str]:
     found = list(options.set)
     for option, field in (
         ("seed", "seed"),
-        ("velocity_term", "repulsion.velocity_term"),
+        ("velocity_term", "collision_vector.velocity_term"),
     ):
         value = getattr(options, option)
         if value is not None:

@@ -28,7 +28,7 @@ EXPERIMENTS = (
     "one_moving_obstacle",
     "two_moving_obstacles",
 )
-VELOCITY_TERM = "repulsion.velocity_term"
+VELOCITY_TERM = "collision_vector.velocity_term"
 _LIBRARY = Path(diagrams.__file__).parent / "layouts"
 #: Fields of a sweep that a comparison sets itself.
 _OURS = ("grid", "runs", "pair")

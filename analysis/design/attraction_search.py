@@ -45,7 +45,7 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
         requirements: What is to be met.
 
     Returns:
-        A copy with K_r, D_r, follow distance and repulsion changed.
+        A copy with K_r, D_r, follow distance and gains changed.
 
     Raises:
         InputError: Nothing meets the requirements.
@@ -74,13 +74,13 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
         attraction = scenario.follower.attraction.model_copy(
             update={"follow_distance_m": round(follow, 2)}
         )
-        scenario = scenario.model_copy(update={"attraction": attraction})
+        scenario = scenario.with_robot(attraction=attraction)
         metres_to_go(scenario, requirements)
         within = _with_reserve(scenario, requirements)
-        repulsion = search_gains(within, requirements)
-        within = within.model_copy(update={"repulsion": repulsion})
+        laws = search_gains(within, requirements)
+        within = within.with_robot(laws=laws)
         if all(check_law(within, x, requirements).acceptable for x in _FOLLOWING_LAWS):
-            return scenario.model_copy(update={"repulsion": repulsion})
+            return scenario.with_robot(laws=laws)
         follow += _STEP_M
 
 
@@ -167,4 +167,4 @@ def with_attraction(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
         scenario.follower.attraction.model_dump()
         | {"stiffness_n_m": K_r, "damping_n_s_m": D_r}
     )
-    return scenario.model_copy(update={"attraction": attraction})
+    return scenario.with_robot(attraction=attraction)

@@ -104,7 +104,7 @@ def study_design(
     """Chooses gains for a scenario's attraction and robot, and recommends others.
 
     Args:
-        scenario: Its repulsion gives reaches and limits of speed only.
+        scenario: Its gains give reaches and limits of speed only.
         requirements: Bounds.
         progress: Called with the number of simulated runs, of ``STUDY_RUNS``.
 
@@ -117,8 +117,8 @@ def study_design(
     """
     scenario.require_one_robot("a design of gains")
     requirements = requirements or DesignRequirements()
-    repulsion = search_gains(scenario, requirements)
-    designed = scenario.model_copy(update={"repulsion": repulsion})
+    laws = search_gains(scenario, requirements)
+    designed = scenario.with_robot(laws=laws)
     better = search_attraction(scenario, requirements)
     K_r = scenario.follower.attraction.stiffness_n_m
 
@@ -161,7 +161,7 @@ def _alternative(
 def _barrier_row(scenario: Scenario, to_go: float) -> BarrierRow:
     attraction, reach = (
         scenario.follower.attraction,
-        scenario.repulsion.conventional.reach_m,
+        scenario.follower.laws.conventional.reach_m,
     )
     farther = DesignRequirements(
         source_range_m=to_go + attraction.follow_distance_m + reach

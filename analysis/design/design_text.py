@@ -112,7 +112,9 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
     curves = []
     for term in ("printed", "closing"):
         scenario = study.today.scenario
-        repulsion = scenario.repulsion.model_copy(update={"velocity_term": term})
-        changed = scenario.model_copy(update={"repulsion": repulsion})
+        echoes = scenario.follower.collision_vector.model_copy(
+            update={"velocity_term": term}
+        )
+        changed = scenario.with_robot(collision_vector=echoes)
         curves += law_curves(changed, DESIGNED_LAWS)
     plot_law_curves(curves).savefig(directory / "law_curves.png", dpi=150)

@@ -28,11 +28,11 @@ from analysis.laws.push_and_pull import (
     spring,
     stiffest,
 )
+from diagrams.scenario.participants import LawGains
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.active import matched_share
 from systems.laws.catalogue import LAWS
-from systems.laws.repulsion import RepulsionParameters
 
 #: Gains are rounded to so many figures.
 _FIGURES = 3
@@ -42,9 +42,7 @@ _GAINS = (1e-3, 1e5)
 _ALPHAS_M = (0.05, 1.0)
 
 
-def search_gains(
-    scenario: Scenario, requirements: DesignRequirements
-) -> RepulsionParameters:
+def search_gains(scenario: Scenario, requirements: DesignRequirements) -> LawGains:
     """The gains that the requirements give to each law.
 
     Args:
@@ -60,7 +58,7 @@ def search_gains(
     """
     for law, tuning in DESIGNED_LAWS.items():
         scenario = _RULES[tuning.rule](scenario, law, requirements)
-    return RepulsionParameters.model_validate(scenario.repulsion.model_dump())
+    return LawGains.model_validate(scenario.follower.laws.model_dump())
 
 
 def gain_for_barrier(
@@ -94,7 +92,7 @@ def gain_for_barrier(
     def missing(gain: float) -> float:
         return energy - largest_rise(gain * push - pull)
 
-    return _root(missing, *_GAINS, f"repulsion.{law}.{field}")
+    return _root(missing, *_GAINS, f"laws.{law}.{field}")
 
 
 def _barrier_gains(
@@ -151,7 +149,7 @@ def _matched_damper(
         return injected_share(law, changed) - requirements.injected_share
 
     # Below sqrt(e) d_ref the term never rises above its value at rest.
-    field = f"repulsion.{law}.matched_damping_n_s_m"
+    field = f"laws.{law}.matched_damping_n_s_m"
     D_0 = _root(excess, math.sqrt(math.e) * d_ref, 1e3 * d_ref, field)
     return with_gains(
         scenario,
@@ -170,7 +168,7 @@ def _matched_spring(
     that meet the offset the longest is taken; where even that is too stiff
     for the contact, the shortest that is not.
     """
-    reach = getattr(scenario.repulsion, law).reach_m
+    reach = getattr(scenario.follower.laws, law).reach_m
     # Of the attraction alone: no alpha changes it.
     allowed = allowed_stiffness(scenario, requirements)
 
@@ -196,7 +194,7 @@ def _matched_spring(
     def too_stiff(alpha: float) -> float:
         return stiffest(law, with_alpha(alpha)) - allowed
 
-    field = f"repulsion.{law}.reference_stiffness_n_m"
+    field = f"laws.{law}.reference_stiffness_n_m"
     alpha = _root(too_far, *_ALPHAS_M, field)
     if too_stiff(alpha) > 0.0:
         alpha = _root(too_stiff, alpha, _ALPHAS_M[1], field)

@@ -35,7 +35,7 @@ def jam_runs(
     """Runs ``two_static_obstacles`` with exact hearing and ultrasonic cones.
 
     Args:
-        scenario: Its attraction, repulsion, tick and rates of sensors and
+        scenario: Its attraction, gains, tick and rates of sensors and
             engine are used.
         laws: As ``Scenario.law``.
         progress: Called with the number of runs done.
@@ -50,26 +50,22 @@ def jam_runs(
         f"engine={scenario.engine}",
     )
     layout = load_scenario("two_static_obstacles", ["hearing=ideal", *settings])
-    static = layout.repulsion.active.speed_limit_m_s
-    active = scenario.repulsion.active.model_copy(update={"speed_limit_m_s": static})
-    repulsion = scenario.repulsion.model_copy(update={"active": active})
+    limit, gains = layout.follower.laws.active.speed_limit_m_s, scenario.follower.laws
+    active = gains.active.model_copy(update={"speed_limit_m_s": limit})
+    gains = gains.model_copy(update={"active": active})
     done, found = 0, []
-    goal = layout.model_copy(
-        update={"attraction": scenario.follower.attraction}
-    ).goal_radius_m
+    goal = layout.with_robot(attraction=scenario.follower.attraction).goal_radius_m
     for law in laws:
         causes: Counter[str] = Counter()
         jams = 0
         for start in JAM_STARTS_M:
             place = layout.only.start.model_copy(update={"position_m": (0.0, start)})
             run = simulate(
-                layout.model_copy(
-                    update={
-                        "law": law,
-                        "start": place,
-                        "attraction": scenario.follower.attraction,
-                        "repulsion": repulsion,
-                    }
+                layout.with_robot(
+                    law=law,
+                    start=place,
+                    attraction=scenario.follower.attraction,
+                    laws=gains,
                 )
             )
             causes[run.cause] += 1

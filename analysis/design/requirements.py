@@ -117,9 +117,9 @@ def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
     Returns:
         A copy.
     """
-    parameters = getattr(scenario.repulsion, law).model_copy(update=gains)
-    repulsion = scenario.repulsion.model_copy(update={law: parameters})
-    return scenario.model_copy(update={"repulsion": repulsion})
+    parameters = getattr(scenario.follower.laws, law).model_copy(update=gains)
+    laws = scenario.follower.laws.model_copy(update={law: parameters})
+    return scenario.with_robot(laws=laws)
 
 
 def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
@@ -136,7 +136,7 @@ def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
         InputError: Nothing is left of the source's range.
     """
     follow = scenario.follower.attraction.follow_distance_m
-    reach = scenario.repulsion.conventional.reach_m
+    reach = scenario.follower.laws.conventional.reach_m
     left = requirements.source_range_m - follow - reach
     if left <= 0.0:
         raise InputError(
@@ -192,5 +192,5 @@ def check_law(
         Check("offset by a far echo", far, requirements.far_offset_m, "m"),
         Check("energy put back", share, requirements.injected_share, "1"),
     )
-    gains = getattr(scenario.repulsion, law).model_dump()
+    gains = getattr(scenario.follower.laws, law).model_dump()
     return LawDesign(law, gains, checks)

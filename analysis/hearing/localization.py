@@ -224,4 +224,4 @@ def prepare_localization(
 
 def _with_estimator(scenario: Scenario, name: str) -> Scenario:
     tdoa = scenario.follower.tdoa.model_copy(update=ESTIMATORS[name])
-    return scenario.model_copy(update={"tdoa": tdoa})
+    return scenario.with_robot(tdoa=tdoa)

@@ -49,7 +49,7 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
     """Samples the laws with a scenario's gains.
 
     Args:
-        scenario: Its ``repulsion`` and ``robot`` count.
+        scenario: Its gains and ``robot`` count.
         laws: As ``Scenario.law``.
 
     Returns:
@@ -60,7 +60,7 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
     """
     curves = []
     for law in laws:
-        controller = make_controller(scenario.model_copy(update={"law": law}))
+        controller = make_controller(scenario.with_robot(law=law))
         if not controller.HasOutputPort("forces_W"):
             raise InputError(
                 "law", f"{law!r} has no output port forces_W to draw; use another law"
@@ -68,7 +68,7 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
         curves.append(
             LawCurves(
                 law=law,
-                velocity_term=scenario.repulsion.velocity_term,
+                velocity_term=scenario.follower.collision_vector.velocity_term,
                 distance_m=DISTANCES_M,
                 push_n=radial_forces(controller, DISTANCES_M, 0.0),
                 at_distance_m=AT_DISTANCE_M,

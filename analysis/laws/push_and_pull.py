@@ -48,7 +48,7 @@ def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
         raise InputError(
             "law", f"{law!r} has no gains to choose; use {', '.join(DESIGNED_LAWS)}"
         )
-    return law_function(scenario.model_copy(update={"law": law}))
+    return law_function(scenario.with_robot(law=law))
 
 
 def spring(law: str, scenario: Scenario) -> Push:
@@ -65,7 +65,7 @@ def spring(law: str, scenario: Scenario) -> Push:
         InputError: The law has no gains to choose.
     """
     force = law_force(law, scenario)
-    speed = DESIGNED_LAWS[law].spring_speed(getattr(scenario.repulsion, law))
+    speed = DESIGNED_LAWS[law].spring_speed(getattr(scenario.follower.laws, law))
     return lambda c: force(c, speed)
 
 
@@ -139,7 +139,7 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
         N/m.
     """
     K_r = scenario.follower.attraction.stiffness_n_m
-    reach = scenario.repulsion.conventional.reach_m
+    reach = scenario.follower.laws.conventional.reach_m
     work = K_r / 2.0 * ((metres_to_go + reach) ** 2 - metres_to_go**2)
     return 2.0 * (kinetic_energy(scenario) + work) / reach**2
 
@@ -154,7 +154,7 @@ def stiffest(law: str, scenario: Scenario) -> float:
     Returns:
         Largest -df/dc at rest, N/m.
     """
-    gains = getattr(scenario.repulsion, law)
+    gains = getattr(scenario.follower.laws, law)
     nearest = scenario.follower.ultrasonic.minimum_range_m
     return DESIGNED_LAWS[law].stiffest(gains, nearest)
 
@@ -218,7 +218,7 @@ def injected_share(law: str, scenario: Scenario) -> float:
         A ratio, 0 or more, at half the reach rho_0.
     """
     force = law_force(law, scenario)
-    within = 0.5 * scenario.repulsion.conventional.reach_m
+    within = 0.5 * scenario.follower.laws.conventional.reach_m
     speeds = scenario.only.robot.top_speed_m_s * _SPEEDS
     term = np.array([force(within, s) for s in speeds.tolist()]) - force(within, 0.0)
     return (

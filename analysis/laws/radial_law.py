@@ -97,7 +97,7 @@ def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:
         raise InputError(
             "law",
             f"{scenario.only.law!r} is a block without a force f(c, s), which energy "
-            "functions need; write it as a function law(c, s, repulsion)",
+            "functions need; write it as a function law(c, s, laws)",
         )
     return function
 
@@ -113,7 +113,7 @@ def radial_law(scenario: Scenario) -> RadialLaw:
     return _tabulate(
         key.only.law,
         str(loaded_digests(key)),
-        key.repulsion.model_dump_json(),
+        key.follower.laws.model_dump_json(),
         (
             key.follower.ultrasonic.minimum_range_m,
             key.follower.ultrasonic.maximum_range_m,
@@ -140,7 +140,7 @@ class _Scenario:
 def _tabulate(
     name: str,
     _own_code: str,
-    _repulsion: str,
+    _gains: str,
     ranges_m: tuple[float, float],
     top_speed: float,
     carrier: _Scenario,

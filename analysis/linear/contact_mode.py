@@ -298,7 +298,7 @@ def contact_limits(
         stiffness_n_m=left,
         reference_stiffness_n_m=left * math.e**2,
         today=(scenario.only.plant.motor_lag_s, 0),
-        stiffness_today_n_m=scenario.repulsion.conventional.stiffness_n_m,
-        reference_stiffness_today_n_m=scenario.repulsion.active.reference_stiffness_n_m,
+        stiffness_today_n_m=scenario.follower.laws.conventional.stiffness_n_m,
+        reference_stiffness_today_n_m=scenario.follower.laws.active.reference_stiffness_n_m,
         tick_s=scenario.tick_s,
     )

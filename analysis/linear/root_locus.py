@@ -128,19 +128,19 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
         return target
     slopes = contact_slopes(scenario)
     k, d = slopes.stiffness_n_m, slopes.approach_damping_n_s_m
-    law = getattr(scenario.repulsion, scenario.only.law)
+    law = getattr(scenario.follower.laws, scenario.only.law)
     spring, damper = record.loop_gains
     today, strength = getattr(law, spring), getattr(law, damper)
     return (
         *target,
         locus(
-            f"repulsion.{scenario.only.law}.{spring}",
+            f"laws.{scenario.only.law}.{spring}",
             "contact",
             today,
             lambda value: contact_matrix(scenario, K + k * value / today),
         ),
         locus(
-            f"repulsion.{scenario.only.law}.{damper}",
+            f"laws.{scenario.only.law}.{damper}",
             "contact",
             strength,
             lambda value: contact_matrix(

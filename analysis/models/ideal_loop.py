@@ -82,7 +82,7 @@ class IdealLoop:
             raise InputError(
                 "law",
                 f"the block of {scenario.only.law!r} has no AutoDiffXd form; write it "
-                "as a function law(c, s, repulsion) with pydrake.math, or as a "
+                "as a function law(c, s, laws) with pydrake.math, or as a "
                 "TemplateSystem of float and AutoDiffXd",
             )
         self.twin: Any = twin

@@ -161,7 +161,7 @@ def _head_on_scenario(
         "obstacles": [box],
         "source": {"waypoints_m": [[far, 0.0]], "heading_deg": 0.0},
         "attraction": {"follow_distance_m": follow},
-        "repulsion": {"velocity_term": term},
+        "collision_vector": {"velocity_term": term},
         "tracker": {"hold": "world"},
         "stop": {"stuck_after_s": 2.0 * duration_s, "goal_margin_m": 1e-6},
     }

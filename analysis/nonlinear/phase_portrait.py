@@ -112,7 +112,7 @@ def phase_portrait(
         ValueError: The law has no radial force.
     """
     contact = head_on(scenario, to_go_m=to_go_m)
-    term = velocity_term or scenario.repulsion.velocity_term
+    term = velocity_term or scenario.follower.collision_vector.velocity_term
     model = head_on_model(contact)
     least = scenario.follower.ultrasonic.minimum_range_m
     c = np.linspace(least + 0.005, 1.5, points)

@@ -49,8 +49,8 @@ def stiffness_ratio_map(
     Returns:
         Distances at which P is held, m, by ratio; NaN: nowhere.
     """
-    contact = head_on(scenario.model_copy(update={"law": "active"}), to_go_m=to_go_m)
-    gains = scenario.repulsion.active
+    contact = head_on(scenario.with_robot(law="active"), to_go_m=to_go_m)
+    gains = scenario.follower.laws.active
     stiffness = scenario.follower.attraction.stiffness_n_m
     c = np.arange(_RATIO_STEP_M, contact.law.range_m, _RATIO_STEP_M)
     pull = stiffness * (contact.to_go_m + c)

@@ -114,7 +114,7 @@ def velocity_term_passivity(
     speeds = INCREMENT_STEPS[1] * np.arange(1, increments.shape[1] + 1)
     slopes = increments / speeds
     return VelocityTermPassivity(
-        velocity_term=velocity_term or scenario.repulsion.velocity_term,
+        velocity_term=velocity_term or scenario.follower.collision_vector.velocity_term,
         rise_n_s_m=max(0.0, float(slopes.max())),
         fall_n_s_m=max(0.0, float(-slopes.min())),
         bodies=len(model.rectangles) if model.all_bodies else 1,

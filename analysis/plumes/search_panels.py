@@ -126,7 +126,8 @@ def _heading(axes: Axes, result: RunResult) -> None:
 def _phase(axes: Axes, result: RunResult) -> None:
     searcher = result.scenario.searcher
     smells = isinstance(searcher, OdorSearcher)
-    names = _PHASES[searcher.search.rules if smells else "sound"]
+    rules = searcher.search.rules if isinstance(searcher, OdorSearcher) else "sound"
+    names = _PHASES[rules]
     phase = result.columns["search_phase"]
     axes.plot(result.time, phase, color=COLOURS["robot"], lw=1.2, label="phase")
     shades = [("moves", result.columns["move"] > 0.5, "seen", 0.2)]

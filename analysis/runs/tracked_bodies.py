@@ -52,7 +52,7 @@ def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
     scenario, columns = result.scenario, result.columns
     if scenario.only.law != "guarded" or not has_known_space(result):
         return None
-    own, tick_s = scenario.repulsion.guarded, scenario.tick_s
+    own, tick_s = scenario.follower.laws.guarded, scenario.tick_s
     wanted = np.ravel(np.asarray(times, dtype=float))
     rows = np.unique(np.abs(result.time[:, None] - wanted).argmin(axis=0))
     hazards = make_hazards(scenario.sensing.ultrasonic.count)

@@ -82,7 +82,7 @@ def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
     if not others:
         return scenario.of_robot(chosen), ""
     # Alone there is nobody to hear it.
-    alone = scenario.of_robot(chosen).model_copy(update={"loudspeaker": None})
+    alone = scenario.of_robot(chosen).with_robot(loudspeaker=None)
     note = f"the report covers robot {chosen!r} alone, without {', '.join(others)}"
     if name is None:
         note += "; the option robot selects another robot"

@@ -118,7 +118,7 @@ class ParameterRow:
     @property
     def of_law(self) -> bool:
         """Whether it belongs to the law, rather than to every loop."""
-        return self.field.startswith("repulsion.")
+        return self.field.startswith("laws.")
 
 
 @dataclass(frozen=True)

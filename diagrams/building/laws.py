@@ -11,7 +11,11 @@ from diagrams.building.own_laws import checked_law, try_law
 from diagrams.building.robots.routed_robot import make_trajectory_controller
 from diagrams.building.robots.searching_robot import search_controller
 from diagrams.scenario.own_code import asked_for, import_own, made
-from diagrams.scenario.participants import HasRangeSensors
+from diagrams.scenario.participants import (
+    Follower,
+    HasRangeSensors,
+    LawGains,
+)
 from diagrams.scenario.scenario import Scenario
 from systems import RadialLawController, WheelCommand
 from systems.base.robot import RobotParameters
@@ -19,10 +23,7 @@ from systems.base.wheel_speed_command import COMMANDS
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.laws.catalogue import LAWS, ROUTE_LAWS
-from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.ranging.collision_vector import SLOTS
-from systems.ranging.parameters import CollisionVectorParameters
 
 #: Optional output ports of a law for the log, with sizes.
 _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
@@ -35,12 +36,14 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     ``path/to/file.py:Name``; Python also searches the working directory. The law is
     either a function or a class.
 
-    A function ``law(c, s, repulsion)`` returns the force away from an obstacle, N. c is
-    the distance of the obstacle, m, and s is its speed, m/s. ``make_controller`` calls
-    the law at a few distances and speeds as a test.
+    A function ``law(c, s, laws)`` returns the force away from an obstacle, N. c is
+    the distance of the obstacle, m, and s is its speed, m/s. ``laws`` has the gains of
+    all laws of the package. ``make_controller`` calls the law at a few distances and
+    speeds as a test.
 
     A class derives from LeafSystem. Its arguments may be ``robot``, ``attraction``,
-    ``repulsion``, ``sensors``, ``tick_s``, ``following``, ``known``, ``bodies`` and
+    ``laws``, ``gains`` (those of the law of the package from whose block the class
+    derives), ``velocity_term``, ``sensors``, ``tick_s``, ``known``, ``bodies`` and
     ``seed``. Each of its inputs has the name of an output port in the diagram. The
     class has exactly one of the outputs that ``make_command`` accepts.
 
@@ -65,46 +68,46 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     if robot.obstacle_sensing == "ideal":
         at_once = {"firing": "simultaneous", "period_s": scenario.tick_s}
         sensors = sensors.model_copy(update=at_once)
-    repulsion = _repulsion(robot)
+    name = robot.law
     parts = {
+        "gains": robot.gains,
         "robot": robot.robot,
-        "attraction": getattr(robot, "attraction", AttractionParameters()),
-        "repulsion": repulsion,
         "tick_s": scenario.tick_s,
         "sensors": sensors,
-    }
-    more = {
-        "known": getattr(robot, "free_space", None),
         "bodies": bodies,
         "seed": seed,
     }
-    name = robot.law
+    if isinstance(robot, Follower):
+        parts |= {
+            "attraction": robot.attraction,
+            "velocity_term": robot.collision_vector.velocity_term,
+            "known": robot.free_space,
+        }
     if name in LAWS:
-        law, controller = LAWS[name], LAWS[name].controller
-        if controller is None:
-            return RadialLawController(law=law, **parts)
-        if law.force is None:
-            parts = asked_for(controller, {**parts, **more})
-        return controller(**parts)
+        controller = LAWS[name].controller
+        if controller is not None:
+            return controller(**asked_for(controller, parts))
+        return _radial(LAWS[name], parts)
     law = import_own(name, "law")
     if inspect.isclass(law):
-        # Pass only those arguments of ``more`` that the signature names. A law that
-        # accepts any keyword may pass all arguments on to a law of the package, which
-        # rejects some of them.
-        named = inspect.signature(getattr(law, "_construct", law)).parameters
-        wanted = {key: value for key, value in more.items() if key in named}
-        return _own_block(name, law, {**parts, **wanted})
+        gains = _gains_of_base(law, robot.laws)
+        return _own_block(name, law, {**parts, "laws": robot.laws, "gains": gains})
     function = checked_law(name, law)
     reach, top_speed = robot.ultrasonic.maximum_range_m, robot.robot.top_speed_m_s
-    try_law(function, repulsion, reach, top_speed)
-    return RadialLawController(**parts, law=function)
+    try_law(function, robot.laws, reach, top_speed)
+    return _radial(function, {**parts, "gains": robot.laws})
 
 
-def _repulsion(robot: HasRangeSensors) -> RepulsionParameters:
-    own = robot.laws
-    fields = {n: getattr(own, n) for n in type(own).model_fields if getattr(own, n)}
-    term = getattr(robot, "collision_vector", CollisionVectorParameters()).velocity_term
-    return RepulsionParameters(velocity_term=term, **fields)
+def _radial(law: Any, parts: dict[str, Any]) -> Any:
+    return RadialLawController(law=law, **asked_for(RadialLawController, parts))
+
+
+def _gains_of_base(block: type, laws: LawGains) -> Any:
+    """Returns the gains of the law of the package whose block is a base of a class."""
+    for name, law in LAWS.items():
+        if law.controller is not None and issubclass(block, law.controller):
+            return getattr(laws, name)
+    return None
 
 
 def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
@@ -112,7 +115,7 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
         raise InputError(
             "law",
             f"{name!r} is a class, but not a LeafSystem; write a function law(c, "
-            "s, repulsion), or derive it from a controller of phonotaxis",
+            "s, laws), or derive it from a controller of phonotaxis",
         )
     block = made(name, "law", law, parts)
     commanded(block, name)

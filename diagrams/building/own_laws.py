@@ -11,8 +11,8 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 
 from diagrams.scenario.own_code import is_interrupt, why
+from diagrams.scenario.participants import LawGains
 from systems.framework.input_error import InputError, shortened
-from systems.laws.repulsion import RepulsionParameters
 
 
 def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
@@ -20,7 +20,7 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
 
     Args:
         name: Name of the law, for messages.
-        law: ``law(c, s, repulsion)``; returns a force, N.
+        law: ``law(c, s, laws)``; returns a force, N.
 
     Returns:
         A function with the same arguments. It returns a finite force, N, as a float or
@@ -28,9 +28,9 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     @functools.wraps(law)
-    def checked(c: Any, s: Any, repulsion: RepulsionParameters) -> Any:
+    def checked(c: Any, s: Any, laws: LawGains) -> Any:
         try:
-            force = law(c, s, repulsion)
+            force = law(c, s, laws)
         except BaseException as error:  # a user's law may raise any exception
             if is_interrupt(error):
                 raise
@@ -53,7 +53,7 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
 
 def try_law(
     law: Callable[..., Any],
-    repulsion: RepulsionParameters,
+    laws: LawGains,
     range_m: float,
     top_speed_m_s: float,
 ) -> None:
@@ -61,7 +61,7 @@ def try_law(
 
     Args:
         law: A function from ``checked_law``.
-        repulsion: Gains of all laws.
+        laws: Gains of all laws.
         range_m: Largest tested distance, m.
         top_speed_m_s: Largest tested speed, m/s.
 
@@ -70,7 +70,7 @@ def try_law(
     """
     for share in (1e-3, 0.1, 0.5, 1.0):
         for s in (0.0, 0.5 * top_speed_m_s, top_speed_m_s):
-            law(share * range_m, s, repulsion)
+            law(share * range_m, s, laws)
 
 
 def _failed(name: str, c: Any, s: Any, what: str) -> InputError:
@@ -78,7 +78,7 @@ def _failed(name: str, c: Any, s: Any, what: str) -> InputError:
     at = f"c = {_number(c):.3g} m, s = {_number(s):.3g} m/s"
     return InputError(
         "law",
-        f"{name!r} {what} at {at}; write law(c, s, repulsion) that returns a finite "
+        f"{name!r} {what} at {at}; write law(c, s, laws) that returns a finite "
         "force in N",
     )
 

@@ -15,7 +15,7 @@ import inspect
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
@@ -282,9 +282,7 @@ def _users_modules(module: ModuleType) -> list[ModuleType]:
     return [*found.values()]
 
 
-def made(
-    name: str, field: str, maker: Callable[..., Any], parts: Mapping[str, Any]
-) -> Any:
+def made(name: str, field: str, maker: type, parts: Mapping[str, Any]) -> Any:
     """Makes an object from a user's class, with the arguments that it accepts.
 
     Args:
@@ -311,20 +309,30 @@ def made(
         ) from error
 
 
-def asked_for(maker: Callable[..., Any], parts: Mapping[str, Any]) -> dict[str, Any]:
+def asked_for(maker: type, parts: Mapping[str, Any]) -> dict[str, Any]:
     """Selects the arguments that a class accepts.
+
+    A class that accepts any keyword passes it on to its base class. Therefore the
+    arguments of the base class count, too.
 
     Args:
         maker: The class, see ``made``.
         parts: Available arguments by name.
 
     Returns:
-        The arguments in the signature; all of them if the class accepts any keyword.
+        The arguments in the signatures; all of them if no base class limits them.
     """
-    asked = inspect.signature(getattr(maker, "_construct", maker)).parameters
-    if any(each.kind is each.VAR_KEYWORD for each in asked.values()):
-        return dict(parts)
-    return {key: parts[key] for key in asked if key in parts}
+    asked: set[str] = set()
+    any_keyword = False
+    for each in maker.__mro__:
+        construct = vars(each).get("_construct") or vars(each).get("__init__")
+        if inspect.isfunction(construct):
+            signature = inspect.signature(construct).parameters.values()
+            asked.update(own.name for own in signature)
+            any_keyword = any(own.kind is own.VAR_KEYWORD for own in signature)
+            if not any_keyword:
+                break
+    return {key: parts[key] for key in parts if any_keyword or key in asked}
 
 
 def _is_users(module: ModuleType, file: str) -> bool:

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import (
     Discriminator,
     Field,
+    SerializerFunctionWrapHandler,
     Strict,
     Tag,
     create_model,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -68,23 +70,31 @@ class StartParameters(Parameters):
         return (*self.position_m, math.radians(self.heading_deg))
 
 
+class _LawGains(Parameters):
+    @model_serializer(mode="wrap")
+    def _dump(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leaves out the laws whose gains nobody has set or uses."""
+        return {k: v for k, v in dump(self).items() if k in self.model_fields_set}
+
+
 if TYPE_CHECKING:
 
-    class LawGains(Parameters):
+    class LawGains(_LawGains):
         """Stub for type checkers, which cannot see the fields from the catalog."""
 
+        def __init__(self, **fields: Any) -> None: ...
         def __getattr__(self, name: str) -> Any: ...
 
 else:
     LawGains = create_model(
         "LawGains",
-        __base__=Parameters,
+        __base__=_LawGains,
         __module__=__name__,
         __doc__="Gains by law. Only the gains of the robot's law have an effect.",
         **{
             law.name: (
-                law.gains | None,
-                Field(None, description=f"Gains of ``law: {law.name}``."),
+                law.gains,
+                Field(law.gains(), description=f"Gains of ``law: {law.name}``."),
             )
             for law in LAWS.values()
             if law.gains is not None
@@ -177,7 +187,7 @@ class Follower(Robot):
     @property
     def gains(self) -> Any:
         """Gains of the robot's law; None for a law without gains."""
-        return gains_of(self.laws, self.law)
+        return getattr(self.laws, self.law, None)
 
     @property
     def own_guard(self) -> GuardParameters | None:
@@ -215,7 +225,7 @@ class Router(Robot):
     @property
     def gains(self) -> Any:
         """Gains of the robot's law; None for a law without gains."""
-        return gains_of(self.laws, self.law)
+        return getattr(self.laws, self.law, None)
 
 
 class OdorSearcher(Robot):
@@ -297,21 +307,6 @@ AnyRobot = Annotated[
     | Annotated[SoundSearcher, Tag("sound_searcher")],
     Discriminator(kind_of),
 ]
-
-
-def gains_of(laws: LawGains, law: str) -> Any:
-    """Returns the gains of a law, by default those of its model.
-
-    Args:
-        laws: Gains that are set.
-        law: Name of a law.
-
-    Returns:
-        The gains; None for a law without gains, and for a user's own law.
-    """
-    if law not in LAWS or (model := LAWS[law].gains) is None:
-        return None
-    return getattr(laws, law) or model()
 
 
 class SourceParameters(SourceRobotParameters):

@@ -208,6 +208,18 @@ class Scenario(RunParameters):
             return self
         return self.model_copy(update={"robots": {name: robot}, "sources": sources})
 
+    def with_robot(self, **fields: Any) -> Scenario:
+        """Returns a copy in which the only robot has other values, unchecked.
+
+        Args:
+            **fields: Models and values, by field of the robot.
+
+        Raises:
+            InputError: There are several robots.
+        """
+        robot = self.only.model_copy(update=fields)
+        return self.model_copy(update={"robots": {next(iter(self.robots)): robot}})
+
     def with_(self, changes: Mapping[str, Any]) -> Scenario:
         """Returns a copy with some fields changed, which is validated.
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from systems.framework.parameters import (
-    Acceleration,
-    Duration,
     Length,
     NonNegative,
     NonNegativeLength,
+    Parameters,
     Positive,
 )
 from systems.laws.law import Equation, Law
-from systems.laws.parameters import MapParameters
 
 
-class DynamicWindowParameters(MapParameters):
+class DynamicWindowParameters(Parameters):
     """Weights and limits of the dynamic window."""
 
     clearance_m: NonNegativeLength = 0.19
@@ -25,12 +23,8 @@ class DynamicWindowParameters(MapParameters):
     """Weight beta of the distance to the nearest obstacle on the arc (paper: 0.2)."""
     speed_gain: NonNegative = 3.6
     """Weight gamma of the speed (paper: 0.2)."""
-    acceleration_m_s2: Acceleration = 1.0
-    """Acceleration that limits the window, and braking deceleration, m/s^2."""
     turn_acceleration_rad_s2: Positive = 6.1
     """Yaw acceleration that limits the window, and that stops a turn, rad/s^2."""
-    period_s: Duration = 0.1
-    """Time from one choice to the next, s."""
     farthest_m: Length = 2.6
     """Largest distance along the arc that counts, m. Obstacles that are farther away
     count as if they were at this distance."""

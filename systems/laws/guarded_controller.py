@@ -11,7 +11,6 @@ from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.laws.guarded import GuardedParameters
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.planning.evasion import EvasionNumbers
 from systems.planning.guarded_drive import (
     CARROT_X,
@@ -78,7 +77,7 @@ class GuardedController(Block):
     Args:
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
-        repulsion: ``RepulsionParameters``; uses ``guarded``.
+        gains: ``GuardedParameters``.
         sensors: Parameters of the range sensors.
         known: Parameters of the map.
         tick_s: Period of the controller, s.
@@ -113,14 +112,14 @@ class GuardedController(Block):
         *,
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
-        repulsion: RepulsionParameters = RepulsionParameters(),
+        gains: GuardedParameters = GuardedParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
         known: FreeSpaceParameters = FreeSpaceParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("guarded_controller")
-        own = repulsion.guarded
+        own = gains
         numbers = DriveNumbers(
             own,
             attraction.follow_distance_m,

@@ -29,8 +29,7 @@ from systems.laws.conventional import CONVENTIONAL
 from systems.laws.conventional_2017 import CONVENTIONAL_2017
 from systems.laws.law import FORCE_COLUMNS, Law
 from systems.laws.no_avoidance import NONE
-from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
+from systems.laws.parameters import AttractionParameters, VelocityTerm
 from systems.ranging.collision_vector import SLOTS
 from systems.ranging.parameters import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
@@ -40,6 +39,8 @@ _ROW = 3 * SLOTS
 
 #: Distance in m. If a target is straight behind P by more, the pull turns aside.
 _BEHIND_M = 0.3
+#: Time constant of the stop when there is no target, s (our choice).
+BRAKE_TIME_S = 0.5
 
 
 @register_jitable
@@ -60,7 +61,7 @@ def attraction_force(
         (Fx, Fy) in W, N: K_r (p_S - p) (1 - d_f/|p_S - p|) - D_r v.
     """
     if not valid:
-        brake = mass / attraction.brake_time_s
+        brake = mass / BRAKE_TIME_S
         return -brake * v_WP[0], -brake * v_WP[1]
     dx, dy = p_WS[0] - p_WP[0], p_WS[1] - p_WP[1]
     pull = attraction.stiffness_n_m
@@ -228,12 +229,13 @@ def ImpedanceController_(T):
 
         Args:
             law: A law of ``systems.laws.catalogue`` that has a force, or a function
-                ``law(c, s, repulsion)``. The function returns the force away from the
+                ``law(c, s, gains)``. The function returns the force away from the
                 obstacle in N for a distance c in m and a speed s in m/s. It must use
                 pydrake.math to be differentiable.
+            gains: Gains of the law. None: a law of the catalogue has its default gains.
+            velocity_term: Definition of s.
             robot: Mass, and position of P.
             attraction: ``AttractionParameters``.
-            repulsion: ``RepulsionParameters``: gains of the law, and definition of s.
             sensors: ``UltrasonicParameters``: period and order of firing, least range.
             tick_s: Period of the controller, s.
         """
@@ -244,23 +246,31 @@ def ImpedanceController_(T):
             self,
             *,
             law: Law | Callable[..., Any] = NONE,
+            gains: Any = None,
+            velocity_term: VelocityTerm = "printed",
             robot: RobotParameters = RobotParameters(),
             attraction: AttractionParameters = AttractionParameters(),
-            repulsion: RepulsionParameters = RepulsionParameters(),
             sensors: UltrasonicParameters = UltrasonicParameters(),
             tick_s: float = TICK_S,
             converter: Any = None,
         ) -> None:
             super().__init__(converter=converter)
             self.set_name("impedance_controller")
+            force: Any = law
+            arguments: tuple[Any, ...] = (gains,)
+            if isinstance(law, Law):
+                assert law.force is not None, f"{law.name} has no force"
+                force = law.force
+                arguments = law.arguments(gains, sensors.minimum_range_m)
             round_ticks = sensors.round_ticks(tick_s)
             self.states = _slot_names(round_ticks)
             numbers = ImpedanceNumbers(
-                *_force_and_arguments(law, repulsion, sensors.minimum_range_m),
+                force,
+                arguments,
                 attraction,
                 robot.mass_kg,
                 robot.control_point_m,
-                repulsion.velocity_term == "closing",
+                velocity_term == "closing",
                 round_ticks * tick_s,
             )
             step = Step(impedance_step, numbers, [0.0] * (_ROW * round_ticks))
@@ -272,17 +282,6 @@ def ImpedanceController_(T):
             return numbers.force(c, s, *numbers.arguments)
 
     return Impl
-
-
-def _force_and_arguments(
-    law: Law | Callable[..., Any],
-    repulsion: RepulsionParameters,
-    least_range_m: float,
-) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-    if not isinstance(law, Law):
-        return law, (repulsion,)
-    assert law.force is not None, f"{law.name} has no force"
-    return law.force, law.arguments(repulsion, least_range_m)
 
 
 def _slot_names(round_ticks: int) -> tuple[str, ...]:
@@ -332,7 +331,7 @@ def _define_for(law: Law, block_name: str) -> Any:
     {law.equations[0].title}: {equations}.
 
     It is ``ImpedanceController`` with this law, and takes the same arguments but
-    ``law``. Its gains are ``{law.name}`` of ``RepulsionParameters``."""
+    ``law``. Its gains are ``{law.gains.__name__ if law.gains else None}``."""
     return _define(law.controller_name, block_name, documentation, law=law)
 
 

@@ -61,8 +61,7 @@ class Law:
     """One law. ``systems.laws.catalogue`` lists them all."""
 
     name: str
-    """Name of the law in ``Scenario.law``, and of its gains in
-    ``Scenario.repulsion``."""
+    """Name of the law in scenarios."""
     title: str
     """Heading in reports."""
     label: str
@@ -74,9 +73,7 @@ class Law:
 
     The function takes a distance in m and a speed in m/s, floats or AutoDiffXd. Its
     part f(c, 0) has a potential energy. None: the block of the law decides on a motion
-    instead of a force, so that the law has no linear model. The class of such a block
-    may also take the arguments ``following``, ``known`` (parameters of the map),
-    ``bodies`` (number of bodies), and ``seed``."""
+    instead of a force, so that the law has no linear model."""
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
@@ -97,29 +94,30 @@ class Law:
     """Color in pictures. None: the next color of the palette."""
 
     @property
-    def controller(self) -> Callable[..., Any] | None:
+    def controller(self) -> type | None:
         """Class of the law's block, or None if the law names none.
 
-        The class takes the arguments robot, attraction, repulsion, and sensors. This
-        property imports the class when it is read. Therefore the check of a scenario
-        needs no Drake and no compiled code.
+        The class may take the arguments ``gains``, ``velocity_term``, ``robot``,
+        ``attraction``, ``sensors``, ``tick_s``, ``known`` (parameters of the map),
+        ``bodies`` (number of bodies), and ``seed``. This property imports the class
+        when it is read. Therefore the check of a scenario needs no Drake and no
+        compiled code.
         """
         if not self.controller_name:
             return None
         return getattr(import_module("systems"), self.controller_name)
 
-    def arguments(self, repulsion: Any, least_range_m: float) -> tuple[Any, ...]:
+    def arguments(self, gains: Any, least_range_m: float) -> tuple[Any, ...]:
         """Returns the arguments of ``force`` after c and s.
 
         Args:
-            repulsion: ``RepulsionParameters``.
+            gains: Gains of the law, or None for the default gains.
             least_range_m: Least range of the sensors, m.
 
         Returns:
             The gains, or None for a law without gains. If ``least_range`` is true, the
             least range in m follows.
         """
-        gains: Any = None
-        if self.gains is not None:
-            gains = getattr(repulsion, self.name)
+        if gains is None and self.gains is not None:
+            gains = self.gains()
         return (gains, least_range_m) if self.least_range else (gains,)

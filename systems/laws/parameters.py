@@ -1,17 +1,18 @@
-"""Attraction, and the parameters that several laws share."""
+"""The attraction, and the definition of s that the laws share."""
 
 from __future__ import annotations
 
 from typing import Literal
 
 from systems.framework.parameters import (
-    Duration,
     NonNegativeDamping,
     NonNegativeLength,
     NonNegativeStiffness,
     Parameters,
 )
 
+#: Definition of the speed s of an obstacle: ``printed`` is |dC/dt|, ``closing`` is the
+#: speed of approach only.
 VelocityTerm = Literal["printed", "closing"]
 
 
@@ -26,23 +27,3 @@ class AttractionParameters(Parameters):
     follow_distance_m: NonNegativeLength = 1.2
     """Distance d_f from the source at which the spring has no force, m (our choice).
     With 0, as in the paper, the spring pulls P onto the source."""
-    brake_time_s: Duration = 0.5
-    """Time constant of the stop when there is no target, s (our choice)."""
-
-
-class SharedRepulsion(Parameters):
-    """Parameters that the pushes of all laws share."""
-
-    velocity_term: VelocityTerm = "printed"
-    """Definition of the speed s: ``printed`` is |dC/dt|, ``closing`` is the speed of
-    approach only."""
-
-
-class MapParameters(Parameters):
-    """Parameters of the baselines that use a map of echoes."""
-
-    clearance_m: NonNegativeLength = 0.05
-    """Distance that the robot keeps from cells with echoes, m."""
-    source_clearance_m: NonNegativeLength = 0.5
-    """Distance from the target within which echoes count as echoes of the target,
-    m."""

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from systems.framework.parameters import Duration, Length, NonNegativeLength, Parameters
+from systems.framework.parameters import Duration, Length, Parameters
 from systems.laws.law import Equation, Law
 
 
 class ReciprocalAvoidanceParameters(Parameters):
-    """Horizon and distances of ORCA."""
+    """Horizon of ORCA, and the point that it moves."""
 
     horizon_s: Duration = 1.8
     """Time for which the chosen velocity avoids contacts, s."""
     offset_m: Length = 0.045
     """Distance ahead of the axle of the point whose velocity ORCA chooses, m."""
-    clearance_m: NonNegativeLength = 0.02
-    """Distance that the robot keeps from all bodies, m."""
-    farthest_m: Length = 5.0
-    """Distance beyond which bodies do not count, m."""
 
 
 ORCA = Law(

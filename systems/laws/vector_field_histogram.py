@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from pydantic import model_validator
-
-from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Length,
     NonNegative,
     NonNegativeLength,
+    Parameters,
     Positive,
 )
 from systems.laws.law import Equation, Law
-from systems.laws.parameters import MapParameters
 
 
-class VectorFieldHistogramParameters(MapParameters):
+class VectorFieldHistogramParameters(Parameters):
     """Weights and thresholds of VFH+."""
 
     clearance_m: NonNegativeLength = 0.04
@@ -24,28 +21,12 @@ class VectorFieldHistogramParameters(MapParameters):
     """Distance within which cells count, m (half of the paper's active window:
     1.65)."""
     low_threshold: NonNegative = 0.33
-    """Density below which a sector becomes free."""
-    high_threshold: NonNegative = 0.66
-    """Density above which a sector becomes blocked. Between the two thresholds a
-    sector keeps its state."""
+    """Density below which a sector becomes free. Above twice this density, a sector
+    becomes blocked. Between these thresholds a sector keeps its state."""
     slow_density: Positive = 69.0
     """Density in the chosen direction at which the speed falls to 0."""
-    target_gain: NonNegative = 5.0
-    """Weight mu_1 of the target's direction (paper: 5)."""
-    heading_gain: NonNegative = 2.0
-    """Weight mu_2 of the robot's heading (paper: 2)."""
     previous_gain: NonNegative = 2.9
     """Weight mu_3 of the previously chosen direction (paper: 2)."""
-
-    @model_validator(mode="after")
-    def _check_thresholds(self) -> VectorFieldHistogramParameters:
-        if self.high_threshold < self.low_threshold:
-            raise InputError(
-                "high_threshold",
-                f"{self.high_threshold:g} is below low_threshold, "
-                f"{self.low_threshold:g}; raise it",
-            )
-        return self
 
 
 VFH_PLUS = Law(

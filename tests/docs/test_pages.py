@@ -28,7 +28,7 @@ IN_A_CLONE = ("make ", ". .venv", "git ", "pip ", "cd ")
 def test_the_scenario_of_the_page_is_one() -> None:
     office = page_file("your_scenario.md", "office.yaml")
     scenario = scenario_from_mapping(YAML(typ="safe").load(office))
-    assert list(scenario.all_sources) == ["source", "radio"]
+    assert list(scenario.sources) == ["source", "radio"]
     assert [body.name for body in scenario.obstacles] == ["box", "cart"]
 
 

@@ -35,12 +35,12 @@ def random_scenario(seed: int) -> Scenario:
         f"attraction.stiffness_n_m={2.0 * factor():.3f}",
         f"attraction.damping_n_s_m={1.0 * factor():.3f}",
         f"attraction.follow_distance_m={rng.choice([0.0, 0.6, 1.2]):.1f}",
-        f"repulsion.velocity_term={rng.choice(['printed', 'closing'])}",
-        f"repulsion.conventional.stiffness_n_m={16.0 * factor():.3f}",
-        f"repulsion.conventional.damping_n_s_m={0.8 * factor():.3f}",
-        f"repulsion.active.reference_stiffness_n_m={120.0 * factor():.3f}",
-        f"repulsion.active.reference_damping_n_s_m={d_ref:.3f}",
-        f"repulsion.active2017.distance_gain_j={1.2 * factor():.3f}",
+        f"collision_vector.velocity_term={rng.choice(['printed', 'closing'])}",
+        f"laws.conventional.stiffness_n_m={16.0 * factor():.3f}",
+        f"laws.conventional.damping_n_s_m={0.8 * factor():.3f}",
+        f"laws.active.reference_stiffness_n_m={120.0 * factor():.3f}",
+        f"laws.active.reference_damping_n_s_m={d_ref:.3f}",
+        f"laws.active2017.distance_gain_j={1.2 * factor():.3f}",
         "collision_vector.aggregation="
         + ("sum" if boxes.count("name") < 3 and seed % 2 else "nearest"),
     ]

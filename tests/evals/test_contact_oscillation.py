@@ -14,11 +14,11 @@ from diagrams import load_scenario
 GAINS = (
     "attraction.stiffness_n_m=2.0",
     "attraction.damping_n_s_m=1.0",
-    "repulsion.conventional.damping_n_s_m=0.8",
-    "repulsion.active.reference_stiffness_n_m=64",
-    "repulsion.active.matched_stiffness_n_m=16",
-    "repulsion.active.reference_damping_n_s_m=0.2",
-    "repulsion.active.matched_damping_n_s_m=0.8",
+    "laws.conventional.damping_n_s_m=0.8",
+    "laws.active.reference_stiffness_n_m=64",
+    "laws.active.matched_stiffness_n_m=16",
+    "laws.active.reference_damping_n_s_m=0.2",
+    "laws.active.matched_damping_n_s_m=0.8",
 )
 
 
@@ -29,7 +29,7 @@ def scenario(law, *overrides):
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["conventional", "active"])
 def test_bias_and_decay_of_a_stable_contact(law):
-    case = scenario(law, "repulsion.conventional.stiffness_n_m=16")
+    case = scenario(law, "laws.conventional.stiffness_n_m=16")
     found = contact_oscillation(case, duration_s=30.0)
     for term, run in found.runs.items():
         predicted = found.predictions[term]
@@ -54,7 +54,7 @@ def test_bias_and_decay_of_a_stable_contact(law):
 @pytest.mark.slow
 def test_limit_cycle_of_a_contact_that_is_too_stiff():
     """K_0 = 20 N/m is past the limit of 18: it grows till P leaves the reach."""
-    case = scenario("conventional", "repulsion.conventional.stiffness_n_m=20")
+    case = scenario("conventional", "laws.conventional.stiffness_n_m=20")
     found = contact_oscillation(case, to_go_m=1.0, start_m=0.75, duration_s=120.0)
     predicted, run = found.predictions["printed"], found.runs["printed"]
     assert predicted.limit_cycle is not None
@@ -69,7 +69,7 @@ def test_limit_cycle_of_a_contact_that_is_too_stiff():
 @pytest.mark.parametrize("stiffness", [10.0, 16.0, 22.0])
 def test_growth_of_small_oscillations_is_that_of_the_linear_chain(stiffness):
     """The printed term damps nothing: |z| of contact mode with K_r + K_0."""
-    case = scenario("conventional", f"repulsion.conventional.stiffness_n_m={stiffness}")
+    case = scenario("conventional", f"laws.conventional.stiffness_n_m={stiffness}")
     contact = head_on(case, to_go_m=1.0)
     small = predict_oscillation(contact, "printed", largest_m=0.01, points=1)
     radius = contact_spectral_radius(case, stiffness + 2.0)

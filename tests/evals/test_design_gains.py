@@ -28,11 +28,11 @@ SPRINGS = {
 
 def run_at_wall(law: str, share: float):
     """Head-on at a wall, the target as far behind it as the design allows for."""
-    repulsion = Scenario().repulsion.model_dump()
+    repulsion = Scenario().follower.laws.model_dump()
     for field in SPRINGS[law]:
         repulsion[law][field] *= share
     to_go = metres_to_go(Scenario(), DesignRequirements())
-    source = WALL_X + to_go + Scenario().attraction.follow_distance_m
+    source = WALL_X + to_go + Scenario().follower.attraction.follow_distance_m
     return simulate(
         Scenario.model_validate(
             {
@@ -84,7 +84,7 @@ def test_command_derives_the_defaults(tmp_path, capsys):
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     laws = {law["law"]: law for law in summary["today"]["laws"]}
     for law in DESIGNED_LAWS:
-        assert laws[law]["gains"] == getattr(Scenario().repulsion, law).model_dump()
+        assert laws[law]["gains"] == getattr(Scenario().follower.laws, law).model_dump()
     assert all(runs["jams"] == 0 for runs in summary["today"]["jams"])
     better = summary["recommended"]
     assert [law["acceptable"] for law in better["laws"]] == [True, True, False, False]
@@ -103,13 +103,13 @@ def assert_layouts_have_the_gains_of(recommended: Scenario) -> None:
     """Limits and saturations of two_static_obstacles stay its own."""
     plan = comparison_plan("two_static_obstacles_recommended", runs=1)
     scenario = plan.scenario_of(plan.points()[0])
-    assert scenario.attraction == recommended.attraction
+    assert scenario.follower.attraction == recommended.follower.attraction
     own = load_scenario("two_static_obstacles").repulsion.model_dump()
-    printed = Scenario().repulsion.model_dump()
+    printed = Scenario().follower.laws.model_dump()
     for law in DESIGNED_LAWS:
         kept = {k: v for k, v in own[law].items() if v != printed[law][k]}
         designed = getattr(recommended.repulsion, law).model_dump() | kept
-        assert getattr(scenario.repulsion, law).model_dump() == designed
+        assert getattr(scenario.follower.laws, law).model_dump() == designed
 
 
 def test_command_refuses_what_cannot_be_designed(tmp_path, capsys):

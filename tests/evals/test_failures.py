@@ -36,8 +36,8 @@ RUNS = {
     "held off": (
         f"{NO_BOX}--set attraction.follow_distance_m=0.6 "
         "--set attraction.stiffness_n_m=8.4 --set attraction.damping_n_s_m=8.4 "
-        "--set repulsion.conventional.stiffness_n_m=41.9 "
-        "--set repulsion.conventional.damping_n_s_m=6.72"
+        "--set laws.conventional.stiffness_n_m=41.9 "
+        "--set laws.conventional.damping_n_s_m=6.72"
     ),
     "pushed too little": TRAP.format("active"),
 }
@@ -46,7 +46,7 @@ RUNS = {
 def run(words: str) -> RunResult:
     """What ``phonotaxis simulate`` would run."""
     scenario, *options = words.split()
-    fields = {"--law": "law=", "--velocity-term": "repulsion.velocity_term="}
+    fields = {"--law": "law=", "--velocity-term": "collision_vector.velocity_term="}
     overrides = [
         fields.get(option, "") + value
         for option, value in zip(options[::2], options[1::2], strict=True)

@@ -126,9 +126,9 @@ def test_slower_sensors_enter_all_of_the_map(slower):
 
 def test_the_law_brings_its_guard():
     scenario = load_scenario("default", ["law=guarded"])
-    assert scenario.guard is None
-    assert scenario.all_robots["robot"].own_guard is not None
-    assert load_scenario("default").all_robots["robot"].own_guard is None
+    assert scenario.follower.guard is None
+    assert scenario.robots["robot"].own_guard is not None
+    assert load_scenario("default").robots["robot"].own_guard is None
 
 
 def test_it_needs_ranges():

@@ -21,6 +21,7 @@ from systems import (
     ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
+from systems.laws import catalogue
 from systems.laws.active import active_force
 from systems.laws.active_2017 import active_2017_force
 from systems.laws.conventional import conventional_force
@@ -31,7 +32,6 @@ from systems.laws.impedance_controller import (
     repulsion_force,
 )
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 
 pytestmark = pytest.mark.drake
 
@@ -93,7 +93,7 @@ def scenario(law: str, velocity_term: str = "printed") -> Scenario:
             "odometry": {"rounding": False},
             "tracker": {"hold": "world"},
             "attraction": ATTRACTION,
-            "repulsion": {"velocity_term": velocity_term, **REPULSION},
+            "collision_vector": {"velocity_term": velocity_term, **REPULSION},
             "integrator": {"scheme": "runge_kutta5", "step_s": 0.005},
             "source": {"waypoints_m": [SOURCE_START.tolist(), [9.0, 0.3]]},
             "obstacles": [
@@ -337,19 +337,16 @@ BLOCKS: dict[str, Any] = {
 }
 
 
-def parameters(velocity_term: str) -> dict[str, Any]:
-    repulsion = {"velocity_term": velocity_term, **REPULSION}
-    return {
-        "attraction": AttractionParameters.model_validate(ATTRACTION),
-        "repulsion": RepulsionParameters.model_validate(repulsion),
-    }
+def gains_of(law: str) -> Any:
+    model: Any = catalogue.LAWS[law].gains
+    return model.model_validate(REPULSION[law])
 
 
 @cache
 def pulls_at_1e5_states() -> np.ndarray:
     """(n, 2) F_m, which is that of every law."""
     state = random_states(100_000, seed=1)
-    gains = parameters("printed")["attraction"]
+    gains = AttractionParameters.model_validate(ATTRACTION)
     columns = (state[name].tolist() for name in ("p_WS", "p_WP", "v_WP"))
     return np.array(
         [
@@ -364,7 +361,7 @@ def pulls_at_1e5_states() -> np.ndarray:
 @pytest.mark.parametrize("law", LAWS)
 def test_force_is_the_same_to_1e_9_at_1e5_states(law, velocity_term):
     state = random_states(100_000, seed=1)
-    gains = getattr(parameters(velocity_term)["repulsion"], law)
+    gains = gains_of(law)
     force = FUNCTIONS[law]
 
     closing = velocity_term == "closing"
@@ -386,7 +383,11 @@ def test_force_is_the_same_to_1e_9_at_1e5_states(law, velocity_term):
 def test_block_s_acceleration_is_the_force_over_the_mass(law, velocity_term):
     """The state seen by a robot with a heading of its own, through the ports."""
     state = random_states(2000, seed=2)
-    block: Any = BLOCKS[law](**parameters(velocity_term))
+    block: Any = BLOCKS[law](
+        gains=gains_of(law),
+        velocity_term=velocity_term,
+        attraction=AttractionParameters.model_validate(ATTRACTION),
+    )
     context = block.CreateDefaultContext()
     theta = np.random.default_rng(3).uniform(-np.pi, np.pi, 2000)
     block.GetInputPort("target_valid").FixValue(context, np.ones(1))

@@ -29,6 +29,6 @@ def test_robot_of_experiment_2_is_no_faster_than_mu_0():
     """Han 5.2: the maximum approaching velocity of the mobile robot, 600 mm/s."""
     for law in ("conventional", "active", "conventional2017", "active2017"):
         scenario = load_scenario("two_static_obstacles", [f"law={law}"])
-        assert scenario.robot.top_speed_m_s == 0.6
-        assert scenario.repulsion.active.speed_limit_m_s == 0.6
-    assert load_scenario("one_moving_obstacle").robot.top_speed_m_s == 0.72
+        assert scenario.only.robot.top_speed_m_s == 0.6
+        assert scenario.follower.laws.active.speed_limit_m_s == 0.6
+    assert load_scenario("one_moving_obstacle").only.robot.top_speed_m_s == 0.72

@@ -124,4 +124,4 @@ def test_exported_models_have_the_poles_of_the_document(report, document):
 
 
 def test_effective_scenario_can_be_analysed_again(report):
-    assert load_scenario(report / "scenario.yaml").law == "conventional"
+    assert load_scenario(report / "scenario.yaml").only.law == "conventional"

@@ -71,7 +71,7 @@ def studies():
 
 def push(scenario, c, s=0.0):
     """f(c, s) in N, from docs/results_laws.md."""
-    gains = scenario.repulsion
+    gains = scenario.follower.laws
     if scenario.law == "conventional":
         own = gains.conventional
         near = c < own.reach_m
@@ -319,13 +319,13 @@ def test_delay_margin_lies_between_two_whole_ticks(studies, law):
 def test_contact_growth_is_a_root_of_a_polynomial(law, ticks):
     """K_0; k_ref/e^2, at 2 alpha; K_0/rho_1^2: on an echo some ticks old."""
     scenario = load_scenario("default", [f"law={law}"])
-    own = getattr(scenario.repulsion, law)
+    own = getattr(scenario.follower.laws, law)
     steepest = {
         "conventional": lambda: own.stiffness_n_m,
         "active": lambda: own.reference_stiffness_n_m / math.e**2,
         "active2017": lambda: own.distance_gain_j / own.saturation_distance_m**2,
     }[law]()
-    total = scenario.attraction.stiffness_n_m + steepest
+    total = scenario.follower.attraction.stiffness_n_m + steepest
     growth = growth_with(scenario, total, ticks=ticks)
     # The table of the law has steps of 0.2 mm.
     assert read_contact(Study(scenario), ticks) == pytest.approx(growth, abs=5e-3)
@@ -484,7 +484,7 @@ def test_places_to_jam_are_where_runs_end():
     rest = ends[np.linalg.norm(ends[:, 2:], axis=1) < 1e-3]
     behind = np.linalg.norm(rest[:, :2] - bodies(scenario)[-1, :2], axis=1)
     far = rest[
-        behind > scenario.attraction.follow_distance_m + scenario.stop.goal_margin_m
+        behind > scenario.follower.attraction.follow_distance_m + scenario.stop.goal_margin_m
     ]
     assert jams == len(np.unique(np.round(far[:, :2], 1), axis=0)) == 1
     assert len(far) < len(ends)
@@ -492,7 +492,7 @@ def test_places_to_jam_are_where_runs_end():
 
 def potential(scenario, points, c):
     """K_r (r - d_f)^2/2 + K_0 (rho_0 - c)^2/2, J: the conventional law's."""
-    own, attraction = scenario.repulsion.conventional, scenario.attraction
+    own, attraction = scenario.follower.laws.conventional, scenario.attraction
     r = np.linalg.norm(points - bodies(scenario)[-1, :2], axis=1)
     spring = 0.5 * own.stiffness_n_m * np.maximum(own.reach_m - c, 0.0) ** 2
     pull = 0.5 * attraction.stiffness_n_m * (r - attraction.follow_distance_m) ** 2
@@ -544,8 +544,8 @@ def test_certified_starts_are_those_of_an_own_flood(spring_n_m):
         "two_static_obstacles",
         [
             "law=conventional",
-            f"repulsion.conventional.stiffness_n_m={spring_n_m}",
-            "repulsion.conventional.damping_n_s_m=0.001",
+            f"laws.conventional.stiffness_n_m={spring_n_m}",
+            "laws.conventional.damping_n_s_m=0.001",
         ],
     )
     found = [Made(certificate=certify_energy(scenario, cell_m=0.03))]

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port
 
+#: Distance from the target within which echoes count as echoes of the target, m.
+SOURCE_CLEARANCE_M = 0.5
+
 
 class BaselineController(Block):
     """The ports of every baseline: target and pose as inputs, a twist as output."""

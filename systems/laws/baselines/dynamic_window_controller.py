@@ -14,12 +14,12 @@ from systems.framework.block import OBJECT, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
+    SOURCE_CLEARANCE_M,
     BaselineController,
     half_size,
 )
 from systems.laws.dynamic_window import DynamicWindowParameters
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.planning.following import SPEED_LIMITS, FollowNumbers, approach
 from systems.planning.occupied import list_occupied
 from systems.planning.turning import wrapped
@@ -28,6 +28,10 @@ from systems.planning.turning import wrapped
 _SPEEDS, _TURNS = 9, 17
 #: Half side of the square around the robot in which cells count, m.
 _REACH_M = 2.5
+#: Acceleration that limits the window, and braking deceleration, m/s^2.
+_ACCELERATION_M_S2 = 1.0
+#: Time from one choice to the next, s.
+_PERIOD_S = 0.1
 
 
 class WindowNumbers(NamedTuple):
@@ -35,11 +39,7 @@ class WindowNumbers(NamedTuple):
 
     gains: tuple[float, float, float]
     """Weights of heading, distance, and speed."""
-    accelerations: tuple[float, float]
-    """Forward acceleration, m/s^2, and yaw acceleration, rad/s^2."""
-    limits: tuple[float, float, float]
-    """Least and largest speed, m/s, and largest yaw rate, rad/s."""
-    period_s: float
+    turn_acceleration_rad_s2: float
     farthest_m: float
     half_size: tuple[float, float]
     """Half of the body's length and width, m."""
@@ -50,7 +50,6 @@ class WindowNumbers(NamedTuple):
 class DynamicWindowNumbers(NamedTuple):
     """Constants of the step of ``DynamicWindowController``."""
 
-    own: DynamicWindowParameters
     window: WindowNumbers
     follow: FollowNumbers
     period_ticks: int
@@ -176,9 +175,9 @@ def choose_in_window(
     """
     # The window.
     heading_gain, distance_gain, speed_gain = numbers.gains
-    braking, turn_braking = numbers.accelerations
-    least, most, turn = numbers.limits
-    dv, dw = braking * numbers.period_s, turn_braking * numbers.period_s
+    turn_braking = numbers.turn_acceleration_rad_s2
+    least, most, turn = SPEED_LIMITS
+    dv, dw = _ACCELERATION_M_S2 * _PERIOD_S, turn_braking * _PERIOD_S
     low = max(now[0] - dv, least if wanted < 0.0 else 0.0)
     high = max(min(now[0] + dv, most), low)
     right, left = max(now[1] - dw, -turn), min(now[1] + dw, turn)
@@ -198,14 +197,14 @@ def choose_in_window(
             contact = min(contact, time_to_contact(near, (v, w), body))
             # The paper requires v <= sqrt(2 dist a). With dist = v t this condition is
             # t >= v/(2 a). The yaw rate has the same condition.
-            stops = max(abs(v) / braking, abs(w) / turn_braking)
+            stops = max(abs(v) / _ACCELERATION_M_S2, abs(w) / turn_braking)
             if contact < 0.5 * stops:
                 continue
             distance = numbers.farthest_m
             if contact < np.inf:
                 distance = min(abs(v) * contact, distance)
             # The heading when the robot has stopped its turn after this period.
-            theta = pose[2] + w * numbers.period_s + 0.5 * w * abs(w) / turn_braking
+            theta = pose[2] + w * _PERIOD_S + 0.5 * w * abs(w) / turn_braking
             heading = 1.0 - abs(wrapped(bearing - theta)) / math.pi
             value = heading_gain * heading
             value += distance_gain * distance / numbers.farthest_m
@@ -220,10 +219,10 @@ def dynamic_window_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DynamicWindowNumbers
 ) -> None:
     """Computes the twist. The state is the last choice of speed and yaw rate."""
-    target, pose, own = inputs[0], inputs[3], numbers.own
+    target, pose = inputs[0], inputs[3]
     if tick % numbers.period_ticks == 0:
         wanted, bearing = approach(inputs, numbers.follow)
-        clear = target[0], target[1], own.source_clearance_m
+        clear = target[0], target[1], SOURCE_CLEARANCE_M
         places = list_occupied(inputs[4], pose[0], pose[1], _REACH_M, clear)
         now, at = (state[0], state[1]), (pose[0], pose[1], pose[2])
         state[0], state[1] = choose_in_window(
@@ -235,10 +234,10 @@ def dynamic_window_step(
 class DynamicWindowController(BaselineController):
     """Chooses a motion that the robot can reach, and from which it can stop in time.
 
-    Every ``period_s`` the block considers the speeds and yaw rates that the robot can
-    reach with its accelerations. It keeps the motions from which the robot can brake
-    before its rectangle covers a cell with echoes. From these motions it chooses the
-    one with the largest weighted sum of heading, distance, and speed.
+    Ten times per second, the block considers the speeds and yaw rates that the robot
+    can reach with its accelerations. It keeps the motions from which the robot can
+    brake before its rectangle covers a cell with echoes. From these motions it chooses
+    the one with the largest weighted sum of heading, distance, and speed.
 
     The block differs from the paper in two points. The speed term rewards speeds near
     the wanted speed, because a follower must not arrive at full speed. The obstacles
@@ -249,7 +248,7 @@ class DynamicWindowController(BaselineController):
     Args:
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
-        repulsion: ``RepulsionParameters``; uses ``dwa``.
+        gains: ``DynamicWindowParameters``.
         tick_s: Period of the controller, s.
 
     Reference: Fox, Burgard and Thrun, The dynamic window approach to collision
@@ -263,26 +262,22 @@ class DynamicWindowController(BaselineController):
         *,
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
-        repulsion: RepulsionParameters = RepulsionParameters(),
+        gains: DynamicWindowParameters = DynamicWindowParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("dynamic_window_controller")
-        own = repulsion.dwa
         window = WindowNumbers(
-            (own.heading_gain, own.distance_gain, own.speed_gain),
-            (own.acceleration_m_s2, own.turn_acceleration_rad_s2),
-            SPEED_LIMITS,
-            own.period_s,
-            own.farthest_m,
+            (gains.heading_gain, gains.distance_gain, gains.speed_gain),
+            gains.turn_acceleration_rad_s2,
+            gains.farthest_m,
             half_size(robot),
-            own.clearance_m,
+            gains.clearance_m,
         )
         numbers = DynamicWindowNumbers(
-            own,
             window,
             FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
-            max(round(own.period_s / tick_s), 1),
+            max(round(_PERIOD_S / tick_s), 1),
         )
         step = Step(dynamic_window_step, numbers, [0.0, 0.0])
         self.declare(step, tick_s=tick_s)

@@ -14,12 +14,12 @@ from systems.framework.block import OBJECT, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
+    SOURCE_CLEARANCE_M,
     BaselineController,
     half_size,
 )
 from systems.laws.parameters import AttractionParameters
 from systems.laws.path_integral import PathIntegralParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.planning.carrot import find_carrot
 from systems.planning.following import (
     APPROACH_GAIN,
@@ -35,8 +35,22 @@ from systems.safety.parameters import FreeSpaceParameters
 
 #: Half side of the window of the distance field, m. A sequence stays within it.
 _WINDOW_M = 2.5
-#: Number of plans after which the random numbers repeat.
-_ROUNDS = 16
+#: Number of plans after which the random numbers repeat, number of motion sequences
+#: that each plan tries, and number of steps of a sequence.
+_ROUNDS, _SAMPLES, _STEPS = 16, 500, 25
+#: Length of a step, and time from one plan to the next, s.
+_STEP_S = 0.1
+#: Standard deviation of the sampled speeds, m/s (Nav2: 0.2).
+_SPEED_SPREAD_M_S = 0.2
+#: Cost gamma of a deviation from the last plan (Nav2: 0.015). It is a sum over the
+#: steps of a sequence, and all other costs are means.
+_CONTROL_GAIN = 0.015
+#: Cost per meter of distance from the wanted position (Nav2's goal critic: 5).
+_GOAL_GAIN = 5.0
+#: Cost of driving backward, s/m (Nav2's prefer forward critic: 5).
+_FORWARD_GAIN = 0.81
+#: Cost of a position nearer to an obstacle than the clearance.
+_COLLISION_COST = 1_000.0
 #: Number of discs that cover the body from side to side.
 _DISCS = 3
 #: A route is a detour if it is longer than the straight line by more than the factor
@@ -50,16 +64,10 @@ _ACROSS = math.sqrt(2.0)
 class RollNumbers(NamedTuple):
     """Constants of the sequences and costs; see ``PathIntegralParameters``."""
 
-    samples: int
-    step_s: float
-    spread: tuple[float, float]
-    """Standard deviations of the speeds, m/s, and the yaw rates, rad/s."""
-    limits: tuple[float, float, float]
-    """Least and largest speed, m/s, and largest yaw rate, rad/s."""
+    turn_spread_rad_s: float
     temperature: float
-    control_gain: float
-    gains: tuple[float, float, float, float, float]
-    """Gains of the goal, angle, forward, obstacle, and collision costs."""
+    angle_gain: float
+    obstacle_gain: float
     inflation_m: float
     discs: tuple[float, float]
     """Distance of the outer discs from the middle of the axle, and radius of all discs
@@ -70,14 +78,13 @@ class RollNumbers(NamedTuple):
 class PathIntegralNumbers(NamedTuple):
     """Constants of the step of ``PathIntegralController``."""
 
-    own: PathIntegralParameters
     roll: RollNumbers
     follow: FollowNumbers
     radius_m: float
     """Radius of the disc for which routes are planned, m."""
     period_ticks: int
     noise: NDArray[np.float64]
-    """(sequences, steps, 2) normal random numbers of standard deviation 1."""
+    """(rounds, samples, steps, 2) normal random numbers of standard deviation 1."""
 
 
 class PathIntegralState(NamedTuple):
@@ -138,7 +145,6 @@ def distance_field(
 def roll_out(
     controls: Any,
     noise: Any,
-    first: int,
     pose: Any,
     goal: Any,
     field: Any,
@@ -151,19 +157,17 @@ def roll_out(
 
     Args:
         controls: (steps, 2) speed, m/s, and yaw rate, rad/s. The function changes it.
-        noise: Random numbers, see ``PathIntegralNumbers``.
-        first: Index of the first sequence of noise.
+        noise: (samples, steps, 2) normal random numbers of standard deviation 1.
         pose: (x, y, theta) of the axle in W, m and rad.
         goal: (x, y, vx, vy): moving position in W that P should reach, m and m/s.
         field: Result of ``distance_field`` around the axle, m.
         cell: Side of a cell of the field, m.
         numbers: Spreads, limits, and costs.
     """
-    samples, steps = numbers.samples, len(controls)
+    samples, steps = len(noise), len(controls)
     costs, tried = np.empty(samples), np.empty((samples, steps, 2))
     for n in range(samples):
-        row = noise[(first + n) % len(noise)]
-        costs[n] = _cost(controls, row, tried[n], pose, goal, field, cell, numbers)
+        costs[n] = _cost(controls, noise[n], tried[n], pose, goal, field, cell, numbers)
     # Weights relative to the least cost do not underflow.
     least, total = np.min(costs), 0.0
     mean = np.zeros((steps, 2))
@@ -196,20 +200,20 @@ def _cost(
     the goal. The total also has the control cost of the deviation from the plan.
     Positions x and y are relative to the axle at the start, in the axes of W.
     """
-    least, most, turn = numbers.limits
-    to_goal, to_angle, forward, obstacle, collision = numbers.gains
+    least, most, turn = SPEED_LIMITS
+    spread, turn_spread = _SPEED_SPREAD_M_S, numbers.turn_spread_rad_s
     aside, radius = numbers.discs
-    steps, dt, half = len(controls), numbers.step_s, 0.5 * len(field)
+    steps, dt, half = len(controls), _STEP_S, 0.5 * len(field)
     x, y, theta, total = 0.0, 0.0, pose[2], 0.0
     for k in range(steps):
-        v = controls[k, 0] + numbers.spread[0] * noise[k, 0]
-        w = controls[k, 1] + numbers.spread[1] * noise[k, 1]
+        v = controls[k, 0] + spread * noise[k, 0]
+        w = controls[k, 1] + turn_spread * noise[k, 1]
         v, w = min(max(v, least), most), min(max(w, -turn), turn)
         tried[k, 0], tried[k, 1] = v, w
         # Control cost of the deviation from the plan.
-        off = controls[k, 0] * (v - controls[k, 0]) / numbers.spread[0] ** 2
-        off += controls[k, 1] * (w - controls[k, 1]) / numbers.spread[1] ** 2
-        total += numbers.control_gain * off
+        off = controls[k, 0] * (v - controls[k, 0]) / spread**2
+        off += controls[k, 1] * (w - controls[k, 1]) / turn_spread**2
+        total += _CONTROL_GAIN * off
         # Motion along the mean heading of the step.
         theta += 0.5 * w * dt
         c, s = math.cos(theta), math.sin(theta)
@@ -222,18 +226,20 @@ def _cost(
             j = math.floor((y + at * c) / cell + half)
             if 0 <= i < len(field) and 0 <= j < len(field):
                 nearest = min(nearest, field[i, j] - radius)
-        cost = max(-v, 0.0) * forward
+        cost = max(-v, 0.0) * _FORWARD_GAIN
         if nearest < 0.0:
-            cost += collision
-        cost += obstacle * math.exp(-max(nearest, 0.0) / numbers.inflation_m)
+            cost += _COLLISION_COST
+        inflated = math.exp(-max(nearest, 0.0) / numbers.inflation_m)
+        cost += numbers.obstacle_gain * inflated
         # Distance and direction from P to the goal at this time.
         time, ahead = (k + 1) * dt, numbers.control_point_m
         gx = goal[0] + goal[2] * time - pose[0] - x - ahead * c
         gy = goal[1] + goal[3] * time - pose[1] - y - ahead * s
         distance = math.hypot(gx, gy)
-        cost += to_goal * distance
+        cost += _GOAL_GAIN * distance
         if distance > ahead:
-            cost += to_angle * abs(wrapped(math.atan2(gy, gx) - theta))
+            off_goal = abs(wrapped(math.atan2(gy, gx) - theta))
+            cost += numbers.angle_gain * off_goal
         total += cost / steps
     return total
 
@@ -247,7 +253,7 @@ def path_integral_step(
     numbers: PathIntegralNumbers,
 ) -> None:
     """Computes the twist, and a new plan every ``period_ticks``."""
-    target, velocity, pose, own = inputs[0], inputs[1], inputs[3], numbers.own
+    target, velocity, pose = inputs[0], inputs[1], inputs[3]
     plan, space, twist = state.plan, inputs[4], outputs[0]
     steps = len(plan)
     if tick % numbers.period_ticks == 0:
@@ -259,12 +265,12 @@ def path_integral_step(
         at, valid = (pose[0], pose[1], pose[2]), inputs[2][0] > 0.5
         place, speed = (target[0], target[1]), (velocity[0], velocity[1])
         goal = _goal(at, place, speed, valid, space, state.way, numbers)
-        beside = (place[0], place[1], own.source_clearance_m)
+        beside = (place[0], place[1], SOURCE_CLEARANCE_M)
         places = list_occupied(space, at[0], at[1], _WINDOW_M, beside)
         cell = space.cell_m
         field = distance_field(places, at[0], at[1], _WINDOW_M, cell)
-        first = tick // numbers.period_ticks * own.samples
-        roll_out(controls, numbers.noise, first, at, goal, field, cell, numbers.roll)
+        noise = numbers.noise[tick // numbers.period_ticks % _ROUNDS]
+        roll_out(controls, noise, at, goal, field, cell, numbers.roll)
         for k in range(steps):
             plan[k, 0], plan[k, 1] = controls[k, 0], controls[k, 1]
     twist[0], twist[1] = plan[0, 0], plan[0, 1]
@@ -282,8 +288,8 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
     px, py = at[0] + ahead * math.cos(at[2]), at[1] + ahead * math.sin(at[2])
     if not valid:
         return px, py, 0.0, 0.0
-    own, follow = numbers.own, numbers.follow
-    clear = np.array([[target[0], target[1], own.source_clearance_m]])
+    follow = numbers.follow
+    clear = np.array([[target[0], target[1], SOURCE_CLEARANCE_M]])
     start = at[0], at[1]
     find_way(way, space, start, target, 0.0, numbers.radius_m, clear)
     straight = math.hypot(target[0] - px, target[1] - py)
@@ -305,11 +311,11 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
 class PathIntegralController(BaselineController):
     """Tries many motion sequences and drives their mean, weighted by cost.
 
-    Every ``step_s`` the block makes a new plan:
+    Ten times per second, the block makes a new plan:
 
     1. It plans a route to the target on the map with ``find_way``, like the guarded
        law. In the direction of the route it places a goal that moves with the target.
-    2. It draws ``samples`` sequences around the last plan. The cost of a sequence
+    2. It draws 500 sequences of 2.5 s around the last plan. The cost of a sequence
        depends on the distance and angle to the goal, on driving backward, and on
        occupied cells near the body. Three discs cover the body.
     3. The new plan is the mean of the sequences with weights exp(-cost/temperature).
@@ -319,7 +325,7 @@ class PathIntegralController(BaselineController):
     Args:
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
-        repulsion: ``RepulsionParameters``; uses ``mppi``.
+        gains: ``PathIntegralParameters``.
         known: Parameters of the map.
         seed: Seed of the random sequences.
         tick_s: Period of the controller, s.
@@ -336,59 +342,45 @@ class PathIntegralController(BaselineController):
         *,
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
-        repulsion: RepulsionParameters = RepulsionParameters(),
+        gains: PathIntegralParameters = PathIntegralParameters(),
         known: FreeSpaceParameters = FreeSpaceParameters(),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("path_integral_controller")
-        own = repulsion.mppi
         numbers = PathIntegralNumbers(
-            own,
-            _roll_numbers(own, robot),
+            _roll_numbers(gains, robot),
             FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
-            body_radius(robot) + own.clearance_m,
-            max(round(own.step_s / tick_s), 1),
-            _noise(own, seed),
+            body_radius(robot) + gains.clearance_m,
+            max(round(_STEP_S / tick_s), 1),
+            _noise(seed),
         )
-        state = PathIntegralState(np.zeros((own.steps, 2)), make_way(known.cells))
+        state = PathIntegralState(np.zeros((_STEPS, 2)), make_way(known.cells))
         self.declare(Step(path_integral_step, numbers, state), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
         """Returns the step with its own state and with the noise of the run."""
         step = super().step_for(run)
-        noise = _noise(step.numbers.own, run.seed_of("controller"))
+        noise = _noise(run.seed_of("controller"))
         return step._replace(numbers=step.numbers._replace(noise=noise))
 
 
-def _roll_numbers(
-    own: PathIntegralParameters,
-    robot: RobotParameters,
-) -> RollNumbers:
+def _roll_numbers(gains: PathIntegralParameters, robot: RobotParameters) -> RollNumbers:
     length, width = half_size(robot)
     # Each disc covers a third of the width.
     part = width / _DISCS
     return RollNumbers(
-        own.samples,
-        own.step_s,
-        (own.speed_spread_m_s, own.turn_spread_rad_s),
-        SPEED_LIMITS,
-        own.temperature,
-        own.control_gain,
-        (
-            own.goal_gain,
-            own.angle_gain,
-            own.forward_gain,
-            own.obstacle_gain,
-            own.collision_cost,
-        ),
-        own.inflation_m,
-        (2.0 * part, math.hypot(length, part) + own.clearance_m),
+        gains.turn_spread_rad_s,
+        gains.temperature,
+        gains.angle_gain,
+        gains.obstacle_gain,
+        gains.inflation_m,
+        (2.0 * part, math.hypot(length, part) + gains.clearance_m),
         robot.control_point_m,
     )
 
 
-def _noise(own: PathIntegralParameters, seed: int) -> NDArray[np.float64]:
-    shape = _ROUNDS * own.samples, own.steps, 2
+def _noise(seed: int) -> NDArray[np.float64]:
+    shape = _ROUNDS, _SAMPLES, _STEPS, 2
     return np.random.default_rng(seed).standard_normal(shape)

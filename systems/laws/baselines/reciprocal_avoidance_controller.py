@@ -13,16 +13,16 @@ from systems.base.wheel_speed_command import turned_off_back
 from systems.framework.block import Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.laws.baselines.baseline_controller import (
-    BaselineController,
-)
+from systems.laws.baselines.baseline_controller import BaselineController
 from systems.laws.parameters import AttractionParameters
 from systems.laws.reciprocal_avoidance import ReciprocalAvoidanceParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.planning.following import CRUISE_SPEED_M_S, FollowNumbers, approach
 from systems.planning.half_planes import nearest_velocity
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
+#: Distance that the robot keeps from all bodies, and distance beyond which bodies do
+#: not count, m.
+_CLEARANCE_M, _FARTHEST_M = 0.02, 5.0
 #: Time within which the robot must leave a contact, s.
 _OUT_S = 0.1
 #: Speed below which the robot is at rest, and difference below which two velocities
@@ -94,14 +94,9 @@ def avoid_body(
         # The center of the disc would be in the rectangle. Leave by the nearest side.
         dx, dy = vx * time - px, vy * time - py
         left_x, left_y = a - abs(dx), b - abs(dy)
-        nx, ny = (
-            (math.copysign(1.0, dx), 0.0)
-            if left_x < left_y
-            else (
-                0.0,
-                math.copysign(1.0, dy),
-            )
-        )
+        nx, ny = 0.0, math.copysign(1.0, dy)
+        if left_x < left_y:
+            nx, ny = math.copysign(1.0, dx), 0.0
         signed = -(min(left_x, left_y) + radius) / time
     best = signed, nx, ny
     if not inside:
@@ -188,7 +183,7 @@ def reciprocal_avoidance_step(
             uy = (y - state[3 + 3 * k]) / numbers.tick_s
         for i in range(3):
             state[2 + 3 * k + i] = poses[3 * k + i]
-        if math.hypot(x - qx, y - qy) - sizes[2 * k] > own.farthest_m:
+        if math.hypot(x - qx, y - qy) - sizes[2 * k] > _FARTHEST_M:
             continue
         relative = x - qx, y - qy, theta
         half = 0.5 * sizes[2 * k], 0.5 * sizes[2 * k + 1]
@@ -237,7 +232,7 @@ class ReciprocalAvoidanceController(BaselineController):
     Args:
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
-        repulsion: ``RepulsionParameters``; uses ``orca``.
+        gains: ``ReciprocalAvoidanceParameters``.
         bodies: Number of bodies.
         tick_s: Period of the controller, s.
 
@@ -257,17 +252,16 @@ class ReciprocalAvoidanceController(BaselineController):
         *,
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
-        repulsion: RepulsionParameters = RepulsionParameters(),
+        gains: ReciprocalAvoidanceParameters = ReciprocalAvoidanceParameters(),
         bodies: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("reciprocal_avoidance_controller")
-        own = repulsion.orca
         numbers = AvoidanceNumbers(
-            own,
+            gains,
             FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
-            body_radius(robot) + own.offset_m + own.clearance_m,
+            body_radius(robot) + gains.offset_m + _CLEARANCE_M,
             tick_s,
         )
         state = [0.0] * (2 + 3 * bodies)

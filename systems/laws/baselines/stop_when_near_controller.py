@@ -9,11 +9,8 @@ from numba.extending import register_jitable
 from systems.base.robot import RobotParameters
 from systems.framework.block import Port, Step
 from systems.framework.signals import TICK_S
-from systems.laws.baselines.baseline_controller import (
-    BaselineController,
-)
+from systems.laws.baselines.baseline_controller import BaselineController
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.laws.stop_when_near import StopWhenNearParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.turning import turn_towards
@@ -49,7 +46,7 @@ class StopWhenNearController(BaselineController):
     Args:
         robot: Robot, for the position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
-        repulsion: ``RepulsionParameters``; uses ``stop_when_near``.
+        gains: ``StopWhenNearParameters``.
         sensors: Range sensors; uses their number.
         tick_s: Period of the controller, s.
 
@@ -67,14 +64,14 @@ class StopWhenNearController(BaselineController):
         *,
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
-        repulsion: RepulsionParameters = RepulsionParameters(),
+        gains: StopWhenNearParameters = StopWhenNearParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("stop_when_near_controller")
         numbers = StopNumbers(
-            repulsion.stop_when_near,
+            gains,
             FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
         )
         self.declare(

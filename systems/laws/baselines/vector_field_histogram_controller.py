@@ -14,10 +14,10 @@ from systems.framework.block import OBJECT, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
+    SOURCE_CLEARANCE_M,
     BaselineController,
 )
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.occupied import list_occupied
@@ -26,6 +26,11 @@ from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 #: Number of sectors (5 deg each, as in the paper), and largest number of sectors of a
 #: narrow valley.
 _SECTORS, _WIDE = 72, 16
+#: Weight mu_1 of the target's direction, and weight mu_2 of the robot's heading (as in
+#: the paper).
+_TARGET_GAIN, _HEADING_GAIN = 5.0, 2.0
+#: Ratio of the high threshold of the density to the low threshold.
+_THRESHOLDS_RATIO = 2.0
 #: Value of the direction if no direction was chosen.
 _NONE = -1.0
 
@@ -36,10 +41,8 @@ class HistogramNumbers(NamedTuple):
     window_m: float
     radius_m: float
     """Radius of the robot, including the clearance, m."""
-    thresholds: tuple[float, float]
-    """Low and high threshold of the density."""
-    gains: tuple[float, float, float]
-    """Weights of target, heading, and previous direction."""
+    low_threshold: float
+    previous_gain: float
 
 
 class VectorFieldHistogramNumbers(NamedTuple):
@@ -135,7 +138,7 @@ def choose_direction(
     target: float,
     heading: float,
     previous: float,
-    gains: tuple[float, float, float],
+    previous_gain: float,
 ) -> float:  # pragma: no cover  (compiled)
     """Chooses the candidate direction of least cost (eqs 14-18).
 
@@ -149,7 +152,7 @@ def choose_direction(
         target: Direction of the target, sectors.
         heading: Heading of the robot, sectors.
         previous: Previously chosen direction, sectors; negative if there is none.
-        gains: Weights of the angles to the target, heading, and previous direction.
+        previous_gain: Weight mu_3 of the angle to the previous direction.
 
     Returns:
         Chosen direction, sectors; negative if all sectors are blocked.
@@ -185,10 +188,10 @@ def choose_direction(
     # Candidate of least cost.
     best, found = np.inf, _NONE
     for n in range(count):
-        cost = gains[0] * _apart(candidates[n], target)
-        cost += gains[1] * _apart(candidates[n], heading)
+        cost = _TARGET_GAIN * _apart(candidates[n], target)
+        cost += _HEADING_GAIN * _apart(candidates[n], heading)
         if previous >= 0.0:
-            cost += gains[2] * _apart(candidates[n], previous)
+            cost += previous_gain * _apart(candidates[n], previous)
         if cost < best:
             best, found = cost, candidates[n] % _SECTORS
     return found
@@ -211,16 +214,16 @@ def _steer(
     density = polar_histogram(places, pose[0], pose[1], numbers)
     blocked = np.empty(_SECTORS, dtype=np.bool_)
     for k in range(_SECTORS):
-        if density[k] > numbers.thresholds[1]:
+        if density[k] > _THRESHOLDS_RATIO * numbers.low_threshold:
             state[k] = 1.0
-        elif density[k] < numbers.thresholds[0]:
+        elif density[k] < numbers.low_threshold:
             state[k] = 0.0
         blocked[k] = state[k] > 0.5
     _mask(blocked, places, pose, circle, numbers)
     width = math.tau / _SECTORS
     target, heading = (bearing / width) % _SECTORS, (pose[2] / width) % _SECTORS
     previous = state[_SECTORS]
-    chosen = choose_direction(blocked, target, heading, previous, numbers.gains)
+    chosen = choose_direction(blocked, target, heading, previous, numbers.previous_gain)
     state[_SECTORS] = chosen
     if chosen < 0.0:
         return np.nan, 0.0
@@ -242,7 +245,7 @@ def vector_field_histogram_step(
     """
     target, pose, own, twist = inputs[0], inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
-    clear = target[0], target[1], own.source_clearance_m
+    clear = target[0], target[1], SOURCE_CLEARANCE_M
     places = list_occupied(inputs[4], pose[0], pose[1], own.window_m, clear)
     memory = np.empty(len(state))
     for k in range(len(memory)):
@@ -285,7 +288,7 @@ class VectorFieldHistogramController(BaselineController):
     Args:
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
-        repulsion: ``RepulsionParameters``; uses ``vfh_plus``.
+        gains: ``VectorFieldHistogramParameters``.
         tick_s: Period of the controller, s.
 
     Reference: Ulrich and Borenstein, VFH+: reliable obstacle avoidance for fast mobile
@@ -299,20 +302,19 @@ class VectorFieldHistogramController(BaselineController):
         *,
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
-        repulsion: RepulsionParameters = RepulsionParameters(),
+        gains: VectorFieldHistogramParameters = VectorFieldHistogramParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("vector_field_histogram_controller")
-        own = repulsion.vfh_plus
         histogram = HistogramNumbers(
-            own.window_m,
-            body_radius(robot) + own.clearance_m,
-            (own.low_threshold, own.high_threshold),
-            (own.target_gain, own.heading_gain, own.previous_gain),
+            gains.window_m,
+            body_radius(robot) + gains.clearance_m,
+            gains.low_threshold,
+            gains.previous_gain,
         )
         numbers = VectorFieldHistogramNumbers(
-            own,
+            gains,
             histogram,
             FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
         )

@@ -111,5 +111,5 @@ def test_without_a_law_an_obstacle_reaches_a_waiting_robot(two_boxes):
 
 
 def test_a_velocity_term_that_takes_all_of_d_r_leaves_no_bound(two_boxes):
-    strong = "repulsion.conventional.damping_n_s_m=1.0"
+    strong = "laws.conventional.damping_n_s_m=1.0"
     assert disturbance_bounds(two_boxes("conventional", strong), runs=2).obstacle == ()

@@ -167,7 +167,7 @@ def test_without_a_law_only_the_shadow_of_the_goal_is_certified(two_boxes):
 
 
 def test_an_uncovered_velocity_term_is_left_out(two_boxes):
-    strong = "repulsion.conventional.damping_n_s_m=1.2"
+    strong = "laws.conventional.damping_n_s_m=1.2"
     certificate = certify_energy(two_boxes("conventional", strong), cell_m=0.05)
     assert certificate.term == "none"
     closing = certify_energy(

@@ -101,7 +101,7 @@ def test_simulation_of_the_conventional_law_is_linear(two_boxes):
 
 
 def test_an_unstable_contact_has_no_region(two_boxes):
-    stiff = ("repulsion.conventional.stiffness_n_m=30", "plant.motor_lag_s=0.1")
+    stiff = ("laws.conventional.stiffness_n_m=30", "plant.motor_lag_s=0.1")
     with pytest.raises(
         ValueError, match=r"no region of attraction .* 0.1 s of motor lag"
     ):

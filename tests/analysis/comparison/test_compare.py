@@ -39,7 +39,7 @@ def test_layouts_of_the_library_are_valid_and_differ(name):
     laws = ("none", "active")
     if load_scenario(plan.scenario).route is not None:
         laws = ("trajectory_conventional", "trajectory_filtered")
-    if (scenario := load_scenario(plan.scenario)).robots or scenario.searches:
+    if (scenario := load_scenario(plan.scenario)).robots or scenario.only.searches:
         plan = plan.model_copy(update={"runs": 20})
     else:
         plan = comparison_plan(name, laws=laws, runs=20)
@@ -67,7 +67,7 @@ def test_laws_meet_the_same_layouts_with_the_same_noise():
     points = plan.points()
     for none, active in zip(points[::2], points[1::2], strict=True):
         one, other = plan.scenario_of(none), plan.scenario_of(active)
-        assert (one.law, other.law) == ("none", "active")
+        assert (one.only.law, other.only.law) == ("none", "active")
         assert one.model_copy(update={"law": "active"}) == other
 
 
@@ -86,8 +86,8 @@ def test_the_recommended_attraction_meets_the_same_layouts():
     )
     for one, other in zip(printed.points(), recommended.points(), strict=True):
         a, b = printed.scenario_of(one), recommended.scenario_of(other)
-        changed = {"name": a.name, "attraction": a.attraction, "repulsion": a.repulsion}
-        assert a.attraction != b.attraction
+        changed = {"name": a.name, "attraction": a.follower.attraction, "repulsion": a.repulsion}
+        assert a.follower.attraction != b.follower.attraction
         assert b.model_copy(update=changed) == a
 
 
@@ -99,7 +99,7 @@ def test_a_users_own_layouts(tmp_path):
     )
     plan = comparison_plan(str(file), laws=("none",), runs=2, settings=IDEAL)
     scenario = plan.scenario_of(plan.points()[0])
-    assert scenario.hearing == "ideal"
+    assert scenario.follower.hearing == "ideal"
     assert 0.5 <= scenario.obstacles[0].waypoints_m[0][1] <= 0.9
 
 
@@ -140,7 +140,7 @@ def test_mistakes_are_named(words, field):
 
 def test_velocity_terms_are_set_or_compared():
     (one,) = comparison_plans(["default"], velocity_terms="closing").values()
-    assert one.set == {"repulsion.velocity_term": "closing"}
+    assert one.set == {"collision_vector.velocity_term": "closing"}
     (both,) = comparison_plans(["default"], velocity_terms="printed,closing").values()
     assert len(both.cells()) == 10
 

@@ -38,7 +38,7 @@ def outline(rectangle: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", FAMILIES)
 def test_nothing_stands_near_the_start(name):
     for scenario in layouts(name):
-        start = np.array(scenario.start.position_m)
+        start = np.array(scenario.only.start.position_m)
         for body in scenario.bodies().values():
             away = np.linalg.norm(outline(body.rectangle(0.0)) - start, axis=1)
             assert away.min() >= 0.8
@@ -77,8 +77,8 @@ def way_on_a_grid(scenario: Scenario) -> bool:
             box = body.rectangle(0.0)
             free &= np.hypot(*nearest_point_on_rectangle((x, y), box)) >= RADIUS
     goal = np.array(scenario.source.waypoints_m[0])
-    reach = scenario.attraction.follow_distance_m + 0.175
-    start_x, start_y = scenario.start.position_m
+    reach = scenario.follower.attraction.follow_distance_m + 0.175
+    start_x, start_y = scenario.only.start.position_m
     queue = [(0.0, round((start_x + 3.0) / CELL), round((start_y + 5.0) / CELL))]
     while queue:
         _, i, j = heapq.heappop(queue)
@@ -135,7 +135,7 @@ def test_rooms_have_one_door_off_the_axis_of_the_source():
         assert len(door) == pytest.approx(120, abs=1)
         assert np.ptp(door) == pytest.approx(1.19, abs=0.011)
         assert abs(door.mean() - source[1]) >= 0.6 - 0.006
-        assert scenario.start.position_m[0] < 2.5 < source[0]
+        assert scenario.only.start.position_m[0] < 2.5 < source[0]
 
 
 def test_two_bodies_cross_the_way_to_a_source_that_rests():

@@ -49,7 +49,7 @@ def test_default_follow_distance_has_room_for_the_overshoot():
     overshoot = braking_overshoot(SCENARIO)
     assert overshoot == pytest.approx(0.76, abs=0.005)
     found = follow_distance(SCENARIO, REQUIREMENTS, overshoot)
-    assert found == SCENARIO.attraction.follow_distance_m == 1.2
+    assert found == SCENARIO.follower.attraction.follow_distance_m == 1.2
 
 
 def test_damping_spares_the_room():

@@ -18,15 +18,15 @@ from analysis.design.requirements import (
     metres_to_go,
 )
 from analysis.laws.push_and_pull import DESIGNED_LAWS
+from diagrams.scenario.follower.laws import RepulsionParameters
 from diagrams.scenario.scenario import Scenario
-from systems.laws.repulsion import RepulsionParameters
 from tests.results import documented, numbers
 
 SCENARIO, REQUIREMENTS = Scenario(), DesignRequirements()
 
 
 def with_attraction(**changes) -> Scenario:
-    attraction = SCENARIO.attraction.model_copy(update=changes)
+    attraction = SCENARIO.follower.attraction.model_copy(update=changes)
     return SCENARIO.model_copy(update={"attraction": attraction})
 
 

@@ -32,7 +32,7 @@ def test_runs_have_the_rates_of_the_scenario(tick_s, monkeypatch):
     }
     (found,) = module.jam_runs(Scenario.model_validate(rates), ["active"])
     assert {case.tick_s for case in seen} == {tick_s}
-    assert {case.microphones.frame_s for case in seen} == {2 * tick_s}
-    assert {case.ultrasonic.period_s for case in seen} == {4 * tick_s}
+    assert {case.follower.microphones.frame_s for case in seen} == {2 * tick_s}
+    assert {case.follower.ultrasonic.period_s for case in seen} == {4 * tick_s}
     assert found.causes == {"stuck": len(module.JAM_STARTS_M)}
     assert found.jams == len(module.JAM_STARTS_M), "none came into the goal"

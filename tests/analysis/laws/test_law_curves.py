@@ -30,7 +30,7 @@ SCENARIO = Scenario.model_validate(
 
 
 def curves_by_law(**changes):
-    repulsion = SCENARIO.repulsion.model_copy(update=changes)
+    repulsion = SCENARIO.follower.laws.model_copy(update=changes)
     scenario = SCENARIO.model_copy(update={"repulsion": repulsion})
     return {curve.law: curve for curve in law_curves(scenario, FORCE_LAWS)}
 
@@ -39,7 +39,7 @@ def test_laws_meet_where_the_paper_matches_them():
     """K_0 rho_0/2 = 4 N at 0.4 m and D_0 mu_0/2 = 0.72 N more at mu_0/2."""
     scenario = SCENARIO
     for law in ("conventional", "active"):
-        controller = make_controller(scenario.model_copy(update={"law": law}))
+        controller = make_controller(scenario.with_robot(law=law))
         assert radial_forces(controller, 0.4, 0.36) == pytest.approx(4.72)
 
 

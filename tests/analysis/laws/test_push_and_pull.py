@@ -29,7 +29,7 @@ K_R, RHO_0, NEAREST = 2.0, 0.8, 0.03
 
 
 def with_attraction(**changes) -> Scenario:
-    attraction = SCENARIO.attraction.model_copy(update=changes)
+    attraction = SCENARIO.follower.attraction.model_copy(update=changes)
     return SCENARIO.model_copy(update={"attraction": attraction})
 
 
@@ -54,7 +54,7 @@ def test_barrier_of_the_active_law_without_a_pull(ratio, factor):
     """K_0 rho_0^2/2 times r/(2 ln^2 r), but for the last 3 cm and beyond 3 m."""
     gains = {"reference_stiffness_n_m": 16.0 * ratio, "matched_stiffness_n_m": 16.0}
     scenario = with_gains(with_attraction(stiffness_n_m=1e-12), "active", **gains)
-    alpha, k = scenario.repulsion.active.alpha_m, 16.0 * ratio
+    alpha, k = scenario.follower.laws.active.alpha_m, 16.0 * ratio
     left_out = (
         k
         * alpha
@@ -75,7 +75,7 @@ def test_net_barrier_is_the_integral_between_the_balances(law):
     c = np.linspace(NEAREST, 3.0, 100_000)
     net = np.array([push(x) - K_R * (x + 2.0) for x in c])
     inside = c[net > 0.0]
-    points = [SCENARIO.repulsion.active2017.saturation_distance_m]
+    points = [SCENARIO.follower.laws.active2017.saturation_distance_m]
     expected, _ = quad(
         lambda x: push(x) - K_R * (x + 2.0), inside[0], inside[-1], points=points
     )
@@ -99,7 +99,7 @@ def test_stiffest_slope_is_that_of_the_curve(law):
 def test_offset_behind_the_master_robot_of_the_conventional_law():
     """None from rho_0 on; nearer, two springs share the gap."""
     assert rest_offset("conventional", SCENARIO) == 0.0
-    gains = SCENARIO.repulsion.conventional
+    gains = SCENARIO.follower.laws.conventional
     gap = 0.7 - 0.163
     expected = gains.stiffness_n_m * (RHO_0 - gap) / (K_R + gains.stiffness_n_m)
     near = with_attraction(follow_distance_m=0.7)
@@ -108,7 +108,7 @@ def test_offset_behind_the_master_robot_of_the_conventional_law():
 
 def test_offset_behind_the_master_robot_of_2017():
     """K_r x = K_0/(gap + x)."""
-    K_0 = SCENARIO.repulsion.active2017.distance_gain_j
+    K_0 = SCENARIO.follower.laws.active2017.distance_gain_j
     gap = 1.2 - 0.163
     expected = -gap / 2.0 + math.sqrt(gap**2 / 4.0 + K_0 / K_R)
     assert rest_offset("active2017", SCENARIO) == pytest.approx(expected)
@@ -125,11 +125,11 @@ def test_offset_where_the_master_robot_covers_the_follow_point():
 
 def test_offset_by_a_far_echo():
     """d_ref mu_0/K_r, whatever the distance; K_0/(3 K_r) of 2017."""
-    active = SCENARIO.repulsion.active
+    active = SCENARIO.follower.laws.active
     tail = active.reference_stiffness_n_m * 3.0 * math.exp(-3.0 / active.alpha_m)
     at_rest = active.reference_damping_n_s_m * active.speed_limit_m_s
     assert far_offset("active", SCENARIO) == pytest.approx((at_rest + tail) / K_R)
-    K_0 = SCENARIO.repulsion.active2017.distance_gain_j
+    K_0 = SCENARIO.follower.laws.active2017.distance_gain_j
     assert far_offset("active2017", SCENARIO) == pytest.approx(K_0 / 3.0 / K_R)
     assert far_offset("conventional", SCENARIO) == 0.0
 
@@ -150,7 +150,7 @@ def test_share_put_back_by_the_active_law(limit, steepest):
     A body that comes at the robot is up to twice as fast as its top of 0.72 m/s.
     """
     scenario = with_gains(SCENARIO, "active", speed_limit_m_s=limit)
-    gains = scenario.repulsion.active
+    gains = scenario.follower.laws.active
     d, b, m = gains.reference_damping_n_s_m, gains.beta_m_s, gains.speed_limit_m_s
     s = np.linspace(1e-4, m, 20_000)
     secants = (d * np.exp(s / b) * (m - s) - d * m) / s
@@ -165,8 +165,8 @@ def largest_gain(law: str, scenario: Scenario, start: list[float]) -> float:
 
     In the plane, in continuous time, exact sensing; s = |v| as printed.
     """
-    force, mass = law_force(law, scenario), scenario.robot.mass_kg
-    to_rest, D_r = np.array([-2.0, 0.0]), scenario.attraction.damping_n_s_m
+    force, mass = law_force(law, scenario), scenario.only.robot.mass_kg
+    to_rest, D_r = np.array([-2.0, 0.0]), scenario.follower.attraction.damping_n_s_m
 
     def motion(_, x):
         c, v = np.linalg.norm(x[:2]), x[2:]

@@ -70,7 +70,7 @@ def test_force_between_entries(c):
 
     scenario = load_scenario("default", ["law=active"])
     table = radial_law(scenario)
-    expected = active_force(c, 0.0, scenario.repulsion.active)
+    expected = active_force(c, 0.0, scenario.follower.laws.active)
     assert float(table.at_rest(c)) == pytest.approx(expected, abs=1e-4)
 
 

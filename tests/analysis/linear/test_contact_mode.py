@@ -101,7 +101,7 @@ def test_radial_modes_of_the_whole_diagram_are_those_of_the_chain(stiffness):
             "law": "conventional",
             "source": {"waypoints_m": [[3.0, 0.0]], "length_m": 1e-3, "width_m": 1e-3},
             "attraction": {"follow_distance_m": 0.0},
-            "repulsion": {"conventional": {"stiffness_n_m": stiffness}},
+            "laws": {"conventional": {"stiffness_n_m": stiffness}},
             "obstacles": [
                 {
                     "waypoints_m": [[1.0, 0.0]],

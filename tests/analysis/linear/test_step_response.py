@@ -38,7 +38,7 @@ def test_the_corner_of_a_strong_velocity_term_costs_damping():
     printed = check_step(Scenario(law="active2017"))
     assert abs(printed.frequency_error) < 0.02
     assert 0.02 < abs(printed.damping_error) < 0.05
-    smooth = {"law": "active2017", "repulsion": {"active2017": {"damping_n_s_m": 1e-9}}}
+    smooth = {"law": "active2017", "laws": {"active2017": {"damping_n_s_m": 1e-9}}}
     check = check_step(Scenario.model_validate(smooth), step_m=0.002)
     assert abs(check.frequency_error) < 1e-3
     assert abs(check.damping_error) < 1e-2

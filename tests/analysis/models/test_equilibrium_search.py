@@ -250,7 +250,7 @@ def test_three_walls_hold_p_in_a_dead_end():
     scene = Scenario.model_validate(
         {
             "law": "conventional",
-            "repulsion": {"conventional": {"stiffness_n_m": 16.0, "reach_m": 0.8}},
+            "laws": {"conventional": {"stiffness_n_m": 16.0, "reach_m": 0.8}},
             "source": {"waypoints_m": [[5.0, 0.0]]},
             "obstacles": ends,
         }

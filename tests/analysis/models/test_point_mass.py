@@ -29,7 +29,7 @@ def block_force(scenario, law, state, *, before=None):
         return nearest_vectors((p[0], p[1], 0.0), bodies, 0.0, 3.0, slots)
 
     C = {} if before is None else {round(v[0]): v[1:] for v in vectors(before)}
-    closing = scenario.repulsion.velocity_term == "closing"
+    closing = scenario.follower.collision_vector.velocity_term == "closing"
     pushes = [(0.0, 0.0)]
     for feature, *C_W in vectors(state):
         then = C.get(round(feature))
@@ -68,7 +68,7 @@ def test_force_at_rest_is_that_of_the_blocks(two_boxes, law, aggregation):
 @pytest.mark.parametrize("law", LAWS)
 def test_force_in_motion_is_that_of_the_blocks(two_boxes, law, term):
     """The blocks' difference over a very short tick is the derivative here."""
-    scenario = two_boxes(law, f"repulsion.velocity_term={term}")
+    scenario = two_boxes(law, f"collision_vector.velocity_term={term}")
     model = point_mass(scenario)
     function = make_controller(scenario).radial_force
     free = states(200)

@@ -23,9 +23,9 @@ def stiff(law):
     """The gains of the design note: K_0 = 20, r = 4."""
     return (
         law,
-        "repulsion.conventional.stiffness_n_m=20",
-        "repulsion.active.matched_stiffness_n_m=20",
-        "repulsion.active.reference_stiffness_n_m=80",
+        "laws.conventional.stiffness_n_m=20",
+        "laws.active.matched_stiffness_n_m=20",
+        "laws.active.reference_stiffness_n_m=80",
     )
 
 
@@ -98,7 +98,7 @@ def test_exact_sensing_makes_a_saddle_and_cones_a_trap(two_boxes, law):
 
 def test_outer_equilibrium_of_the_active_law_by_hand(two_boxes):
     """With nothing to go behind, and hardly any push by the velocity term."""
-    scenario = two_boxes("active", "repulsion.active.reference_damping_n_s_m=1e-9")
+    scenario = two_boxes("active", "laws.active.reference_damping_n_s_m=1e-9")
     found = stiffness_ratio_map(scenario, (4.0, 16.0), to_go_m=0.0)
     for ratio, outer in zip(found.ratios, found.outer_m, strict=True):
         alpha = 0.8 / (2.0 * math.log(ratio))

@@ -41,7 +41,7 @@ def test_saturating_term_of_2017_injects_d0(two_boxes):
 
 
 def test_more_damping_than_d_r_is_not_covered(two_boxes):
-    stronger = "repulsion.conventional.damping_n_s_m=1.2"
+    stronger = "laws.conventional.damping_n_s_m=1.2"
     assert not velocity_term_passivity(two_boxes("conventional", stronger)).covered
 
 

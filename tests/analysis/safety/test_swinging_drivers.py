@@ -66,7 +66,7 @@ def test_a_swinging_driver_visits_a_box_and_comes_back_to_it():
     box = 0.0, -1.63, 0.0, 0.3, 0.3
     names = "box", "swing", "plain"
     result = run_result(swing_at_boxes(names, [box], BY_HAND, 60.0, swings=1))
-    robot, near, aimed = result.scenario.robot, [], []
+    robot, near, aimed = result.scenario.only.robot, [], []
     body = np.array([0.0, 0.0, 0.0, robot.length_m, robot.width_m])
     corner = math.atan2(robot.width_m, robot.length_m)
     for x, y, theta in result.poses("WB"):

@@ -26,7 +26,7 @@ def refuse(study):
     raise InputError("law", "cannot; choose another")
 
 
-MASS = Part("mass", "Mass", lambda study: study.scenario.robot.mass_kg, render)
+MASS = Part("mass", "Mass", lambda study: study.scenario.only.robot.mass_kg, render)
 TWICE = Part("twice", "Twice", lambda study: 2.0 * study.need("mass"), render)
 BUILT = Part("built", "Built", lambda study: study.need("refused"), render)
 REFUSED = Part("refused", "Refused", refuse, render)
@@ -57,9 +57,9 @@ def test_nothing_stands_without_the_first_part():
 
 def test_laws_are_chosen_once_each():
     base = load_scenario("default", ["law=none", "seed=3"])
-    assert [s.law for s in chosen_laws(base, [])] == ["none"]
+    assert [s.only.law for s in chosen_laws(base, [])] == ["none"]
     chosen = chosen_laws(base, ["active", "all"])
-    assert [s.law for s in chosen] == [
+    assert [s.only.law for s in chosen] == [
         "active",
         "conventional",
         "conventional2017",

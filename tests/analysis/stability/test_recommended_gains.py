@@ -149,7 +149,7 @@ def test_advice_says_what_the_law_leaves_of_the_margins(law):
 
 def test_law_that_is_too_stiff_has_no_gains():
     scenario = load_scenario(
-        "default", ["law=conventional", "repulsion.conventional.stiffness_n_m=5000"]
+        "default", ["law=conventional", "laws.conventional.stiffness_n_m=5000"]
     )
     found = recommend_gains(scenario, springs=(1.0,))
     assert found.choices[0].figures is None

@@ -106,7 +106,7 @@ def test_page_shows_a_law_and_the_table_both(analyses):
 
 def test_laws_of_a_route_are_chosen_on_a_route():
     scenario = load_scenario("unknown_block")
-    assert [each.law for each in chosen_laws(scenario, ["all"])] == [
+    assert [each.only.law for each in chosen_laws(scenario, ["all"])] == [
         "trajectory_conventional",
         "trajectory_adaptive",
         "trajectory_filtered",
@@ -125,7 +125,7 @@ def test_laws_of_a_route_are_chosen_on_a_route():
 )
 def test_one_robot_of_several_is_taken_alone(scenario, name, start, others):
     alone, note = chosen_robot(load_scenario(scenario), name)
-    assert alone.start.position_m == start
+    assert alone.only.start.position_m == start
     assert not alone.robots
     assert others in note
     assert bool(note) == bool(others)
@@ -138,8 +138,8 @@ def test_one_of_a_convoy_has_a_linear_model_of_its_own(name):
     (chosen,) = chosen_laws(alone, [])
     ideal = ideal_scenario(chosen)
     require_ideal(ideal)
-    assert len(ideal.all_robots) == 1
-    assert ideal.loudspeaker is None
+    assert len(ideal.robots) == 1
+    assert ideal.only.loudspeaker is None
 
 
 def test_a_robot_that_is_none_is_refused():

@@ -153,10 +153,10 @@ def test_every_verdict_reads_what_its_name_says():
 def test_contact_growth_is_a_root_of_the_difference_equation(ticks):
     """K_r + K_0 on a position some ticks old, D_r, 50 ms of lag: an own polynomial."""
     scenario = Scenario.model_validate(
-        {"law": "conventional", "repulsion": {"conventional": {"stiffness_n_m": 30.0}}}
+        {"law": "conventional", "laws": {"conventional": {"stiffness_n_m": 30.0}}}
     )
-    mass, lag = scenario.robot.mass_kg, scenario.plant.motor_lag_s
-    attraction = scenario.attraction
+    mass, lag = scenario.only.robot.mass_kg, scenario.only.plant.motor_lag_s
+    attraction = scenario.follower.attraction
     decay = math.exp(-T / lag)
     k = T / mass * (30.0 + attraction.stiffness_n_m)
     d = T / mass * attraction.damping_n_s_m

@@ -80,8 +80,8 @@ def test_laws_are_compared_by_name_in_the_first_ones_order():
 @pytest.mark.parametrize(("spring_n_m", "certified"), [(0.01, 0.0), (1000.0, 1.0)])
 def test_a_start_is_certified_by_the_spring_before_it(two_boxes, spring_n_m, certified):
     """A box stands on the way down to the source; 1000 N/m hold 320 J, 0.01 nothing."""
-    stiffness = f"repulsion.conventional.stiffness_n_m={spring_n_m}"
-    damping = "repulsion.conventional.damping_n_s_m=0.001"
+    stiffness = f"laws.conventional.stiffness_n_m={spring_n_m}"
+    damping = "laws.conventional.damping_n_s_m=0.001"
     scenario = two_boxes("conventional", stiffness, damping)
     certificate = certify_energy(scenario, cell_m=0.02)
     found = {"certificates": [SimpleNamespace(certificate=certificate)]}

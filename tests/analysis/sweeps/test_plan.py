@@ -59,9 +59,9 @@ def test_scenario_has_every_field():
     sweep = plan()
     point = sweep.points()[-1]
     scenario = sweep.scenario_of(point)
-    assert scenario.hearing == "ideal"
-    assert scenario.law == "active"
-    assert scenario.attraction.stiffness_n_m == 16.0
+    assert scenario.follower.hearing == "ideal"
+    assert scenario.only.law == "active"
+    assert scenario.follower.attraction.stiffness_n_m == 16.0
     assert scenario.seed == point.seed
     obstacle = scenario.obstacles[0]
     assert obstacle.speed_m_s == point.fields[SPEED]

@@ -29,7 +29,7 @@ LAW = TrajectoryImpedanceParameters(
     contact_stiffness_n_m=3.0,
     security_zone_m=1.0,
 )
-PREFIX = "repulsion.trajectory_adaptive.adaptation"
+PREFIX = "laws.trajectory_adaptive.adaptation"
 CURES = (
     "{rule: sensitivity, rate: 10, normalisation: 0.01, projected: true, "
     "leakage: 0.2, freezes: true}"

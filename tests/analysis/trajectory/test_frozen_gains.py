@@ -208,7 +208,7 @@ def test_the_printed_sign_is_unstable_before_a_wall():
     """D - D_e = 0 with one contact: the motors' lag makes it grow."""
     where = scenario(
         "trajectory_conventional",
-        "repulsion.trajectory_conventional.reading=printed_force",
+        "laws.trajectory_conventional.reading=printed_force",
     )
     growth = {each.at.name: each.growth_per_s for each in frozen_gains(where)}
     assert growth["at rest"] < 0.0 < growth["in a zone"]

@@ -164,7 +164,7 @@ def test_a_block_that_commands_nothing_gets_no_wheels():
 @pytest.mark.parametrize("law", ["none", "active"])
 def test_our_laws_command_an_acceleration(law):
     scenario = Scenario(law=law)
-    command = make_command(make_controller(scenario), scenario.robot)
+    command = make_command(make_controller(scenario), scenario.only.robot)
     assert command.get_name() == "wheel_command"
 
 
@@ -177,4 +177,4 @@ def test_linear_models_are_refused(constants):
     with pytest.raises(InputError, match="no output port acceleration_W"):
         ideal_loop(scenario)
     with pytest.raises(InputError, match="no output port forces_W to draw"):
-        law_curves(scenario, [scenario.law])
+        law_curves(scenario, [scenario.only.law])

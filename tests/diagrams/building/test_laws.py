@@ -16,7 +16,7 @@ from systems.laws.catalogue import FORCE_LAWS, LAWS
 
 OWN_LAWS = """
 from systems import ConventionalImpedanceController
-from systems.laws.repulsion import RepulsionParameters
+from diagrams.scenario.follower.laws import RepulsionParameters
 
 number = 5
 
@@ -161,16 +161,24 @@ class Anything(ActiveImpedanceController):
 class Asking(StopWhenNearController):
     asked = {}
 
-    def __init__(self, following, known, bodies, seed, tick_s):
+    def __init__(self, gains, known, bodies, seed, tick_s):
         Asking.asked = {"bodies": bodies, "seed": seed, "cell": known.cell_m}
-        super().__init__(following=following, tick_s=tick_s)
+        super().__init__(gains=gains, tick_s=tick_s)
 """
 
 
 def test_own_blocks_get_what_they_name(tmp_path):
-    """One that takes any keyword gets what laws of ours take, and no more."""
+    """One that takes any keyword gets what its base takes, with the base's gains."""
     file = tmp_path / "own_blocks.py"
     file.write_text(OWN_BLOCKS, encoding="utf-8")
-    make_controller(Scenario(law=f"{file}:Anything"))
-    block = make_controller(Scenario(law=f"{file}:Asking"), bodies=3, seed=7)
+    repulsion = {
+        "active": {"reference_damping_n_s_m": 0.2, "matched_stiffness_n_m": 16.0},
+        "stop_when_near": {"stop_m": 0.3},
+    }
+    own = {"law": f"{file}:Anything", "repulsion": repulsion}
+    block = make_controller(Scenario.model_validate(own))
+    assert repulsion_of(block) == pytest.approx(-16.0 * 0.4 - 0.2 * 0.72)
+    own = {"law": f"{file}:Asking", "repulsion": repulsion}
+    block = make_controller(Scenario.model_validate(own), bodies=3, seed=7)
+    assert block.step.numbers.own.stop_m == 0.3
     assert type(block).asked == {"bodies": 3, "seed": 7, "cell": 0.05}

@@ -20,7 +20,7 @@ from pydrake.math import exp
 
 
 def gaussian(c, s, repulsion):
-    return 6.0 * exp(-c * c / repulsion.active.alpha_m) + 0.5 * s
+    return 6.0 * exp(-c * c / laws.active.alpha_m) + 0.5 * s
 
 
 def wordy(c, s, repulsion):

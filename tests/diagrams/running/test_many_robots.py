@@ -258,14 +258,14 @@ def test_one_robots_settings_do_not_touch_another_and_follow_the_scenarios():
         },
     }
     scenario = scenario_from_mapping(data)
-    a, b = scenario.all_robots["a"], scenario.all_robots["b"]
+    a, b = scenario.robots["a"], scenario.robots["b"]
     assert (a.law, b.law) == ("conventional", "none")
     assert a.attraction.damping_n_s_m == 1.0
     assert b.attraction.damping_n_s_m == 3.0
     assert a.attraction.follow_distance_m == b.attraction.follow_distance_m == 0.9
     assert a.start.position_m == (0.0, 5.0)
-    other = scenario.model_copy(update={"law": "active"})
-    assert other.all_robots["a"].law == "active"
+    other = scenario.with_robot(law="active")
+    assert other.robots["a"].law == "active"
 
 
 def test_parts_are_asked_for_by_name_where_there_are_several():

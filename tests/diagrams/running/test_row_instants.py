@@ -45,7 +45,7 @@ def run(law: str, engine: Engine) -> RunResult:
     name, settings = MOVING[law]
     more = ["guard={}"] if guard else []
     scenario = load_scenario(name, [f"law={law}", *settings, *EXACT, *more])
-    assert scenario.plant.slip == (0.0, 0.0)
+    assert scenario.only.plant.slip == (0.0, 0.0)
     return simulate(scenario, engine=engine)
 
 
@@ -55,14 +55,14 @@ def run(law: str, engine: Engine) -> RunResult:
 def test_a_rows_command_moves_the_wheels_to_the_next_row(law, engine):
     """A wheel lags exponentially behind a command that is held for a tick."""
     result = run(law, engine)
-    robot, columns = result.scenario.robot, result.columns
+    robot, columns = result.scenario.only.robot, result.columns
     heading, turning = columns["theta_WB"], columns["omega_WB"]
     forward = columns["v_WB_x"] * np.cos(heading) + columns["v_WB_y"] * np.sin(heading)
     assert len(result.time) > 20
     for side, sign in (("left", -0.5), ("right", 0.5)):
         rim = forward + sign * robot.wheel_separation_m * turning
         wheel, command = rim / robot.wheel_radius_m, columns[f"wheel_speed_{side}"]
-        left = math.exp(-result.scenario.tick_s / result.scenario.plant.motor_lag_s)
+        left = math.exp(-result.scenario.tick_s / result.scenario.only.plant.motor_lag_s)
         after = command[:-1] + left * (wheel[:-1] - command[:-1])
         np.testing.assert_allclose(wheel[1:], after, rtol=0.0, atol=1e-8)
         # What the run shows: that of the next row would be off.
@@ -74,7 +74,7 @@ def test_a_rows_command_moves_the_wheels_to_the_next_row(law, engine):
 
 def _check_chain(result: RunResult, *, guarded: bool) -> None:
     """From what the law puts out to the wheels, in one row."""
-    columns, robot = result.columns, result.scenario.robot
+    columns, robot = result.columns, result.scenario.only.robot
     vx, vy = columns["v_WP_x"], columns["v_WP_y"]
     if result.scenario.route is None:
         theta = columns["theta_WB_estimated"]

@@ -81,7 +81,7 @@ def test_played_is_the_waveform_behind_its_gate(tmp_path, engine):
         "sound.start_s=0.11",
     )
     scenario = load_scenario("default", ["sound.on_s=0.2"])
-    burst = make_waveform(scenario.sound)
+    burst = make_waveform(scenario.source.sound)
     assert len(burst) == 20_000
     expected = np.zeros(100_000)
     for begin in (11_000, 61_000):

@@ -334,7 +334,7 @@ def test_contact_between_two_ticks_is_found():
     assert (result.collision.object, result.collision.fault) == ("speck", "obstacle")
     assert result.collision.time == pytest.approx(20.5 * 0.025, abs=0.005)
 
-    robot = robot_rectangle(result.scenario.start.pose, result.scenario.robot)
+    robot = robot_rectangle(result.scenario.only.start.pose, result.scenario.only.robot)
     path = result.scenario.obstacles[0].path()
     for tick in range(40):
         body = np.array([*path.pose(tick * 0.025), 0.002, 0.002])
@@ -441,7 +441,7 @@ def test_corners_are_not_cut_however_fast():
         }
         result = run(**WAITING, obstacles=[cart], duration_s=0.3)
         path = result.scenario.obstacles[0].path()
-        robot = robot_rectangle(result.scenario.start.pose, result.scenario.robot)
+        robot = robot_rectangle(result.scenario.only.start.pose, result.scenario.only.robot)
         dense = [
             rectangle_clearance(robot, np.array([*path.pose(t), 0.002, 0.002]))
             for t in np.linspace(0.0, 0.2, 8001)

@@ -137,12 +137,12 @@ def test_values_arrive(tmp_path):
     assert scenario.seed == 9
     assert scenario.source.waypoints_m == ((1.0, 0.0), (3.0, 0.0))
     assert scenario.obstacles[1].name == "cart"
-    assert scenario.plant.slip == (0.1, 0.0)
+    assert scenario.only.plant.slip == (0.1, 0.0)
 
 
 @pytest.mark.parametrize("name", sorted(library_scenarios()))
 def test_dumped_scenario_loads_as_it_was(tmp_path, name):
-    scenario = load_scenario(name, ["seed=3", "repulsion.velocity_term=closing"])
+    scenario = load_scenario(name, ["seed=3", "collision_vector.velocity_term=closing"])
     assert load_scenario(write(tmp_path, dump_scenario(scenario))) == scenario
 
 
@@ -158,9 +158,9 @@ robots:
 """
     scenario = load_scenario(write(tmp_path, text))
     assert [
-        scenario.sound.file,
-        scenario.all_sources["fan"].sound.file,
-        scenario.microphones.ego_noise_file,
+        scenario.source.sound.file,
+        scenario.sources["fan"].sound.file,
+        scenario.follower.microphones.ego_noise_file,
         scenario.sounds()["second"].file,
     ] == [str((tmp_path / f"{name}.wav").resolve()) for name in "abcd"]
 
@@ -260,8 +260,8 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("obstacles.0.name=source", "obstacles", "'source' is taken; give"),
         ("ultrasonic.minimum_range_m=4", "ultrasonic.minimum_range_m", "below"),
         (
-            "repulsion.active.reference_stiffness_n_m=1",
-            "repulsion.active.reference_stiffness_n_m",
+            "laws.active.reference_stiffness_n_m=1",
+            "laws.active.reference_stiffness_n_m",
             "above",
         ),
         ("acoustics.temperature_c=99", "acoustics.temperature_c", "60"),
@@ -289,7 +289,7 @@ def test_overrides_reach_into_lists_and_make_maps():
     )
     assert scenario.obstacles[0].size_m == (0.3, 0.2)
     assert scenario.obstacles[0].name == "box"
-    assert scenario.robot.mass_kg == 5.0
+    assert scenario.only.robot.mass_kg == 5.0
     assert scenario.source.speed_m_s == 0.1
 
 

@@ -17,8 +17,8 @@ from systems.world.geometry import rectangle_corners
 
 def test_default_scenario_is_complete():
     scenario = Scenario()
-    assert scenario.law == "active"
-    assert (scenario.hearing, scenario.obstacle_sensing) == ("audio", "ultrasonic")
+    assert scenario.only.law == "active"
+    assert (scenario.follower.hearing, scenario.follower.obstacle_sensing) == ("audio", "ultrasonic")
 
 
 def test_goal_radius_is_follow_distance_and_margin():
@@ -67,7 +67,7 @@ def test_the_start_itself_may_move():
         "obstacles": [obstacle(0.0, 0.0)],
         "start": {"position_m": [0.0, -1.0]},
     }
-    assert Scenario.model_validate(data).start.position_m == (0.0, -1.0)
+    assert Scenario.model_validate(data).only.start.position_m == (0.0, -1.0)
 
 
 @pytest.mark.parametrize("names", [("a", "a"), ("a", "source")])

@@ -15,7 +15,6 @@ from systems.laws.active import ActiveParameters, active_force
 from systems.laws.conventional import ConventionalParameters, conventional_force
 from systems.laws.impedance_controller import ActiveImpedanceController
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
 
@@ -128,9 +127,8 @@ def test_at_rest_a_far_obstacle_still_pushes():
 
 
 def test_block_adds_attraction_and_repulsion(bench):
-    repulsion = RepulsionParameters(active=law())
     at = bench(
-        ActiveImpedanceController(repulsion=repulsion),
+        ActiveImpedanceController(gains=law()),
         p_WS_estimated=[3.175, 0.0],
         target_valid=[1.0],
         collision_vectors_B=[0.0, 0.4, 0, 0, 0, 0],
@@ -157,8 +155,7 @@ def test_gradient(controller_bench, check_gradient, velocity_term, limit):
     block = ActiveImpedanceController(
         robot=RobotParameters(control_point_m=0.2, mass_kg=5.0),
         attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
-        repulsion=RepulsionParameters(
-            velocity_term=velocity_term, active=law(speed_limit_m_s=limit)
-        ),
+        gains=law(speed_limit_m_s=limit),
+        velocity_term=velocity_term,
     )
     check_gradient(block, respond, POINT)

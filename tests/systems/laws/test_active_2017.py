@@ -16,7 +16,6 @@ from systems.base.robot import RobotParameters
 from systems.laws.active_2017 import Active2017Parameters, active_2017_force
 from systems.laws.impedance_controller import ActiveImpedance2017Controller
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 
 GAINS = Active2017Parameters(
     distance_gain_j=1.2,
@@ -105,9 +104,7 @@ def test_each_gain_is_read_from_its_own_field():
 
 
 def test_block_adds_attraction_and_repulsion(bench):
-    block = ActiveImpedance2017Controller(
-        repulsion=RepulsionParameters(active2017=GAINS)
-    )
+    block = ActiveImpedance2017Controller(gains=GAINS)
     at = bench(
         block,
         p_WS_estimated=[3.175, 0.0],
@@ -142,8 +139,7 @@ def test_gradient(controller_bench, check_gradient, velocity_term, saturation):
     block = ActiveImpedance2017Controller(
         robot=RobotParameters(control_point_m=0.2, mass_kg=5.0),
         attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
-        repulsion=RepulsionParameters(
-            velocity_term=velocity_term, active2017=GAINS.model_copy(update=saturation)
-        ),
+        gains=GAINS.model_copy(update=saturation),
+        velocity_term=velocity_term,
     )
     check_gradient(block, respond, POINT)

@@ -49,7 +49,7 @@ def printed(*words):
     return json.loads(text.getvalue())
 
 
-settings = ["law=gaussian", "repulsion.gaussian.width_m=0.4"]
+settings = ["law=gaussian", "laws.gaussian.width_m=0.4"]
 scenario = load_scenario("default", [*settings, "hearing=ideal"])
 sheet = model_sheet(scenario)
 curves = law_curves(scenario, DESIGNED_LAWS)
@@ -151,16 +151,16 @@ def test_it_runs_in_the_general_block_with_its_own_gains(answers):
 def test_model_sheet_and_report_have_it(answers):
     assert answers["equations"] == ["f = F_0 exp(-c^2/w^2) + D_0 s"]
     own = {"strength_n", "width_m", "damping_n_s_m"}
-    fields = {f"repulsion.gaussian.{name}" for name in own}
-    assert set(answers["parameters"]) == fields | {"repulsion.velocity_term"}
+    fields = {f"laws.gaussian.{name}" for name in own}
+    assert set(answers["parameters"]) == fields | {"collision_vector.velocity_term"}
     assert "Gaussian law" in answers["heading"]
     assert answers["all"] == [*OURS, "gaussian"]
 
 
 def test_root_loci_vary_its_gains(answers):
     assert answers["loci"][2:] == [
-        "repulsion.gaussian.strength_n",
-        "repulsion.gaussian.damping_n_s_m",
+        "laws.gaussian.strength_n",
+        "laws.gaussian.damping_n_s_m",
     ]
 
 

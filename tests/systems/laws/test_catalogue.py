@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from pydrake.autodiffutils import AutoDiffXd
 
 from systems.laws.catalogue import LAWS, law_title
-from systems.laws.repulsion import RepulsionParameters
 
-TUNED = {law.name: (law, law.tuning) for law in LAWS.values() if law.tuning is not None}
-REPULSION = RepulsionParameters()
+TUNED: dict[str, tuple[Any, Any]] = {
+    law.name: (law, law.tuning) for law in LAWS.values() if law.tuning is not None
+}
 #: Least range of the sensors, and distances beyond it, m.
 LEAST = 0.03
 DISTANCES = np.linspace(LEAST, 3.0, 20_000)[1:]
 
 
 def push(law, c, s, **changed):
-    gains, *more = law.arguments(REPULSION, LEAST)
+    gains, *more = law.arguments(None, LEAST)
     gains = gains.model_copy(update=changed)
     return law.force(c, s, gains, *more)
 
@@ -37,20 +39,11 @@ def test_titles():
     assert law_title("my_laws:soft") == "my_laws:soft"
 
 
-@pytest.mark.parametrize("name", [n for n, law in LAWS.items() if law.gains])
-def test_gains_stand_in_the_scenario_under_the_law_s_name(name):
-    law = LAWS[name]
-    assert law.gains is not None
-    assert getattr(REPULSION, name) == law.gains()
-    field = RepulsionParameters.model_fields[name]
-    assert field.description == f"Gains of ``law: {name}``."
-
-
 @pytest.mark.parametrize("name", TUNED)
 def test_loop_gains_are_those_of_the_two_terms(name):
     """Twice the gain, twice the push at rest, or twice what speed adds."""
     law, tuning = TUNED[name]
-    gains = getattr(REPULSION, name)
+    gains = law.gains()
     assert law.loop_gains is not None
     spring, damper = ({g: 2.0 * getattr(gains, g)} for g in law.loop_gains)
     if tuning.rule == "matched":  # where the other gain that sets alpha, beta follows
@@ -68,7 +61,7 @@ def test_loop_gains_are_those_of_the_two_terms(name):
 @pytest.mark.parametrize("name", TUNED)
 def test_stiffest_is_the_steepest_slope_of_the_push(name):
     law, tuning = TUNED[name]
-    gains = getattr(REPULSION, name)
+    gains = law.gains()
     rest = tuning.spring_speed(gains)
     slopes = [
         push(law, AutoDiffXd(c, 1, 0), rest).derivatives() for c in DISTANCES.tolist()

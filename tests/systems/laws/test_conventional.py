@@ -10,10 +10,8 @@ from systems.base.robot import RobotParameters
 from systems.laws.conventional import ConventionalParameters, conventional_force
 from systems.laws.impedance_controller import ConventionalImpedanceController
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 
 GAINS = ConventionalParameters(stiffness_n_m=10.0, damping_n_s_m=3.0)
-REPULSION = RepulsionParameters(conventional=GAINS)
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
 
 
@@ -41,7 +39,7 @@ def test_barrier_is_the_spring_s_energy():
 
 def test_block_adds_attraction_and_repulsion(bench):
     """Seen from B at rest: P at (0.175, 0), obstacle 0.5 m ahead, new: s = 0."""
-    block = ConventionalImpedanceController(repulsion=REPULSION)
+    block = ConventionalImpedanceController(gains=GAINS)
     at = bench(
         block,
         p_WS_estimated=[3.175, 0.0],
@@ -56,7 +54,7 @@ def test_block_adds_attraction_and_repulsion(bench):
 
 
 def test_printed_velocity_term_also_resists_a_receding_obstacle(controller_bench):
-    at = controller_bench(ConventionalImpedanceController(repulsion=REPULSION), POINT)
+    at = controller_bench(ConventionalImpedanceController(gains=GAINS), POINT)
     s = at.output("obstacle_speeds")[0]
     force = -at.output("forces_W")[2:]
     c = np.hypot(0.6, 0.1)
@@ -64,7 +62,7 @@ def test_printed_velocity_term_also_resists_a_receding_obstacle(controller_bench
 
 
 def test_without_target_it_still_pushes_off(controller_bench):
-    block = ConventionalImpedanceController(repulsion=REPULSION)
+    block = ConventionalImpedanceController(gains=GAINS)
     point = [0.0, 0.0, 0.5, 0.0, 0.0, 0.4, 0.0, 0.0]
     at = controller_bench(block, point, feature=1.0, valid=0.0)
     expected = [-3.94 / 0.5 * 0.4, 0.0, -3.0, 0.0]
@@ -82,6 +80,7 @@ def test_gradient(controller_bench, check_gradient, velocity_term, valid):
     block = ConventionalImpedanceController(
         robot=RobotParameters(control_point_m=0.2, mass_kg=5.0),
         attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
-        repulsion=REPULSION.model_copy(update={"velocity_term": velocity_term}),
+        gains=GAINS,
+        velocity_term=velocity_term,
     )
     check_gradient(block, respond, POINT)

@@ -15,7 +15,6 @@ from systems.laws.conventional_2017 import (
 )
 from systems.laws.impedance_controller import ConventionalImpedance2017Controller
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 from systems.ranging.parameters import UltrasonicParameters
 
 GAINS = Conventional2017Parameters(distance_gain_j=1.2, damping_n_s_m=3.0)
@@ -76,7 +75,7 @@ def test_slope_in_speed(s):
 def test_block_adds_attraction_and_repulsion(bench, distance, least, push):
     """The least range is the sensors'."""
     block = ConventionalImpedance2017Controller(
-        repulsion=RepulsionParameters(conventional2017=GAINS),
+        gains=GAINS,
         sensors=UltrasonicParameters(minimum_range_m=least),
     )
     at = bench(
@@ -106,9 +105,8 @@ def test_gradient(controller_bench, check_gradient, velocity_term, least):
     block = ConventionalImpedance2017Controller(
         robot=RobotParameters(control_point_m=0.2, mass_kg=5.0),
         attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
-        repulsion=RepulsionParameters(
-            velocity_term=velocity_term, conventional2017=GAINS
-        ),
+        gains=GAINS,
+        velocity_term=velocity_term,
         sensors=UltrasonicParameters(minimum_range_m=least),
     )
     check_gradient(block, respond, [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1])

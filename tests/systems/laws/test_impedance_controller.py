@@ -18,7 +18,6 @@ from systems.laws.impedance_controller import (
     repulsion_force,
 )
 from systems.laws.parameters import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
 
 T = 0.025
 PRINTED = AttractionParameters(follow_distance_m=0.0)
@@ -44,8 +43,7 @@ def test_attraction_rests_at_the_follow_distance(direction, distance):
 
 
 def test_without_a_target_the_mass_brakes_with_its_time_constant():
-    attraction = AttractionParameters(brake_time_s=0.5)
-    force = attraction_force((0, 0), (0.4, -0.2), (9, 9), False, attraction, 4.0)
+    force = attraction_force((0, 0), (0.4, -0.2), (9, 9), False, PRINTED, 4.0)
     assert force == pytest.approx((-4.0 / 0.5 * 0.4, 4.0 / 0.5 * 0.2))
 
 
@@ -84,7 +82,7 @@ def test_repulsion_points_away(direction, distance):
 
 
 def test_forces_of_several_vectors_add(bench):
-    block = RadialLawController(law=lambda c, s, repulsion: 1.0 / c)
+    block = RadialLawController(law=lambda c, s, _: 1.0 / c)
     at = on_bench(bench, block)
     see(at, (1.0, 1.0, 0.0), (2.0, 0.0, 0.5))
     np.testing.assert_allclose(at.output("forces_W")[2:], [-1.0, -2.0])
@@ -93,10 +91,7 @@ def test_forces_of_several_vectors_add(bench):
 
 def make_bench(bench, velocity_term="printed", *, pose=(0.0, 0.0, 0.0)):
     """A controller whose force is s itself, so that s shows everywhere."""
-    block = RadialLawController(
-        repulsion=RepulsionParameters(velocity_term=velocity_term),
-        law=lambda c, s, repulsion: s,
-    )
+    block = RadialLawController(velocity_term=velocity_term, law=lambda c, s, _: s)
     return on_bench(bench, block, pose=pose)
 
 
@@ -182,7 +177,7 @@ def test_turning_on_the_spot_is_no_motion_of_the_obstacle(bench):
 
 def test_collision_vector_is_only_rotated(bench):
     """Eq. 16 adds the robot's place; |C| would then be measured from W's origin."""
-    block = RadialLawController(law=lambda c, s, repulsion: 1.0 / c)
+    block = RadialLawController(law=lambda c, s, _: 1.0 / c)
     pose = [100.0, -50.0, math.pi / 2]
     at = bench(
         block,

@@ -24,7 +24,6 @@ from systems.laws.conventional_2017 import (
     Conventional2017Parameters,
     conventional_2017_force,
 )
-from systems.laws.repulsion import RepulsionParameters
 
 pytestmark = pytest.mark.drake
 
@@ -157,15 +156,14 @@ def test_autodiff_equals_the_derivatives_by_hand(law, data, c, s):
     )
 
 
-DEFAULTS = RepulsionParameters()
 BLOCKS: dict[str, tuple[Any, Any]] = {
-    "conventional": (ConventionalImpedanceController(), DEFAULTS.conventional),
-    "active": (ActiveImpedanceController(), DEFAULTS.active),
+    "conventional": (ConventionalImpedanceController(), ConventionalParameters()),
+    "active": (ActiveImpedanceController(), ActiveParameters()),
     "conventional2017": (
         ConventionalImpedance2017Controller(),
-        DEFAULTS.conventional2017,
+        Conventional2017Parameters(),
     ),
-    "active2017": (ActiveImpedance2017Controller(), DEFAULTS.active2017),
+    "active2017": (ActiveImpedance2017Controller(), Active2017Parameters()),
 }
 DUALS = {law: block.ToAutoDiffXd() for law, (block, _) in BLOCKS.items()}
 

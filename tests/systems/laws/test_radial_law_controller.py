@@ -12,20 +12,19 @@ from systems.base.robot import RobotParameters
 from systems.laws.conventional import ConventionalParameters
 from systems.laws.impedance_controller import RadialLawController
 from systems.laws.no_avoidance import no_force
-from systems.laws.repulsion import RepulsionParameters
 
 pytestmark = pytest.mark.drake
 
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
-REPULSION = RepulsionParameters(conventional=ConventionalParameters(stiffness_n_m=7.0))
+GAINS = ConventionalParameters(stiffness_n_m=7.0)
 
 
-def exponential_law(c, s, repulsion):
-    return repulsion.conventional.stiffness_n_m * exp(-c) + 0.5 * s
+def exponential_law(c, s, gains):
+    return gains.stiffness_n_m * exp(-c) + 0.5 * s
 
 
 def test_own_law_gets_distance_speed_and_parameters(controller_bench):
-    block = RadialLawController(repulsion=REPULSION, law=exponential_law)
+    block = RadialLawController(gains=GAINS, law=exponential_law)
     at = controller_bench(block, POINT, feature=1.0)
     magnitude = 7.0 * math.exp(-math.hypot(0.6, 0.1))  # new feature: s = 0
     force = at.output("forces_W")[2:]
@@ -38,7 +37,7 @@ def test_own_law_gets_distance_speed_and_parameters(controller_bench):
 
 
 def test_force_points_away_in_world_axes(controller_bench):
-    block = RadialLawController(law=exponential_law)
+    block = RadialLawController(gains=GAINS, law=exponential_law)
     force = controller_bench(block, POINT).output("forces_W")[2:]
     away = math.atan2(0.1, 0.6) + 0.2 + math.pi
     assert math.atan2(force[1], force[0]) == pytest.approx(away - 2 * math.pi)
@@ -47,7 +46,7 @@ def test_force_points_away_in_world_axes(controller_bench):
 def test_no_avoidance_by_default(controller_bench):
     at = controller_bench(RadialLawController(), POINT)
     np.testing.assert_array_equal(at.output("forces_W")[2:], [0.0, 0.0])
-    assert no_force(0.1, 5.0, REPULSION) == 0.0
+    assert no_force(0.1, 5.0, GAINS) == 0.0
 
 
 def test_gradient(controller_bench, check_gradient):
@@ -56,5 +55,5 @@ def test_gradient(controller_bench, check_gradient):
         return [*at.output("acceleration_W"), *at.updated()]
 
     robot = RobotParameters(control_point_m=0.2, mass_kg=5.0)
-    block = RadialLawController(robot=robot, repulsion=REPULSION, law=exponential_law)
+    block = RadialLawController(robot=robot, gains=GAINS, law=exponential_law)
     check_gradient(block, respond, POINT)

@@ -28,7 +28,7 @@ def sensors(preset: str, **fields: object) -> UltrasonicParameters:
 def chosen(tmp_path: Path, text: str, *overrides: str) -> UltrasonicParameters:
     path = tmp_path / "scene.yaml"
     path.write_text(text, encoding="utf-8")
-    return load_scenario(path, overrides).ultrasonic
+    return load_scenario(path, overrides).follower.ultrasonic
 
 
 def saved(tmp_path: Path, scenario: Scenario) -> Path:
@@ -115,9 +115,9 @@ def test_the_order_on_the_command_line_does_not_matter(tmp_path, first):
     if first == "preset":
         words.reverse()
     expected = sensors("lidar", noise_m=0.002)
-    assert load_scenario("default", words).ultrasonic == expected
+    assert load_scenario("default", words).follower.ultrasonic == expected
     path = saved(tmp_path, load_scenario("default", ["ultrasonic.preset=ring_8"]))
-    assert load_scenario(path, words).ultrasonic == expected
+    assert load_scenario(path, words).follower.ultrasonic == expected
 
 
 def test_fields_of_a_file_win_over_a_preset_of_the_command_line(tmp_path):
@@ -135,7 +135,7 @@ def test_a_saved_scenario_has_the_effective_values(tmp_path, name):
     assert f"beam_half_angle_deg: {sensors(name).beam_half_angle_deg}" in text
     # Another preset takes the place of all of them.
     other = load_scenario(path, ["ultrasonic.preset=ring_12"])
-    assert other.ultrasonic == sensors("ring_12")
+    assert other.follower.ultrasonic == sensors("ring_12")
 
 
 def test_a_ring_of_any_number_on_the_mast():
@@ -148,13 +148,13 @@ def test_each_robot_may_have_another():
     robots += "{position_m: [-2, -1]}}}"
     words = [robots, "ultrasonic.noise_m=0.003"]
     scenario = load_scenario("default", words)
-    assert scenario.all_robots["second"].ultrasonic == sensors("ring_8")
-    assert scenario.all_robots["robot"].ultrasonic == sensors("three", noise_m=0.003)
+    assert scenario.robots["second"].ultrasonic == sensors("ring_8")
+    assert scenario.robots["robot"].ultrasonic == sensors("three", noise_m=0.003)
 
 
 def test_a_robot_may_be_named_preset():
     words = ["robots={robot: {}}", "robots.preset={start: {position_m: [-2, -1]}}"]
-    assert set(load_scenario("default", words).all_robots) == {"robot", "preset"}
+    assert set(load_scenario("default", words).robots) == {"robot", "preset"}
 
 
 def test_a_sweep_goes_through_presets(tmp_path):
@@ -167,7 +167,7 @@ def test_a_sweep_goes_through_presets(tmp_path):
     )
     points = plan.points()
     expected = [sensors(name, period_s=0.05) for name in names]
-    assert [plan.scenario_of(point).ultrasonic for point in points] == expected
+    assert [plan.scenario_of(point).follower.ultrasonic for point in points] == expected
     assert "ultrasonic.preset" in reproducing_command(tmp_path, points[0], "drake")
 
 

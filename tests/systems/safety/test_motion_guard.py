@@ -101,7 +101,7 @@ def test_what_it_reports(bench):
     """Rest at an edge that is 0.8 m away: 8 mm of cells that are only partly free."""
     state = guarded(bench, known_space(0.8), (0.0, 0.0))
     assert state[4] == 0.0
-    needed = body_radius(Scenario().robot) + 0.012
+    needed = body_radius(Scenario().only.robot) + 0.012
     assert 0.8 - 0.05 * math.sqrt(2.0) <= state[5] + needed <= 0.8
     assert state[6] == 0.0
     # At 0.4 m/s of the faster wheel it stops within v^2/2a + v (lag + tick).
@@ -234,7 +234,7 @@ def test_pulses_make_a_tick_count_half_a_pulse_more_and_a_reversal_its_command()
 def test_by_the_encoders_of_the_papers_robot_a_cell_is_known_for_14_m():
     """(q/L) (s + d) + q = 6 mm at d = 2 m, with pulses of q = 0.145 mm at the rim."""
     pulse = 0.06 * math.tau / 2600
-    error = PlaceError.of(FreeSpaceParameters(), Scenario().robot, OdometryParameters())
+    error = PlaceError.of(FreeSpaceParameters(), Scenario().only.robot, OdometryParameters())
     expected = (0.006 - pulse) * 0.41 / pulse - 2.0
     assert lasting(2.0, error) == pytest.approx(expected)
     assert 14.0 < expected < 15.0

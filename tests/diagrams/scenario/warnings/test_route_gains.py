@@ -12,8 +12,8 @@ from analysis.trajectory.point_run import PointLoop, run_point
 from diagrams import load_scenario
 from diagrams.scenario.warnings.warnings_of import warnings_of
 
-ADAPTIVE = "repulsion.trajectory_adaptive"
-FILTERED = "repulsion.trajectory_filtered"
+ADAPTIVE = "laws.trajectory_adaptive"
+FILTERED = "laws.trajectory_filtered"
 
 
 def all_warnings(law, *fields):
@@ -64,7 +64,7 @@ def test_a_block_distance_within_the_body_is_told():
     """A TurtleBot3 Burger, 138 x 178 mm: its rear corners are farthest from P."""
     corners = [(x, y) for x in (-0.069, 0.069) for y in (-0.089, 0.089)]
     reach = max(np.hypot(x - 0.08, y) for x, y in corners)
-    field = "repulsion.trajectory_conventional.block_distance_m"
+    field = "laws.trajectory_conventional.block_distance_m"
     assert warnings("conventional", f"{field}={reach + 1e-6}") == []
     (warning,) = warnings("conventional", f"{field}={reach - 1e-6}")
     assert warning.startswith(f"{field}: is 0.1735")

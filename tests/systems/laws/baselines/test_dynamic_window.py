@@ -14,9 +14,7 @@ from systems.laws.baselines.dynamic_window_controller import (
 )
 
 HALF = 0.2, 0.4
-NUMBERS = WindowNumbers(
-    (2.0, 0.2, 0.2), (1.0, 4.0), (-0.15, 0.6, 2.0), 0.1, 2.0, HALF, 0.0
-)
+NUMBERS = WindowNumbers((2.0, 0.2, 0.2), 4.0, 2.0, HALF, 0.0)
 START = 0.0, 0.0, 0.0
 NOTHING = np.empty((0, 3))
 

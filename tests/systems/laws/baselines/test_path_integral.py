@@ -36,31 +36,30 @@ def test_places_are_where_they_are():
 
 def rolled(own, noise, goal, *, field=None, rounds=1):
     """The plan after some rounds, each from the plan of the last."""
-    controls = np.zeros((own.steps, 2))
+    controls = np.zeros((noise.shape[-2], 2))
     numbers = _roll_numbers(own, RobotParameters())
     if field is None:
         field = distance_field(np.empty((0, 3)), 0.0, 0.0, 2.5, CELL_M)
     for k in range(rounds):
-        first = k * own.samples
-        roll_out(controls, noise, first, START, goal, field, CELL_M, numbers)
+        roll_out(controls, noise[k], START, goal, field, CELL_M, numbers)
     return controls
 
 
-GAINS = {"control_gain": 0.0, "angle_gain": 0.0, "obstacle_gain": 0.0}
+GAINS = {"angle_gain": 0.0, "obstacle_gain": 0.0}
 
 
 def test_weights_are_those_of_the_costs():
     """Straight ahead the cost is that of the distance: by hand for each sample."""
-    own = PathIntegralParameters(samples=10, steps=5, forward_gain=0.0, **GAINS)
+    own = PathIntegralParameters(**GAINS)
     random = np.random.default_rng(2)
-    noise = np.zeros((10, 5, 2))
-    noise[:, :, 0] = random.uniform(0.0, 3.0, (10, 1))
+    noise = np.zeros((1, 10, 5, 2))
+    noise[0, :, :, 0] = random.uniform(0.0, 3.0, (10, 1))
     goal = (1.0, 0.0, 0.0, 0.0)
     found = rolled(own, noise, goal)
-    speeds = np.minimum(own.speed_spread_m_s * noise[:, 0, 0], 0.62)
-    times = own.step_s * np.arange(1, 6)
+    speeds = np.minimum(0.2 * noise[0, :, 0, 0], 0.62)
+    times = 0.1 * np.arange(1, 6)
     ahead = RobotParameters().control_point_m
-    costs = own.goal_gain * np.mean(1.0 - ahead - np.outer(speeds, times), axis=1)
+    costs = 5.0 * np.mean(1.0 - ahead - np.outer(speeds, times), axis=1)
     weights = np.exp(-costs / own.temperature)
     expected = weights @ speeds / weights.sum()
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-12)
@@ -68,9 +67,9 @@ def test_weights_are_those_of_the_costs():
 
 
 def test_a_cold_choice_is_the_best_sample():
-    own = PathIntegralParameters(samples=10, steps=5, temperature=1e-6, **GAINS)
-    noise = np.zeros((10, 5, 2))
-    noise[:, :, 0] = np.linspace(-0.5, 2.0, 10)[:, None]
+    own = PathIntegralParameters(temperature=1e-6, **GAINS)
+    noise = np.zeros((1, 10, 5, 2))
+    noise[0, :, :, 0] = np.linspace(-0.5, 2.0, 10)[:, None]
     found = rolled(own, noise, (9.0, 0.0, 0.0, 0.0))
     np.testing.assert_allclose(found[:, 0], 0.2 * 2.0, rtol=1e-9)
 
@@ -78,7 +77,7 @@ def test_a_cold_choice_is_the_best_sample():
 def test_it_goes_to_where_the_goal_will_be():
     """A goal that moves aside: the plan turns after it."""
     own = PathIntegralParameters()
-    noise = np.random.default_rng(3).standard_normal((4 * own.samples, own.steps, 2))
+    noise = np.random.default_rng(3).standard_normal((1, 500, 25, 2))
     left = rolled(own, noise, (1.0, 0.0, 0.0, 0.4))
     right = rolled(own, noise, (1.0, 0.0, 0.0, -0.4))
     assert left[:8, 1].mean() > 0.2
@@ -86,16 +85,16 @@ def test_it_goes_to_where_the_goal_will_be():
 
 
 def test_it_does_not_drive_into_a_wall():
-    own = PathIntegralParameters(samples=400, temperature=0.02)
-    noise = np.random.default_rng(4).standard_normal((4_000, own.steps, 2))
+    own = PathIntegralParameters(temperature=0.02)
+    noise = np.random.default_rng(4).standard_normal((10, 400, 25, 2))
     wall = np.array([(0.6, 0.05 * k, 1.0) for k in range(-60, 61)])
     field = distance_field(wall, 0.0, 0.0, 2.5, CELL_M)
     goal = 2.0, 0.0, 0.0, 0.0
     free = rolled(own, noise, goal, rounds=10)
     stopped = rolled(own, noise, goal, field=field, rounds=10)
-    assert free[:, 0].sum() * own.step_s > 0.6
+    assert free[:, 0].sum() * 0.1 > 0.6
     # The body reaches 0.175 m ahead, and is kept off by the discs' rounding.
-    assert stopped[:, 0].sum() * own.step_s < 0.6 - 0.175
+    assert stopped[:, 0].sum() * 0.1 < 0.6 - 0.175
 
 
 @pytest.mark.parametrize("width", [0.3, 0.82, 1.4])

@@ -12,10 +12,10 @@ from systems.laws.baselines.vector_field_histogram_controller import (
     choose_direction,
     polar_histogram,
 )
-from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 
-NUMBERS = HistogramNumbers(1.5, 0.4, (1.0, 2.0), (5.0, 2.0, 2.0))
-GAINS = 5.0, 2.0, 2.0
+NUMBERS = HistogramNumbers(1.5, 0.4, 1.0, 2.0)
+#: mu_3 (paper: 2).
+PREVIOUS = 2.0
 
 
 def blocked(*spans):
@@ -49,43 +49,38 @@ def test_a_cell_within_the_robot_blocks_a_half():
 
 
 def test_nothing_blocked_is_straight_to_the_target():
-    assert choose_direction(blocked(), 10.0, 0.0, -1.0, GAINS) == 10.0
+    assert choose_direction(blocked(), 10.0, 0.0, -1.0, PREVIOUS) == 10.0
 
 
 def test_all_blocked():
-    assert choose_direction(blocked((0, 71)), 10.0, 0.0, -1.0, GAINS) < 0.0
+    assert choose_direction(blocked((0, 71)), 10.0, 0.0, -1.0, PREVIOUS) < 0.0
 
 
 def test_a_narrow_valley_is_taken_in_its_middle():
     walls = blocked((0, 29), (40, 71))
-    assert choose_direction(walls, 2.0, 0.0, -1.0, GAINS) == pytest.approx(34.5)
+    assert choose_direction(walls, 2.0, 0.0, -1.0, PREVIOUS) == pytest.approx(34.5)
 
 
 def test_a_wide_valley_is_entered_by_half_of_what_is_wide():
     """Free from 20 to 60: candidates 28 and 52 (eq. 16), and the target between."""
     walls = blocked((0, 19), (61, 71))
-    assert choose_direction(walls, 5.0, 5.0, -1.0, GAINS) == 28.0
-    assert choose_direction(walls, 66.0, 66.0, -1.0, GAINS) == 52.0
-    assert choose_direction(walls, 40.0, 5.0, -1.0, GAINS) == 40.0
+    assert choose_direction(walls, 5.0, 5.0, -1.0, PREVIOUS) == 28.0
+    assert choose_direction(walls, 66.0, 66.0, -1.0, PREVIOUS) == 52.0
+    assert choose_direction(walls, 40.0, 5.0, -1.0, PREVIOUS) == 40.0
 
 
 def test_valleys_across_the_zero_are_one():
     walls = blocked((10, 60))
-    assert choose_direction(walls, 0.0, 0.0, -1.0, GAINS) == 0.0
-    assert choose_direction(walls, 35.0, 9.0, -1.0, GAINS) == pytest.approx(1.0)
+    assert choose_direction(walls, 0.0, 0.0, -1.0, PREVIOUS) == 0.0
+    assert choose_direction(walls, 35.0, 9.0, -1.0, PREVIOUS) == pytest.approx(1.0)
 
 
 def test_it_keeps_to_the_side_that_it_took():
     """The target lies behind a wall, a little nearer to its right end."""
     walls = blocked((30, 41))
-    right = choose_direction(walls, 35.4, 35.0, -1.0, GAINS)
+    right = choose_direction(walls, 35.4, 35.0, -1.0, PREVIOUS)
     assert right == pytest.approx(21.0)
-    assert choose_direction(walls, 35.4, 35.0, 50.0, GAINS) == pytest.approx(50.0)
-
-
-def test_thresholds_in_order():
-    with pytest.raises(ValueError, match="below low_threshold"):
-        VectorFieldHistogramParameters(low_threshold=3.0, high_threshold=2.0)
+    assert choose_direction(walls, 35.4, 35.0, 50.0, PREVIOUS) == pytest.approx(50.0)
 
 
 def test_sectors_are_of_five_degrees():
