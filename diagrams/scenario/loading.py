@@ -14,6 +14,7 @@ from pydantic_core import ValidationError
 from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.fields.near_miss import did_you_mean
 from diagrams.scenario.fields.shipped import SCHEMA_FILE, scenario_schema
+from diagrams.scenario.former_fields import renamed, renewed
 from diagrams.scenario.shorthand import as_written, begins_anew, require_effect
 from diagrams.scenario.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
@@ -53,10 +54,10 @@ def load_scenario(
             path.
     """
     path = _find(source)
-    data = read_mapping(path)
+    data = renewed(read_mapping(path))
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
-    settings = list(_settings(overrides))
+    settings = [(renamed(key), value) for key, value in _settings(overrides)]
     set_fields(data, settings)
     require_effect(data, [key for key, _ in settings])
     resolve_sound(data, Path.cwd())

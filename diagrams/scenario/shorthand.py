@@ -160,10 +160,10 @@ def as_written(place: Sequence[str], data: Mapping[str, Any]) -> list[str]:
     Returns:
         Parts of the path in the file.
     """
-    if len(place) < 3 or place[0] not in ("robots", "sources"):
+    if len(place) < 2 or place[0] not in ("robots", "sources"):
         return list(place)
     group, name, *rest = place
-    if group == "robots" and rest[0] in KINDS:
+    if group == "robots" and rest[:1] and rest[0] in KINDS:
         rest = rest[1:]
     short = rest
     if group == "sources" and rest[:1] != ["sound"]:

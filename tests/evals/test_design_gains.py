@@ -28,9 +28,9 @@ SPRINGS = {
 
 def run_at_wall(law: str, share: float):
     """Head-on at a wall, the target as far behind it as the design allows for."""
-    repulsion = Scenario().follower.laws.model_dump()
+    gains = getattr(Scenario().follower.laws, law).model_dump()
     for field in SPRINGS[law]:
-        repulsion[law][field] *= share
+        gains[field] *= share
     to_go = metres_to_go(Scenario(), DesignRequirements())
     source = WALL_X + to_go + Scenario().follower.attraction.follow_distance_m
     return simulate(
@@ -46,7 +46,7 @@ def run_at_wall(law: str, share: float):
                 "obstacles": [
                     {"waypoints_m": [[WALL_X + 0.05, 0.0]], "size_m": [0.1, 3.0]}
                 ],
-                "repulsion": repulsion,
+                "laws": {law: gains},
             }
         )
     )
@@ -104,11 +104,15 @@ def assert_layouts_have_the_gains_of(recommended: Scenario) -> None:
     plan = comparison_plan("two_static_obstacles_recommended", runs=1)
     scenario = plan.scenario_of(plan.points()[0])
     assert scenario.follower.attraction == recommended.follower.attraction
-    own = load_scenario("two_static_obstacles").repulsion.model_dump()
-    printed = Scenario().follower.laws.model_dump()
+    own = load_scenario("two_static_obstacles").follower.laws
     for law in DESIGNED_LAWS:
-        kept = {k: v for k, v in own[law].items() if v != printed[law][k]}
-        designed = getattr(recommended.repulsion, law).model_dump() | kept
+        printed = getattr(Scenario().follower.laws, law).model_dump()
+        kept = {
+            field: value
+            for field, value in getattr(own, law).model_dump().items()
+            if value != printed[field]
+        }
+        designed = getattr(recommended.follower.laws, law).model_dump() | kept
         assert getattr(scenario.follower.laws, law).model_dump() == designed
 
 

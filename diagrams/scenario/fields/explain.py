@@ -9,6 +9,7 @@ from typing import Any
 from pydantic_core import ErrorDetails, ValidationError
 
 from diagrams.scenario.fields.near_miss import near_field
+from diagrams.scenario.former_fields import constant_now
 from diagrams.scenario.shorthand import ROBOT_FIELDS
 from systems.framework.input_error import InputError, shortened
 from systems.laws.catalogue import LAWS
@@ -75,7 +76,9 @@ def _unknown(
     if kinds:
         laws = [name for name, law in LAWS.items() if law.robot in kinds]
         return (
-            f"is not a field of a {loc[2].replace('_', ' ')}, and the law decides that "
-            f"the robot is one; remove it, or use one of the laws {', '.join(laws)}"
+            f"is not a field of a {loc[2].replace('_', ' ')}; remove it, or use one of "
+            f"the laws of robots that have it: {', '.join(laws)}"
         )
+    if constant := constant_now(".".join(loc[3:] if loc[0] == "robots" else loc)):
+        return f"is no longer a field, but {constant}; remove it"
     return f"is not a field of {what}; remove it{near_field(schema, place)}"

@@ -81,7 +81,7 @@ def test_no_simulated_contact_before_its_certified_time(
     two_boxes, law, weak, certified
 ):
     """Laws so weak that bodies of all six speeds reach P, though not at once."""
-    scenario = two_boxes(law, *(f"repulsion.{field}" for field in weak))
+    scenario = two_boxes(law, *(f"laws.{field}" for field in weak))
     rows = disturbance_bounds(scenario, runs=20).obstacle
     assert len(rows) == 6
     assert sum(row.certified_s > 0.0 for row in rows) == certified

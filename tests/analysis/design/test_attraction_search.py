@@ -20,8 +20,11 @@ SCENARIO, REQUIREMENTS = Scenario(), DesignRequirements()
 
 
 def changed(part: str, **changes) -> Scenario:
-    parameters = getattr(SCENARIO, part).model_copy(update=changes)
-    return SCENARIO.model_copy(update={part: parameters})
+    if part == "stop":
+        stop = SCENARIO.stop.model_copy(update=changes)
+        return SCENARIO.model_copy(update={"stop": stop})
+    parameters = getattr(SCENARIO.follower, part).model_copy(update=changes)
+    return SCENARIO.with_robot(**{part: parameters})
 
 
 def test_damping_ratio_of_the_printed_gains():

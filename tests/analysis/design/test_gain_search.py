@@ -18,7 +18,7 @@ from analysis.design.requirements import (
     metres_to_go,
 )
 from analysis.laws.push_and_pull import DESIGNED_LAWS
-from diagrams.scenario.follower.laws import RepulsionParameters
+from diagrams.scenario.participants import LawGains
 from diagrams.scenario.scenario import Scenario
 from tests.results import documented, numbers
 
@@ -27,12 +27,11 @@ SCENARIO, REQUIREMENTS = Scenario(), DesignRequirements()
 
 def with_attraction(**changes) -> Scenario:
     attraction = SCENARIO.follower.attraction.model_copy(update=changes)
-    return SCENARIO.model_copy(update={"attraction": attraction})
+    return SCENARIO.with_robot(attraction=attraction)
 
 
 def designed(scenario: Scenario, law: str) -> LawDesign:
-    repulsion = search_gains(scenario, REQUIREMENTS)
-    scenario = scenario.model_copy(update={"repulsion": repulsion})
+    scenario = scenario.with_robot(laws=search_gains(scenario, REQUIREMENTS))
     return check_law(scenario, law, REQUIREMENTS)
 
 
@@ -41,11 +40,11 @@ def unmet(design: LawDesign) -> set[str]:
 
 
 def test_defaults_are_what_the_requirements_give():
-    assert search_gains(SCENARIO, REQUIREMENTS) == RepulsionParameters()
+    assert search_gains(SCENARIO, REQUIREMENTS) == LawGains()
 
 
 def test_result_does_not_depend_on_the_gains_it_starts_from():
-    other = RepulsionParameters.model_validate(
+    other = LawGains.model_validate(
         {
             "conventional": {"stiffness_n_m": 40.0},
             "active": {
@@ -55,8 +54,8 @@ def test_result_does_not_depend_on_the_gains_it_starts_from():
             },
         }
     )
-    scenario = SCENARIO.model_copy(update={"repulsion": other})
-    assert search_gains(scenario, REQUIREMENTS) == RepulsionParameters()
+    scenario = SCENARIO.with_robot(laws=other)
+    assert search_gains(scenario, REQUIREMENTS) == LawGains()
 
 
 def test_metres_to_go_are_4_less_the_follow_distance_and_rho_0():
@@ -153,7 +152,7 @@ def test_a_follow_distance_beyond_the_source_is_refused():
 
 def test_an_attraction_that_no_push_can_limit_is_refused():
     scenario = with_attraction(stiffness_n_m=1e5)
-    with pytest.raises(ValueError, match=r"repulsion\.conventional\.stiffness_n_m: "):
+    with pytest.raises(ValueError, match=r"laws\.conventional\.stiffness_n_m: "):
         search_gains(scenario, REQUIREMENTS)
 
 

@@ -12,10 +12,11 @@ from diagrams.building.laws import make_controller
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS
+from systems.ranging.parameters import CollisionVectorParameters
 
 SCENARIO = Scenario.model_validate(
     {
-        "repulsion": {
+        "laws": {
             "conventional": {"stiffness_n_m": 10.0, "damping_n_s_m": 2.0},
             "active": {
                 "matched_stiffness_n_m": 10.0,
@@ -29,9 +30,9 @@ SCENARIO = Scenario.model_validate(
 )
 
 
-def curves_by_law(**changes):
-    repulsion = SCENARIO.follower.laws.model_copy(update=changes)
-    scenario = SCENARIO.model_copy(update={"repulsion": repulsion})
+def curves_by_law(velocity_term="printed"):
+    echoes = CollisionVectorParameters(velocity_term=velocity_term)
+    scenario = SCENARIO.with_robot(collision_vector=echoes)
     return {curve.law: curve for curve in law_curves(scenario, FORCE_LAWS)}
 
 

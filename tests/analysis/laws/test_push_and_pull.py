@@ -30,7 +30,7 @@ K_R, RHO_0, NEAREST = 2.0, 0.8, 0.03
 
 def with_attraction(**changes) -> Scenario:
     attraction = SCENARIO.follower.attraction.model_copy(update=changes)
-    return SCENARIO.model_copy(update={"attraction": attraction})
+    return SCENARIO.with_robot(attraction=attraction)
 
 
 def test_kinetic_energy_at_top_speed():

@@ -148,7 +148,7 @@ def test_obstacle_speed_is_that_of_a_tick(tick_s, law):
     at_rest, slow = radial_forces(controller, 0.4, [0.0, 1e-4])
     assert field.approach_damping(0.4) == pytest.approx((slow - at_rest) / 1e-4)
     if law == "conventional":
-        damping = case.repulsion.conventional.damping_n_s_m
+        damping = case.follower.laws.conventional.damping_n_s_m
         assert field.approach_damping(0.4) == pytest.approx(damping, rel=1e-6)
 
 

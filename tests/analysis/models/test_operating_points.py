@@ -40,7 +40,7 @@ def one_obstacle(law: str, behind: float, **data) -> Scenario:
             "law": law,
             "source": {"waypoints_m": [[3.0, 0.0]]} | POINT,
             "attraction": {"follow_distance_m": 0.0},
-            "repulsion": REPULSION,
+            "laws": REPULSION,
             "obstacles": [
                 {
                     "name": "pin",
@@ -101,7 +101,7 @@ def test_a_flat_face_across_the_line_is_a_trap_as_wide_as_the_face():
 def test_a_stiff_obstacle_oscillates_and_is_a_source():
     """At K_0 = 30 the radial mode grows, past the contact limit of 18.2 N/m."""
     gains = {"conventional": {"stiffness_n_m": 30.0}}
-    scene = one_obstacle("conventional", 2.0, repulsion=gains)
+    scene = one_obstacle("conventional", 2.0, laws=gains)
     search = find_equilibria(scene, area_m=BEFORE)
     (point,) = [p for p in search.points if p.p_WP[0] < 0.9]
     assert point.kind == "source"
@@ -120,7 +120,7 @@ def test_far_from_obstacles_p_rests_anywhere_round_the_source():
 
 def test_pushed_off_the_source_by_the_closed_form_of_the_active_law():
     """On the line K_r (d - d_f) = f(d - half the source's length)."""
-    scenario = {"law": "active", "repulsion": REPULSION}
+    scenario = {"law": "active", "laws": REPULSION}
     point = follow_equilibrium(Scenario.model_validate(scenario))
     alpha = RHO_0 / (2 * math.log(64 / 16))
     c = point.clearance_m

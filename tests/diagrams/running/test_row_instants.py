@@ -76,7 +76,7 @@ def _check_chain(result: RunResult, *, guarded: bool) -> None:
     """From what the law puts out to the wheels, in one row."""
     columns, robot = result.columns, result.scenario.only.robot
     vx, vy = columns["v_WP_x"], columns["v_WP_y"]
-    if result.scenario.route is None:
+    if result.scenario.only.kind != "router":
         theta = columns["theta_WB_estimated"]
         c, s = np.cos(theta), np.sin(theta)
         v, omega = c * vx + s * vy, (c * vy - s * vx) / robot.control_point_m
@@ -92,7 +92,7 @@ def _check_chain(result: RunResult, *, guarded: bool) -> None:
         free = lengths < robot.top_speed_m_s
         assert np.count_nonzero(free) > 0
         np.testing.assert_allclose(v[free], speed[free], rtol=0.0, atol=1e-9)
-    if "attraction_x" in columns and result.scenario.route is None and not guarded:
+    if "attraction_x" in columns and result.scenario.only.kind != "router" and not guarded:
         tick_s, mass = result.scenario.tick_s, robot.mass_kg
         force = result.vector("attraction") + result.vector("repulsion")
         before = np.c_[np.zeros(2), result.vector("v_WP")[:, :-1]]

@@ -55,7 +55,7 @@ sheet = model_sheet(scenario)
 curves = law_curves(scenario, DESIGNED_LAWS)
 lines = plot_law_curves(curves).axes[0].lines
 designed = search_gains(load_scenario("default"), DesignRequirements())
-tuned = scenario.model_copy(update={"repulsion": designed})
+tuned = scenario.with_robot(laws=designed)
 checks = check_law(tuned, "gaussian", DesignRequirements())
 print(json.dumps({
     "listed": printed("laws", "--json")["laws"],

@@ -118,7 +118,7 @@ def test_a_block_distance_within_the_body_is_told():
 )
 def test_a_bound_that_is_passed_is_named(law, fields, parts):
     (warning,) = warnings(law, *fields)
-    assert warning.startswith(f"repulsion.trajectory_{law}")
+    assert warning.startswith(f"laws.trajectory_{law}")
     for part in parts:
         assert part in warning
 
@@ -150,7 +150,7 @@ def test_what_is_warned_of_leaves_all_that_is_stable():
     own = load_scenario(
         "unknown_block",
         ["law=trajectory_adaptive", f"{ADAPTIVE}.adaptation.rate=5000"],
-    ).repulsion.trajectory_adaptive
+    ).router.gains
     loop = PointLoop(own, own.adaptation, motor_lag_s=0.05)
     targets = swinging_target(1.0, 60.0, 0.025)
     assert np.abs(run_point(loop, targets).gains[:, 1]).max() > 80.0

@@ -1,0 +1,207 @@
+"""Accepts fields of the previous version, and says what has replaced them.
+
+``former_fields.tsv`` lists these fields. A renamed field has its new path there. A
+field that has become a constant has the value and the place of the constant.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import warnings
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from diagrams.scenario.participants import KINDS, kind_of
+from diagrams.scenario.shorthand import ROBOT_FIELDS
+from systems.framework.input_error import InputError
+
+_TABLE = Path(__file__).with_suffix(".tsv")
+#: Names of sensor elements in the lists of faults of the previous version.
+_ELEMENTS = {"microphone", "sensor", "switch"}
+#: Beginning of a path to a field of one robot.
+_PREFIX = re.compile(r"^(?:robots\.[^.]+\.)?")
+_MISSING = object()
+
+
+class _Former(NamedTuple):
+    path: str
+    new: str
+    """New path; empty: the field is a constant now."""
+    value: Any
+    """Value of the constant."""
+    place: str
+    """File and name of the constant."""
+
+
+@cache
+def former_fields() -> tuple[_Former, ...]:
+    """The fields of the previous version that have a new name or are constants now."""
+    with _TABLE.open(encoding="utf-8", newline="") as file:
+        return tuple(
+            _Former(path, new, json.loads(value) if value else None, place)
+            for path, new, value, place in csv.reader(file, delimiter="\t")
+        )
+
+
+def renewed(data: dict[str, Any]) -> dict[str, Any]:
+    """Replaces fields of the previous version, with a note for the user.
+
+    In data with such fields, groups that the kinds of its robots do not have are
+    ignored, because the previous version saved all groups of all kinds.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+
+    Returns:
+        The data.
+
+    Raises:
+        InputError: A field that has become a constant has another value.
+    """
+    notes: dict[str, None] = {}
+    for where, fields in _robots_and_sources(data):
+        notes |= dict.fromkeys(_renewed(where, fields))
+    if notes:
+        _drop_groups_of_other_kinds(data)
+        warnings.warn(
+            f"fields of the previous version, accepted for now: {'; '.join(notes)}",
+            FutureWarning,
+            stacklevel=2,
+        )
+    return data
+
+
+def renamed(path: str) -> str:
+    """Returns the present path of a field, with a note if it had another name.
+
+    Args:
+        path: Dotted path that a user has set.
+
+    Returns:
+        The new path of a renamed field; every other path as it is.
+    """
+    new = path
+    for former in former_fields():
+        for begin in _PREFIX.findall(new):
+            rest = new.removeprefix(begin)
+            if former.new and f"{rest}.".startswith(f"{former.path}."):
+                new = f"{begin}{former.new}{rest.removeprefix(former.path)}"
+    if new != path:
+        note = f"field of the previous version, accepted for now: {path} is now {new}"
+        warnings.warn(note, FutureWarning, stacklevel=2)
+    return new
+
+
+def constant_now(path: str) -> str:
+    """Returns the constant that a field of the previous version has become.
+
+    Args:
+        path: Dotted path of the field.
+
+    Returns:
+        The place and value of the constant, in words; empty if there is none.
+    """
+    for former in former_fields():
+        if former.path == path and not former.new:
+            return f"the constant {former.place}, {former.value!r}"
+    return ""
+
+
+def _robots_and_sources(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    yield "", data
+    for group in ("robots", "sources"):
+        named = data.get(group)
+        for name, own in named.items() if isinstance(named, dict) else ():
+            if isinstance(own, dict):
+                yield f"{group}.{name}.", own
+
+
+def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
+    for former in former_fields():
+        path = former.path
+        if where.startswith("sources."):
+            if not path.startswith("source."):
+                continue
+            path = path.removeprefix("source.")
+        value = _taken(fields, path.split("."))
+        if value is _MISSING:
+            continue
+        if former.new:
+            _put(fields, former.new.split("."), value)
+            yield f"{where}{path} is now {former.new}"
+        elif value != former.value:
+            raise InputError(
+                f"{where}{path}",
+                f"is {value!r}, but is no longer a field, but "
+                f"{constant_now(former.path)}; remove it",
+            )
+        else:
+            yield f"{where}{path} is now a constant"
+    for group in [*fields]:
+        faults = _taken(fields, [group, "faults"])
+        if isinstance(faults, list) and faults:
+            fields.setdefault("faults", []).extend(
+                _fault(group, each) for each in faults
+            )
+            yield f"{where}{group}.faults is now faults"
+
+
+def _fault(group: str, fault: Any) -> Any:
+    if not isinstance(fault, Mapping):
+        return fault
+    return {
+        "sensor": group,
+        **{("number" if k in _ELEMENTS else k): v for k, v in fault.items()},
+    }
+
+
+def _taken(fields: dict[str, Any], path: list[str]) -> Any:
+    """Removes a field and the groups that this leaves empty; returns its value."""
+    first, *rest = path
+    if first not in fields:
+        return _MISSING
+    if not rest:
+        return fields.pop(first)
+    below = fields[first]
+    if not isinstance(below, dict):
+        return _MISSING
+    value = _taken(below, rest)
+    if value is not _MISSING and not below:
+        del fields[first]
+    return value
+
+
+def _put(fields: dict[str, Any], path: list[str], value: Any) -> None:
+    *groups, last = path
+    for group in groups:
+        below = fields.setdefault(group, {})
+        if not isinstance(below, dict):
+            return
+        fields = below
+    if isinstance(value, dict) and isinstance(fields.get(last), dict):
+        value = {**value, **fields[last]}
+    fields.setdefault(last, value)
+    if isinstance(value, dict):
+        fields[last] = value
+
+
+def _drop_groups_of_other_kinds(data: dict[str, Any]) -> None:
+    robots = data.get("robots")
+    named = robots if isinstance(robots, dict) and robots else {"": {}}
+    kinds = {}
+    for name, own in named.items():
+        if isinstance(own, dict):
+            kinds[name] = kind_of({**data, **own})
+            for field in [*own]:
+                if (
+                    field in ROBOT_FIELDS
+                    and field not in KINDS[kinds[name]].model_fields
+                ):
+                    del own[field]
+    for field in [*data]:
+        if field in ROBOT_FIELDS and not set(ROBOT_FIELDS[field]) & {*kinds.values()}:
+            del data[field]
