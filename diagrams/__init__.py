@@ -1,6 +1,6 @@
 """Scenarios, the builder that wires blocks, and the run.
 
-``__init__.pyi`` lists what it offers; each name is loaded when it is first asked for.
+``__init__.pyi`` lists what it offers; a name is loaded at its first use.
 """
 
 import lazy_loader

@@ -1,21 +1,26 @@
 """Finds wording in docs and messages that an English reader must read twice.
 
 ``python -m tools.prose`` reads README, CONTRIBUTING and docs, and every text for people
-in the shipped code: messages of errors and warnings, help of commands. Exit status 1 if
+in the shipped code: messages of errors and warnings, and help of commands. In
+``systems`` and ``diagrams``, it also reads docstrings and comments. Exit status 1 if
 there is any. `# prose: ok` ends a line of code whose text stays as it is.
 """
 
 from __future__ import annotations
 
 import ast
+import io
 import re
 import sys
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("systems", "diagrams", "analysis", "phonotaxis")
+#: Packages whose docstrings and comments are read, too.
+READ_WHOLE = ("systems", "diagrams")
 
 #: What to write instead, by pattern.
 PATTERNS = {
@@ -35,9 +40,9 @@ PATTERNS = {
     r"\bhangs? on\b": "depends on",
     r"\bwhence\b|\bthereof\b": "from where, of it",
     r"\b[Mm]aster(?: robot)?s?\b|\bslave\b": "leader, follower",
-    r"\b(?:colour|centre|metre|behaviour|odour|neighbour|licence|analyse|linearis|localis"
+    r"\b(?:colour|centre|metre|behaviour|odour|neighbour|licence|linearis|localis"
     r"|normalis|optimis|summaris|recognis|initialis|discretis|artefact|grey|travell"
-    r"|modell|labell|fulfil\b|draught|judgement)\w*": "American spelling",
+    r"|modell|labell|fulfil\b|draught|judgement)\w*|\banalyse[dr]?\b": "American spelling",
     r"\bOf (?:the|all|these|several|two|each)\b[^.]{0,60}, ": (
         "put the subject first: 'Ten of the ...'"
     ),
@@ -107,6 +112,28 @@ def messages(path: Path) -> Iterator[tuple[int, str]]:
             yield node.lineno, text
 
 
+def remarks(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of each docstring and of each block of comments in a module."""
+    source = path.read_text("utf-8")
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            text = node.value.value
+            if isinstance(text, str):
+                yield node.lineno, prose_of_page(text.replace("``", "`"))
+    above, block = -1, list[str]()
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type != tokenize.COMMENT:
+            continue
+        line = token.start[0]
+        if block and line != above + 1:
+            yield above - len(block) + 1, prose_of_page("\n".join(block))
+            block = []
+        block.append(token.string.lstrip("#: "))
+        above = line
+    if block:
+        yield above - len(block) + 1, prose_of_page("\n".join(block))
+
+
 def _no_texts(node: ast.AST) -> Iterator[ast.AST]:
     """Docstrings, and parts of formatted strings."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
@@ -133,10 +160,13 @@ def findings() -> list[Finding]:
             found.append(Finding(name, line + 1, words, hint))
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
+            name = str(path.relative_to(ROOT))
             for line, text in messages(path):
                 for _, words, hint in found_in(text):
-                    name = str(path.relative_to(ROOT))
                     found.append(Finding(name, line, words, hint))
+            for line, text in remarks(path) if package in READ_WHOLE else ():
+                for below, words, hint in found_in(text):
+                    found.append(Finding(name, line + below, words, hint))
     return sorted(found)
 
 

@@ -279,7 +279,7 @@ def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:
 def _hoisted(
     trees: Mapping[str, Mapping[str, Any]],
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """Separates what all trees have in common from what remains in each tree."""
+    """Separates what all trees have in common from the rest of each tree."""
     shared = _common(list(trees.values()))
     return shared, {name: _without(tree, shared) for name, tree in trees.items()}
 
