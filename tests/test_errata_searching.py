@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from systems.heading.heading_controller import PULSE_WIDTHS, motor_duties
+from systems.heading.heading_controller import motor_duties
 from systems.hearing.spherical_interpolation import interpolate_sphere
 from systems.odor.steady_plume import steady_concentration
 from systems.radio.codec import Frame, decode_frame, encode_frame
@@ -20,7 +20,6 @@ from systems.search.parameters import SongRuleParameters
 from systems.search.search_ending import UNDECIDED
 from systems.search.song_rules import song2011_turn
 
-MENDED, PRINTED, ELSE_ONLY = range(len(PULSE_WIDTHS))
 Y_ARM = 0.15
 
 
@@ -52,25 +51,34 @@ def test_song_eq_7_needs_two_arguments():
     assert math.degrees(math.atan2(hy, hx)) == pytest.approx(120.0)
 
 
+def printed_duties(error, *, mended_else=False):
+    """(left, right) by Song 2011, table 2, with L = 50 deg, deg clockwise."""
+    if mended_else and abs(error) > 50.0:
+        return 0.01 * error, -0.01 * error
+    if error >= 0.0:
+        return (0.01 - 1.0) / 50.0 * error + 1.0, -(0.01 + 1.0 / 50.0) * error + 1.0
+    return (0.01 + 1.0) / 50.0 * error + 1.0, (-0.01 + 1.0 / 50.0) * error + 1.0
+
+
 def test_song_table_2_lacks_an_else():
     """Its second if overwrites the first: both motors run backwards at e = 100."""
-    assert motor_duties(100.0, 50.0, PRINTED) == pytest.approx((-0.98, -2.0))
-    assert motor_duties(100.0, 50.0, MENDED) == pytest.approx((1.0, -1.0))
+    assert printed_duties(100.0) == pytest.approx((-0.98, -2.0))
+    assert motor_duties(100.0) == pytest.approx((1.0, -1.0))
 
 
 def test_song_table_2_has_a_bracket_in_the_wrong_place():
     """(0.01 - 1)/L e + 1 for (0.01 - 1/L) e + 1: a jump of 0.49 at L."""
-    at, beyond = (motor_duties(e, 50.0, ELSE_ONLY)[0] for e in (50.0, 50.0 + 1e-9))
+    at, beyond = (printed_duties(e, mended_else=True)[0] for e in (50.0, 50.0 + 1e-9))
     assert beyond - at == pytest.approx(0.49, abs=1e-6)
-    at, beyond = (motor_duties(e, 50.0, MENDED)[0] for e in (50.0, 50.0 + 1e-9))
+    at, beyond = (motor_duties(e)[0] for e in (50.0, 50.0 + 1e-9))
     assert beyond == pytest.approx(at, abs=1e-6)
 
 
 def test_song_table_3_does_not_speed_up():
     """At e = 0 both run at full duty: in a slow turn the outer wheel slows, too."""
-    assert motor_duties(0.0, 50.0, MENDED) == (1.0, 1.0)
-    assert motor_duties(25.0, 50.0, MENDED) == pytest.approx((0.75, 0.25))
-    assert motor_duties(50.0, 50.0, MENDED) == pytest.approx((0.5, -0.5))
+    assert motor_duties(0.0) == (1.0, 1.0)
+    assert motor_duties(25.0) == pytest.approx((0.75, 0.25))
+    assert motor_duties(50.0) == pytest.approx((0.5, -0.5))
 
 
 def test_song_sec_4_2_point_g_compares_r1_with_r3():

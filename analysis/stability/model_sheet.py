@@ -15,6 +15,7 @@ from analysis.reporting.provenance import versions
 from diagrams import Scenario, dump_scenario
 from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
+from systems.heading.heading_controller import TURNING_BEYOND_DEG
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Equation
 
@@ -265,12 +266,11 @@ def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
 
 #: What a searching robot's report shows of the scenario.
 _SEARCH_PARTS = {
-    "odor": ("robot", "plant", "compass", "heading_control", "motor_driver", "search"),
+    "odor": ("robot", "plant", "compass", "motor_driver", "search"),
     "sound": (
         "robot",
         "plant",
         "compass",
-        "heading_control",
         "motor_driver",
         "sound_search",
         "cross_power",
@@ -303,11 +303,13 @@ _SEARCH_ASSUMPTIONS = (
 
 def _search_envelope(scenario: Scenario) -> tuple[Limit, ...]:
     motors = scenario.motor_driver.full_speed_m_s
-    beyond = scenario.heading_control.turning_beyond_deg
     return (
         Limit("speed of a wheel", motors, "m/s", "at full duty"),
         Limit(
-            "output of the PID", beyond, "deg", "the robot turns on the spot beyond it"
+            "output of the PID",
+            TURNING_BEYOND_DEG,
+            "deg",
+            "the robot turns on the spot beyond it",
         ),
     )
 

@@ -12,11 +12,7 @@ from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.parameters import Angle, Parameters, Point
-from systems.heading.parameters import (
-    CompassParameters,
-    HeadingControlParameters,
-    MotorDriverParameters,
-)
+from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
     CrossPowerParameters,
     IdealHearingParameters,
@@ -102,7 +98,6 @@ class FollowerParameters(Parameters):
     sound_search: SoundSearchParameters = SoundSearchParameters()
     cross_power: CrossPowerParameters = CrossPowerParameters()
     compass: CompassParameters = CompassParameters()
-    heading_control: HeadingControlParameters = HeadingControlParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
 
     @field_validator("law")

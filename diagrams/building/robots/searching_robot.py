@@ -76,7 +76,7 @@ def searching_blocks(
     compass = MagneticHeading(
         parameters=scenario.compass, seed=seed_of("magnetic_heading"), tick_s=tick_s
     )
-    heading = HeadingController(parameters=scenario.heading_control, tick_s=tick_s)
+    heading = HeadingController(tick_s=tick_s)
     senses = _smell if scenario.searches == "odor" else _ears
     return [compass, heading, *senses(scenario, bodies, others, seed_of)]
 
