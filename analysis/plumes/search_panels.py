@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from analysis.reporting.palette import COLOURS
 from diagrams import RunResult
+from systems.search.song_rules import AIRFLOW_THRESHOLD
 
 #: Names of what a robot is at, by number, of each kind of search.
 _PHASES = {
@@ -92,8 +93,9 @@ def _airflow(axes: Axes, result: RunResult) -> None:
     )
     _curves(axes, result, sides, 0.7)
     if result.scenario.search.rules == "song2011":
-        threshold = result.scenario.search.song2011.airflow_threshold
-        axes.axhline(threshold, color="black", ls="--", lw=1.0, label="threshold")
+        axes.axhline(
+            AIRFLOW_THRESHOLD, color="black", ls="--", lw=1.0, label="threshold"
+        )
     axes.set_ylabel("airflow")
     axes.set_ylim(bottom=0.0)
 

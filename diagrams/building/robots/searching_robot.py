@@ -34,7 +34,6 @@ def search_controller(scenario: Scenario) -> Any:
         return PlumeSearch(parameters=scenario.search, tick_s=scenario.tick_s)
     return SoundSearch(
         parameters=scenario.sound_search,
-        radio=scenario.radio,
         speed_m_s=scenario.motor_driver.full_speed_m_s,
         tick_s=scenario.tick_s,
     )
@@ -131,9 +130,5 @@ def _ears(
             acoustics=scenario.acoustics,
             microphones=scenario.microphones,
         ),
-        RadioRange(
-            parameters=scenario.radio,
-            seed=seed_of("radio_range"),
-            tick_s=scenario.tick_s,
-        ),
+        RadioRange(seed=seed_of("radio_range"), tick_s=scenario.tick_s),
     ]
