@@ -13,7 +13,6 @@ from systems.framework.parameters import (
     Length,
     Parameters,
     Period,
-    Point,
     Size,
     Speed,
 )
@@ -72,16 +71,6 @@ class StopParameters(Parameters):
     for a sound that counts as found."""
 
 
-class OdorSourceParameters(OdorParameters):
-    """The source of odor and its position."""
-
-    position_m: Point = (0.0, 0.0)
-    """Center of the container in W, m."""
-    container_m: Size = (0.08, 0.08)
-    """Extents of the container along x and y of W, m. Robots can touch the
-    container."""
-
-
 class IntegratorParameters(Parameters):
     """How Drake integrates the plant, with a fixed step."""
 
@@ -129,7 +118,7 @@ class RunParameters(Parameters):
     acoustics: AcousticParameters = AcousticParameters()
     room: RoomParameters | None = None
     wind: WindParameters = WindParameters()
-    odor: OdorSourceParameters | None = None
+    odor: OdorParameters | None = None
     """A source of odor in the wind, for robots that search for it."""
     radio: RadioParameters = RadioParameters()
     integrator: IntegratorParameters = IntegratorParameters()

@@ -41,6 +41,7 @@ from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
 from systems.laws.catalogue import LAWS
+from systems.odor.parameters import CONTAINER_M
 from systems.sound.parameters import SoundParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
@@ -227,7 +228,7 @@ class Scenario(FollowerParameters, RunParameters):
                 bodies[name] = Body(source.path(), (source.length_m, source.width_m))
         if self.odor is not None:
             still = WaypointPath((self.odor.position_m,), speed=0.0)
-            bodies[ODOR] = Body(still, self.odor.container_m)
+            bodies[ODOR] = Body(still, CONTAINER_M)
         route = self.all_robots[robot].route
         if route is not None:
             return Surroundings(bodies, GOAL, WaypointPath((route.goal_m,), speed=0.0))

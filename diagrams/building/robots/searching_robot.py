@@ -19,6 +19,7 @@ from systems import (
     RadioRange,
     SoundSearch,
 )
+from systems.odor.parameters import CONTAINER_M
 
 
 def search_controller(scenario: Scenario) -> Any:
@@ -86,7 +87,6 @@ def _smell(
     others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    assert scenario.odor is not None
     tick_s = scenario.tick_s
     return [
         GasSensorArray(
@@ -103,7 +103,7 @@ def _smell(
             parameters=scenario.contact_switches,
             robot=scenario.robot,
             bodies=bodies,
-            source_size=scenario.odor.container_m,
+            source_size=CONTAINER_M,
             tick_s=tick_s,
         ),
     ]

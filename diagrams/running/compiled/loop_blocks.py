@@ -176,9 +176,8 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
             blocks[name] = LoopBlocks(made())
             continue
         made_from = _without_goal(own).model_dump_json(exclude=_NO_BLOCKS)
-        sizes = own.source_size, own.odor and own.odor.container_m
         code = loaded_digests(own)
-        key = f"{name} {bodies} {robots} {others} {sizes} {code} {made_from}"
+        key = f"{name} {bodies} {robots} {others} {own.source_size} {code} {made_from}"
         blocks[name] = _shared(key, made)
     return blocks
 
