@@ -157,6 +157,7 @@ def test_a_puff_spreads_by_the_way_that_the_wind_has_gone():
     """In a wind without gusts: exactly, whatever velocity the puff has of its own."""
     plume = carried(1.0, wind=WindParameters(kind="uniform"))[-1]
     puffs = plume[PUFFS_BEGIN:].reshape(-1, 7)[: int(plume[2])]
+    puffs = puffs[puffs[:, 4] < 0.12 * 4.0]  # farther ones leave one by one
     # 16 a second at 1 m/s: one every 62.5 mm.
     np.testing.assert_allclose(np.diff(puffs[:, 4]), -0.12 * 0.0625, rtol=1e-9)
     np.testing.assert_allclose(puffs[:, 5] / 0.13, puffs[:, 4] / 0.12, rtol=1e-9)
