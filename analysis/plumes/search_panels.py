@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from analysis.reporting.palette import COLOURS
 from diagrams import RunResult
+from diagrams.running.stop_rules import ODOR_WITHIN_M
 from systems.search.song_rules import AIRFLOW_THRESHOLD
 
 #: Names of what a robot is at, by number, of each kind of search.
@@ -60,7 +61,7 @@ def _distance(axes: Axes, result: RunResult) -> None:
         axes.plot(
             result.time, heard, ".", ms=3, color=COLOURS["estimate"], label="heard"
         )
-    found = stop.odor_within_m if smells else stop.sound_within_m
+    found = ODOR_WITHIN_M if smells else stop.sound_within_m
     axes.axhline(found, color="black", ls="--", lw=1.0, label="found within")
     axes.set_ylabel("range of\nsource (m)")
     axes.set_ylim(0.0, 1.1 * max(found, float(np.max(away))))
