@@ -291,29 +291,29 @@ FOUND = (
 DIVERGED = FOUND.index("diverged")
 
 
-class _Judged(NamedTuple):
-    """State of ``judge_tick``, or the indices of its elements."""
+class _StatePlaces(NamedTuple):
+    """Indices in the state of ``judge_tick``."""
 
-    stays: float
+    stays: int
     """Time at which P began to stay in its present place, s. The next two elements are
     the position of P at this time in W, m."""
-    x: float
-    y: float
-    seen: float
+    x: int
+    y: int
+    seen: int
     """Time of the last valid target, s."""
-    rests: float
+    rests: int
     """Time at which P came to rest in the goal, s."""
-    in_goal: float
+    in_goal: int
     """Whether P has been in the goal, 0 or 1."""
-    ticks: float
+    ticks: int
     """Number of ticks since the first detection."""
-    following: float
+    following: int
     """Number of these ticks in which P followed the target."""
 
 
-_AT = _Judged(*range(8))
-#: State of ``judge_tick`` before the first tick.
-UNJUDGED = _Judged(0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
+_AT = _StatePlaces(*range(8))
+#: State of ``judge_tick`` before the first tick, in the order of ``_StatePlaces``.
+UNJUDGED = (0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
 
 
 def judge_tick(
