@@ -176,6 +176,6 @@ def test_what_cannot_be_searched_is_refused_by_name(scenario, settings, complain
 def test_a_find_away_from_the_source_is_a_false_one():
     """Without the gate the robot takes the first wall for the source."""
     settings = [*SHORT, "search.gate=false", "search.rules=song2011"]
-    settings += ["start.position_m=[1.0, 1.35]", "start.heading_deg=90.0"]
+    settings += ["start.position_m=[1.0, 1.35]", "start.heading_deg=-45.0"]
     result = simulate(load_scenario("odor_search", settings), engine="compiled")
     assert (result.cause, result.reason) == ("false find", "")
