@@ -14,10 +14,9 @@ from systems.framework.signals import TICK_S
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES
 from systems.radio.parameters import RadioParameters
 
-#: Largest number of frames that arrive per tick.
-_MOST_ON_AIR = 3 * MOST_FRAMES
-#: Size of the port ``air``: the number of bytes, then the bytes.
-AIR_SIZE = 1 + FRAME_BYTES * _MOST_ON_AIR
+#: Size of the port ``air``: the number of bytes, then the bytes. Per tick, three robots
+#: send at most ``MOST_FRAMES`` frames each.
+AIR_SIZE = 1 + FRAME_BYTES * 3 * MOST_FRAMES
 
 
 class ChannelNumbers(NamedTuple):
@@ -72,8 +71,7 @@ def radio_channel_step(
     for frames in inputs:
         sends = sends or frames[0] > 0.5
     if sends:
-        rows = max(_MOST_ON_AIR, len(inputs) * MOST_FRAMES)
-        random = tick_normals(numbers.noise, tick, rows, 1)
+        random = tick_normals(numbers.noise, tick, len(inputs) * MOST_FRAMES, 1)
         sent = 0
         for frames in inputs:
             sent = _send(state, place, frames, numbers, random, sent)

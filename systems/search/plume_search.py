@@ -26,7 +26,6 @@ from systems.search.search_state import (
     MOVE_S,
     REPORT_EVERY_S,
     add_frame,
-    clear_frames,
     publish_search,
     search_ports,
     ticks_of,
@@ -226,7 +225,7 @@ def _add_frames(
 ) -> None:
     """Adds the frames of this tick: the readings of the step, or the final result."""
     address = numbers.address
-    clear_frames(state, _OWN.frames)
+    state[_OWN.frames] = 0.0
     if state[AT.activity] == _OVER:
         if tick % numbers.repeat == 0:
             add_frame(state, _OWN.frames, address, _FN_RESULT, state[AT.flag])

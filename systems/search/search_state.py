@@ -102,17 +102,6 @@ def publish_search(state: Any, outputs: Any, first: int) -> None:
 
 
 @register_jitable
-def clear_frames(state: Any, first: int) -> None:
-    """Removes the frames of the last tick.
-
-    Args:
-        state: State of the search. It contains the number of frames, then their bytes.
-        first: Index of the number of frames.
-    """
-    state[first] = 0.0
-
-
-@register_jitable
 def add_frame(
     state: Any, first: int, address: int, function: int, value: float
 ) -> None:

@@ -29,7 +29,6 @@ from systems.search.search_state import (
     MOVE_S,
     REPORT_EVERY_S,
     add_frame,
-    clear_frames,
     publish_search,
     search_ports,
     ticks_of,
@@ -233,7 +232,7 @@ def _add_frames(
 ) -> None:
     """Adds the frames of this tick: the data of the step, or the final result."""
     address = numbers.own.address
-    clear_frames(state, _OWN.frames)
+    state[_OWN.frames] = 0.0
     if state[AT.activity] == _OVER:
         if tick % numbers.repeat == 0:
             found = 1.0 if state[AT.ended] == FOUND else 0.0
