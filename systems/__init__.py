@@ -2,7 +2,7 @@
 
 Templated blocks (float, AutoDiffXd) also have a name that ends in an
 underscore, as in Drake: ``DiffDrivePlant`` is ``DiffDrivePlant_[float]``.
-``__init__.pyi`` lists them; each is loaded when it is first asked for.
+``__init__.pyi`` lists them; a block is loaded at its first use.
 """
 
 import lazy_loader

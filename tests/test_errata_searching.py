@@ -11,16 +11,13 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from systems.heading.heading_controller import PULSE_WIDTHS, motor_duties
+from systems.heading.heading_controller import motor_duties
 from systems.hearing.spherical_interpolation import interpolate_sphere
 from systems.odor.steady_plume import steady_concentration
-from systems.radio.codec import Frame, decode_frame, encode_frame
-from systems.radio.radio_range import radio_distance, radio_level
-from systems.search.parameters import SongRuleParameters
+from systems.radio.codec import FRAME_BYTES, read_frame, write_frame
 from systems.search.search_ending import UNDECIDED
 from systems.search.song_rules import song2011_turn
 
-MENDED, PRINTED, ELSE_ONLY = range(len(PULSE_WIDTHS))
 Y_ARM = 0.15
 
 
@@ -31,7 +28,7 @@ def test_song_eq_2_to_4_are_spreads_that_grow_with_time():
     bracket = 1.0 + math.sqrt(2 * math.pi) * s * math.exp(s * s / 2) * ndtr(s)
     factor = 2.0 / ((2 * math.pi) ** 1.5 * g2 * (x * x + y * y))
     printed = factor * math.exp(-u * u / (2 * g1 * g1)) * bracket
-    assert steady_concentration(x, y, 0, 0, 1.0, u, (g1, g1, g2)) == pytest.approx(
+    assert steady_concentration(x, y, 1.0, u, (g1, g1, g2)) == pytest.approx(
         printed, rel=1e-9
     )
 
@@ -41,7 +38,7 @@ def test_song_sec_5_breeze_model_is_the_gaussian_plume_on_the_axis():
     for i in (0.1, 0.27, 0.5):
         x, u = 1.5, 1.0
         gaussian = 1.0 / (math.pi * u * (i * x) * (0.1 * x))
-        breeze = steady_concentration(x, 0, 0, 0, 1.0, u, (i * u, i * u, 0.1 * u))
+        breeze = steady_concentration(x, 0, 1.0, u, (i * u, i * u, 0.1 * u))
         assert breeze == pytest.approx(gaussian, rel=0.005)
 
 
@@ -52,41 +49,50 @@ def test_song_eq_7_needs_two_arguments():
     assert math.degrees(math.atan2(hy, hx)) == pytest.approx(120.0)
 
 
+def printed_duties(error, *, mended_else=False):
+    """(left, right) by Song 2011, table 2, with L = 50 deg, deg clockwise."""
+    if mended_else and abs(error) > 50.0:
+        return 0.01 * error, -0.01 * error
+    if error >= 0.0:
+        return (0.01 - 1.0) / 50.0 * error + 1.0, -(0.01 + 1.0 / 50.0) * error + 1.0
+    return (0.01 + 1.0) / 50.0 * error + 1.0, (-0.01 + 1.0 / 50.0) * error + 1.0
+
+
 def test_song_table_2_lacks_an_else():
     """Its second if overwrites the first: both motors run backwards at e = 100."""
-    assert motor_duties(100.0, 50.0, PRINTED) == pytest.approx((-0.98, -2.0))
-    assert motor_duties(100.0, 50.0, MENDED) == pytest.approx((1.0, -1.0))
+    assert printed_duties(100.0) == pytest.approx((-0.98, -2.0))
+    assert motor_duties(100.0) == pytest.approx((1.0, -1.0))
 
 
 def test_song_table_2_has_a_bracket_in_the_wrong_place():
     """(0.01 - 1)/L e + 1 for (0.01 - 1/L) e + 1: a jump of 0.49 at L."""
-    at, beyond = (motor_duties(e, 50.0, ELSE_ONLY)[0] for e in (50.0, 50.0 + 1e-9))
+    at, beyond = (printed_duties(e, mended_else=True)[0] for e in (50.0, 50.0 + 1e-9))
     assert beyond - at == pytest.approx(0.49, abs=1e-6)
-    at, beyond = (motor_duties(e, 50.0, MENDED)[0] for e in (50.0, 50.0 + 1e-9))
+    at, beyond = (motor_duties(e)[0] for e in (50.0, 50.0 + 1e-9))
     assert beyond == pytest.approx(at, abs=1e-6)
 
 
 def test_song_table_3_does_not_speed_up():
     """At e = 0 both run at full duty: in a slow turn the outer wheel slows, too."""
-    assert motor_duties(0.0, 50.0, MENDED) == (1.0, 1.0)
-    assert motor_duties(25.0, 50.0, MENDED) == pytest.approx((0.75, 0.25))
-    assert motor_duties(50.0, 50.0, MENDED) == pytest.approx((0.5, -0.5))
+    assert motor_duties(0.0) == (1.0, 1.0)
+    assert motor_duties(25.0) == pytest.approx((0.75, 0.25))
+    assert motor_duties(50.0) == pytest.approx((0.5, -0.5))
 
 
 def test_song_sec_4_2_point_g_compares_r1_with_r3():
     """ "R1 was less than R2 [...] 30 deg to the right": R2 is behind."""
-    rules = SongRuleParameters()
     memory = [1.0, 0.0, 0.0, 0.0]
-    turn = song2011_turn((0.5, 0.7, 0.6), (1.5, 1.5), memory, rules)
+    turn = song2011_turn((0.5, 0.7, 0.6), (1.5, 1.5), memory)
     assert turn == (30.0, 4, UNDECIDED)
-    turn = song2011_turn((0.6, 0.7, 0.5), (1.5, 1.5), memory, rules)
+    turn = song2011_turn((0.6, 0.7, 0.5), (1.5, 1.5), memory)
     assert turn == (-30.0, 4, UNDECIDED)
 
 
 def test_song_table_5_direction_of_sound_is_an_angle():
     """-136 deg of fig. 13 fits no field of two decimals up to 99.99."""
-    frame = decode_frame(encode_frame(Frame(2, 13, -136.0)))
-    assert frame == Frame(2, 13, -136.0)
+    frame = [0.0] * FRAME_BYTES
+    write_frame(frame, 0, 2, 13, -136.0)
+    assert read_frame(frame, 0) == (2, 13, -136.0)
 
 
 def test_song_eq_13_has_six_pairs():
@@ -108,8 +114,8 @@ def test_song_eq_17_turns_round_where_the_sum_changes_its_sign():
 def test_song_sec_4_3_a_stop_at_20_cm_is_within_both_arms():
     """15 and 20 cm of arms between the centres; and 4 dB make 20 cm 13 to 32 cm."""
     assert Y_ARM + 0.2 > 0.2
-    level = radio_level(0.2, -42.4, 2.0)
-    near, far = (radio_distance(level + db, -42.4, 2.0) for db in (4.0, -4.0))
+    # By eq. 8 with n = 2: the distance is proportional to 10^(-R / 20).
+    near, far = (0.2 * 10.0 ** (-db / 20.0) for db in (4.0, -4.0))
     assert (near, far) == pytest.approx((0.126, 0.317), abs=1e-3)
 
 

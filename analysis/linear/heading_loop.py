@@ -12,7 +12,12 @@ from analysis.linear.loop_margins import loop_margins
 from analysis.models.linear_models import LinearModel
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
-from systems.heading.parameters import HeadingControlParameters, MotorDriverParameters
+from systems.heading.heading_controller import (
+    DIFFERENTIAL_S,
+    INTEGRAL_1_S,
+    PROPORTIONAL,
+)
+from systems.heading.parameters import MotorDriverParameters
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,6 @@ class HeadingLoopMargins:
 
 
 def heading_loop(
-    heading: HeadingControlParameters,
     motors: MotorDriverParameters,
     robot: RobotParameters,
     lag_s: float,
@@ -48,7 +52,6 @@ def heading_loop(
     linear in the deviation: what the wheels have in common does not turn.
 
     Args:
-        heading: Gains.
         motors: Speed at full duty.
         robot: Track of the wheels.
         lag_s: Of the motors, s.
@@ -63,10 +66,7 @@ def heading_loop(
     # The states are written down one by one: transfer functions of so short a tick are
     # ill-conditioned.
     parts = _sampled if tick_s else _continuous
-    A, B, C, D = parts(heading, turn, lag_s, tick_s or 0.0)
-    if heading.integral == 0.0:
-        # Nothing reaches the integral, whose pole would count as one of the loop.
-        A, B, C = A[1:, 1:], B[1:], C[:, 1:]
+    A, B, C, D = parts(turn, lag_s, tick_s or 0.0)
     return LinearModel(
         name="L of the heading",
         A=A,
@@ -85,14 +85,12 @@ _Matrices = tuple[
 ]
 
 
-def _continuous(
-    heading: HeadingControlParameters, turn: float, lag_s: float, _: float
-) -> _Matrices:
+def _continuous(turn: float, lag_s: float, _: float) -> _Matrices:
     """States: integral of the deviation, heading, and its rate where motors lag.
 
     The derivative of the deviation is taken into the heading or its rate.
     """
-    kp, ki, kd = heading.proportional, heading.integral, heading.differential
+    kp, ki, kd = PROPORTIONAL, INTEGRAL_1_S, DIFFERENTIAL_S
     one = np.ones((1, 1))
     if lag_s == 0.0:
         A = np.array([[0.0, 0.0], [turn * ki, 0.0]])
@@ -106,11 +104,9 @@ def _continuous(
     return A, B, np.array([[0.0, 1.0, 0.0]]), 0.0 * one
 
 
-def _sampled(
-    heading: HeadingControlParameters, turn: float, lag_s: float, tick_s: float
-) -> _Matrices:
+def _sampled(turn: float, lag_s: float, tick_s: float) -> _Matrices:
     """States: integral of the PID, last deviation, heading, and its rate."""
-    kp, ki, kd = heading.proportional, heading.integral, heading.differential
+    kp, ki, kd = PROPORTIONAL, INTEGRAL_1_S, DIFFERENTIAL_S
     keep = math.exp(-tick_s / lag_s) if lag_s > 0.0 else 0.0
     # Heading and rate after a tick, by the rate at its beginning and by the command.
     coast = lag_s * (1.0 - keep)
@@ -126,7 +122,6 @@ def _sampled(
 
 
 def heading_loop_margins(
-    heading: HeadingControlParameters,
     motors: MotorDriverParameters,
     robot: RobotParameters,
     lag_s: float,
@@ -135,7 +130,6 @@ def heading_loop_margins(
     """Margins of ``heading_loop``.
 
     Args:
-        heading: Gains.
         motors: Speed at full duty.
         robot: Track of the wheels.
         lag_s: Of the motors, s.
@@ -144,7 +138,7 @@ def heading_loop_margins(
     Returns:
         The margins; the gain margin is infinite where no gain is too much.
     """
-    parts = heading, motors, robot, lag_s
+    parts = motors, robot, lag_s
     found = loop_margins(heading_loop(*parts, tick_s))
     free = loop_margins(heading_loop(*parts, None))
     return HeadingLoopMargins(

@@ -62,4 +62,4 @@ def concentration_map(
     Returns:
         (m, n) in units of the gas sensors' C1.
     """
-    return np.array([[concentration(plume, u, v, 0.0) for u in x] for v in y])
+    return np.array([[concentration(plume, u, v) for u in x] for v in y])

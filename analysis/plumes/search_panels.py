@@ -9,7 +9,9 @@ from matplotlib.axes import Axes
 
 from analysis.reporting.palette import COLOURS
 from diagrams import RunResult
+from diagrams.running.stop_rules import ODOR_WITHIN_M
 from diagrams.scenario.participants import OdorSearcher
+from systems.search.song_rules import AIRFLOW_THRESHOLD
 
 #: Names of what a robot is at, by number, of each kind of search.
 _PHASES = {
@@ -60,7 +62,7 @@ def _distance(axes: Axes, result: RunResult) -> None:
         axes.plot(
             result.time, heard, ".", ms=3, color=COLOURS["estimate"], label="heard"
         )
-    found = stop.odor_within_m if smells else stop.sound_within_m
+    found = ODOR_WITHIN_M if smells else stop.sound_within_m
     axes.axhline(found, color="black", ls="--", lw=1.0, label="found within")
     axes.set_ylabel("range of\nsource (m)")
     axes.set_ylim(0.0, 1.1 * max(found, float(np.max(away))))
@@ -95,8 +97,9 @@ def _airflow(axes: Axes, result: RunResult) -> None:
     searcher = result.scenario.searcher
     assert isinstance(searcher, OdorSearcher)
     if searcher.search.rules == "song2011":
-        threshold = searcher.search.song2011.airflow_threshold
-        axes.axhline(threshold, color="black", ls="--", lw=1.0, label="threshold")
+        axes.axhline(
+            AIRFLOW_THRESHOLD, color="black", ls="--", lw=1.0, label="threshold"
+        )
     axes.set_ylabel("airflow")
     axes.set_ylim(bottom=0.0)
 
@@ -125,7 +128,6 @@ def _heading(axes: Axes, result: RunResult) -> None:
 
 def _phase(axes: Axes, result: RunResult) -> None:
     searcher = result.scenario.searcher
-    smells = isinstance(searcher, OdorSearcher)
     rules = searcher.search.rules if isinstance(searcher, OdorSearcher) else "sound"
     names = _PHASES[rules]
     phase = result.columns["search_phase"]

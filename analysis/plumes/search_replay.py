@@ -13,13 +13,15 @@ from pydrake.math import RigidTransform
 from analysis.plumes.plume_history import plume_history
 from diagrams import RunResult
 from systems.odor.odor_plume import PUFF_SIZE, PUFFS_BEGIN
+from systems.odor.parameters import CONTAINER_M
 
 #: The plume is shown so often, s, and by so many discs, from the source downwind.
 _PERIOD_S, _DISCS = 0.5, 30
 #: Discs are so far apart, m, and each shows the puff next to its distance.
 _APART_M = 0.15
 _RADIUS_M = 1.0
-_CONTAINER_M = 0.12
+#: Height of the container, m.
+_HEIGHT_M = 0.12
 #: Lamp over a robot, m; its colours by what the robot is at.
 _LAMP_M = 0.32
 _LAMPS = {
@@ -90,9 +92,9 @@ def _record_plume(meshcat: Meshcat, result: RunResult) -> None:
     odor = result.full_scenario.odor
     assert odor is not None
     x, y = odor.position_m
-    box = Box(*odor.container_m, _CONTAINER_M)
+    box = Box(*CONTAINER_M, _HEIGHT_M)
     meshcat.SetObject("odor/container", box, Rgba(0.6, 0.2, 0.5))
-    meshcat.SetTransform("odor/container", _placed(x, y, 0.5 * _CONTAINER_M))
+    meshcat.SetTransform("odor/container", _placed(x, y, 0.5 * _HEIGHT_M))
     if odor.kind == "steady":
         return
     paths = [f"odor/puff_{k}" for k in range(_DISCS)]

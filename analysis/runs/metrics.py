@@ -22,7 +22,7 @@ from analysis.runs.smoothness import (
     windows,
 )
 from diagrams.running.run_result import RunResult
-from diagrams.running.stop_rules import ROUNDING_S
+from diagrams.running.stop_rules import REST_SPEED_M_S, ROUNDING_S
 from systems.framework.compiling import njit
 from systems.world.geometry import beyond_rectangle, control_point_velocity
 
@@ -106,7 +106,7 @@ def _settling_time(result: RunResult, inside: NDArray[np.bool_]) -> float | None
     """Since when P has been in the goal and, where the source rests, at rest."""
     stop, settled, least = result.scenario.stop, inside, 0.0
     if not result.target_moves:
-        settled = inside & (_speed_of_P(result) < stop.rest_speed_m_s)
+        settled = inside & (_speed_of_P(result) < REST_SPEED_M_S)
         least = stop.rest_time_s - ROUNDING_S
     exits = np.flatnonzero(~settled)
     first = int(exits[-1]) + 1 if len(exits) else 0

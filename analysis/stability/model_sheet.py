@@ -16,6 +16,7 @@ from diagrams import Scenario, dump_scenario
 from diagrams.scenario.participants import Follower, Router
 from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
+from systems.heading.heading_controller import TURNING_BEYOND_DEG
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Equation
 
@@ -27,7 +28,6 @@ _PARTS = {
         "robot",
         "plant",
         "compass",
-        "heading_control",
         "motor_driver",
         "search",
     ),
@@ -35,7 +35,6 @@ _PARTS = {
         "robot",
         "plant",
         "compass",
-        "heading_control",
         "motor_driver",
         "sound_search",
         "cross_power",
@@ -311,11 +310,13 @@ _SEARCH_ASSUMPTIONS = (
 
 def _search_envelope(scenario: Scenario) -> tuple[Limit, ...]:
     motors = scenario.searcher.motor_driver.full_speed_m_s
-    beyond = scenario.searcher.heading_control.turning_beyond_deg
     return (
         Limit("speed of a wheel", motors, "m/s", "at full duty"),
         Limit(
-            "output of the PID", beyond, "deg", "the robot turns on the spot beyond it"
+            "output of the PID",
+            TURNING_BEYOND_DEG,
+            "deg",
+            "the robot turns on the spot beyond it",
         ),
     )
 

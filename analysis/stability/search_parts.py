@@ -32,7 +32,6 @@ def search_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
 def _heading_loop(study: Study) -> HeadingLoopMargins:
     scenario = study.scenario
     return heading_loop_margins(
-        scenario.searcher.heading_control,
         scenario.searcher.motor_driver,
         scenario.only.robot,
         scenario.only.plant.motor_lag_s,

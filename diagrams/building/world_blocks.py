@@ -46,7 +46,6 @@ def world_blocks(scenario: Scenario, seeds: Mapping[str, int]) -> dict[str, Any]
         blocks["plume"] = OdorPlume(
             parameters=scenario.odor,
             wind=scenario.wind,
-            p_WO=scenario.odor.position_m,
             seed=seeds["odor_plume"],
             tick_s=tick_s,
         )

@@ -37,6 +37,18 @@ ROUNDING_S = 1e-9
 #: in one part, m. If a body is faster, ticks have more parts.
 BETWEEN_TICKS, _PART_M = 5, 0.02
 
+#: Speed below which P is at rest, m/s.
+REST_SPEED_M_S = 0.05
+#: Least share of the time since the first detection in which P must follow, so that the
+#: run counts as completed.
+FOLLOWING_SHARE = 0.5
+#: Greatest distance that P can move and still count as in one place, m.
+_STUCK_RADIUS_M = 0.1
+#: At the end of a search for an odor that counts as found: greatest distance of the
+#: source from the origin of B, m, and greatest angle between the heading and the
+#: direction to the source, deg.
+ODOR_WITHIN_M, _ODOR_AHEAD_DEG = 0.22, 75.0
+
 #: Port by which a law reports that no route leads to the target, 0 or 1.
 GIVES_UP = "gives_up"
 #: Port by which a search reports how it ended.
@@ -278,11 +290,29 @@ FOUND = (
 )
 DIVERGED = FOUND.index("diverged")
 
-#: State of ``judge_tick`` before the first tick. Its entries are:
-#: 0 to 2: time, s, and position of P, m, when P began to stay in its present place;
-#: 3: time of the last valid target, s; 4: time at which P came to rest in the goal, s;
-#: 5: whether P has been in the goal; 6: number of ticks since the first detection;
-#: 7: number of ticks since the first detection in which P followed the target.
+
+class _StatePlaces(NamedTuple):
+    """Indices in the state of ``judge_tick``."""
+
+    stays: int
+    """Time at which P began to stay in its present place, s. The next two elements are
+    the position of P at this time in W, m."""
+    x: int
+    y: int
+    seen: int
+    """Time of the last valid target, s."""
+    rests: int
+    """Time at which P came to rest in the goal, s."""
+    in_goal: int
+    """Whether P has been in the goal, 0 or 1."""
+    ticks: int
+    """Number of ticks since the first detection."""
+    following: int
+    """Number of these ticks in which P followed the target."""
+
+
+_AT = _StatePlaces(*range(8))
+#: State of ``judge_tick`` before the first tick, in the order of ``_StatePlaces``.
 UNJUDGED = (0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
 
 
@@ -326,31 +356,31 @@ def judge_tick(
     in_goal = distance <= numbers.goal_radius_m
     # Data for the cause of a run that reaches its time limit.
     if in_goal:
-        state[5] = 1.0
-    if valid or state[6] > 0.0:
+        state[_AT.in_goal] = 1.0
+    if valid or state[_AT.ticks] > 0.0:
         error = abs(distance - numbers.follow_distance_m)
-        state[6] += 1.0
+        state[_AT.ticks] += 1.0
         if error <= stop.following_band_m:
-            state[7] += 1.0
+            state[_AT.following] += 1.0
     # Reached: P has rested in the goal of a target at rest for long enough.
     there = numbers.source_rests and in_goal and valid
     if there:
         vx, vy = control_point_velocity(pose[2], velocity, numbers.control_point_m)
-        there = math.hypot(vx, vy) < stop.rest_speed_m_s
-    state[4] = min(state[4], time) if there else math.inf
-    if time - state[4] >= stop.rest_time_s - ROUNDING_S:
+        there = math.hypot(vx, vy) < REST_SPEED_M_S
+    state[_AT.rests] = min(state[_AT.rests], time) if there else math.inf
+    if time - state[_AT.rests] >= stop.rest_time_s - ROUNDING_S:
         return 2
     # Lost: there has been no target for too long.
     if valid:
-        state[3] = time
-    elif time - state[3] > stop.lost_after_s:
+        state[_AT.seen] = time
+    elif time - state[_AT.seen] > stop.lost_after_s:
         return 3
     # Stuck: P stays in one place outside of the goal although there is a target.
-    moved = math.hypot(x_P - state[1], y_P - state[2]) > stop.stuck_radius_m
-    if not valid or in_goal or moved:
-        state[0], state[1], state[2] = time, x_P, y_P
+    way = math.hypot(x_P - state[_AT.x], y_P - state[_AT.y])
+    if not valid or in_goal or way > _STUCK_RADIUS_M:
+        state[_AT.stays], state[_AT.x], state[_AT.y] = time, x_P, y_P
         return 0
-    if time - state[0] < stop.stuck_after_s:
+    if time - state[_AT.stays] < stop.stuck_after_s:
         return 0
     return 5 if gives_up else 4
 
@@ -384,8 +414,8 @@ def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> in
         return 6 if distance <= numbers.stop.sound_within_m else 7
     off = math.atan2(dy, dx) - pose[2]
     off = abs(math.degrees(math.atan2(math.sin(off), math.cos(off))))
-    ahead = off <= numbers.stop.odor_ahead_deg
-    return 6 if ahead and distance <= numbers.stop.odor_within_m else 7
+    ahead = off <= _ODOR_AHEAD_DEG
+    return 6 if ahead and distance <= ODOR_WITHIN_M else 7
 
 
 class JudgedTick(NamedTuple):
@@ -525,12 +555,11 @@ class RobotRules:
             return "lost"
         if not self._source_rests:
             return "astray"
-        return "unsettled" if self._state[5] > 0.0 else "timeout"
+        return "unsettled" if self._state[_AT.in_goal] > 0.0 else "timeout"
 
     def _has_followed(self) -> bool:
-        share = self.scenario.stop.following_share
-        *_, ticks, following_ticks = self._state
-        return ticks > 0.0 and following_ticks >= share * ticks
+        ticks, following = self._state[_AT.ticks], self._state[_AT.following]
+        return ticks > 0.0 and following >= FOLLOWING_SHARE * ticks
 
     def _find_collision(
         self, time: float, pose: Sequence[float], places: _Places

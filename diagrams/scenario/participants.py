@@ -26,11 +26,7 @@ from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.parameters import Angle, Parameters, Point
-from systems.heading.parameters import (
-    CompassParameters,
-    HeadingControlParameters,
-    MotorDriverParameters,
-)
+from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
     CrossPowerParameters,
     IdealHearingParameters,
@@ -240,7 +236,6 @@ class OdorSearcher(Robot):
     airflow_sensors: AirflowParameters = AirflowParameters()
     contact_switches: ContactParameters = ContactParameters()
     compass: CompassParameters = CompassParameters()
-    heading_control: HeadingControlParameters = HeadingControlParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
 
 
@@ -256,7 +251,6 @@ class SoundSearcher(Robot):
     sound_search: SoundSearchParameters = SoundSearchParameters()
     cross_power: CrossPowerParameters = CrossPowerParameters()
     compass: CompassParameters = CompassParameters()
-    heading_control: HeadingControlParameters = HeadingControlParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
 
     @model_validator(mode="after")

@@ -8,13 +8,10 @@ from pydantic import Field, Strict
 
 from systems.framework.parameters import (
     Duration,
-    Fraction,
     Length,
     Parameters,
     Period,
-    Point,
     Size,
-    Speed,
 )
 from systems.framework.signals import TICK_S
 from systems.odor.parameters import OdorParameters, WindParameters
@@ -36,45 +33,22 @@ class StopParameters(Parameters):
     goal_margin_m: Length = 0.3
     """Margin of the goal at a source at rest, m. P is in the goal if its distance from
     the source is at most the follow distance plus this margin."""
-    rest_speed_m_s: Speed = 0.05
-    """Speed below which P is at rest, m/s."""
     rest_time_s: Duration = 1.0
     """Time for which P must be at rest in the goal without a break, s. Then the run
     ends as reached."""
     following_band_m: Length = 0.8
     """Greatest deviation from the follow distance, m. P follows if its distance from
     the source deviates from the follow distance by at most this value."""
-    following_share: Fraction = 0.5
-    """Least share of the time since the first detection in which P must follow, so that
-    the run counts as completed."""
     stuck_after_s: Duration = 10.0
     """Time after which the run ends as stuck, s: P has stayed in one place (within
-    ``stuck_radius_m``) outside of its goal for this time."""
-    stuck_radius_m: Length = 0.1
-    """Greatest distance, m, that P can move and still count as in one place."""
+    0.1 m) outside of its goal for this time."""
     lost_after_s: Duration = 20.0
     """Time without a valid target after which the run ends as lost, s."""
     diverged_range_m: Length = 20.0
     """Distance from the source or the goal beyond which the run ends as diverged, m."""
-    odor_within_m: Length = 0.22
-    """Greatest distance of the source from the origin of B, m, at the end of a search
-    for an odor that counts as found."""
-    odor_ahead_deg: float = Field(default=75.0, ge=0.0, le=180.0)
-    """Greatest angle between the heading and the direction to the source, deg, at the
-    end of a search for an odor that counts as found."""
     sound_within_m: Length = 0.6
     """Greatest distance of the source from the origin of B, m, at the end of a search
     for a sound that counts as found."""
-
-
-class OdorSourceParameters(OdorParameters):
-    """The source of odor and its position."""
-
-    position_m: Point = (0.0, 0.0)
-    """Center of the container in W, m."""
-    container_m: Size = (0.08, 0.08)
-    """Extents of the container along x and y of W, m. Robots can touch the
-    container."""
 
 
 class IntegratorParameters(Parameters):
@@ -115,7 +89,7 @@ class RunParameters(Parameters):
     acoustics: AcousticParameters = AcousticParameters()
     room: RoomParameters | None = None
     wind: WindParameters = WindParameters()
-    odor: OdorSourceParameters | None = None
+    odor: OdorParameters | None = None
     """A source of odor in the wind, for robots that search for it."""
     radio: RadioParameters = RadioParameters()
     integrator: IntegratorParameters = IntegratorParameters()

@@ -47,6 +47,7 @@ from diagrams.scenario.shorthand import SOURCE, file_form, resolved
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
+from systems.odor.parameters import CONTAINER_M
 from systems.sound.parameters import SoundParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
@@ -296,7 +297,7 @@ class Scenario(RunParameters):
                 bodies[name] = Body(source.path(), (source.length_m, source.width_m))
         if self.odor is not None:
             still = WaypointPath((self.odor.position_m,), speed=0.0)
-            bodies[ODOR] = Body(still, self.odor.container_m)
+            bodies[ODOR] = Body(still, CONTAINER_M)
         own = self.robots[robot]
         if isinstance(own, Router):
             goal = WaypointPath((own.route.goal_m,), speed=0.0)

@@ -9,12 +9,23 @@ from numba.extending import register_jitable
 from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.heading.compass import wrapped_deg
-from systems.heading.parameters import HeadingControlParameters
 
-#: Methods to compute duties from the output of the PID controller: corrected, as
-#: printed, and as printed with only the missing ``else`` added.
-PULSE_WIDTHS = ("mended", "printed", "else_only")
-_MENDED, _PRINTED, _ELSE_ONLY = range(len(PULSE_WIDTHS))
+# Gains and limits of Song 2011, 2.3.2 and tables 1 and 2.
+#: K_P, gain of the proportional part.
+PROPORTIONAL = 2.0
+#: K_I, gain of the integral part, 1/s.
+INTEGRAL_1_S = 0.5
+#: K_D, gain of the differential part, s.
+DIFFERENTIAL_S = 0.01
+#: L, output beyond which the robot turns on the spot, deg.
+TURNING_BEYOND_DEG = 50.0
+#: Deviation below which the integral part accumulates, deg. At larger deviations, the
+#: integral part is 0.
+_INTEGRAL_WITHIN_DEG = 20.0
+#: Limits of the integral part and of the differential part, deg.
+_LARGEST_INTEGRAL_DEG, _LARGEST_DIFFERENTIAL_DEG = 30.0, 20.0
+#: Limit of the output, deg. The text states this limit, but table 1 does not.
+_LARGEST_OUTPUT_DEG = 100.0
 
 
 @register_jitable
@@ -24,7 +35,7 @@ def _limited(value: float, largest: float) -> float:
 
 @register_jitable
 def heading_error(
-    deviation: float, change: float, integral: float, tick_s: float, own: Any
+    deviation: float, change: float, integral: float, tick_s: float
 ) -> tuple[float, float]:
     """Computes the output of the PID controller (Song 2011, table 1).
 
@@ -33,57 +44,42 @@ def heading_error(
         change: Change of the deviation since the last tick, wrapped, deg.
         integral: I, integral part at the last tick, deg.
         tick_s: Period of the control, s.
-        own: ``HeadingControlParameters``.
 
     Returns:
         The output epsilon, deg, and the new integral part I, deg.
     """
-    if abs(deviation) < own.integral_within_deg:
-        integral += own.integral * deviation * tick_s
-        integral = _limited(integral, own.largest_integral_deg)
+    if abs(deviation) < _INTEGRAL_WITHIN_DEG:
+        integral += INTEGRAL_1_S * deviation * tick_s
+        integral = _limited(integral, _LARGEST_INTEGRAL_DEG)
     else:
         integral = 0.0
-    rate = own.differential * change / tick_s
-    rate = _limited(rate, own.largest_differential_deg)
-    total = own.proportional * deviation + integral + rate
-    return _limited(total, own.largest_error_deg), integral
+    rate = DIFFERENTIAL_S * change / tick_s
+    rate = _limited(rate, _LARGEST_DIFFERENTIAL_DEG)
+    total = PROPORTIONAL * deviation + integral + rate
+    return _limited(total, _LARGEST_OUTPUT_DEG), integral
 
 
 @register_jitable
-def motor_duties(error: float, limit: float, kind: int) -> tuple[float, float]:
-    """Computes the duties of the motors (Song 2011, table 2).
+def motor_duties(error: float) -> tuple[float, float]:
+    """Computes the duties of the motors (Song 2011, table 2, corrected).
 
-    In the corrected form, the left duty is v + w and the right duty is v - w, with
-    v = max(0, 1 - |e|/L) and w = 0.01 e.
+    The left duty is v + w and the right duty is v - w, with v = max(0, 1 - |e|/L) and
+    w = 0.01 e. Therefore the duties change without a jump from full speed ahead to
+    turning on the spot. docs/errata.md states what is wrong in the printed table.
 
     Args:
         error: epsilon, output of the PID controller, clockwise, deg.
-        limit: L, output beyond which the robot turns on the spot, deg.
-        kind: Index in ``PULSE_WIDTHS``.
 
     Returns:
         The left and the right duty. They are not limited to -1 to 1.
     """
-    if kind == _MENDED:
-        ahead, turn = max(0.0, 1.0 - abs(error) / limit), 0.01 * error
-        return ahead + turn, ahead - turn
-    left, right = 0.01 * error, -0.01 * error
-    if kind == _ELSE_ONLY and abs(error) > limit:
-        return left, right
-    if error >= 0.0:
-        left = (0.01 - 1.0) / limit * error + 1.0
-        right = -(0.01 + 1.0 / limit) * error + 1.0
-    else:
-        left = (0.01 + 1.0) / limit * error + 1.0
-        right = (-0.01 + 1.0 / limit) * error + 1.0
-    return left, right
+    ahead, turn = max(0.0, 1.0 - abs(error) / TURNING_BEYOND_DEG), 0.01 * error
+    return ahead + turn, ahead - turn
 
 
 class HeadingNumbers(NamedTuple):
     """Constants of the step of ``HeadingController``."""
 
-    own: HeadingControlParameters
-    kind: int
     tick_s: float
 
 
@@ -104,10 +100,9 @@ def heading_controller_step(
         return
     deviation = wrapped_deg(expected[0] - heading[0])
     change = wrapped_deg(deviation - state[1]) if state[2] > 0.5 else 0.0
-    own = numbers.own
-    error, state[0] = heading_error(deviation, change, state[0], numbers.tick_s, own)
+    error, state[0] = heading_error(deviation, change, state[0], numbers.tick_s)
     state[1], state[2] = deviation, 1.0
-    left, right = motor_duties(error, own.turning_beyond_deg, numbers.kind)
+    left, right = motor_duties(error)
     duty[0], duty[1] = _limited(left, 1.0), _limited(right, 1.0)
 
 
@@ -127,7 +122,6 @@ class HeadingController(Block):
     degree (``analysis.linear.heading_loop``).
 
     Args:
-        parameters: Gains and limits.
         tick_s: Period of the control, s.
 
     Reference: Song 2011, 2.3.2, tables 1 to 3, with the errata in docs/errata.md.
@@ -143,14 +137,8 @@ class HeadingController(Block):
         Port("duty", 2, "1, left and right, -1 to 1", ("duty_left", "duty_right")),
     )
 
-    def __init__(
-        self,
-        *,
-        parameters: HeadingControlParameters = HeadingControlParameters(),
-        tick_s: float = TICK_S,
-    ) -> None:
+    def __init__(self, *, tick_s: float = TICK_S) -> None:
         super().__init__()
         self.set_name("heading_controller")
-        kind = PULSE_WIDTHS.index(parameters.pulse_widths)
-        numbers = HeadingNumbers(parameters, kind, tick_s)
-        self.declare(Step(heading_controller_step, numbers, [0.0] * 3), tick_s=tick_s)
+        step = Step(heading_controller_step, HeadingNumbers(tick_s), [0.0] * 3)
+        self.declare(step, tick_s=tick_s)

@@ -13,6 +13,8 @@ from systems.framework.signals import TICK_S
 from systems.odor.parameters import AirflowParameters
 from systems.odor.wind import WIND_SIZE, wind_velocity
 
+#: Standard deviation of a reading, divided by the reading.
+_NOISE_SHARE = 0.02
 #: Square of the relative sensitivity of a crosswind wire to wind along the wire.
 _ALONG = 0.04
 
@@ -41,7 +43,6 @@ class AirflowNumbers(NamedTuple):
 
     gain: float
     crosswind: bool
-    noise_share: float
     noise: TickNoise
 
 
@@ -57,7 +58,7 @@ def airflow_step(
     normals = tick_normals(numbers.noise, tick, 1, 2)
     for k in range(2):
         value = numbers.gain * speed * airflow_reading(source, k, numbers.crosswind)
-        outputs[0][k] = value * (1.0 + numbers.noise_share * float(normals[0, k]))
+        outputs[0][k] = value * (1.0 + _NOISE_SHARE * float(normals[0, k]))
 
 
 class AirflowSensors(Block):
@@ -69,7 +70,7 @@ class AirflowSensors(Block):
     The block has no state. It draws new noise every tick. There is no latency.
 
     Args:
-        parameters: Gain, lobe and noise.
+        parameters: Gain and lobe.
         seed: Seed of the noise.
         tick_s: Period of the robot, s.
 
@@ -78,7 +79,7 @@ class AirflowSensors(Block):
 
     part, stage = "airflow", "obstacle sensing"
     inputs = (
-        Port("wind", WIND_SIZE, "number, nine of them, see systems.odor.wind"),
+        Port("wind", WIND_SIZE, "number, six of them, see systems.odor.wind"),
         Port("pose_WB", 3, "m, m, rad"),
     )
     outputs = (
@@ -97,7 +98,6 @@ class AirflowSensors(Block):
         numbers = AirflowNumbers(
             parameters.gain_s_m,
             parameters.lobe == "crosswind",
-            parameters.noise,
             tick_noise(seed),
         )
         self.declare(Step(airflow_step, numbers), tick_s=tick_s, arrays=True)

@@ -21,9 +21,12 @@ from systems.framework.noise import (
 )
 from systems.framework.signals import TICK_S
 from systems.odor.odor_plume import PLUME_SIZE, concentration
-from systems.odor.parameters import GAS_SENSORS, GasSensorParameters
+from systems.odor.parameters import GAS_EXPONENT, GAS_SENSORS, GasSensorParameters
 
-_HOUR_S = 3_600.0
+#: For each preset: time constant while the concentration grows, and while it falls, s.
+_TIMES_S = {"song2011": (2.5, 5.8), "tgs2620": (2.96, 15.71)}
+#: Mismatch of the exponents, divided by the mismatch of R0.
+_EXPONENT_MISMATCH = 3.0
 _DEAD, _STUCK = 1, 2
 
 
@@ -32,7 +35,6 @@ class GasNumbers(NamedTuple):
 
     positions: NDArray[np.float64]
     """(3, 2) positions of the sensors in B, m."""
-    height_m: float
     scales: NDArray[np.float64]
     """(3,) factors of the readings, due to the mismatch of R0."""
     exponents: NDArray[np.float64]
@@ -42,7 +44,6 @@ class GasNumbers(NamedTuple):
     recovery: float
     """Share of the deviation that vanishes per tick while the concentration falls."""
     noise_share: float
-    drift_per_s: float
     faults: NDArray[np.float64]
     """(3, 2) for each sensor: kind of the fault (0: none) and start of the fault, s."""
     tick_s: float
@@ -51,13 +52,13 @@ class GasNumbers(NamedTuple):
 
 @njit(cache=True)
 def _concentrations(
-    plume: Any, pose: Any, positions: Any, height: float, out: Any
+    plume: Any, pose: Any, positions: Any, out: Any
 ) -> None:  # pragma: no cover  (compiled)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(positions)):
         x, y = positions[k, 0], positions[k, 1]
         place = pose[0] + c * x - s * y, pose[1] + s * x + c * y
-        out[k] = concentration(plume, place[0], place[1], height)
+        out[k] = concentration(plume, place[0], place[1])
 
 
 @register_jitable
@@ -70,7 +71,7 @@ def gas_sensor_step(
     """
     ratios, truths = outputs
     gas = np.empty(3)
-    _concentrations(inputs[0], inputs[1], numbers.positions, numbers.height_m, gas)
+    _concentrations(inputs[0], inputs[1], numbers.positions, gas)
     normals = tick_normals(numbers.noise, tick, 1, 4)
     time = tick * numbers.tick_s
     for k in range(3):
@@ -78,8 +79,8 @@ def gas_sensor_step(
         rest = (1.0 + gas[k]) ** -numbers.exponents[k]
         share = numbers.response if rest < state[k] else numbers.recovery
         state[k] += share * (rest - state[k])
-        # Mismatch, drift, noise and faults.
-        value = state[k] * numbers.scales[k] * (1.0 + numbers.drift_per_s * time)
+        # Mismatch, noise and faults.
+        value = state[k] * numbers.scales[k]
         value *= 1.0 + numbers.noise_share * float(normals[0, k])
         kind = numbers.faults[k, 0] if time >= numbers.faults[k, 1] else 0.0
         if kind == _DEAD:
@@ -94,14 +95,15 @@ class GasSensorArray(Block):
     """Measures the concentration of gas at three positions.
 
     A reading is the ratio Rs/R0. It is 1 in clean air, and smaller in gas. It follows
-    (1 + C/C1)^-exponent with a first-order lag. By default, the lag is shorter when the
-    concentration grows than when it falls. ``gas_concentration`` is the true C/C1.
+    (1 + C/C1)^-exponent with a first-order lag. The lag is shorter when the
+    concentration grows than when it falls. The sensors are on the floor, as the source
+    is. ``gas_concentration`` is the true C/C1.
 
     The discrete state holds the ratio and the last reading of each sensor, and is
     updated every tick. There is no latency apart from the lag.
 
     Args:
-        parameters: Positions, power law, lag, errors and faults.
+        parameters: Positions, lag, errors and faults.
         seed: Seed of noise and mismatch.
         tick_s: Period of the robot, s.
 
@@ -154,19 +156,18 @@ class GasSensorArray(Block):
 
 def _numbers(own: GasSensorParameters, tick_s: float, seed: int) -> GasNumbers:
     drawn = standard_normals((2, GAS_SENSORS), seed, BEFORE_THE_RUN)
+    response_s, recovery_s = _TIMES_S[own.preset]
     faults = np.zeros((GAS_SENSORS, 2))
     for fault in own.faults:
         kind = _DEAD if fault.kind == "dead" else _STUCK
         faults[fault.sensor - 1] = kind, fault.start_s
     return GasNumbers(
         np.array(own.positions_m),
-        own.height_m,
         1.0 + own.mismatch * drawn[0],
-        own.exponent * (1.0 + own.slope_mismatch * drawn[1]),
-        -math.expm1(-tick_s / own.response_s),
-        -math.expm1(-tick_s / own.recovery_s),
+        GAS_EXPONENT * (1.0 + _EXPONENT_MISMATCH * own.mismatch * drawn[1]),
+        -math.expm1(-tick_s / response_s),
+        -math.expm1(-tick_s / recovery_s),
         own.noise,
-        own.drift_per_h / _HOUR_S,
         faults,
         tick_s,
         tick_noise(seed),

@@ -8,19 +8,33 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import NDArray
 
 from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
-from systems.odor.parameters import OdorParameters, WindParameters
+from systems.odor.parameters import GAS_EXPONENT, OdorParameters, WindParameters
 from systems.odor.steady_plume import steady_concentration
 from systems.odor.wind import WIND_PERIOD_S, WIND_SIZE, initial_wind, wind_velocity
 
-#: Largest number of puffs. The plume drops the oldest puffs first.
+#: Number of puffs released per second, 1/s.
+_PUFFS_PER_S = 16.0
+#: Largest number of puffs, which are those of 20 s. The plume drops the oldest puffs
+#: first.
 MOST_PUFFS = 320
+#: Growth of the horizontal and of the vertical spread of a puff per distance traveled.
+#: The second is also gamma_2 / u of the steady plume.
+_LEVEL_GROWTH, _UPRIGHT_GROWTH = 0.12, 0.13
+#: Standard deviation of each component of a puff's own velocity, divided by the wind
+#: speed, and correlation time of this velocity, s.
+_OWN_INTENSITY, OWN_TIME_S = 0.1, 2.0
+#: Distance from the source beyond which puffs are removed, m.
+_REACH_M = 6.0
+#: gamma_1 / u, growth of the horizontal spread of the steady plume. It is the value of
+#: the puffs in the default wind near the source. The value of the puffs 2 m downwind is
+#: about 0.19.
+_MEAN_INTENSITY = 0.197
 
 
 class _PlumePlaces(NamedTuple):
@@ -34,8 +48,6 @@ class _PlumePlaces(NamedTuple):
     """Number of puffs."""
     part: int
     """Share of the next puff that the source has already released, 0 to 1."""
-    height: int
-    """Height of the source above the floor, m."""
     age: int
     """Time since the beginning of the release, s."""
 
@@ -70,19 +82,15 @@ class _SteadyPlaces(NamedTuple):
     """Release rate of the source, in units of C1, m^3/s."""
     speed: int
     """Speed of the wind, m/s."""
-    level: int
-    """Growth of the horizontal spread, m/s."""
-    upright: int
-    """Growth of the vertical spread, m/s."""
 
 
-_AT = _PlumePlaces(*range(6))
+_AT = _PlumePlaces(*range(5))
 #: Index of the first puff in the port.
 PUFFS_BEGIN = len(_AT)
 _PUFF = _PuffPlaces(*range(7))
 #: Number of values of a puff.
 PUFF_SIZE = len(_PUFF)
-_MEAN_PLUME = _SteadyPlaces(*range(PUFFS_BEGIN, PUFFS_BEGIN + 8))
+_MEAN_PLUME = _SteadyPlaces(*range(PUFFS_BEGIN, PUFFS_BEGIN + 6))
 #: Size of the port ``plume``.
 PLUME_SIZE = PUFFS_BEGIN + PUFF_SIZE * MOST_PUFFS
 #: Smallest spread of a puff, m.
@@ -95,55 +103,55 @@ _STEADY_M_S = 1e-3
 _FAR = 6.0
 #: Longest simulated time before a run, s.
 _LONGEST_SPIN_UP_S = 25.0
-#: The strength of the source refers to these conditions: exponent of the gas sensor,
-#: its distance downwind of the source, m, and speed of the wind, m/s.
-_EXPONENT, _REFERENCE_M, _REFERENCE_M_S = 0.7155, 2.0, 1.0
 
 
-def release_rate(own: OdorParameters) -> float:
+@njit(cache=True)
+def _mean_concentration(
+    x: float, y: float, rate: float, speed: float
+) -> float:  # pragma: no cover  (compiled)
+    """Computes the concentration in the steady plume, see ``steady_concentration``."""
+    level, upright = _MEAN_INTENSITY * speed, _UPRIGHT_GROWTH * speed
+    return steady_concentration(x, y, rate, speed, (level, level, upright))
+
+
+def release_rate(ratio_at_2_m: float) -> float:
     """Computes the release rate from the reading of a gas sensor 2 m downwind.
 
     Args:
-        own: Parameters of the source.
+        ratio_at_2_m: Mean ratio Rs/R0 of the sensor in a wind of 1 m/s.
 
     Returns:
         Release rate Q, in units of the concentration C1 of the sensor, m^3/s.
     """
-    wanted = own.ratio_at_2_m ** (-1.0 / _EXPONENT) - 1.0
-    spreads = own.mean_intensity, own.mean_intensity, own.upright_growth
-    got = steady_concentration(
-        _REFERENCE_M, 0.0, 0.0, 0.0, 1.0, _REFERENCE_M_S, spreads
-    )
-    return wanted / float(got)
+    wanted = ratio_at_2_m ** (-1.0 / GAS_EXPONENT) - 1.0
+    return wanted / float(_mean_concentration(2.0, 0.0, 1.0, 1.0))
 
 
 @njit(cache=True)
 def concentration(
-    plume: Any, x: float, y: float, z: float
+    plume: Any, x: float, y: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the concentration at a point.
+    """Computes the concentration at a point of the floor.
 
-    A puff is a Gaussian distribution around its center, and the floor reflects it. The
-    concentration is the sum over all puffs. A steady plume has a closed form.
+    A puff is a Gaussian distribution around its center on the floor, and the floor
+    reflects it. The concentration is the sum over all puffs. A steady plume has a
+    closed form.
 
     Args:
         plume: (PLUME_SIZE,) value of the port ``plume``.
         x: x coordinate of the point in W, m.
         y: y coordinate of the point in W, m.
-        z: Height of the point above the floor, m.
 
     Returns:
         Concentration of plume and background, in units of the C1 of the gas sensors.
     """
-    total, height = plume[_AT.background], plume[_AT.height]
+    total = plume[_AT.background]
     if plume[_AT.steady] > 0.5:
         at = _MEAN_PLUME
         dx, dy = x - plume[at.x], y - plume[at.y]
         c, s = plume[at.cosine], plume[at.sine]
-        spreads = plume[at.level], plume[at.level], plume[at.upright]
-        rate, speed = plume[at.rate], plume[at.speed]
         u, v = c * dx + s * dy, c * dy - s * dx
-        return total + steady_concentration(u, v, z, height, rate, speed, spreads)
+        return total + _mean_concentration(u, v, plume[at.rate], plume[at.speed])
     for puff in range(int(plume[_AT.puffs])):
         first = PUFFS_BEGIN + PUFF_SIZE * puff
         level = max(plume[first + _PUFF.level], _SMALLEST_M)
@@ -152,11 +160,9 @@ def concentration(
         off = (dx * dx + dy * dy) / (level * level)
         if off > _FAR * _FAR:
             continue
-        # The mirror image of the puff below the floor models the reflection.
-        low, high = (z - height) / upright, (z + height) / upright
-        lift = math.exp(-0.5 * low * low) + math.exp(-0.5 * high * high)
         dense = plume[first + _PUFF.amount] / (level * level * upright)
-        total += dense * math.exp(-0.5 * off) * lift / (2.0 * math.pi) ** 1.5
+        # The reflection at the floor doubles the concentration.
+        total += dense * math.exp(-0.5 * off) * 2.0 / (2.0 * math.pi) ** 1.5
     return total
 
 
@@ -167,13 +173,8 @@ class PlumeNumbers(NamedTuple):
     """Position of the source in W, x and y, m."""
     y: float
     rate: float
-    puffs_per_s: float
-    level_growth: float
-    upright_growth: float
-    own_intensity: float
     own_keep: float
     """Share of a puff's own velocity that remains after one period."""
-    reach_m: float
     volume: float
     """Volume of the room, m^3. 0: no background."""
     period: int
@@ -192,7 +193,7 @@ def _advance(
     Each puff moves with the wind at its center and with its own velocity. The own
     velocity is an Ornstein-Uhlenbeck process. Its standard deviation is proportional to
     the wind speed. The spreads grow with the distance that the wind covers. Puffs
-    beyond ``reach_m`` are removed. If there are more than ``MOST_PUFFS`` puffs, the
+    beyond ``_REACH_M`` are removed. If there are more than ``MOST_PUFFS`` puffs, the
     oldest are removed. The port contains the puffs in the order of their age, with the
     oldest first.
     """
@@ -203,7 +204,7 @@ def _advance(
     if numbers.steady:
         return
     normals = tick_normals(numbers.noise, tick, 2 * MOST_PUFFS, 2)
-    change = math.sqrt(1.0 - numbers.own_keep**2) * numbers.own_intensity
+    change = math.sqrt(1.0 - numbers.own_keep**2) * _OWN_INTENSITY
     # Moves the existing puffs, and closes the gaps of removed puffs.
     kept = 0
     for puff in range(int(plume[_AT.puffs])):
@@ -215,19 +216,19 @@ def _advance(
         vx = keep * plume[old + _PUFF.vx] + spread * normals[puff, 0]
         vy = keep * plume[old + _PUFF.vy] + spread * normals[puff, 1]
         x, y = x + dt * (ux + vx), y + dt * (uy + vy)
-        if math.hypot(x - numbers.x, y - numbers.y) > numbers.reach_m:
+        if math.hypot(x - numbers.x, y - numbers.y) > _REACH_M:
             continue
         way = dt * max(speed, _STILL_M_S)
         plume[new + _PUFF.x], plume[new + _PUFF.y] = x, y
         plume[new + _PUFF.vx], plume[new + _PUFF.vy] = vx, vy
-        level, upright = numbers.level_growth * way, numbers.upright_growth * way
+        level, upright = _LEVEL_GROWTH * way, _UPRIGHT_GROWTH * way
         plume[new + _PUFF.level] = plume[old + _PUFF.level] + level
         plume[new + _PUFF.upright] = plume[old + _PUFF.upright] + upright
         plume[new + _PUFF.amount] = plume[old + _PUFF.amount]
         kept += 1
     # Computes the number of new puffs, and makes space for them.
     before = plume[_AT.part]
-    plume[_AT.part] += dt * numbers.puffs_per_s
+    plume[_AT.part] += dt * _PUFFS_PER_S
     fresh = int(plume[_AT.part])
     plume[_AT.part] -= fresh
     if kept + fresh > MOST_PUFFS:
@@ -240,17 +241,17 @@ def _advance(
     speed = math.hypot(ux, uy)
     for k in range(fresh):
         # Time since the release of the puff within the period. The oldest is first.
-        age = dt - (k + 1.0 - before) / numbers.puffs_per_s
+        age = dt - (k + 1.0 - before) / _PUFFS_PER_S
         first, row = PUFFS_BEGIN + PUFF_SIZE * kept, MOST_PUFFS + k
-        vx = numbers.own_intensity * speed * normals[row, 0]
-        vy = numbers.own_intensity * speed * normals[row, 1]
+        vx = _OWN_INTENSITY * speed * normals[row, 0]
+        vy = _OWN_INTENSITY * speed * normals[row, 1]
         way = age * max(speed, _STILL_M_S)
         plume[first + _PUFF.x] = numbers.x + age * (ux + vx)
         plume[first + _PUFF.y] = numbers.y + age * (uy + vy)
         plume[first + _PUFF.vx], plume[first + _PUFF.vy] = vx, vy
-        plume[first + _PUFF.level] = numbers.level_growth * way
-        plume[first + _PUFF.upright] = numbers.upright_growth * way
-        plume[first + _PUFF.amount] = numbers.rate / numbers.puffs_per_s
+        plume[first + _PUFF.level] = _LEVEL_GROWTH * way
+        plume[first + _PUFF.upright] = _UPRIGHT_GROWTH * way
+        plume[first + _PUFF.amount] = numbers.rate / _PUFFS_PER_S
         kept += 1
     plume[_AT.puffs] = kept
 
@@ -292,9 +293,8 @@ class OdorPlume(Block):
     0.1 s before the change.
 
     Args:
-        parameters: Kind, strength and spread of the plume.
+        parameters: Position, kind and strength of the source.
         wind: Wind before the run, and wind of a steady plume.
-        p_WO: Position of the source in W, m.
         seed: Seed of the puffs' own velocities.
         tick_s: Period of the robots, s. The period of the plume, 0.1 s, is a multiple
             of it.
@@ -306,7 +306,7 @@ class OdorPlume(Block):
     """
 
     part, stage = "plume", "world"
-    inputs = (Port("wind", WIND_SIZE, "number, nine of them, see systems.odor.wind"),)
+    inputs = (Port("wind", WIND_SIZE, "number, six of them, see systems.odor.wind"),)
     outputs = (Port("plume", PLUME_SIZE, "number, many, see systems.odor.odor_plume"),)
 
     def __init__(
@@ -314,7 +314,6 @@ class OdorPlume(Block):
         *,
         parameters: OdorParameters = OdorParameters(),
         wind: WindParameters = WindParameters(),
-        p_WO: tuple[float, float] = (0.0, 0.0),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
@@ -327,7 +326,7 @@ class OdorPlume(Block):
                 "puffs",
             )
         self.set_name("odor_plume")
-        self._step_of = partial(_step, parameters, wind, p_WO, tick_s)
+        self._step_of = partial(_step, parameters, wind, tick_s)
         self.declare(self._step_of(seed), tick_s=tick_s, arrays=True)
 
     def step_for(self, run: RunFacts) -> Step:
@@ -335,24 +334,13 @@ class OdorPlume(Block):
         return self._step_of(run.seed_of(self.get_name()))
 
 
-def _step(
-    own: OdorParameters,
-    wind: WindParameters,
-    p_WO: tuple[float, float],
-    tick_s: float,
-    seed: int,
-) -> Step:
+def _step(own: OdorParameters, wind: WindParameters, tick_s: float, seed: int) -> Step:
     period = max(1, round(WIND_PERIOD_S / tick_s))
     period_s = period * tick_s
     numbers = PlumeNumbers(
-        *p_WO,
-        release_rate(own),
-        own.puffs_per_s,
-        own.level_growth,
-        own.upright_growth,
-        own.own_intensity,
-        math.exp(-period_s / own.own_time_s),
-        own.reach_m,
+        *own.position_m,
+        release_rate(own.ratio_at_2_m),
+        math.exp(-period_s / OWN_TIME_S),
         own.room_volume_m3 or 0.0,
         period,
         period_s,
@@ -360,32 +348,22 @@ def _step(
         tick_noise(seed),
     )
     plume = np.zeros(PLUME_SIZE)
-    plume[_AT.height] = own.height_m
     if numbers.steady:
         direction, speed = math.radians(wind.direction_deg), wind.speed_m_s
         plume[_AT.steady] = 1.0
         plume[[*_MEAN_PLUME]] = (
-            *p_WO,
+            *own.position_m,
             math.cos(direction),
             math.sin(direction),
             numbers.rate,
             speed,
-            own.mean_intensity * speed,
-            own.upright_growth * speed,
         )
     else:
-        _spin_up(plume, initial_wind(wind, seed), own, numbers)
+        # Simulates the puffs before the run, in a constant wind.
+        before = initial_wind(wind, seed)
+        for k in range(round(min(own.age_s, _LONGEST_SPIN_UP_S) / period_s)):
+            _advance(plume, before, -1 - k, numbers)
     plume[_AT.age] = own.age_s
+    if numbers.volume > 0.0:
+        plume[_AT.background] = numbers.rate * own.age_s / numbers.volume
     return Step(plume_step, numbers, plume, _publish)
-
-
-def _spin_up(
-    plume: NDArray[np.float64],
-    wind: NDArray[np.float64],
-    own: OdorParameters,
-    numbers: PlumeNumbers,
-) -> None:
-    """Simulates the plume before the run, in a constant wind."""
-    plume[_AT.age] = own.age_s
-    for k in range(round(min(own.age_s, _LONGEST_SPIN_UP_S) / numbers.period_s)):
-        _advance(plume, wind, -1 - k, numbers)

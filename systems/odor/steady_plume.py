@@ -50,26 +50,18 @@ def _kernel(s: float, cut: float) -> float:  # pragma: no cover  (compiled)
 
 @njit(cache=True)
 def steady_concentration(
-    x: float,
-    y: float,
-    z: float,
-    height: float,
-    rate: float,
-    speed: float,
-    spreads: Any,
+    x: float, y: float, rate: float, speed: float, spreads: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the mean concentration of growing puffs (Song 2011, eq. 1 to 6).
+    """Computes the mean concentration of growing puffs on the floor (Song 2011, eq. 6).
 
     The result is the integral of eq. 1 over the time t since the release of a puff. The
     spreads are sigma_x = a t, sigma_y = b t and sigma_z = c t. Only these spreads lead
-    to eq. 6, where a = b = gamma_1, c = gamma_2 and z = H = 0. The floor reflects the
-    odor: a mirror image of the source below the floor adds the second term.
+    to eq. 6, where a = b = gamma_1 and c = gamma_2. The source is on the floor (H = 0),
+    which reflects the odor and thereby doubles the concentration.
 
     Args:
         x: Distance downwind of the source, m. Negative: upwind.
         y: Distance across the wind, m.
-        z: Height above the floor, m.
-        height: H, height of the source, m.
         rate: Q, amount per second.
         speed: u, speed of the wind, above 0, m/s.
         spreads: (a, b, c), growth of the spreads, m/s.
@@ -80,44 +72,6 @@ def steady_concentration(
     a, b, c = spreads
     factor = rate / ((2.0 * math.pi) ** 1.5 * a * b * c)
     along, cut = x / (a * a), 0.5 * (speed / a) ** 2
-    total = 0.0
-    for lift in (z - height, z + height):
-        far = (x / a) ** 2 + (y / b) ** 2 + (lift / c) ** 2
-        far = max(far, 1e-30)
-        s = speed * along / math.sqrt(far)
-        total += factor / far * _kernel(s, cut)
-    return total
-
-
-@njit(cache=True)
-def sharan_concentration(
-    x: float,
-    y: float,
-    z: float,
-    rate: float,
-    speed: float,
-    intensities: Any,
-) -> float:  # pragma: no cover  (compiled)
-    """Computes the concentration with diffusivities that grow downwind (Sharan 1996).
-
-    The source is on the floor. The flux through each plane across the wind is exactly
-    Q. The concentration upwind of the source is 0.
-
-    Args:
-        x: Distance downwind of the source, m.
-        y: Distance across the wind, m.
-        z: Height above the floor, m.
-        rate: Q, amount per second.
-        speed: u, speed of the wind, m/s.
-        intensities: (alpha, beta, gamma), the values of sigma^2 / x^2 along the wind,
-            across the wind, and in the vertical direction.
-
-    Returns:
-        Concentration, amount per cubic meter.
-    """
-    if x <= 0.0:
-        return 0.0
-    alpha, beta, gamma = intensities
-    off = (y * y / beta + z * z / gamma) / (x * x)
-    factor = rate / (math.pi * speed * math.sqrt(beta * gamma) * x * x)
-    return factor * (1.0 + alpha * off) ** (-1.0 - 0.5 / alpha)
+    far = max((x / a) ** 2 + (y / b) ** 2, 1e-30)
+    s = speed * along / math.sqrt(far)
+    return 2.0 * (factor / far * _kernel(s, cut))

@@ -32,21 +32,24 @@ class _Places(NamedTuple):
     """Mean velocity, x and y, m/s."""
     gust: int
     """Unsteady velocity, x and y, m/s."""
-    origin: int
-    """Position of the outlet of a jet in W, x and y, m."""
     diameter: int
     """Diameter of the outlet of a jet, m."""
-    growth: int
-    """Growth of the half width of a jet per meter."""
     size: int
     """Size of the port."""
 
 
-_AT = _Places(*accumulate((1, 2, 2, 2, 1, 1), initial=0))
+_AT = _Places(*accumulate((1, 2, 2, 1), initial=0))
 #: Size of the port ``wind``.
 WIND_SIZE = _AT.size
 #: Period with which wind and plume change, s.
 WIND_PERIOD_S = 0.1
+#: Correlation time of the meandering, s.
+MEANDER_TIME_S = 8.0
+#: Position of the outlet of a jet in W, m.
+_ORIGIN_M = (-2.2, 0.0)
+#: Growth of the half width of a jet per meter along its axis. At the half width, the
+#: speed is exp(-1/2) of the speed on the axis.
+_GROWTH = 0.1
 #: Distance along which a round jet keeps its speed on the axis, in diameters of the
 #: outlet (Pope 2000, 5.1: decay constant 6 for a uniform outlet).
 _CORE = 6.0
@@ -73,12 +76,12 @@ def wind_velocity(
     share = 1.0
     speed = math.hypot(wind[_AT.mean], wind[_AT.mean + 1])
     if wind[_AT.jet] > 0.5 and speed > 0.0:
-        dx, dy = x - wind[_AT.origin], y - wind[_AT.origin + 1]
+        dx, dy = x - _ORIGIN_M[0], y - _ORIGIN_M[1]
         along = (dx * wind[_AT.mean] + dy * wind[_AT.mean + 1]) / speed
         across = (dy * wind[_AT.mean] - dx * wind[_AT.mean + 1]) / speed
         if along <= 0.0:
             return 0.0, 0.0
-        width = 0.5 * wind[_AT.diameter] + wind[_AT.growth] * along
+        width = 0.5 * wind[_AT.diameter] + _GROWTH * along
         share = min(1.0, _CORE * wind[_AT.diameter] / along)
         share *= math.exp(-0.5 * (across / width) ** 2)
     ux = share * (wind[_AT.mean] + wind[_AT.gust])
@@ -140,8 +143,7 @@ def initial_wind(own: WindParameters, seed: int) -> NDArray[np.float64]:
     wind[_AT.gust : _AT.gust + 2] = (
         _spread(own) * standard_normals((1, 2), seed, BEFORE_THE_RUN)[0]
     )
-    wind[_AT.origin : _AT.origin + 2] = own.jet_origin_m
-    wind[_AT.diameter], wind[_AT.growth] = own.jet_diameter_m, own.jet_growth
+    wind[_AT.diameter] = own.jet_diameter_m
     return wind
 
 
@@ -168,7 +170,7 @@ class WindField(Block):
     """
 
     part, stage = "wind", "world"
-    outputs = (Port("wind", WIND_SIZE, "number, nine of them, see systems.odor.wind"),)
+    outputs = (Port("wind", WIND_SIZE, "number, six of them, see systems.odor.wind"),)
 
     def __init__(
         self,
@@ -180,7 +182,7 @@ class WindField(Block):
         super().__init__()
         self.set_name("wind_field")
         period = max(1, round(WIND_PERIOD_S / tick_s))
-        keep = math.exp(-period * tick_s / parameters.meander_time_s)
+        keep = math.exp(-period * tick_s / MEANDER_TIME_S)
         numbers = WindNumbers(_spread(parameters), keep, period, tick_noise(seed))
         self._initial = partial(initial_wind, parameters)
         self.declare(

@@ -14,10 +14,9 @@ from systems.framework.signals import TICK_S
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES
 from systems.radio.parameters import RadioParameters
 
-#: Largest number of frames that arrive per tick.
-_MOST_ON_AIR = 3 * MOST_FRAMES
-#: Size of the port ``air``: the number of bytes, then the bytes.
-AIR_SIZE = 1 + FRAME_BYTES * _MOST_ON_AIR
+#: Size of the port ``air``: the number of bytes, then the bytes. Per tick, three robots
+#: send at most ``MOST_FRAMES`` frames each.
+AIR_SIZE = 1 + FRAME_BYTES * 3 * MOST_FRAMES
 
 
 class ChannelNumbers(NamedTuple):
@@ -26,7 +25,6 @@ class ChannelNumbers(NamedTuple):
     delay: int
     """Latency, ticks, at least 1."""
     loss: float
-    byte_error: float
     noise: TickNoise
 
 
@@ -42,8 +40,8 @@ def _send(
 ) -> int:
     """Appends the frames of one robot to the bytes that are sent in this tick.
 
-    Each frame has its own row of random numbers, even if it is lost. Returns the number
-    of frames sent so far.
+    Each frame has its own random number, even if it is lost. Returns the number of
+    frames sent so far.
     """
     for frame in range(int(frames[0])):
         row, sent = sent, sent + 1
@@ -51,11 +49,7 @@ def _send(
         if _share(random[row, 0]) < numbers.loss or count + FRAME_BYTES >= AIR_SIZE:
             continue
         for k in range(FRAME_BYTES):
-            byte = frames[1 + frame * FRAME_BYTES + k]
-            if _share(random[row, 1 + 2 * k]) < numbers.byte_error:
-                other = min(math.floor(255.0 * _share(random[row, 2 + 2 * k])), 254.0)
-                byte = (byte + 1.0 + other) % 256.0
-            state[place + 1 + count + k] = byte
+            state[place + 1 + count + k] = frames[1 + frame * FRAME_BYTES + k]
         state[place] = count + float(FRAME_BYTES)
     return sent
 
@@ -77,9 +71,7 @@ def radio_channel_step(
     for frames in inputs:
         sends = sends or frames[0] > 0.5
     if sends:
-        rows = max(_MOST_ON_AIR, len(inputs) * MOST_FRAMES)
-        columns = 1 + 2 * FRAME_BYTES
-        random = tick_normals(numbers.noise, tick, rows, columns)
+        random = tick_normals(numbers.noise, tick, len(inputs) * MOST_FRAMES, 1)
         sent = 0
         for frames in inputs:
             sent = _send(state, place, frames, numbers, random, sent)
@@ -99,16 +91,16 @@ class RadioChannel(Block):
     For each robot that sends, the block has an input port ``frames_<robot>`` (number of
     frames, and nine bytes per frame). All radios receive the same bytes. A robot also
     receives its own frames. The addresses in the frames identify the senders. A frame
-    is lost with the probability ``loss``, independently of other frames. A byte changes
-    with the probability ``byte_error``.
+    is lost with the probability ``loss``, independently of other frames. All other
+    frames arrive without errors.
 
     The discrete state holds the bytes in transit, and is updated every tick. The
     latency is ``latency_s``, rounded to ticks, and at least one tick.
 
     Args:
-        parameters: Latency, losses and errors.
+        parameters: Latency and losses.
         robots: Names of the robots that send.
-        seed: Seed of losses and errors.
+        seed: Seed of the losses.
         tick_s: Period of the update, s.
 
     Reference: Song 2011, 3.3. Latency and losses are ours.
@@ -132,9 +124,7 @@ class RadioChannel(Block):
             for name in robots
         ]
         delay = max(1, round(parameters.latency_s / tick_s))
-        numbers = ChannelNumbers(
-            delay, parameters.loss, parameters.byte_error, tick_noise(seed)
-        )
+        numbers = ChannelNumbers(delay, parameters.loss, tick_noise(seed))
         self.declare(
             Step(radio_channel_step, numbers, [0.0] * (delay * AIR_SIZE), _publish),
             tick_s=tick_s,

@@ -10,50 +10,49 @@ from numba.extending import register_jitable
 from systems.framework.block import Block, Port, Step
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
-from systems.radio.parameters import RadioParameters
 
 #: Period of the measurements, s.
 _PERIOD_S = 0.1
 #: Smallest distance in the path loss, m.
 _LEAST_M = 0.01
+#: -A in eq. 8, level at a distance of 1 m, dBm (example in the data sheet of the
+#: CC2431).
+_LEVEL_AT_1_M_DBM = -42.4
+#: n in eq. 8, exponent of the path loss.
+_EXPONENT = 2.5
+#: Standard deviation of a measured level, dB.
+_FADING_DB = 4.0
 
 
 @register_jitable
-def radio_level(distance: float, level_at_1_m_dbm: float, exponent: float) -> float:
+def radio_level(distance: float) -> float:
     """Computes the level at a distance (path loss of Song 2011, eq. 8).
 
     Args:
         distance: d, distance between the antennas, m.
-        level_at_1_m_dbm: -A, level at a distance of 1 m, dBm.
-        exponent: n, exponent of the path loss.
 
     Returns:
         Level R = -(10 n lg d + A), dBm.
     """
-    return level_at_1_m_dbm - 10.0 * exponent * math.log10(max(distance, _LEAST_M))
+    return _LEVEL_AT_1_M_DBM - 10.0 * _EXPONENT * math.log10(max(distance, _LEAST_M))
 
 
 @register_jitable
-def radio_distance(level: float, level_at_1_m_dbm: float, exponent: float) -> float:
+def radio_distance(level: float) -> float:
     """Computes the distance from a level, as the inverse of ``radio_level``.
 
     Args:
         level: R, dBm.
-        level_at_1_m_dbm: -A, level at a distance of 1 m, dBm.
-        exponent: n, exponent of the path loss.
 
     Returns:
         Distance, m.
     """
-    return 10.0 ** ((level_at_1_m_dbm - level) / (10.0 * exponent))
+    return 10.0 ** ((_LEVEL_AT_1_M_DBM - level) / (10.0 * _EXPONENT))
 
 
 class RangeNumbers(NamedTuple):
     """Constants of the step of ``RadioRange``."""
 
-    level_at_1_m_dbm: float
-    exponent: float
-    fading_db: float
     period: int
     """Period of the measurements, ticks."""
     noise: TickNoise
@@ -71,8 +70,7 @@ def radio_range_step(
         pose, other = inputs
         distance = math.hypot(other[0] - pose[0], other[1] - pose[1])
         normals = tick_normals(numbers.noise, tick, 1, 2)
-        level = radio_level(distance, numbers.level_at_1_m_dbm, numbers.exponent)
-        state[0] = level + numbers.fading_db * float(normals[0, 0])
+        state[0] = radio_level(distance) + _FADING_DB * float(normals[0, 0])
     outputs[0][0] = state[0]
 
 
@@ -86,7 +84,6 @@ class RadioRange(Block):
     The discrete state is the last measured level. There is no latency.
 
     Args:
-        parameters: Levels and fading.
         seed: Seed of the errors.
         tick_s: Period of the update, s.
 
@@ -97,20 +94,8 @@ class RadioRange(Block):
     inputs = (Port("pose_WB", 3, "m, m, rad"), Port("pose_WS", 3, "m, m, rad"))
     outputs = (Port("rssi_dbm", 1, "dBm", "rssi_dbm"),)
 
-    def __init__(
-        self,
-        *,
-        parameters: RadioParameters = RadioParameters(),
-        seed: int = 0,
-        tick_s: float = TICK_S,
-    ) -> None:
+    def __init__(self, *, seed: int = 0, tick_s: float = TICK_S) -> None:
         super().__init__()
-        numbers = RangeNumbers(
-            parameters.level_at_1_m_dbm,
-            parameters.path_loss_exponent,
-            parameters.fading_db,
-            max(1, round(_PERIOD_S / tick_s)),
-            tick_noise(seed),
-        )
         self.set_name("radio_range")
+        numbers = RangeNumbers(max(1, round(_PERIOD_S / tick_s)), tick_noise(seed))
         self.declare(Step(radio_range_step, numbers, [0.0]), tick_s=tick_s)

@@ -11,14 +11,28 @@ from numpy.typing import NDArray
 
 from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
+from systems.radio.codec import FRAME_BYTES, read_frame
 from systems.radio.radio_channel import AIR_SIZE
-from systems.radio.stream import PARSER_SIZE, parse_byte
 
-#: Status of each robot: number of frames received; function of the last frame (-1: no
-#: frame yet); value of the last frame; time since the last frame, s; and result of the
-#: search (-1: none yet, 0: not found, 1: found).
-SINK_FIELDS = ("frames", "function", "value", "age_s", "result")
-_COUNT, _FUNCTION, _VALUE, _AGE, _RESULT = range(len(SINK_FIELDS))
+
+class SinkPlaces(NamedTuple):
+    """Indices in the status of a robot. The names are also those of its columns."""
+
+    frames: int
+    """Number of frames received."""
+    function: int
+    """Function of the last frame; -1: no frame yet."""
+    value: int
+    """Value of the last frame."""
+    age_s: int
+    """Time since the last frame, s."""
+    result: int
+    """Result of the search; -1: none yet, 0: not found, 1: found."""
+
+
+_AT = SinkPlaces(*range(5))
+# Numbers of the frames with the result of a search (Song 2011, table 5).
+_FN_FOUND_ODOR, _FN_FOUND_SOUND = 12, 16
 
 
 class SinkNumbers(NamedTuple):
@@ -33,28 +47,24 @@ class SinkNumbers(NamedTuple):
 def sink_monitor_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SinkNumbers
 ) -> None:
-    """Updates the status of each robot with the bytes of this tick.
+    """Updates the status of each robot with the frames of this tick.
 
-    The state holds the ``SINK_FIELDS`` of each robot, then the state of the parser.
+    The state is the output.
     """
-    air, fields, robots = inputs[0], 5, len(numbers.addresses)
+    air, robots = inputs[0], len(numbers.addresses)
     for robot in range(robots):
-        state[robot * fields + _AGE] += numbers.tick_s
-    first = robots * fields
-    parser = state[first:]
-    for k in range(int(air[0])):
-        good, address, function, value = parse_byte(parser, air[1 + k])
-        if not good:
-            continue
+        state[len(_AT) * robot + _AT.age_s] += numbers.tick_s
+    for first in range(1, 1 + int(air[0]), FRAME_BYTES):
+        address, function, value = read_frame(air, first)
         for robot in range(robots):
             if numbers.addresses[robot] == address:
-                place = robot * fields
-                state[place + _COUNT] += 1.0
-                state[place + _FUNCTION] = float(function)
-                state[place + _VALUE] = value
-                state[place + _AGE] = 0.0
-                if function in (12, 16):
-                    state[place + _RESULT] = value
+                place = len(_AT) * robot
+                state[place + _AT.frames] += 1.0
+                state[place + _AT.function] = float(function)
+                state[place + _AT.value] = value
+                state[place + _AT.age_s] = 0.0
+                if function in (_FN_FOUND_ODOR, _FN_FOUND_SOUND):
+                    state[place + _AT.result] = value
 
 
 @register_jitable
@@ -68,8 +78,8 @@ def _publish(state: Any, outputs: Any, numbers: SinkNumbers) -> None:
 class SinkMonitor(Block):
     """Receives all frames, and stores the last frame of each robot.
 
-    The discrete state holds the output and the state of the parser, and is updated
-    every tick. The latency is one tick.
+    The discrete state is the output, and is updated every tick. The latency is one
+    tick.
 
     Args:
         robots: Addresses of the robots, by name.
@@ -81,7 +91,7 @@ class SinkMonitor(Block):
     part, stage = "sink", "world"
     inputs = (Port("air", AIR_SIZE, "number of bytes, and bytes"),)
     outputs = (
-        Port("sink_status", "5 robots", "number, five for each robot, see SINK_FIELDS"),
+        Port("sink_status", "5 robots", "number, five for each robot, see SinkPlaces"),
     )
 
     def __init__(
@@ -89,9 +99,9 @@ class SinkMonitor(Block):
     ) -> None:
         super().__init__()
         self.set_name("sink_monitor")
-        names = tuple(f"{name}.{field}" for name in robots for field in SINK_FIELDS)
+        names = tuple(f"{name}.{field}" for name in robots for field in _AT._fields)
         self.outputs = (self.outputs[0]._replace(columns=names),)
-        state = [0.0, -1.0, 0.0, 0.0, -1.0] * len(robots) + [0.0] * PARSER_SIZE
+        state = [0.0, -1.0, 0.0, 0.0, -1.0] * len(robots)
         addresses = np.array([*robots.values()], dtype=np.int64)
         self.declare(
             Step(sink_monitor_step, SinkNumbers(addresses, tick_s), state, _publish),

@@ -12,9 +12,7 @@ from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.heading.compass import wrapped_deg
 from systems.radio.codec import FRAMES_SIZE
-from systems.search.parameters import (
-    PlumeSearchParameters,
-)
+from systems.search.parameters import PlumeSearchParameters
 from systems.search.search_ending import (
     FOUND,
     NO_NOSE,
@@ -25,8 +23,9 @@ from systems.search.search_ending import (
 )
 from systems.search.search_state import (
     AT,
+    MOVE_S,
+    REPORT_EVERY_S,
     add_frame,
-    clear_frames,
     publish_search,
     search_ports,
     ticks_of,
@@ -34,6 +33,13 @@ from systems.search.search_state import (
 from systems.search.song_rules import song2011_turn
 from systems.search.upwind_gradient import RULE_MEMORY, upwind_gradient_turn
 
+#: Averaging time of the readings, s (Song 2011, 4.2). The mean excludes the largest and
+#: the smallest reading.
+SENSE_S = 2.0
+#: An object smells if the lowest gas ratio is below this. Clean air has the ratio 1.
+#: This lowest ratio is the minimum of the mean ratios of the last two stops and of all
+#: readings since the last stop.
+_GATE_SHARE = 0.95
 #: Number of readings that a stop averages: R1, R2, R3, F1, F2.
 _SENSED = 5
 _WAIT, _SENSE, _MOVE, _OVER = range(4)
@@ -81,8 +87,7 @@ class PlumeSearchNumbers(NamedTuple):
     """Constants of the step of ``PlumeSearch``."""
 
     turn: Callable[..., tuple[float, int, int]]
-    """``turn(gas, airflow, memory, rules)``, for example ``song2011_turn``."""
-    rules: Any
+    """``turn(gas, airflow, memory)``, for example ``song2011_turn``."""
     wait: int
     """Duration, ticks. The next three fields are also in ticks."""
     sense: int
@@ -90,7 +95,6 @@ class PlumeSearchNumbers(NamedTuple):
     repeat: int
     most_steps: int
     gate: bool
-    gate_share: float
     address: int
 
 
@@ -171,7 +175,7 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
     mean = state[_OWN.mean], state[_OWN.mean + 1], state[_OWN.mean + 2]
     blown = state[_OWN.mean + 3], state[_OWN.mean + 4]
     memory = state[_OWN.memory : _OWN.memory + RULE_MEMORY]
-    turn, phase, ended = numbers.turn(mean, blown, memory, numbers.rules)
+    turn, phase, ended = numbers.turn(mean, blown, memory)
     state[AT.phase] = phase
     if ended != UNDECIDED:
         _end(state, ended)
@@ -211,7 +215,7 @@ def _check_switches(state: Any, contact: Any) -> bool:
 @register_jitable
 def _judge_touch(state: Any, numbers: PlumeSearchNumbers) -> None:
     """Ends the search: the touched object is the source, or does not smell."""
-    found = not numbers.gate or state[_OWN.smelt] < numbers.gate_share
+    found = not numbers.gate or state[_OWN.smelt] < _GATE_SHARE
     _end(state, FOUND if found else REFUSED)
 
 
@@ -221,7 +225,7 @@ def _add_frames(
 ) -> None:
     """Adds the frames of this tick: the readings of the step, or the final result."""
     address = numbers.address
-    clear_frames(state, _OWN.frames)
+    state[_OWN.frames] = 0.0
     if state[AT.activity] == _OVER:
         if tick % numbers.repeat == 0:
             add_frame(state, _OWN.frames, address, _FN_RESULT, state[AT.flag])
@@ -284,9 +288,9 @@ class PlumeSearch(Block):
     """Searches for an odor source in steps.
 
     Each step has three activities. First, the robot rests for ``wait_s``, until the gas
-    sensors have settled. Then it averages the readings for ``sense_s``. The rules
+    sensors have settled. Then it averages the readings for ``SENSE_S``. The rules
     choose a heading from the averages. Finally, the robot turns and drives for
-    ``move_s``.
+    ``MOVE_S``.
 
     A touch ends the search at once. If the touched object smells, it is the odor
     source, and the robot calls. Otherwise the robot gives up the search. The numbers of
@@ -304,7 +308,7 @@ class PlumeSearch(Block):
     of the rules. It is updated every tick. The latency is one tick.
 
     Args:
-        parameters: Durations of a step, rules, and end of the search.
+        parameters: Rules, and end of the search.
         tick_s: Period of the update, s.
 
     Reference: Song 2011, 2.3.3 and 4.2. The gate and ``upwind_gradient`` are ours.
@@ -330,14 +334,12 @@ class PlumeSearch(Block):
         own, printed = parameters, parameters.rules == "song2011"
         numbers = PlumeSearchNumbers(
             song2011_turn if printed else upwind_gradient_turn,
-            own.song2011 if printed else own.upwind_gradient,
             ticks_of(own.wait_s, tick_s, least=0),
-            ticks_of(own.sense_s, tick_s),
-            ticks_of(own.move_s, tick_s),
-            ticks_of(own.call_every_s, tick_s),
+            ticks_of(SENSE_S, tick_s),
+            ticks_of(MOVE_S, tick_s),
+            ticks_of(REPORT_EVERY_S, tick_s),
             own.most_steps,
             own.gate,
-            own.gate_share,
             own.address,
         )
         self.declare(

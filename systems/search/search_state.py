@@ -10,6 +10,11 @@ from systems.framework.block import Port
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES, write_frame
 from systems.search.search_ending import REPORT_COLUMNS
 
+#: Time of a step for turning and driving, s (Song 2011, 4.2 and 4.3).
+MOVE_S = 3.0
+#: Period of the radio reports after the end of a search, s.
+REPORT_EVERY_S = 1.0
+
 
 class SearchPlaces(NamedTuple):
     """Indices in the state of a search, for values that both searches have."""
@@ -94,17 +99,6 @@ def publish_search(state: Any, outputs: Any, first: int) -> None:
         report[k] = state[AT.ended + k]
     for k in range(len(frames)):
         frames[k] = state[first + k]
-
-
-@register_jitable
-def clear_frames(state: Any, first: int) -> None:
-    """Removes the frames of the last tick.
-
-    Args:
-        state: State of the search. It contains the number of frames, then their bytes.
-        first: Index of the number of frames.
-    """
-    state[first] = 0.0
 
 
 @register_jitable

@@ -8,11 +8,24 @@ from numba.extending import register_jitable
 
 from systems.search.search_ending import UNDECIDED
 
+# Thresholds and angles of the four phases (Song 2011, 4.2).
+#: R_init. The robot is in the plume if all three ratios Rs/R0 are below this.
+_INITIAL_THRESHOLD = 0.95
+#: F_thresh, in the unit of the port ``airflow``. The paper prints no unit, so that
+#: ``airflow_sensors.gain_s_m`` defines the meaning of this value.
+AIRFLOW_THRESHOLD = 1.0
+#: R_turning. In phase 3, the robot turns if R1 or R3 is below this.
+_TURNING_THRESHOLD = 0.75
+#: R_reverse. In phase 3, the robot turns back if R2 is the smallest ratio and below
+#: this. The paper prints no value. This value is our choice.
+_REVERSE_THRESHOLD = 0.9
+#: Turning angles in the phases 1 (toward a front sensor), 2, 3 and 4, deg.
+_INITIAL_TURN_DEG, _UPWIND_TURN_DEG = 60.0, 45.0
+_GRADIENT_TURN_DEG, _LOCAL_TURN_DEG = 60.0, 30.0
+
 
 @register_jitable
-def song2011_turn(
-    gas: Any, airflow: Any, memory: Any, rules: Any
-) -> tuple[float, int, int]:
+def song2011_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, int, int]:
     """Computes the turning angle after a stop (Song 2011, 2.3.3 and 4.2).
 
     Phase 1 lasts until the robot is in the plume for the first time. Afterwards, the
@@ -26,7 +39,6 @@ def song2011_turn(
         airflow: (F1, F2), left and right reading.
         memory: The first number is 1 after the robot was in the plume, else 0. The
             function changes it.
-        rules: ``SongRuleParameters``.
 
     Returns:
         Turning angle, clockwise, deg; phase, 1 to 4; and ``UNDECIDED``.
@@ -37,21 +49,21 @@ def song2011_turn(
     side = 0.0
     if right != left:
         side = 1.0 if right < left else -1.0
-    if memory[0] < 0.5 and max(right, rear, left) < rules.initial_threshold:
+    if memory[0] < 0.5 and max(right, rear, left) < _INITIAL_THRESHOLD:
         memory[0] = 1.0
-    left_blown = airflow[0] > rules.airflow_threshold
-    right_blown = airflow[1] > rules.airflow_threshold
+    left_blown = airflow[0] > AIRFLOW_THRESHOLD
+    right_blown = airflow[1] > AIRFLOW_THRESHOLD
     if memory[0] < 0.5:
-        turn, phase = (180.0 if rear == least else 60.0 * side), 1
+        turn, phase = (180.0 if rear == least else _INITIAL_TURN_DEG * side), 1
     elif left_blown != right_blown:
-        turn = rules.upwind_turn_deg if right_blown else -rules.upwind_turn_deg
+        turn = _UPWIND_TURN_DEG if right_blown else -_UPWIND_TURN_DEG
         phase = 2
     elif left_blown:
-        turn, phase = rules.local_turn_deg * side, 4
-    elif rear == least and rear < rules.reverse_threshold:
+        turn, phase = _LOCAL_TURN_DEG * side, 4
+    elif rear == least and rear < _REVERSE_THRESHOLD:
         turn, phase = 180.0, 3
-    elif min(right, left) < rules.turning_threshold:
-        turn, phase = rules.gradient_turn_deg * side, 3
+    elif min(right, left) < _TURNING_THRESHOLD:
+        turn, phase = _GRADIENT_TURN_DEG * side, 3
     else:
         turn, phase = 0.0, 3
     return turn, phase, UNDECIDED

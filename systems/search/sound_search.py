@@ -11,12 +11,10 @@ from numba.extending import register_jitable
 from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.heading.compass import wrapped_deg
-from systems.radio.codec import FRAMES_SIZE
-from systems.radio.parameters import RadioParameters
+from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, read_frame
 from systems.radio.radio_channel import AIR_SIZE
 from systems.radio.radio_range import radio_distance
-from systems.radio.stream import PARSER_SIZE, parse_byte
-from systems.search.parameters import SoundSearchParameters
+from systems.search.parameters import CALLER, SoundSearchParameters
 from systems.search.search_ending import (
     AMBIGUOUS,
     CALLER_LOST,
@@ -28,8 +26,9 @@ from systems.search.search_ending import (
 )
 from systems.search.search_state import (
     AT,
+    MOVE_S,
+    REPORT_EVERY_S,
     add_frame,
-    clear_frames,
     publish_search,
     search_ports,
     ticks_of,
@@ -57,7 +56,7 @@ class _Places(NamedTuple):
     called: int
     """Report of the caller: 1 found, -1 found nothing, 0 none yet."""
     arrived: int
-    """Whether the robot that goes first has reported a result, or ``hold_s`` are over,
+    """Whether the robot that goes first has reported a result, or ``HOLD_S`` are over,
     0 or 1."""
     bearing: int
     """Bearing of the source, CCW, deg."""
@@ -65,13 +64,12 @@ class _Places(NamedTuple):
     """Range of the source, m. 0 if it is not known."""
     away: int
     """Distance from the caller, computed from the radio level, m."""
-    parser: int
     frames: int
     size: int
     """Size of the state."""
 
 
-_OWN = _Places(*accumulate((*(1,) * 11, PARSER_SIZE, FRAMES_SIZE), initial=len(AT)))
+_OWN = _Places(*accumulate((*(1,) * 11, FRAMES_SIZE), initial=len(AT)))
 # Numbers of frames (Song 2011, table 5).
 _FN_HEADING, _FN_FOUND_ODOR, _FN_DIRECTION = 5, 12, 13
 _FN_DISTANCE, _FN_RADIO_DISTANCE, _FN_RESULT = 14, 15, 16
@@ -79,6 +77,19 @@ _FN_DISTANCE, _FN_RADIO_DISTANCE, _FN_RESULT = 14, 15, 16
 _LOST_MICROPHONE = 32
 #: Values of the port ``listening``.
 _NOTHING, _NOISE, _SOUND = 0.0, 1.0, 2.0
+#: Computing time of a step, s (Song 2011, 4.3).
+COMPUTE_S = 5.0
+#: Distance from the caller within which the robot waits for another robot, m, and
+#: longest time for which it waits, s.
+_HOLD_WITHIN_M, HOLD_S = 1.2, 200.0
+#: Time without a call after which the robot gives up, s.
+CALL_WITHIN_S = 1800.0
+#: Distance from the caller below which the heard range counts, m. The robot computes
+#: the distance from the radio level.
+_RADIO_GATE_M = 1.2
+#: Number of consecutive steps without a unique direction of the sound after which the
+#: robot gives up.
+_TRIES = 3
 #: Approximate duration of a turn, s/deg, and lag of the motors, s.
 _TURN_S_DEG, _LAG_S = 1.0 / 90.0, 0.1
 #: The last step ends at this multiple of ``stop_range_m``.
@@ -99,10 +110,6 @@ class SoundSearchNumbers(NamedTuple):
     call_within: int
     repeat: int
     speed_m_s: float
-    level_dbm: float
-    """Radio level at a distance of 1 m, dBm."""
-    exponent: float
-    """Exponent of the path loss."""
     tick_s: float
 
 
@@ -116,12 +123,11 @@ def _end(state: Any, ended: int) -> None:
 @register_jitable
 def _receive(state: Any, air: Any, own: Any) -> None:
     """Reads the reports of the caller and of the robot that goes first."""
-    parser = state[_OWN.parser : _OWN.parser + PARSER_SIZE]
-    for k in range(int(air[0])):
-        good, address, function, value = parse_byte(parser, air[1 + k])
-        if good and address == own.caller and function == _FN_FOUND_ODOR:
+    for first in range(1, 1 + int(air[0]), FRAME_BYTES):
+        address, function, value = read_frame(air, first)
+        if address == CALLER and function == _FN_FOUND_ODOR:
             state[_OWN.called] = 1.0 if value > 0.5 else -1.0
-        if good and address == own.waits_for and function == _FN_RESULT:
+        if address == own.waits_for and function == _FN_RESULT:
             state[_OWN.arrived] = 1.0
 
 
@@ -147,7 +153,7 @@ def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
     """Begins to listen, or to wait for the robot that goes first."""
     own = numbers.own
     state[AT.moves] = 0.0
-    near = 0.0 < state[_OWN.away] < own.hold_within_m
+    near = 0.0 < state[_OWN.away] < _HOLD_WITHIN_M
     if own.waits_for > 0 and state[_OWN.arrived] < 0.5 and near:
         state[AT.activity], state[AT.left] = _HOLDS, numbers.hold
         return
@@ -158,9 +164,9 @@ def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
 
 @register_jitable
 def _missed(state: Any, ended: int, numbers: SoundSearchNumbers) -> None:
-    """Listens again, or ends the search after ``tries`` misses."""
+    """Listens again, or ends the search after ``_TRIES`` misses."""
     state[_OWN.misses] += 1.0
-    if state[_OWN.misses] >= numbers.own.tries:
+    if state[_OWN.misses] >= _TRIES:
         _end(state, ended)
     else:
         _begin_step(state, numbers)
@@ -175,14 +181,14 @@ def _decide(
     The radio level gives a distance. The microphones give a bearing and perhaps a
     range. The robot has arrived if the distance or the range is below its threshold.
     The range counts only near the caller. Without a unique bearing, the robot listens
-    again. Near the caller, the next move is shorter than ``move_s``.
+    again. Near the caller, the next move is shorter than ``MOVE_S``.
     """
     bearing, distance, detected, ranged, ambiguous, lost = heard
     own = numbers.own
     state[AT.fault] = float(_LOST_MICROPHONE) if lost > 0.5 else 0.0
     # Distance from the caller, computed from the mean radio level.
     level = state[_OWN.levels] / max(state[_OWN.readings], 1.0)
-    away = radio_distance(level, numbers.level_dbm, numbers.exponent)
+    away = radio_distance(level)
     state[_OWN.away] = away
     if away < own.radio_stop_m:
         _end(state, FOUND)
@@ -197,7 +203,7 @@ def _decide(
     state[_OWN.misses] = 0.0
     state[_OWN.bearing] = math.degrees(bearing)
     state[_OWN.distance] = distance if ranged > 0.5 else 0.0
-    near = own.stop == "range" and ranged > 0.5 and away < own.radio_gate_m
+    near = own.stop == "range" and ranged > 0.5 and away < _RADIO_GATE_M
     if near and distance < own.stop_range_m:
         _end(state, FOUND)
         return
@@ -206,7 +212,7 @@ def _decide(
         return
     # Duration of the next move.
     move = numbers.move
-    if own.stop == "range" and ranged < 0.5 and away < own.radio_gate_m:
+    if own.stop == "range" and ranged < 0.5 and away < _RADIO_GATE_M:
         move = max(1, move // 2)  # near the caller, but without a range
     if near:
         way = distance - _SHORT_OF * own.stop_range_m
@@ -226,7 +232,7 @@ def _add_frames(
 ) -> None:
     """Adds the frames of this tick: the data of the step, or the final result."""
     address = numbers.own.address
-    clear_frames(state, _OWN.frames)
+    state[_OWN.frames] = 0.0
     if state[AT.activity] == _OVER:
         if tick % numbers.repeat == 0:
             found = 1.0 if state[AT.ended] == FOUND else 0.0
@@ -299,25 +305,24 @@ class SoundSearch(Block):
     """Searches for a calling robot in steps.
 
     First, the robot listens to the noise for ``noise_s``. Then it waits for the call of
-    ``caller``: a frame with the message that the odor source is found. In each step,
-    the robot listens for ``listen_s`` and computes for ``compute_s``. Then it turns and
-    drives for ``move_s``, or for a shorter time near the source.
+    ``CALLER``: a frame with the message that the odor source is found. In each step,
+    the robot listens for ``listen_s`` and computes for ``COMPUTE_S``. Then it turns and
+    drives for ``MOVE_S``, or for a shorter time near the source.
 
     Two robots approach the same caller one after the other. The second robot has the
     address of the first robot in ``waits_for``. It waits near the caller until the
-    first robot has reported its result, or until ``hold_s`` are over.
+    first robot has reported its result, or until ``HOLD_S`` are over.
 
     The robot does not follow a sound that fits several directions. It listens again,
-    and gives up after ``tries``. The numbers of the endings and faults are in
+    and gives up after three such steps. The numbers of the endings and faults are in
     ``systems.search.search_ending``. The phase is the activity: 1 waiting for the call,
     2 waiting for the first robot, 3 listening, 4 computing, 5 moving, 6 finished.
 
-    The discrete state holds the outputs, the parser of the radio, and the measurements
-    of the step. It is updated every tick. The latency is one tick.
+    The discrete state holds the outputs and the measurements of the step. It is updated
+    every tick. The latency is one tick.
 
     Args:
-        parameters: Durations of a step, radio addresses, and end of the search.
-        radio: Path loss, to compute a distance from a level.
+        parameters: Radio addresses, times of listening, and end of the search.
         speed_m_s: Speed of the robot at full duty, m/s.
         tick_s: Period of the update, s.
 
@@ -342,7 +347,6 @@ class SoundSearch(Block):
         self,
         *,
         parameters: SoundSearchParameters = SoundSearchParameters(),
-        radio: RadioParameters = RadioParameters(),
         speed_m_s: float = 0.14,
         tick_s: float = TICK_S,
     ) -> None:
@@ -353,14 +357,12 @@ class SoundSearch(Block):
             own,
             ticks_of(own.noise_s, tick_s, least=0),
             ticks_of(own.listen_s, tick_s),
-            ticks_of(own.compute_s, tick_s),
-            ticks_of(own.move_s, tick_s),
-            ticks_of(own.hold_s, tick_s),
-            ticks_of(own.call_within_s, tick_s),
-            ticks_of(own.report_every_s, tick_s),
+            ticks_of(COMPUTE_S, tick_s),
+            ticks_of(MOVE_S, tick_s),
+            ticks_of(HOLD_S, tick_s),
+            ticks_of(CALL_WITHIN_S, tick_s),
+            ticks_of(REPORT_EVERY_S, tick_s),
             speed_m_s,
-            radio.level_at_1_m_dbm,
-            radio.path_loss_exponent,
             tick_s,
         )
         self.declare(

@@ -26,6 +26,20 @@ class _Places(NamedTuple):
 _AT = _Places(*range(4))
 #: Number of values that the rules store from stop to stop.
 RULE_MEMORY = len(_AT)
+#: Gain of the angle from upwind toward the front sensor with more gas, deg. The angle
+#: is this gain times the natural logarithm of the quotient of the two front ratios
+#: Rs/R0.
+_GAIN_DEG = 20.0
+#: Largest angle from upwind toward the side with more gas, deg.
+_LARGEST_LEAN_DEG = 45.0
+#: The robot has lost the plume if 1 - Rs/R0 of all sensors is below this share of the
+#: largest value so far.
+_LOST_SHARE = 0.35
+#: Angle from upwind at which the robot searches for a lost plume, deg. The robot goes
+#: to the two sides alternately, and each time one step farther.
+_CAST_DEG = 110.0
+#: There is no wind if both airflow sensors read less than this, in their unit.
+_STILL_AIR = 0.05
 #: An airflow reading below this share of the other reading counts as no wind.
 _SHADED = 0.1
 #: Angle of the wind if only one sensor has wind, deg. The true angle is between 45 and
@@ -58,9 +72,7 @@ def upwind_angle(airflow: Any) -> float:
 
 
 @register_jitable
-def upwind_gradient_turn(
-    gas: Any, airflow: Any, memory: Any, rules: Any
-) -> tuple[float, int, int]:
+def upwind_gradient_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, int, int]:
     """Computes the turning angle after a stop.
 
     In the plume, the robot goes upwind, with an angle toward the side with more gas.
@@ -73,13 +85,12 @@ def upwind_gradient_turn(
         gas: (R1, R2, R3), ratios Rs/R0: right front, rear, left front.
         airflow: (F1, F2), left and right reading.
         memory: ``RULE_MEMORY`` numbers, initially 0. The function changes them.
-        rules: ``UpwindGradientParameters``.
 
     Returns:
         Turning angle, clockwise, deg; phase, 1 upwind or 2 across; and ``NO_WIND`` if
         the search ends, else ``UNDECIDED``.
     """
-    if max(airflow[0], airflow[1]) < rules.still_air:
+    if max(airflow[0], airflow[1]) < _STILL_AIR:
         memory[_AT.calm] += 1.0
         ended = NO_WIND if memory[_AT.calm] >= _CALM_STOPS else UNDECIDED
         return 180.0, 1, ended
@@ -87,15 +98,15 @@ def upwind_gradient_turn(
     upwind = upwind_angle(airflow)
     strongest = 1.0 - min(gas[0], gas[1], gas[2])
     memory[_AT.best] = max(memory[_AT.best], strongest)
-    if strongest < rules.lost_share * memory[_AT.best]:
+    if strongest < _LOST_SHARE * memory[_AT.best]:
         memory[_AT.casts] += 1.0
         # Leg k, from 0, has k + 1 steps. Even legs go to the side of the last angle.
         leg = math.floor(0.5 * (math.sqrt(8.0 * memory[_AT.casts] - 7.0) - 1.0) + 1e-9)
         side = memory[_AT.side] if leg % 2 == 0 else -memory[_AT.side]
-        turn = rules.cast_deg if side >= 0.0 else -rules.cast_deg
+        turn = _CAST_DEG if side >= 0.0 else -_CAST_DEG
         return upwind + turn, 2, UNDECIDED
     memory[_AT.casts] = 0.0
-    lean = rules.gain_deg * math.log(max(gas[2], _LEAST) / max(gas[0], _LEAST))
-    lean = min(max(lean, -rules.largest_lean_deg), rules.largest_lean_deg)
+    lean = _GAIN_DEG * math.log(max(gas[2], _LEAST) / max(gas[0], _LEAST))
+    lean = min(max(lean, -_LARGEST_LEAN_DEG), _LARGEST_LEAN_DEG)
     memory[_AT.side] = 1.0 if lean >= 0.0 else -1.0
     return upwind + lean, 1, UNDECIDED

@@ -42,7 +42,7 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "PlumeSearch": {},
     "RadioChannel": {},
     "RadioRange": {},
-    "SinkMonitor": {},
+    "SinkMonitor": {"robots": {"nose": 1}},
     "SoundSearch": {},
     "WindField": {},
 }

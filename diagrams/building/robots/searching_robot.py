@@ -20,6 +20,7 @@ from systems import (
     RadioRange,
     SoundSearch,
 )
+from systems.odor.parameters import CONTAINER_M
 
 
 def search_controller(scenario: Scenario) -> Any:
@@ -37,7 +38,6 @@ def search_controller(scenario: Scenario) -> Any:
     assert isinstance(robot, SoundSearcher)
     return SoundSearch(
         parameters=robot.sound_search,
-        radio=scenario.radio,
         speed_m_s=robot.motor_driver.full_speed_m_s,
         tick_s=scenario.tick_s,
     )
@@ -82,7 +82,7 @@ def searching_blocks(
     compass = MagneticHeading(
         parameters=robot.compass, seed=seed_of("magnetic_heading"), tick_s=tick_s
     )
-    heading = HeadingController(parameters=robot.heading_control, tick_s=tick_s)
+    heading = HeadingController(tick_s=tick_s)
     if isinstance(robot, OdorSearcher):
         return [compass, heading, *_smell(scenario, robot, bodies, seed_of)]
     return [compass, heading, *_ears(scenario, robot, others, seed_of)]
@@ -94,7 +94,6 @@ def _smell(
     bodies: int,
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    assert scenario.odor is not None
     tick_s = scenario.tick_s
     return [
         GasSensorArray(
@@ -111,7 +110,7 @@ def _smell(
             parameters=robot.contact_switches,
             robot=robot.robot,
             bodies=bodies,
-            source_size=scenario.odor.container_m,
+            source_size=CONTAINER_M,
             tick_s=tick_s,
         ),
     ]
@@ -138,9 +137,5 @@ def _ears(
             acoustics=scenario.acoustics,
             microphones=robot.microphones,
         ),
-        RadioRange(
-            parameters=scenario.radio,
-            seed=seed_of("radio_range"),
-            tick_s=scenario.tick_s,
-        ),
+        RadioRange(seed=seed_of("radio_range"), tick_s=scenario.tick_s),
     ]

@@ -218,6 +218,5 @@ def _made_from(own: Scenario) -> str:
         route = robot.route.model_copy(update={"goal_m": (0.0, 0.0)})
         robot = robot.model_copy(update={"route": route})
     source = None if robot.has_goal else (own.source_size, own.source.sound)
-    odor = own.odor and own.odor.container_m
     run = own.model_dump_json(exclude=_NO_BLOCKS)
-    return f"{robot.model_dump_json(exclude={'start'})} {source} {odor} {run}"
+    return f"{robot.model_dump_json(exclude={'start'})} {source} {run}"

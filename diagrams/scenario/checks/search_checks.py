@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from diagrams.scenario.participants import OdorSearcher, Robot, SoundSearcher
 from diagrams.scenario.run_parameters import RunParameters
 from systems.framework.input_error import InputError
+from systems.search.parameters import CALLER
 
 
 def address_of_robot(robot: OdorSearcher | SoundSearcher) -> int:
@@ -72,17 +73,14 @@ def _check_sound(
             "'sound_search' needs four, with the first in the middle; use "
             "robot.preset song2011_hearing",
         )
-    if robot.sound_search.await_call:
-        callers = [
-            name
-            for name, other in robots.items()
-            if isinstance(other, OdorSearcher)
-            and other.search.address == robot.sound_search.caller
-        ]
-        if not callers:
-            raise InputError(
-                f"{prefix}sound_search.caller",
-                f"{robot.sound_search.caller} is not the address of a robot that "
-                "smells, so that no robot calls; set sound_search.await_call to "
-                "false, or give a robot law plume_search and this search.address",
-            )
+    called = any(
+        isinstance(other, OdorSearcher) and other.search.address == CALLER
+        for other in robots.values()
+    )
+    if robot.sound_search.await_call and not called:
+        raise InputError(
+            f"{prefix}sound_search.await_call",
+            f"is on, but no robot that smells has the radio address {CALLER}, so that "
+            "no robot calls; set it to false, or give a robot law plume_search and "
+            f"search.address {CALLER}",
+        )

@@ -26,7 +26,7 @@ from analysis.models.linear_models import LinearModel
 from analysis.stability.recommended_gains import GainThresholds, recommend_gains
 from diagrams.scenario.scenario import Scenario
 from systems.base.robot import RobotParameters
-from systems.heading.parameters import HeadingControlParameters, MotorDriverParameters
+from systems.heading.parameters import MotorDriverParameters
 
 # --- exact polynomials, lowest power first ---------------------------------------
 
@@ -438,7 +438,6 @@ def test_the_gang_of_four_has_its_peaks_in_the_picture():
 def test_the_heading_loop_without_lag_has_its_gain_margin_at_the_last_frequency():
     """At z = -1 L is real; poles of the closed loop leave there."""
     parts = (
-        HeadingControlParameters(),
         MotorDriverParameters(),
         RobotParameters(preset="song2011_hearing"),
         0.0,

@@ -11,10 +11,10 @@ import pytest
 from analysis.linear.heading_loop import heading_loop_margins
 from systems.base.robot import RobotParameters
 from systems.heading.heading_controller import HeadingController
-from systems.heading.parameters import HeadingControlParameters, MotorDriverParameters
+from systems.heading.parameters import MotorDriverParameters
 
 ROBOT = RobotParameters(preset="song2011_hearing")
-PARTS = HeadingControlParameters(), MotorDriverParameters(), ROBOT, 0.1
+PARTS = MotorDriverParameters(), ROBOT, 0.1
 
 
 def test_without_sampling_they_are_those_of_the_formula():

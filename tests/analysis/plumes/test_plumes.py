@@ -35,7 +35,7 @@ def test_the_history_is_the_plume_of_the_run(mission):
         tick = round(instant.time_s / 0.025)
         x, y, theta = poses[tick]
         place = x - 0.2 * np.cos(theta), y - 0.2 * np.sin(theta)
-        found = concentration(instant.plume, *place, 0.0)
+        found = concentration(instant.plume, *place)
         assert found == pytest.approx(truth[tick], abs=1e-12)
 
 
@@ -44,7 +44,7 @@ def test_a_map_is_of_points(mission):
     x, y = np.array([0.0, 1.0, 2.0]), np.array([-0.2, 0.3])
     dense = concentration_map(plume, x, y)
     assert dense.shape == (2, 3)
-    assert dense[1, 2] == concentration(plume, 2.0, 0.3, 0.0)
+    assert dense[1, 2] == concentration(plume, 2.0, 0.3)
 
 
 def test_the_call_is_heard_by_the_sink_soon_after_the_touch(mission):

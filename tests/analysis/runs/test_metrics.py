@@ -17,6 +17,7 @@ from analysis.runs.metrics import frames_with_sound, run_metrics
 from analysis.runs.proximity import Proximity
 from analysis.runs.smoothness import log_dimensionless_jerk, spectral_arc_length
 from diagrams import RunResult, build_sound_follower, load_scenario, simulate
+from diagrams.running import stop_rules
 from diagrams.running.stop_rules import Collision
 from diagrams.scenario.scenario import Scenario
 from systems.ranging.parameters import UltrasonicParameters
@@ -321,16 +322,15 @@ def test_what_is_heard_and_what_sounds_agree(hearing):
     )
 
 
-def test_completed_is_decided_by_the_share_that_is_reported():
+def test_completed_is_decided_by_the_share_that_is_reported(monkeypatch):
     source = "source.waypoints_m=[[1.98, 0], [9, 0]]"
     words = ["hearing=ideal", "law=none", "attraction.stiffness_n_m=0", source]
     scenario = load_scenario("default", [*words, "obstacles=[]", "duration_s=6"])
     share = run_metrics(simulate(scenario))["following_fraction"]
     assert share is not None
     for bound, cause in ((share, "completed"), (share + 1e-6, "astray")):
-        stop = scenario.stop.model_copy(update={"following_share": bound})
-        run = simulate(scenario.model_copy(update={"stop": stop}))
-        assert run.cause == cause
+        monkeypatch.setattr(stop_rules, "FOLLOWING_SHARE", bound)
+        assert simulate(scenario).cause == cause
 
 
 def test_swinging_to_and_fro():

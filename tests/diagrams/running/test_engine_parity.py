@@ -40,8 +40,6 @@ OTHERS = {
     "laws.trajectory_filtered.safety_filter.approach_rate": "a gain",
     "sound_search.noise_s": "for how long a search listens",
     "cross_power.noise_cross_power": "on by default",
-    "odor.mean_intensity": "of the steady plume, which has no noise",
-    "gas_sensors.slope_mismatch": "0.03 by default",
     "gas_sensors.mismatch": "0.01 by default",
     "laws.mppi.step_s": "of what the law predicts",
     "tdoa.false_alarm_rate": "a threshold",
@@ -53,17 +51,12 @@ WHEELS = {
 }
 AIR = {
     "wind.meander_intensity": 0.2,
-    "odor.own_intensity": 0.2,
     "gas_sensors.noise": 0.01,
-    "gas_sensors.drift_per_h": 0.02,
     "gas_sensors.faults": [{"sensor": 2, "kind": "stuck", "start_s": 2.0}],
-    "airflow_sensors.noise": 0.05,
     "contact_switches.faults": [{"switch": 1, "kind": "stuck_open", "start_s": 1.0}],
     "compass.noise_deg": 2.0,
     "radio.latency_s": 0.075,
     "radio.loss": 0.1,
-    "radio.byte_error": 0.02,
-    "radio.fading_db": 6.0,
     "integrator.scheme": "runge_kutta2",
     "integrator.step_s": 0.01,
 }

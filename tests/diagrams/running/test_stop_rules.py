@@ -18,6 +18,7 @@ from diagrams import (
     make_simulator,
     simulate,
 )
+from diagrams.running import stop_rules
 from diagrams.running.stop_rules import FOUND, RobotRules, StopRules, judge_search
 from diagrams.scenario.bodies import robot_rectangle
 from diagrams.scenario.scenario import Scenario
@@ -173,13 +174,13 @@ def test_a_moving_source_that_is_followed():
     assert result.simulated_s == pytest.approx(3.0)
 
 
-def leaving(duration_s: float, **stop: float) -> RunResult:
+def leaving(duration_s: float) -> RunResult:
     """P waits; the source leaves the band, 2 m, after 2.05 s, at 0.1 m/s.
 
     20 mm at its speed, 0.05 s for its start at 1 m/s^2, 0.05 s for its motors' lag.
     """
     source = {"waypoints_m": [[1.98, 0.0], [9.0, 0.0]], "speed_m_s": 0.1}
-    return run(**WAITING, source=source, duration_s=duration_s, stop=stop)
+    return run(**WAITING, source=source, duration_s=duration_s)
 
 
 @pytest.mark.parametrize(
@@ -191,8 +192,9 @@ def leaving(duration_s: float, **stop: float) -> RunResult:
         (3.9, 0.55, "astray"),
     ],
 )
-def test_completed_needs_a_share_of_following(duration_s, share, cause):
-    assert leaving(duration_s, following_share=share).cause == cause
+def test_completed_needs_a_share_of_following(duration_s, share, cause, monkeypatch):
+    monkeypatch.setattr(stop_rules, "FOLLOWING_SHARE", share)
+    assert leaving(duration_s).cause == cause
 
 
 def test_a_moving_source_that_is_not_followed_and_gone_is_lost():

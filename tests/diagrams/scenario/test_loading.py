@@ -101,7 +101,6 @@ SEARCHING = {
     "contact_switches",
     "cross_power",
     "gas_sensors",
-    "heading_control",
     "motor_driver",
     "odor",
     "radio",

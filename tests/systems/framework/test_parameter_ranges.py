@@ -43,11 +43,6 @@ KINDS = {
 }
 #: Fields whose range is wider than their kind: bounds that may be without effect.
 WIDER = {
-    "HeadingControlParameters.integral_within_deg",
-    "HeadingControlParameters.largest_differential_deg",
-    "HeadingControlParameters.largest_error_deg",
-    "HeadingControlParameters.largest_integral_deg",
-    "HeadingControlParameters.turning_beyond_deg",
     "IdealHearingParameters.bearing_noise_deg",
     "TDOAParameters.maximum_bearing_std_deg",
 }

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from systems.odor import airflow_sensors
 from systems.odor.airflow_sensors import AirflowSensors
 from systems.odor.gas_sensor_array import GasSensorArray
 from systems.odor.odor_plume import PLUME_SIZE
@@ -19,7 +20,7 @@ from systems.odor.parameters import (
 )
 from systems.odor.wind import WindField
 
-QUIET = {"noise": 0.0, "mismatch": 0.0, "slope_mismatch": 0.0}
+QUIET = {"noise": 0.0, "mismatch": 0.0}
 
 
 def ratios(levels, compiled=False, **own):
@@ -84,32 +85,41 @@ def test_mismatch_and_noise_are_as_large_as_told():
     ]
     scales = np.concatenate([numbers.scales for numbers in drawn])
     assert np.std(scales) == pytest.approx(0.02, rel=0.1)
+    exponents = np.concatenate([numbers.exponents for numbers in drawn])
+    assert np.std(exponents / 0.7155) == pytest.approx(0.06, rel=0.1)
     rows = ratios([0.0] * 3000, noise=0.003)
     np.testing.assert_allclose(rows.std(axis=0), 0.003, rtol=0.1)
 
 
-def airflow(heading_deg, **own):
+@pytest.fixture
+def airflow(monkeypatch):
+    """Readings without noise."""
+    monkeypatch.setattr(airflow_sensors, "_NOISE_SHARE", 0.0)
+    return _airflow
+
+
+def _airflow(heading_deg, **own):
     wind = WindParameters(kind="uniform", speed_m_s=0.8)
     air = np.array(WindField(parameters=wind).step.state)
-    step = AirflowSensors(parameters=AirflowParameters(noise=0.0, **own)).step
+    step = AirflowSensors(parameters=AirflowParameters(**own)).step
     pose, outputs = np.array([0.0, 0.0, math.radians(heading_deg)]), [[0.0, 0.0]]
     step.step(0, [], [air, pose], outputs, step.numbers)
     return outputs[0]
 
 
-def test_the_wind_on_the_nose_is_felt_alike_on_both_sides():
+def test_the_wind_on_the_nose_is_felt_alike_on_both_sides(airflow):
     """It blows along x, so that upwind is 180 deg: k U cos 45."""
     assert airflow(180.0) == pytest.approx([2.4 * math.sqrt(0.5)] * 2)
 
 
-def test_the_windward_sensor_feels_more():
+def test_the_windward_sensor_feels_more(airflow):
     """Heading 150 deg: the wind comes from 30 deg to the left."""
     left, right = airflow(150.0)
     assert left == pytest.approx(2.4 * math.cos(math.radians(15.0)))
     assert right == pytest.approx(2.4 * math.cos(math.radians(75.0)))
 
 
-def test_a_crosswind_wire_feels_a_fifth_along_and_all_across():
+def test_a_crosswind_wire_feels_a_fifth_along_and_all_across(airflow):
     """Both below the threshold where it points upwind, as at point B of Song 2011."""
     assert airflow(180.0, lobe="crosswind") == pytest.approx([0.48, 0.48])
     assert airflow(90.0, lobe="crosswind") == pytest.approx([2.4, 0.0], abs=1e-9)

@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 
 from systems.framework.input_error import InputError
-from systems.odor.odor_plume import PUFFS_BEGIN, OdorPlume, concentration, release_rate
+from systems.odor.odor_plume import (
+    OWN_TIME_S,
+    PUFFS_BEGIN,
+    OdorPlume,
+    concentration,
+    release_rate,
+)
 from systems.odor.parameters import OdorParameters, WindParameters
 from systems.odor.steady_plume import steady_concentration
-from systems.odor.wind import WindField, wind_velocity
+from systems.odor.wind import MEANDER_TIME_S, WindField, wind_velocity
 
 WIND = WindParameters()
 INTENSITY = math.sqrt(0.12**2 + 0.12**2 + 0.1**2)
@@ -27,11 +33,9 @@ def carried(seconds, *, seed=1, own=None, wind=WIND, every=1.0, parts=1):
     puffs = OdorPlume(parameters=own, wind=wind, seed=seed + 1, tick_s=tick_s).step
     period = field.numbers.period // parts
     dt = period * tick_s
-    of_wind = field.numbers._replace(
-        period=period, keep=math.exp(-dt / wind.meander_time_s)
-    )
+    of_wind = field.numbers._replace(period=period, keep=math.exp(-dt / MEANDER_TIME_S))
     of_puffs = puffs.numbers._replace(
-        period=period, period_s=dt, own_keep=math.exp(-dt / own.own_time_s)
+        period=period, period_s=dt, own_keep=math.exp(-dt / OWN_TIME_S)
     )
     air, plume = np.array(field.state), np.array(puffs.state)
     rows = []
@@ -50,17 +54,14 @@ POINTS = [
 
 
 def means(rows):
-    return np.array(
-        [np.mean([concentration(r, *p, 0.0) for r in rows]) for p in POINTS]
-    )
+    return np.array([np.mean([concentration(r, *p) for r in rows]) for p in POINTS])
 
 
 def test_their_mean_over_fifty_minutes_is_equation_6():
-    own = OdorParameters()
+    rate = release_rate(OdorParameters().ratio_at_2_m)
     got = means(carried(3000.0, every=0.5))
     expected = [
-        steady_concentration(x, y, 0, 0, release_rate(own), 1.0, (0.197, 0.197, 0.13))
-        for x, y in POINTS
+        steady_concentration(x, y, rate, 1.0, (0.197, 0.197, 0.13)) for x, y in POINTS
     ]
     np.testing.assert_allclose(got, expected, rtol=0.15)
 
@@ -86,15 +87,24 @@ def test_the_same_seed_gives_the_same_bytes():
 def test_the_strength_is_what_a_sensor_reads_two_metres_downwind():
     own = OdorParameters(kind="steady", ratio_at_2_m=0.6)
     plume = np.array(OdorPlume(parameters=own, wind=WIND).step.state)
-    assert (1.0 + concentration(plume, 2.0, 0.0, 0.0)) ** -0.7155 == pytest.approx(0.6)
+    assert (1.0 + concentration(plume, 2.0, 0.0)) ** -0.7155 == pytest.approx(0.6)
 
 
 def test_a_closed_room_fills():
     """Q t / V, whatever the wind does."""
     own = OdorParameters(age_s=60.0, room_volume_m3=37.5)
+    rate = release_rate(own.ratio_at_2_m)
     plume = carried(30.0, own=own)[-1]
-    far = concentration(plume, -50.0, 0.0, 0.0)
-    assert far == pytest.approx(release_rate(own) * 89.1 / 37.5, rel=0.02)
+    far = concentration(plume, -50.0, 0.0)
+    assert far == pytest.approx(rate * 89.1 / 37.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["puffs", "steady"])
+def test_a_closed_room_is_as_full_at_the_start_as_its_age_says(kind):
+    own = OdorParameters(kind=kind, age_s=60.0, room_volume_m3=37.5)
+    plume = np.array(OdorPlume(parameters=own).step.state)
+    full = release_rate(own.ratio_at_2_m) * 60.0 / 37.5
+    assert concentration(plume, -50.0, 0.0) == pytest.approx(full, rel=1e-9)
 
 
 def test_without_wind_puffs_stay_and_spread():
@@ -133,24 +143,24 @@ def test_wind_and_plume_change_ten_times_a_second():
 
 
 def test_a_jet_widens_slows_and_blows_nothing_backwards():
-    wind = WindParameters(
-        kind="jet", meander_intensity=0.0, jet_origin_m=(0.0, 0.0), jet_diameter_m=0.3
-    )
+    """Its outlet is at -2.2 m."""
+    wind = WindParameters(kind="jet", meander_intensity=0.0, jet_diameter_m=0.3)
     air = np.array(WindField(parameters=wind).step.state)
-    assert wind_velocity(air, -0.1, 0.0) == (0.0, 0.0)
-    assert wind_velocity(air, 1.0, 0.0)[0] == pytest.approx(1.0)
-    assert wind_velocity(air, 3.6, 0.0)[0] == pytest.approx(0.5)
+    assert wind_velocity(air, -2.3, 0.0) == (0.0, 0.0)
+    assert wind_velocity(air, -1.2, 0.0)[0] == pytest.approx(1.0)
+    assert wind_velocity(air, 1.4, 0.0)[0] == pytest.approx(0.5)
     half_width = 0.15 + 0.1 * 3.6
-    assert wind_velocity(air, 3.6, half_width)[0] == pytest.approx(0.5 * math.exp(-0.5))
+    assert wind_velocity(air, 1.4, half_width)[0] == pytest.approx(0.5 * math.exp(-0.5))
 
 
-def test_a_puff_spreads_by_the_way_that_it_has_gone():
-    """In a wind without gusts, and without velocities of their own: exactly."""
-    own = OdorParameters(own_intensity=0.0, level_growth=0.2, upright_growth=0.1)
-    plume = carried(1.0, own=own, wind=WindParameters(kind="uniform"))[-1]
+def test_a_puff_spreads_by_the_way_that_the_wind_has_gone():
+    """In a wind without gusts: exactly, whatever velocity the puff has of its own."""
+    plume = carried(1.0, wind=WindParameters(kind="uniform"))[-1]
     puffs = plume[PUFFS_BEGIN:].reshape(-1, 7)[: int(plume[2])]
-    np.testing.assert_allclose(puffs[:, 1], 0.0, atol=1e-12)
-    np.testing.assert_allclose(puffs[:, 4], 0.2 * puffs[:, 0], rtol=1e-9)
-    np.testing.assert_allclose(puffs[:, 5], 0.1 * puffs[:, 0], rtol=1e-9)
+    puffs = puffs[puffs[:, 4] < 0.12 * 4.0]  # farther ones leave one by one
     # 16 a second at 1 m/s: one every 62.5 mm.
-    np.testing.assert_allclose(np.diff(puffs[:, 0]), -0.0625, rtol=1e-9)
+    np.testing.assert_allclose(np.diff(puffs[:, 4]), -0.12 * 0.0625, rtol=1e-9)
+    np.testing.assert_allclose(puffs[:, 5] / 0.13, puffs[:, 4] / 0.12, rtol=1e-9)
+    way = puffs[:, 4] / 0.12
+    assert np.abs(puffs[:, 0] - way).max() < 4.0 * 0.1 * way.max()
+    assert np.std((puffs[:, 0] - way) / way) == pytest.approx(0.1, abs=0.05)

@@ -12,43 +12,49 @@ from scipy.special import erfcx, ndtr
 
 from systems.odor.steady_plume import (
     scaled_erfc,
-    sharan_concentration,
     steady_concentration,
 )
 
 DRAWS = 300
 
 
-def by_quadrature(x, y, z, height, rate, speed, spreads):
-    """Song 2011, eq. 1, over s = 1 / t, in parts about the peak."""
+def by_quadrature(x, y, rate, speed, spreads):
+    """Song 2011, eq. 1 on the floor, over s = 1 / t, in parts about the peak."""
     a, b, c = spreads
-    total = 0.0
-    for lift in (z - height, z + height):
-        far = (x / a) ** 2 + (y / b) ** 2 + (lift / c) ** 2
-        peak = speed * x / a**2 / far
-        width = 1.0 / math.sqrt(far)
+    far = (x / a) ** 2 + (y / b) ** 2
+    peak = speed * x / a**2 / far
+    width = 1.0 / math.sqrt(far)
 
-        def density(s, lift=lift):
-            cut = ((x * s - speed) / a) ** 2 + (y * s / b) ** 2 + (lift * s / c) ** 2
-            return s * math.exp(-0.5 * cut)
+    def density(s):
+        cut = ((x * s - speed) / a) ** 2 + (y * s / b) ** 2
+        return s * math.exp(-0.5 * cut)
 
-        top = max(peak, 0.0) + 40.0 * width
-        points = [p for p in (peak - 6 * width, peak, peak + 6 * width) if 0 < p < top]
-        total += quad(density, 0.0, top, points=points, limit=400, epsabs=0)[0]
-    return rate / ((2 * math.pi) ** 1.5 * a * b * c) * total
+    top = max(peak, 0.0) + 40.0 * width
+    points = [p for p in (peak - 6 * width, peak, peak + 6 * width) if 0 < p < top]
+    total = quad(density, 0.0, top, points=points, limit=400, epsabs=0)[0]
+    return 2.0 * rate / ((2 * math.pi) ** 1.5 * a * b * c) * total
+
+
+def sharan_concentration(x, y, rate, speed, intensities):
+    """On the floor, with diffusivities that grow downwind (Sharan 1996).
+
+    ``intensities``: sigma^2 / x^2 along the wind, across it, and upright.
+    """
+    alpha, beta, gamma = intensities
+    factor = rate / (math.pi * speed * math.sqrt(beta * gamma) * x * x)
+    off = y * y / beta / (x * x)
+    return factor * (1.0 + alpha * off) ** (-1.0 - 0.5 / alpha)
 
 
 def test_the_closed_form_is_the_integral():
-    """Upwind, off the floor, for raised sources and unequal spreads too."""
+    """Upwind, and for unequal spreads too."""
     generator = np.random.default_rng(3)
     for _ in range(DRAWS):
         x, y = generator.uniform(-2.0, 3.0), generator.uniform(-1.5, 1.5)
-        z, height = generator.uniform(0.0, 1.0, 2)
         speed = generator.uniform(0.3, 2.0)
         spreads = tuple(speed * generator.uniform(0.15, 0.6, 3))
-        place = x, y, z, height
-        expected = by_quadrature(*place, 2.0, speed, spreads)
-        got = steady_concentration(*place, 2.0, speed, spreads)
+        expected = by_quadrature(x, y, 2.0, speed, spreads)
+        got = steady_concentration(x, y, 2.0, speed, spreads)
         assert got == pytest.approx(expected, rel=1e-10, abs=1e-300)
 
 
@@ -59,18 +65,18 @@ def test_on_the_floor_it_is_equation_6():
         bracket = 1 + math.sqrt(2 * math.pi) * s * math.exp(s * s / 2) * ndtr(s)
         expected = 2 * math.exp(-u * u / (2 * g1 * g1)) / g2 / r2 * bracket
         expected /= (2 * math.pi) ** 1.5
-        got = steady_concentration(x, y, 0.0, 0.0, 1.0, u, (g1, g1, g2))
+        got = steady_concentration(x, y, 1.0, u, (g1, g1, g2))
         assert got == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_strong_wind_overflows_nothing():
     """u / gamma_1 = 100, where exp(s^2 / 2) is 10^2171: a Gaussian plume."""
     u, g = 1.0, 0.01
-    got = steady_concentration(1.0, 0.005, 0.0, 0.0, 1.0, u, (g, g, g))
+    got = steady_concentration(1.0, 0.005, 1.0, u, (g, g, g))
     sigma = g * 1.0 / u
     expected = math.exp(-0.5 * (0.005 / sigma) ** 2) / (math.pi * u * sigma * sigma)
     assert got == pytest.approx(expected, rel=2e-3)
-    assert steady_concentration(-1.0, 0.0, 0.0, 0.0, 1.0, u, (g, g, g)) == 0.0
+    assert steady_concentration(-1.0, 0.0, 1.0, u, (g, g, g)) == 0.0
 
 
 @pytest.mark.parametrize("strength", [1.5, 2.0, 4.0, 8.0])
@@ -83,7 +89,7 @@ def test_what_passes_is_what_is_released(strength):
     u, h = strength * a, 1e-4
 
     def at(off, speed):  # equal on ellipses of y / b and z / c
-        return steady_concentration(x, off * b, 0.0, 0.0, rate, speed, (a, b, c))
+        return steady_concentration(x, off * b, rate, speed, (a, b, c))
 
     def ring(off):  # its half above the floor
         slope = (at(off, u + h) - at(off, u - h)) / (2.0 * h)
@@ -102,8 +108,8 @@ def test_sharan_is_near_it_within_two_sigma():
     for x in (0.5, 1.0, 2.0):
         for off in (0.0, 1.0, 2.0):
             y = off * i * x
-            first = steady_concentration(x, y, 0.0, 0.0, 1.0, 1.0, (i, i, gamma))
-            second = sharan_concentration(x, y, 0.0, 1.0, 1.0, (i * i, i * i, gamma**2))
+            first = steady_concentration(x, y, 1.0, 1.0, (i, i, gamma))
+            second = sharan_concentration(x, y, 1.0, 1.0, (i * i, i * i, gamma**2))
             assert second == pytest.approx(first, rel=0.08)
 
 
@@ -112,7 +118,7 @@ def test_sharan_carries_all_of_it():
 
     def ring(off):
         c = sharan_concentration(
-            x, off * math.sqrt(beta) * x, 0.0, 1.0, u, (alpha, beta, gamma)
+            x, off * math.sqrt(beta) * x, 1.0, u, (alpha, beta, gamma)
         )
         # Half an ellipse above the floor, of equal off.
         return u * c * math.pi * off * math.sqrt(beta * gamma) * x * x

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from systems.radio.stream import StreamParser
+from systems.search import plume_search
 from systems.search.parameters import PlumeSearchParameters
 from systems.search.plume_search import PlumeSearch
 from systems.search.search_ending import (
@@ -20,8 +20,15 @@ from systems.search.search_ending import (
     UNDECIDED,
     fault_names,
 )
+from tests.systems.radio.frames import Frame, decode
 
-OWN = {"wait_s": 0.5, "sense_s": 0.25, "move_s": 0.5, "rules": "upwind_gradient"}
+OWN = {"wait_s": 0.5, "rules": "upwind_gradient"}
+
+
+@pytest.fixture(autouse=True)
+def _short_steps(monkeypatch):
+    monkeypatch.setattr(plume_search, "SENSE_S", 0.25)
+    monkeypatch.setattr(plume_search, "MOVE_S", 0.5)
 
 
 class Run:
@@ -30,8 +37,8 @@ class Run:
     def __init__(self, **own: Any) -> None:
         block = PlumeSearch(parameters=PlumeSearchParameters(**{**OWN, **own}))
         self.step, self.state, self.tick = block.step, np.array(block.step.state), 0
-        self.noise, self.parser = np.random.default_rng(1), StreamParser()
-        self.frames: list[Any] = []
+        self.noise = np.random.default_rng(1)
+        self.frames: list[Frame] = []
         self.log: list[list[float]] = []
 
     def go(
@@ -49,7 +56,7 @@ class Run:
             self.step.publish(self.state, outputs, numbers)
             self.log.append([outputs[0][0], outputs[1][0], outputs[2][0], *outputs[3]])
             sent = outputs[4]
-            self.frames += self.parser.feed(map(int, sent[1 : 1 + 9 * int(sent[0])]))
+            self.frames += decode(sent[1 : 1 + 9 * int(sent[0])])
             self.tick += 1
         return self
 

@@ -6,7 +6,6 @@ import math
 
 import pytest
 
-from systems.search.parameters import SongRuleParameters, UpwindGradientParameters
 from systems.search.search_ending import NO_WIND, UNDECIDED
 from systems.search.song_rules import song2011_turn
 from systems.search.upwind_gradient import (
@@ -18,9 +17,9 @@ from systems.search.upwind_gradient import (
 IN_PLUME = [1.0, 0.0, 0.0, 0.0]
 
 
-def song(gas, airflow, memory=None, **own):
+def song(gas, airflow, memory=None):
     memory = [*IN_PLUME] if memory is None else memory
-    turn, phase, _ = song2011_turn(gas, airflow, memory, SongRuleParameters(**own))
+    turn, phase, _ = song2011_turn(gas, airflow, memory)
     return turn, phase
 
 
@@ -45,7 +44,7 @@ def test_phases_turn_to_the_other_side_alike():
 
 def test_the_rear_sensor_turns_it_back():
     assert song((0.9, 0.8, 0.95), (0.5, 0.5)) == (180.0, 3)
-    assert song((0.9, 0.8, 0.95), (0.5, 0.5), reverse_threshold=0.75) == (0.0, 3)
+    assert song((0.95, 0.91, 0.95), (0.5, 0.5)) == (0.0, 3)
 
 
 def test_out_of_the_plume_it_goes_to_the_strongest_sensor_until_it_is_in():
@@ -65,14 +64,14 @@ def test_two_cosine_sensors_tell_upwind_exactly(psi_deg):
     assert upwind_angle((left, right)) == pytest.approx(-psi_deg, abs=1e-9)
 
 
-def ours(gas, airflow=(2.0, 2.0), memory=None, **own):
+def ours(gas, airflow=(2.0, 2.0), memory=None):
     memory = [0.0] * RULE_MEMORY if memory is None else memory
-    return upwind_gradient_turn(gas, airflow, memory, UpwindGradientParameters(**own))
+    return upwind_gradient_turn(gas, airflow, memory)
 
 
 def test_it_leans_by_the_logarithm_of_the_ratios():
     """R1, right front, smells more: clockwise."""
-    turn, phase, ended = ours((0.5, 0.6, 0.6), gain_deg=20.0)
+    turn, phase, ended = ours((0.5, 0.6, 0.6))
     assert turn == pytest.approx(20.0 * math.log(0.6 / 0.5))
     assert (phase, ended) == (1, UNDECIDED)
     assert ours((0.01, 0.6, 0.9))[0] == pytest.approx(45.0)
@@ -81,7 +80,7 @@ def test_it_leans_by_the_logarithm_of_the_ratios():
 def test_lost_it_casts_to_both_sides_a_step_farther_each_time():
     memory = [0.0] * RULE_MEMORY
     ours((0.5, 0.5, 0.6), memory=memory)
-    turns = [ours((0.9, 0.9, 0.9), memory=memory, cast_deg=110.0)[0] for _ in range(6)]
+    turns = [ours((0.9, 0.9, 0.9), memory=memory)[0] for _ in range(6)]
     assert turns == [110.0, -110.0, -110.0, 110.0, 110.0, 110.0]
     assert ours((0.7, 0.7, 0.7), memory=memory)[1] == 1
     assert ours((0.9, 0.9, 0.9), memory=memory)[1] == 2

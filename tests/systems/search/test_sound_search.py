@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from systems.radio.codec import Frame, encode_frame
 from systems.radio.radio_channel import AIR_SIZE
 from systems.radio.radio_range import radio_level
-from systems.radio.stream import StreamParser
+from systems.search import sound_search
 from systems.search.parameters import SoundSearchParameters
 from systems.search.search_ending import (
     AMBIGUOUS,
@@ -25,9 +24,16 @@ from systems.search.search_ending import (
     fault_names,
 )
 from systems.search.sound_search import SoundSearch
+from tests.systems.radio.frames import Frame, decode, encode
 
-OWN = {"noise_s": 0.1, "listen_s": 0.2, "compute_s": 0.3, "move_s": 0.5}
+OWN = {"noise_s": 0.1, "listen_s": 0.2}
 CALL, LOST = Frame(1, 12, 1.0), Frame(1, 12, 0.0)
+
+
+@pytest.fixture(autouse=True)
+def _short_steps(monkeypatch):
+    monkeypatch.setattr(sound_search, "COMPUTE_S", 0.3)
+    monkeypatch.setattr(sound_search, "MOVE_S", 0.5)
 
 
 class Run:
@@ -37,7 +43,6 @@ class Run:
         block = SoundSearch(parameters=SoundSearchParameters(**{**OWN, **own}))
         self.step, self.state, self.tick = block.step, np.array(block.step.state), 0
         self.frames: list[Frame] = []
-        self.parser = StreamParser()
         self.log: list[list[float]] = []
 
     def go(
@@ -53,10 +58,10 @@ class Run:
         sent=(),
     ):
         for _ in range(ticks):
-            data = b"".join(map(encode_frame, sent))
-            air = [float(len(data)), *map(float, data)]
+            data = encode(*sent)
+            air = [float(len(data)), *data]
             air += [0.0] * (AIR_SIZE - len(air))
-            level = radio_level(away, -42.4, 2.5)
+            level = radio_level(away)
             heard = (
                 bearing,
                 distance,
@@ -75,7 +80,7 @@ class Run:
             self.step.publish(self.state, outputs, numbers)
             self.log.append([outputs[0][0], outputs[1][0], outputs[2][0], *outputs[3]])
             out = outputs[4]
-            self.frames += self.parser.feed(map(int, out[1 : 1 + 9 * int(out[0])]))
+            self.frames += decode(out[1 : 1 + 9 * int(out[0])])
             self.tick += 1
             sent = ()
         return self
@@ -138,24 +143,26 @@ def test_it_arrives_by_radio_alone_as_printed():
     assert called(**own).go(25, away=0.18).ended == FOUND
 
 
-def test_the_last_step_is_shorter():
+def test_the_last_step_is_shorter(monkeypatch):
     """0.8 m heard, 0.48 m wanted: 0.32 m at 0.14 m/s take 2.4 s, not 3."""
-    long = called(move_s=3.0).go(200, bearing=0.0)
-    short = called(move_s=3.0).go(200, bearing=0.0, distance=0.8, away=0.9)
+    monkeypatch.setattr(sound_search, "MOVE_S", 3.0)
+    long = called().go(200, bearing=0.0)
+    short = called().go(200, bearing=0.0, distance=0.8, away=0.9)
     moves = [_first_move([row[1] for row in run.log]) for run in (long, short)]
     assert moves[0] == pytest.approx(120, abs=1)
     assert moves[1] == pytest.approx(40 * ((0.8 - 0.93 * 0.52) / 0.14 + 0.1), abs=2)
 
 
 def test_the_second_holds_until_the_first_has_reported():
-    run = called(waits_for=2, hold_within_m=1.2).go(60, away=1.0)
+    run = called(waits_for=2).go(60, away=1.0)
     assert run.phase == 2
     assert run.go(100, away=1.0).phase == 2
     assert run.go(2, away=1.0, sent=(Frame(2, 16, 1.0),)).phase == 3
 
 
-def test_it_holds_for_so_long_at_most():
-    run = called(waits_for=2, hold_s=1.0).go(60, away=1.0)
+def test_it_holds_for_so_long_at_most(monkeypatch):
+    monkeypatch.setattr(sound_search, "HOLD_S", 1.0)
+    run = called(waits_for=2).go(60, away=1.0)
     assert run.phase == 2
     assert run.go(42, away=1.0).phase != 2
 
@@ -169,7 +176,7 @@ def test_it_holds_for_so_long_at_most():
     ],
 )
 def test_after_some_tries_it_gives_up_by_name(heard, ended):
-    run = called(tries=2).go(25, **heard)
+    run = called().go(45, **heard)
     assert run.ended == UNDECIDED
     assert run.go(40, **heard).ended == ended
     assert all(row[1] == 0.0 for row in run.log)
@@ -182,8 +189,9 @@ def test_one_lost_microphone_is_named_and_it_goes_on():
     assert run.log[-1][1] == 1.0
 
 
-def test_no_call_and_a_lost_caller_end_it():
-    assert Run(call_within_s=1.0).go(60).ended == NOT_CALLED
+def test_no_call_and_a_lost_caller_end_it(monkeypatch):
+    monkeypatch.setattr(sound_search, "CALL_WITHIN_S", 1.0)
+    assert Run().go(60).ended == NOT_CALLED
     assert Run().go(10).go(3, sent=(LOST,)).ended == CALLER_LOST
 
 
