@@ -17,7 +17,7 @@ from systems.laws.trajectory.trajectory_impedance import (
     state_matrices,
     step_is_blocked,
 )
-from systems.routes.grid_search import find_cells
+from systems.routes.grid_search import search_cells
 
 #: K = K_e = 3 N/m, D = D_e = 4 N s/m, M = 1 kg, as in the paper's tables.
 K, D = 3.0, 4.0
@@ -179,6 +179,6 @@ def test_engelbrecht_sec_1_a_star_is_up_to_8_percent_long():
     size = 200
     blocked = np.zeros((size, size), dtype=np.bool_)
     end = (199, round(199 * math.tan(math.radians(22.5))))
-    cells = np.array(find_cells(blocked, (0, 0), end))
+    cells = search_cells(blocked, (0, 0), end)
     steps = np.hypot(*np.diff(cells, axis=0).T).sum()
     assert steps / math.hypot(*end) == pytest.approx(1.0824, abs=1e-3)

@@ -128,10 +128,10 @@ def test_the_same_seed_gives_the_same_bytes():
             r"^route.goal_m: \(3, 0.1\) lies in a known obstacle",
         ),
         (
-            ["obstacles.0.known=true", "route.arena_margin_m=0.2"],
+            ["obstacles.0={name: u, size_m: [0.1, 20], waypoints_m: [[3, 0]]}"],
             "^route.goal_m: no route leads",
         ),
-        (["route.cell_m=0.5"], "^route.cell_m"),
+        (["route.clearance_m=0.1"], "^route.clearance_m"),
         (
             ["route.goal_m=[60, 0]"],
             "^route.goal_m: .* beyond stop.diverged_range_m, 20",
@@ -152,7 +152,7 @@ def test_what_cannot_be_is_refused(fields, message):
             "0.141 m from another robot's goal",
         ),
         (["robots.second.start.position_m=[-3.0, 0.1]"], "overlaps robot 'first'"),
-        (["robots.second.route.cell_m=0.5"], "^robots.second.route.cell_m"),
+        (["robots.second.route.clearance_m=0"], "^robots.second.route.clearance_m"),
     ],
 )
 def test_nor_what_two_robots_cannot(fields, message):
