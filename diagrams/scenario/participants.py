@@ -31,7 +31,6 @@ from systems.planning.parameters import FollowingParameters
 from systems.ranging.parameters import (
     CollisionVectorParameters,
     ContactParameters,
-    ObjectDetectorParameters,
     ObjectSensorParameters,
     UltrasonicParameters,
 )
@@ -90,7 +89,6 @@ class FollowerParameters(Parameters):
     """Goal and planner of a robot that drives on a planned route; null: the robot does
     not drive on a route."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
-    detector: ObjectDetectorParameters = ObjectDetectorParameters()
     guard: GuardParameters | None = None
     """The guard works with any law and keeps the robot in space that its sensors have
     seen as free; null: no guard, unless the law is ``guarded``."""

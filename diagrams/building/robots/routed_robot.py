@@ -134,12 +134,7 @@ def _seen_objects(
             seed=seed_of("ultrasonic_array"),
             tick_s=tick_s,
         ),
-        ObjectDetector(
-            parameters=scenario.detector,
-            sensors=scenario.ultrasonic,
-            robot=robot,
-            tick_s=tick_s,
-        ),
+        ObjectDetector(sensors=scenario.ultrasonic, robot=robot, tick_s=tick_s),
     ]
 
 

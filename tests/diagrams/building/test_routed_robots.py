@@ -33,6 +33,18 @@ def test_both_engines_do_the_same(name, law, fields):
         np.testing.assert_allclose(compiled.columns[column], values, atol=1e-9)
 
 
+#: Four walls around the goal.
+WALLED_IN = [
+    {"name": f"wall {k}", "waypoints_m": [place], "size_m": size}
+    for k, (place, size) in enumerate(
+        [
+            ([5.0, 0.0], [0.1, 2.1]),
+            ([7.0, 0.0], [0.1, 2.1]),
+            ([6.0, 1.0], [2.1, 0.1]),
+            ([6.0, -1.0], [2.1, 0.1]),
+        ]
+    )
+]
 HEAD_ON = "obstacles.0.waypoints_m=[[3.0, 0.0]]", "route.replan=false", "duration_s=45"
 
 
@@ -128,7 +140,7 @@ def test_the_same_seed_gives_the_same_bytes():
             r"^route.goal_m: \(3, 0.1\) lies in a known obstacle",
         ),
         (
-            ["obstacles.0={name: u, size_m: [0.1, 20], waypoints_m: [[3, 0]]}"],
+            [f"obstacles={WALLED_IN}"],
             "^route.goal_m: no route leads",
         ),
         (["route.clearance_m=0.1"], "^route.clearance_m"),

@@ -203,7 +203,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "ultrasonic.noise_m": 0.01,
             "ultrasonic.dropout_probability": 0.05,
             "ultrasonic.faults": [{"sensor": 3, "kind": "frozen", "start_s": 3.0}],
-            "detector.noise_m": 0.06,
         },
     ),
     "searching": (

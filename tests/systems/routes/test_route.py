@@ -185,7 +185,5 @@ def test_what_cannot_be_planned_is_refused(start, goal, boxes, message):
 
 
 def test_a_grid_that_is_too_large_is_refused():
-    with pytest.raises(
-        InputError, match="goal_m: .* 64 m x 64 m, .* more than 1000000"
-    ):
+    with pytest.raises(InputError, match=r"goal_m: .* 64 m x 64 m, .* than 1000000"):
         plan_route((0, 0), (60, 60), [])
