@@ -17,10 +17,9 @@ from systems import (
     TrajectoryImpedanceController,
     UltrasonicArray,
 )
-from systems.laws.trajectory.parameters import (
-    AdaptiveTrajectoryParameters,
-    FilteredTrajectoryParameters,
-)
+from systems.laws.trajectory.reference_model import nominal_poles
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
+from systems.laws.trajectory.trajectory_filtered import FilteredTrajectoryParameters
 
 
 def _gains(scenario: Scenario) -> Any:
@@ -30,8 +29,7 @@ def _gains(scenario: Scenario) -> Any:
 def _adapting(scenario: Scenario) -> AdaptiveTrajectoryParameters | None:
     """Parameters of the law if it adapts its gains; otherwise None."""
     own = _gains(scenario)
-    adaptive = isinstance(own, AdaptiveTrajectoryParameters)
-    return own if adaptive and own.adaptation.rule != "none" else None
+    return own if isinstance(own, AdaptiveTrajectoryParameters) else None
 
 
 def make_trajectory_controller(scenario: Scenario) -> Any:
@@ -61,12 +59,12 @@ def trajectory_command(scenario: Scenario) -> Any | None:
         The block; None if the law has no safety filter.
     """
     own = _gains(scenario)
-    filtered = AdaptiveTrajectoryParameters, FilteredTrajectoryParameters
-    if not isinstance(own, filtered) or own.safety_filter is None:
+    filters = isinstance(own, FilteredTrajectoryParameters)
+    if isinstance(own, AdaptiveTrajectoryParameters):
+        filters = own.safety_filter
+    if not filters:
         return None
-    return SafetyFilter(
-        parameters=own.safety_filter, robot=scenario.robot, tick_s=scenario.tick_s
-    )
+    return SafetyFilter(robot=scenario.robot, tick_s=scenario.tick_s)
 
 
 def routed_blocks(
@@ -143,12 +141,10 @@ def _adaptation(scenario: Scenario) -> list[Any]:
     if own is None:
         return []
     robot, tick_s = scenario.robot, scenario.tick_s
-    frequency, ratio = own.reference.poles(
+    frequency, ratio = nominal_poles(
         robot.mass_kg, own.stiffness_n_m, own.damping_n_s_m
     )
     return [
         ReferenceModel(frequency=frequency, ratio=ratio, tick_s=tick_s),
-        ImpedanceAdaptation(
-            parameters=own.adaptation, impedance=own, robot=robot, tick_s=tick_s
-        ),
+        ImpedanceAdaptation(parameters=own, robot=robot, tick_s=tick_s),
     ]

@@ -38,7 +38,7 @@ def check_goals(robots: Mapping[str, FollowerParameters], farthest_m: float) -> 
         if robot.guard is not None:
             raise InputError(
                 f"{prefix}guard",
-                "is set, but only the safety_filter of its law keeps a robot on "
+                "is set, but only the safety filter of its law keeps a robot on "
                 "a route off obstacles; leave guard out",
             )
     for (_, first), (prefix, second) in combinations(routed.items(), 2):

@@ -148,7 +148,7 @@ def test_the_same_seed_gives_the_same_bytes():
             ["route.goal_m=[60, 0]"],
             "^route.goal_m: .* beyond stop.diverged_range_m, 20",
         ),
-        (["guard={}"], "^guard: is set, but only the safety_filter"),
+        (["guard={}"], "^guard: is set, but only the safety filter"),
     ],
 )
 def test_what_cannot_be_is_refused(fields, message):
