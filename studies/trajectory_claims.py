@@ -37,23 +37,28 @@ def _gradient(
     penalty: float, contact_rate: float = 0.0, *, boxes: bool = True
 ) -> dict[str, Any]:
     """The gradient with the safety term of eq. 27; its d_sec is S of table 1."""
-    adaptation = {
-        "rule": "sensitivity",
-        "penalty": penalty,
-        "penalty_distance_m": 1.0,
-        "contact_rate": contact_rate,
-        "projected": boxes,
-    }
-    return _gains(_ADAPTIVE, damping_fades=True, adaptation=adaptation)
+    return _gains(
+        _ADAPTIVE,
+        rule="sensitivity",
+        penalty=penalty,
+        contact_rate=contact_rate,
+        projected=boxes,
+    )
+
+
+def _changed(block: str, **fields: Any) -> dict[str, Any]:
+    """The conventional law, whose block ``printed_impedance`` replaces."""
+    blocks = [f"studies.support.printed_impedance:{block}"]
+    return {**_gains(_CONVENTIONAL, **fields), "blocks": blocks}
 
 
 #: Settings by what the tables call them. Each that adapts names lambda, the weight of
 #: the safety term.
 VARIANTS: Mapping[str, Mapping[str, Any]] = {
-    "signs of eq. 10": _gains(_CONVENTIONAL, reading="printed_state"),
-    "signs of eq. 4, 5": _gains(_CONVENTIONAL, reading="printed_force"),
+    "signs of eq. 10": _changed("SignsOfEq10"),
+    "signs of eq. 4, 5": _changed("SignsOfEq4And5"),
     "conventional": {"law": _CONVENTIONAL},
-    "conventional, damping fades": _gains(_CONVENTIONAL, damping_fades=True),
+    "conventional, damping fades": _changed("FadingDamping"),
     r"eq. 40 to 42, $\lambda$ = 0": {"law": _ADAPTIVE},
     r"gradient, $\lambda$ = 0, no boxes": _gradient(0.0, boxes=False),
     r"gradient, $\lambda$ = 0": _gradient(0.0),
@@ -68,9 +73,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     r"gradient, $\lambda$ = 10, $K_e$ adapts, no boxes": _gradient(
         10.0, 10.0, boxes=False
     ),
-    "conventional, $K_e$ = 12": _gains(
-        _CONVENTIONAL, damping_fades=True, contact_stiffness_n_m=12.0
-    ),
+    "conventional, $K_e$ = 12": _changed("FadingDamping", contact_stiffness_n_m=12.0),
     "filtered": {"law": "trajectory_filtered"},
 }
 #: Pairs of them that are compared layout by layout.

@@ -33,7 +33,7 @@ FAMILIES = (
     "one_moving_obstacle",
     "two_moving_obstacles",
 )
-#: Fields of ``repulsion.<law>``, or of another part of the scenario where they have a
+#: Fields of ``laws.<law>``, or of another part of the scenario where they have a
 #: dot, and between what they are looked for, by ratio.
 RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "stop_when_near": {"stop_m": (0.15, 1.2)},

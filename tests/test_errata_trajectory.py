@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from systems.laws.trajectory.impedance_sensitivity import penalty_gradient
-from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 from systems.laws.trajectory.trajectory_impedance import (
     Contact,
     contact_force,
@@ -17,27 +19,20 @@ from systems.laws.trajectory.trajectory_impedance import (
     state_matrices,
     step_is_blocked,
 )
-from systems.routes.grid_search import find_cells
+from systems.routes.grid_search import search_cells
 
 #: K = K_e = 3 N/m, D = D_e = 4 N s/m, M = 1 kg, as in the paper's tables.
 K, D = 3.0, 4.0
-LAW = TrajectoryImpedanceParameters(
-    stiffness_n_m=K,
-    damping_n_s_m=D,
-    contact_stiffness_n_m=K,
-    contact_damping_n_s_m=D,
-    security_zone_m=1.0,
-    damping_fades=False,
-)
+NUMBERS = contact_numbers(TrajectoryImpedanceParameters())
 
 
-def force(distance, speed=0.0, **changes):
+def force(distance, speed=0.0, *, damping=D, **changes):
     """On P along x, away from an object ahead of it at rest."""
-    numbers = contact_numbers(LAW.model_copy(update=changes))
     objects = np.zeros(64)
     objects[:6] = 1.0, distance, 0.0, 0.0, 0.0, 1.0
+    numbers = NUMBERS._replace(**changes)
     contacts = contacts_of_objects(objects, (speed, 0.0), numbers)
-    return -contact_force(contacts, K, D, numbers)[0]
+    return -contact_force(contacts, K, damping)[0]
 
 
 def poles(contacts):
@@ -48,7 +43,7 @@ def poles(contacts):
 def test_engelbrecht_eq_4_and_5_drive_what_they_should_damp():
     """+D (v - v_j): the push falls as P comes nearer, and the motion feeds itself."""
     assert force(0.5, 0.2) == pytest.approx(K * 0.5 + D * 0.2)
-    assert force(0.5, 0.2, reading="printed_force") == pytest.approx(K * 0.5 - D * 0.2)
+    assert force(0.5, 0.2, damping=-D) == pytest.approx(K * 0.5 - D * 0.2)
     one, two = poles([(K, -D)]), poles([(K, -D)] * 2)
     np.testing.assert_allclose(one, [-2.449j, 2.449j], atol=1e-3)
     np.testing.assert_allclose(two, [2.0 - 2.236j, 2.0 + 2.236j], atol=1e-3)
@@ -56,7 +51,8 @@ def test_engelbrecht_eq_4_and_5_drive_what_they_should_damp():
 
 
 def test_engelbrecht_eq_10_pulls_to_the_obstacle():
-    assert force(0.5, reading="printed_state") == pytest.approx(-K * 0.5)
+    """The spring of eq. 10 has no force on the obstacle, x_e = q."""
+    assert force(0.5, rest_m=0.0) == pytest.approx(-K * 0.5)
     assert force(0.5) == pytest.approx(K * 0.5)
 
 
@@ -83,9 +79,8 @@ def test_engelbrecht_eq_13_adds_a_velocity_to_a_place():
 
 def test_engelbrecht_zone_of_the_text_makes_the_force_jump():
     """R - d on d < S: 3 N at 1 m from one side, nothing from the other."""
-    jump = {"zone": "jump", "horizon_m": 2.0}
-    assert force(0.9999, **jump) == pytest.approx(3.0, abs=1e-3)
-    assert force(1.0001, **jump) == 0.0
+    assert force(0.9999, rest_m=2.0) == pytest.approx(3.0, abs=1e-3)
+    assert force(1.0001, rest_m=2.0) == 0.0
     assert force(0.9999) == pytest.approx(0.0, abs=1e-3)
 
 
@@ -179,6 +174,6 @@ def test_engelbrecht_sec_1_a_star_is_up_to_8_percent_long():
     size = 200
     blocked = np.zeros((size, size), dtype=np.bool_)
     end = (199, round(199 * math.tan(math.radians(22.5))))
-    cells = np.array(find_cells(blocked, (0, 0), end))
+    cells = search_cells(blocked, (0, 0), end)
     steps = np.hypot(*np.diff(cells, axis=0).T).sum()
     assert steps / math.hypot(*end) == pytest.approx(1.0824, abs=1e-3)

@@ -172,7 +172,6 @@ _ROUTES = [
         contact_stiffness="stiffness between robot and obstacles, K_e",
     ),
     *_of("N s/m", damping="damping between robot and target, D"),
-    *_of("0 or 1", adaptation_active="whether gains are being adapted"),
     *_of(
         "m/s",
         filter_slack="speed by which the filter relaxes its limit near moving objects",

@@ -239,7 +239,6 @@ def _adaptation_document(data: AdaptationStability) -> dict[str, Any]:
             "reference_damping_ratio": data.reference[1],
             "reference_poles": data.reference_poles,
             "reference_poles_z": data.held_poles,
-            "matched": data.matched,
             "lyapunov": run
             and {
                 "falls": run.falls,
@@ -251,7 +250,7 @@ def _adaptation_document(data: AdaptationStability) -> dict[str, Any]:
             "drift": {
                 name: getattr(data.drift, name)
                 for name in (
-                    "push_n", "time_s", "gradient_n_m", "simulated_n_m", "cured_n_m"
+                    "push_n", "time_s", "gradient_n_m", "simulated_n_m", "limited_n_m"
                 )
             },
             "jam": data.jam,
@@ -262,7 +261,6 @@ def _adaptation_document(data: AdaptationStability) -> dict[str, Any]:
             },
             "margin": data.margin,
             "bounded": data.bounded,
-            "cures": {cure.field: cure.active for cure in data.cures},
         }
     }  # fmt: skip
 
@@ -276,17 +274,13 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
             f"{', '.join(number(_plain(pole)) for pole in data.reference_poles)} "
             "rad/s, and over a tick the poles "
             f"{', '.join(number(_plain(z)) for z in data.held_poles)}. The sampled "
-            "reference is exact, and it is stable for every xi above 0."
-            + (
-                " It has the nominal gains, so that there is nothing to learn on free "
-                "floor: contacts, limits and motors cause all that the law learns."
-                if data.matched
-                else ""
-            )
+            "reference is exact. It has the nominal gains, so that there is nothing to "
+            "learn on free floor: contacts, limits and motors cause all that the law "
+            "learns."
         ),
         paragraph(_of_lyapunov(data)),
         paragraph(
-            f"The adaptation rate is gamma = {number(data.rate)}. Without a remedy K "
+            f"The adaptation rate is gamma = {number(data.rate)}. Without limits K "
             f"and D run away at rates from {number(data.critical.rate)} on, "
             f"{number(data.margin)} times the current rate, if the target swings by "
             f"{number(data.critical.amplitude_m)} m; this is the lag at which the "
@@ -298,21 +292,21 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
             + "."
         ),
         table(
-            ["time (s)", "gradient, closed form", "no remedy", "with the remedies"],
+            ["time (s)", "gradient, closed form", "without limits", "as set"],
             [
                 [float(time), *values]
                 for time, *values in zip(
                     data.drift.time_s,
                     data.drift.gradient_n_m,
                     data.drift.simulated_n_m,
-                    data.drift.cured_n_m,
+                    data.drift.limited_n_m,
                     strict=True,
                 )
             ],
             caption=
                 f"Drift of K (N/m) under a push of {number(data.drift.push_n)} N that "
                 "the reference does not include: closed form (K_0\u2074 + 4 gamma "
-                "F\u00b2 t)^(1/4), and simulation without and with the remedies"
+                "F\u00b2 t)^(1/4), and simulation without limits and as set"
             ,
         ),
         table(
@@ -320,7 +314,7 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
              f"{number(data.jam.after_s)} s later"],
             [
                 [text, data.jam.end_n_m[k], data.jam.left_n_m[k]]
-                for k, text in enumerate(("no remedy", "with the remedies"))
+                for k, text in enumerate(("without limits", "as set"))
             ],
             caption=
                 "Jam: K (N/m) while a wall holds P and the target moves on, and after "
@@ -328,16 +322,9 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
                 "gains that it learned"
             ,
         ),
-        table(
-            ["remedy", "field", "", "effect"],
-            [
-                [cure.name, f"`{cure.field}`", "on" if cure.active else "off",
-                 cure.effect]
-                for cure in data.cures
-            ],
-        ),
         paragraph(
-            "K and D are always bounded."
+            "The limits of `projected` keep K and D within bounds. They do not bring K "
+            "and D back."
             if data.bounded
             else "Nothing bounds K and D; set `projected` to bound them."
         ),

@@ -154,14 +154,14 @@ ROUTE_CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
         "critical adaptation rate over the current rate", "", "above", 1.0,
         "K and D do not run away where the target leads by the largest lag",
         "K and D run away where the target leads by the largest lag",
-        "simulated without contacts and without the remedies",
+        "simulated without contacts and without limits",
     ): _adaptation(lambda data: data.margin),
     Criterion(
         "stiffness learned in a jam, share of the stable limit", "", "below", 1.0,
         "it stays stable with the stiffness that it learns behind a wall",
         "the stiffness that it learns behind a wall makes it unstable when the wall "
         "is gone",
-        "after 90 s of jam the target rests; with the remedies of the scenario",
+        "after 90 s of jam the target rests; with the limits of the scenario",
     ): _jammed,
     Criterion(
         "chain amplification with feed-forward", "", "at most", 1.0 + 1e-6,

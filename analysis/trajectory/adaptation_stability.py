@@ -14,12 +14,9 @@ from analysis.trajectory.route_loop import route_law
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.trajectory.impedance_sensitivity import sensitivity_sources
-from systems.laws.trajectory.parameters import (
-    AdaptationParameters,
-    AdaptiveTrajectoryParameters,
-)
-from systems.laws.trajectory.reference_model import held_matrices
+from systems.laws.trajectory.reference_model import held_matrices, nominal_poles
 from systems.laws.trajectory.sampled_bounds import pull_through_m
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 from systems.laws.trajectory.trajectory_impedance import target_force
 
 #: Length of a run that learns, and of one that looks for a critical rate, s.
@@ -81,15 +78,15 @@ class Drift:
     """F, N."""
     time_s: tuple[float, ...]
     gradient_n_m: tuple[float, ...]
-    """(K_0^4 + 4 gamma F^2 t)^(1/4), the gradient's without a cure, N/m."""
+    """(K_0^4 + 4 gamma F^2 t)^(1/4), the gradient's without limits, N/m."""
     simulated_n_m: tuple[float, ...]
-    """This rule without a cure, N/m."""
-    cured_n_m: tuple[float, ...]
+    """This rule without limits of the gains, N/m."""
+    limited_n_m: tuple[float, ...]
     """This rule as the scenario has it, N/m."""
     curve_s: NDArray[np.float64]
     """(n,) s."""
     curves_n_m: NDArray[np.float64]
-    """(n, 2) K without a cure, and as the scenario has it, N/m."""
+    """(n, 2) K without limits, and as the scenario has it, N/m."""
 
 
 @dataclass(frozen=True)
@@ -99,14 +96,14 @@ class Jam:
     jam_s: float
     after_s: float
     end_n_m: tuple[float, float]
-    """K at the end of the jam without a cure, and as the scenario has it, N/m."""
+    """K at the end of the jam without limits, and as the scenario has it, N/m."""
     left_n_m: tuple[float, float]
     """The same so long after; infinite: it has run away."""
 
 
 @dataclass(frozen=True)
 class CriticalRate:
-    """The rate from which K and D run away, without a cure and without contacts."""
+    """The rate from which K and D run away, without limits and without contacts."""
 
     amplitude_m: float
     """a of the target a (sin 0.6 t + 0.5 sin 1.7 t)."""
@@ -117,17 +114,6 @@ class CriticalRate:
     def product(self) -> float:
         """gamma_crit a^2, which does not depend on a."""
         return self.rate * self.amplitude_m**2
-
-
-@dataclass(frozen=True)
-class Cure:
-    """One of the remedies against gains that run away."""
-
-    name: str
-    field: str
-    active: bool
-    effect: str
-    """What it does; a clause."""
 
 
 @dataclass(frozen=True)
@@ -143,8 +129,6 @@ class AdaptationStability:
     """(2,) s plane, rad/s."""
     held_poles: NDArray[np.complex128]
     """(2,) of the block, z plane."""
-    matched: bool
-    """Whether the nominal gains are the reference's own: nothing is to be learnt."""
     lyapunov: LyapunovRun | None
     """None for a rule that has no such function."""
     drift: Drift
@@ -153,17 +137,13 @@ class AdaptationStability:
     """At the lag at which the target pulls P through a contact, or 1 m."""
     products: tuple[CriticalRate, ...]
     """At other amplitudes."""
-    cures: tuple[Cure, ...]
+    bounded: bool
+    """Whether limits hold K and D whatever happens."""
 
     @property
     def margin(self) -> float:
         """gamma_crit/gamma; above 1 it is stable."""
         return self.critical.rate / self.rate if self.rate else math.inf
-
-    @property
-    def bounded(self) -> bool:
-        """Whether a bound holds K and D whatever happens."""
-        return any(cure.active and cure.field == "projected" for cure in self.cures)
 
 
 def adaptation_stability(scenario: Scenario) -> AdaptationStability:
@@ -179,43 +159,35 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
         InputError: The law does not adapt.
     """
     own = route_law(scenario)
-    if (
-        not isinstance(own, AdaptiveTrajectoryParameters)
-        or own.adaptation.rule == "none"
-    ):
+    if not isinstance(own, AdaptiveTrajectoryParameters):
         raise InputError(
-            "law",
-            f"{scenario.only.law!r} has no adaptation; use trajectory_adaptive with a "
-            "rule",
+            "law", f"{scenario.only.law!r} has no adaptation; use trajectory_adaptive"
         )
-    mass, rule = scenario.only.robot.mass_kg, own.adaptation
-    frequency, ratio = own.reference.poles(mass, own.stiffness_n_m, own.damping_n_s_m)
+    mass, wanted = scenario.only.robot.mass_kg, (own.stiffness_n_m, own.damping_n_s_m)
+    frequency, ratio = nominal_poles(mass, *wanted)
     loop = PointLoop(
         own,
-        rule,
         (frequency, ratio),
         scenario.only.robot,
         scenario.only.plant.motor_lag_s,
         scenario.tick_s,
     )
     amplitude = pull_through_m(own)
-    wanted = mass * frequency**2, 2.0 * ratio * frequency * mass
     rates = {a_m: critical_rate(loop, a_m) for a_m in {*_AMPLITUDES_M, amplitude}}
     a = np.array(held_matrices(frequency, ratio, scenario.tick_s).a).reshape(2, 2)
     line = [[0.0, 1.0], [-(frequency**2), -2.0 * ratio * frequency]]
     return AdaptationStability(
-        rule=rule.rule,
-        rate=rule.rate,
+        rule=own.rule,
+        rate=own.rate,
         reference=(frequency, ratio),
         reference_poles=np.linalg.eigvals(line).astype(complex),
         held_poles=np.linalg.eigvals(a).astype(complex),
-        matched=np.allclose(wanted, (own.stiffness_n_m, own.damping_n_s_m)),
-        lyapunov=_lyapunov(loop, wanted) if rule.rule == "lyapunov" else None,
+        lyapunov=_lyapunov(loop, wanted) if own.rule == "lyapunov" else None,
         drift=_drift(loop),
         jam=_jam(loop),
         critical=rates[amplitude],
         products=tuple(rates[a_m] for a_m in _AMPLITUDES_M),
-        cures=_cures(rule),
+        bounded=own.projected,
     )
 
 
@@ -240,7 +212,7 @@ def swinging_target(
 
 
 def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
-    """The least rate at which the rule, with no cure, runs away within a minute.
+    """The least rate at which the rule, without limits, runs away within a minute.
 
     Args:
         loop: Its rule, gains, reference, mass, lag and tick are used.
@@ -252,7 +224,7 @@ def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
     targets = swinging_target(amplitude_m, _CRITICAL_S, loop.tick_s)
 
     def runs_away(rate: float) -> bool:
-        run = run_point(_uncured(loop, rate), targets)
+        run = run_point(_unlimited(loop, rate), targets)
         found = np.concatenate([run.motion, run.gains], axis=1)
         return not bool(np.all(np.abs(found) < _WILD))
 
@@ -284,21 +256,16 @@ def drift_stiffness(start: float, rate: float, push: float, time_s: float) -> fl
     return float((start**4 + 4.0 * rate * push**2 * time_s) ** 0.25)
 
 
-def _uncured(loop: PointLoop, rate: float | None = None) -> PointLoop:
-    """The same rule without bounds, leak, normalisation and freezing."""
-    own = loop.adaptation
-    return loop._replace(
-        adaptation=AdaptationParameters(
-            rule=own.rule,
-            rate=own.rate if rate is None else rate,
-            velocity_weight_s=own.velocity_weight_s,
-        )
-    )
+def _unlimited(loop: PointLoop, rate: float | None = None) -> PointLoop:
+    """The same rule of K and D without limits and without the safety term."""
+    plain = {"projected": False, "penalty": 0.0, "contact_rate": 0.0}
+    rates = {} if rate is None else {"rate": rate}
+    return loop._replace(law=loop.law.model_copy(update={**plain, **rates}))
 
 
 def _lyapunov(loop: PointLoop, wanted: tuple[float, float]) -> LyapunovRun:
     """Both loops from gains that are off, at the scenario's rate."""
-    mass, rate = loop.robot.mass_kg, loop.adaptation.rate
+    mass, rate = loop.robot.mass_kg, loop.law.rate
     assert loop.poles is not None
     frequency, ratio = loop.poles
     time = np.arange(0.0, _LEARN_S, loop.tick_s)
@@ -330,7 +297,7 @@ def _lyapunov(loop: PointLoop, wanted: tuple[float, float]) -> LyapunovRun:
     gains = loop.law.model_copy(
         update={"stiffness_n_m": start[0], "damping_n_s_m": start[1]}
     )
-    run = run_point(_uncured(loop._replace(law=gains)), targets)
+    run = run_point(_unlimited(loop._replace(law=gains)), targets)
     continuous = _energy(found[:, :4], found[:, 4:], wanted, frequency, rate)
     moved = np.column_stack(
         [run.motion[:, [0, 2]], run.reference[:, [0, 2]], run.gains[:, :2]]
@@ -362,7 +329,7 @@ def _energy(
 
 
 def _drift(loop: PointLoop) -> Drift:
-    own, rate = loop.law, loop.adaptation.rate
+    own, rate = loop.law, loop.law.rate
     push = 0.5 * own.contact_stiffness_n_m * own.security_zone_m or 1.0
     ticks = [round(t / loop.tick_s) for t in _DRIFT_S]
     targets = np.zeros((ticks[-1], 4))
@@ -370,7 +337,7 @@ def _drift(loop: PointLoop) -> Drift:
     curves = np.stack(
         [
             run_point(each, targets, start=start, push=(push, 0.0)).gains[:, 0]
-            for each in (_uncured(loop), loop)
+            for each in (_unlimited(loop), loop)
         ],
         axis=1,
     )
@@ -383,7 +350,7 @@ def _drift(loop: PointLoop) -> Drift:
             drift_stiffness(own.stiffness_n_m, rate, push, t) for t in _DRIFT_S
         ),
         simulated_n_m=tuple(curves[at, 0].tolist()),
-        cured_n_m=tuple(curves[at, 1].tolist()),
+        limited_n_m=tuple(curves[at, 1].tolist()),
         curve_s=drawn * loop.tick_s,
         curves_n_m=curves[drawn],
     )
@@ -401,39 +368,10 @@ def _jam(loop: PointLoop) -> Jam:
     held = np.where(jammed, _HELD_M, math.inf)
     runs = [
         run_point(each, targets, wall, held=held).gains[:, 0]
-        for each in (_uncured(loop), loop)
+        for each in (_unlimited(loop), loop)
     ]
     last = int(np.flatnonzero(jammed)[-1])
     found = [[float(run[at]) for run in runs] for at in (last, -1)]
     # What has run away is no number any more.
     ends, left = ([k if abs(k) < _WILD else math.inf for k in row] for row in found)
     return Jam(_JAM_S, _AFTER_S, (ends[0], ends[1]), (left[0], left[1]))
-
-
-def _cures(own: AdaptationParameters) -> tuple[Cure, ...]:
-    return (
-        Cure(
-            "box",
-            "projected",
-            own.projected,
-            "keeps K and D within bounds, and does not bring them back",
-        ),
-        Cure(
-            "leak",
-            "leakage",
-            own.leakage > 0.0,
-            "brings K and D back, and bounds a drift through the leakage rate",
-        ),
-        Cure(
-            "normalization",
-            "normalisation",
-            own.normalisation is not None,
-            "bounds the rate for all amplitudes, and does not bound the drift",
-        ),
-        Cure(
-            "freeze",
-            "freezes",
-            own.freezes,
-            "does not learn during a contact, and learns from all motion after it",
-        ),
-    )

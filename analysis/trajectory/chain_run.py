@@ -28,6 +28,9 @@ from systems.laws.trajectory.trajectory_impedance import (
     contacts_of_objects,
     target_force,
 )
+from systems.laws.trajectory.trajectory_impedance_controller import (
+    ACCELERATION_LIMIT_M_S2,
+)
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, X
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
@@ -54,8 +57,8 @@ class ChainNumbers(NamedTuple):
     """... and so far behind."""
     contacts: ContactNumbers
     mass: float
-    limits: tuple[float, float]
-    """Of acceleration, m/s^2, and speed, m/s."""
+    top_speed: float
+    """Of P, m/s."""
     motors: tuple[float, float]
     """Share of the speed that is left after a tick, and way for each m/s of it, s."""
     late_ticks: int
@@ -116,9 +119,11 @@ def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cov
             velocity = v[i], 0.0
             ux, _ = target_force((p[i], 0.0), velocity, target, k, d)
             found = contacts_of_objects(objects, velocity, numbers.contacts)
-            fx, _ = contact_force(found, k_e, d_e, numbers.contacts)
-            a, b = clamped_velocity((ux + fx) / numbers.mass, 0.0, numbers.limits[0])
-            v[i], _ = integrate_velocity(velocity, (a, b), tick_s, numbers.limits[1])
+            fx, _ = contact_force(found, k_e, d_e)
+            a, b = clamped_velocity(
+                (ux + fx) / numbers.mass, 0.0, ACCELERATION_LIMIT_M_S2
+            )
+            v[i], _ = integrate_velocity(velocity, (a, b), tick_s, numbers.top_speed)
         kept, coasting = numbers.motors
         for i in range(1, robots):
             p[i] += coasting * w[i] + (tick_s - coasting) * v[i]
@@ -165,7 +170,7 @@ def run_chain(
         *disc_offsets(scenario),
         contact_numbers(own),
         robot.mass_kg,
-        (own.acceleration_limit_m_s2, robot.top_speed_m_s),
+        robot.top_speed_m_s,
         (kept, lag * (1.0 - kept)),
         round(scenario.router.objects.latency_s / tick_s),
         tick_s,

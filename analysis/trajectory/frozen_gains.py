@@ -23,13 +23,19 @@ from analysis.trajectory.route_loop import (
     route_points,
 )
 from diagrams.scenario.scenario import Scenario
-from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
+from systems.laws.trajectory.impedance_adaptation import (
+    DAMPING_BOX_N_S_M,
+    STIFFNESS_BOX_N_M,
+)
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,
     damping_bound,
     stiffness_bound,
 )
-from systems.laws.trajectory.trajectory_impedance import contact_numbers
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 
 #: The damping ratio that is asked for.
 WELL_DAMPED = 0.7
@@ -155,8 +161,7 @@ def gain_bounds(scenario: Scenario) -> GainBounds:
     today = np.array(
         [_bounds(scenario, own.damping_n_s_m, late) for late in LATE_TICKS]
     )
-    zone = contact_numbers(own).begins_m
-    stiffness, damping = contact_gains(own, 0.5 * zone)
+    stiffness, damping = contact_gains(own, 0.5 * own.security_zone_m)
     k, d = own.stiffness_n_m, own.damping_n_s_m
     return GainBounds(
         mass=of,
@@ -263,7 +268,5 @@ def _contacts(own: TrajectoryImpedanceParameters, most: float) -> float:
 def _box(
     own: TrajectoryImpedanceParameters,
 ) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    adaptation = getattr(own, "adaptation", None)
-    if adaptation is None or adaptation.rule == "none" or not adaptation.projected:
-        return None
-    return adaptation.stiffness_box_n_m, adaptation.damping_box_n_s_m
+    projected = isinstance(own, AdaptiveTrajectoryParameters) and own.projected
+    return (STIFFNESS_BOX_N_M, DAMPING_BOX_N_S_M) if projected else None

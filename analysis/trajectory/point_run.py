@@ -16,15 +16,13 @@ from systems.laws.trajectory.impedance_adaptation import (
     adaptation_numbers,
     adaptation_step,
 )
-from systems.laws.trajectory.parameters import (
-    AdaptationParameters,
-    TrajectoryImpedanceParameters,
-)
 from systems.laws.trajectory.reference_model import (
     ReferenceNumbers,
     held_matrices,
+    nominal_poles,
     reference_step,
 )
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 from systems.laws.trajectory.trajectory_impedance import (
     contact_force,
     contacts_of_objects,
@@ -38,10 +36,9 @@ _FAR_M = 1e6
 
 
 class PointLoop(NamedTuple):
-    """What is run: a law, what adapts, and the robot that it moves."""
+    """What is run: a law, and the robot that it moves."""
 
-    law: TrajectoryImpedanceParameters
-    adaptation: AdaptationParameters = AdaptationParameters()
+    law: AdaptiveTrajectoryParameters
     poles: tuple[float, float] | None = None
     """w_n, rad/s, and xi of the reference; none: those of the law."""
     robot: RobotParameters = RobotParameters()
@@ -88,7 +85,7 @@ def _run(
     for k in range(3):
         state[k] = numbers.nominal[k]
     pose, v, w = np.zeros(3), np.zeros(2), np.zeros(2)
-    impedance, active = np.zeros(3), np.zeros(1)
+    impedance = np.zeros(3)
     objects = np.zeros(OBJECT_SLOTS * OBJECT_SIZE)
     pose[0], pose[1] = start[0] - numbers.control_point_m, start[1]
     for axis in range(2):
@@ -104,15 +101,13 @@ def _run(
                 objects[at + VX], objects[at + VY] = place[2], place[3]
         reference_step(tick, reference, (targets[tick],), (seen,), model)
         inputs = targets[tick], seen, pose, v, objects
-        adaptation_step(tick, state, inputs, (impedance, active), numbers)
+        adaptation_step(tick, state, inputs, (impedance,), numbers)
         rows[tick, 0], rows[tick, 1], rows[tick, 2], rows[tick, 3] = *p, v[0], v[1]
         rows[tick, 4:7], rows[tick, 7:19] = impedance, state[3:]
         rows[tick, 19:] = seen
         ux, uy = target_force(p, v, targets[tick], impedance[0], impedance[1])
         found = contacts_of_objects(objects, v, numbers.contacts)
-        fx, fy = contact_force(
-            found, impedance[2], numbers.contact_damping, numbers.contacts
-        )
+        fx, fy = contact_force(found, impedance[2], numbers.contact_damping)
         v[0] += tick_s / numbers.mass * (ux + fx + push[0])
         v[1] += tick_s / numbers.mass * (uy + fy + push[1])
         if p[0] + tick_s * v[0] > held[tick]:
@@ -153,10 +148,10 @@ def run_point(
     points = np.asarray(places, dtype=float)
     if points.ndim < 3:
         points = np.tile(points.reshape(1, -1, 4), (len(wanted), 1, 1))
-    numbers = adaptation_numbers(loop.adaptation, loop.law, loop.robot, loop.tick_s)
-    mass, k, d = loop.robot.mass_kg, loop.law.stiffness_n_m, loop.law.damping_n_s_m
-    own = math.sqrt(k / mass), d / (2.0 * math.sqrt(k * mass))
-    frequency, ratio = loop.poles or own
+    numbers = adaptation_numbers(loop.law, loop.robot, loop.tick_s)
+    frequency, ratio = loop.poles or nominal_poles(
+        loop.robot.mass_kg, loop.law.stiffness_n_m, loop.law.damping_n_s_m
+    )
     model = held_matrices(float(frequency), float(ratio), loop.tick_s)
     kept = math.exp(-loop.tick_s / loop.motor_lag_s) if loop.motor_lag_s else 0.0
     motors = _Motors(kept, loop.motor_lag_s * (1.0 - kept))

@@ -16,7 +16,6 @@ from analysis.linear.frequency_levels import frequency_grid
 from analysis.trajectory.route_loop import contact_gains, route_law
 from diagrams.scenario.scenario import Scenario
 from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
-from systems.laws.trajectory.trajectory_impedance import contact_numbers
 
 #: Numbers of robots in the chains that are looked at, the first one among them.
 ROBOTS = tuple(range(2, 9))
@@ -164,9 +163,9 @@ def chain_spacings(scenario: Scenario) -> tuple[float, float]:
     Returns:
         1.25 zones, and half a zone, between P and the disc before it.
     """
-    zone = contact_numbers(route_law(scenario)).begins_m
+    zone_m = route_law(scenario).security_zone_m
     offset = disc_offsets(scenario)[0]
-    return _APART * zone + offset, 0.5 * zone + offset
+    return _APART * zone_m + offset, 0.5 * zone_m + offset
 
 
 def disc_offsets(scenario: Scenario) -> tuple[float, float]:
@@ -203,21 +202,18 @@ def resting_gaps(
         (robots - 1,) from the first to the last.
     """
     own = route_law(scenario)
-    numbers = contact_numbers(own)
-    k, k_e = own.stiffness_n_m, own.contact_stiffness_n_m
+    k, k_e, zone_m = own.stiffness_n_m, own.contact_stiffness_n_m, own.security_zone_m
     ahead, behind = disc_offsets(scenario)
-    # Along the line a contact with what is ahead is k_e (d - rest); with the sign of
-    # eq. 10 it is k_e d.
-    rest = numbers.rest_m if numbers.spring_sign > 0.0 else 0.0
+    # Along the line a contact with what is ahead is k_e (d - S).
     gaps, pushed = np.empty(robots - 1), 0.0
     for i in reversed(range(robots - 1)):
         gap = spacing_m - pushed / k
-        touching = (k * spacing_m - pushed + k_e * (rest + ahead)) / (k + k_e)
-        if touching - ahead < numbers.begins_m:
+        touching = (k * spacing_m - pushed + k_e * (zone_m + ahead)) / (k + k_e)
+        if touching - ahead < zone_m:
             gap = touching
         gaps[i] = gap
         off = gap - behind
-        pushed = k_e * (rest - off) if off < numbers.begins_m else 0.0
+        pushed = k_e * (zone_m - off) if off < zone_m else 0.0
     return gaps
 
 

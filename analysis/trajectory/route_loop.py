@@ -22,8 +22,9 @@ from systems.base.wheel_speed_command import WheelCommand_
 from systems.framework.block import Block, part_of
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import ROUTE_LAWS
-from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
-from systems.laws.trajectory.trajectory_impedance import contact_numbers
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 from systems.laws.trajectory.trajectory_impedance_controller import (
     TrajectoryImpedanceController_,
 )
@@ -80,9 +81,9 @@ def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
         RoutePoint("at rest"),
     ]
     if own.contact_stiffness_n_m > 0.0 or own.contact_damping_n_s_m > 0.0:
-        zone = contact_numbers(own).begins_m
+        zone_m = own.security_zone_m
         depths = _DEPTHS if own.damping_fades else {"in a zone": 0.5}
-        points += [RoutePoint(name, wall_m=d * zone) for name, d in depths.items()]
+        points += [RoutePoint(name, wall_m=d * zone_m) for name, d in depths.items()]
     return tuple(points)
 
 
@@ -96,14 +97,12 @@ def contact_gains(
         distance_m: Of P from the object, m.
 
     Returns:
-        0 and 0 outside its zone. Eq. 10, which pulls, pulls as stiffly.
+        0 and 0 outside its zone.
     """
-    numbers = contact_numbers(own)
-    if distance_m >= numbers.begins_m:
+    if distance_m >= own.security_zone_m:
         return 0.0, 0.0
-    share = 1.0 - distance_m / numbers.begins_m if numbers.fades else 1.0
-    damping = numbers.damper_sign * share * own.contact_damping_n_s_m
-    return own.contact_stiffness_n_m, float(damping)
+    share = 1.0 - distance_m / own.security_zone_m if own.damping_fades else 1.0
+    return own.contact_stiffness_n_m, float(share * own.contact_damping_n_s_m)
 
 
 def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
@@ -214,7 +213,8 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
     ahead = 0.0
     if point.wall_m is not None:
         objects[[THERE, X, KNOWN]] = 1.0, point.wall_m, 1.0
-        ahead = _push(own, point.wall_m) / own.stiffness_n_m
+        push = own.contact_stiffness_n_m * (own.security_zone_m - point.wall_m)
+        ahead = push / own.stiffness_n_m
     target = np.array([p[0] + ahead, 0.0, speed, 0.0])
     plant = DiffDrivePlant(robot=robot, plant=scenario.only.plant)
     config = simulator_config(scenario)
@@ -268,14 +268,6 @@ def _named(block: Block, model: LinearModel) -> LinearModel:
     part = part_of(block)
     states = tuple(f"{part}.{name}" for name in block.states)
     return replace(model, name=part, state_names=states if len(model.A) else ())
-
-
-def _push(own: TrajectoryImpedanceParameters, distance_m: float) -> float:
-    """Force of the spring of a contact with an obstacle at rest, N."""
-    numbers = contact_numbers(own)
-    attracts = numbers.spring_sign < 0.0
-    overlap = distance_m if attracts else numbers.rest_m - distance_m
-    return numbers.spring_sign * own.contact_stiffness_n_m * overlap
 
 
 def _seen_wall(scenario: Scenario, point: RoutePoint) -> LinearModel:

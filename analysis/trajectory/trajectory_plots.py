@@ -132,7 +132,7 @@ def plot_adaptation(found: AdaptationStability) -> Figure:
         color="black",
         label="closed form of the gradient",
     )
-    for k, name in enumerate(("no remedy", "with the remedies")):
+    for k, name in enumerate(("without limits", "as set")):
         axes.semilogx(
             drift.curve_s,
             drift.curves_n_m[:, k],

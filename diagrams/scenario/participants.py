@@ -39,7 +39,6 @@ from systems.odor.parameters import AirflowParameters, GasSensorParameters
 from systems.ranging.parameters import (
     CollisionVectorParameters,
     ContactParameters,
-    ObjectDetectorParameters,
     ObjectSensorParameters,
     UltrasonicParameters,
 )
@@ -216,7 +215,6 @@ class Router(Robot):
     laws: LawGains = LawGains()
     """Gains by law. Only the gains of the robot's law have an effect."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
-    detector: ObjectDetectorParameters = ObjectDetectorParameters()
 
     @property
     def gains(self) -> Any:

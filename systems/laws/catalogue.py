@@ -16,11 +16,9 @@ from systems.laws.path_integral import MPPI
 from systems.laws.reciprocal_avoidance import ORCA
 from systems.laws.searches import PLUME_SEARCH, SOUND_SEARCH
 from systems.laws.stop_when_near import STOP_WHEN_NEAR
-from systems.laws.trajectory.trajectory_laws import (
-    TRAJECTORY_ADAPTIVE,
-    TRAJECTORY_CONVENTIONAL,
-    TRAJECTORY_FILTERED,
-)
+from systems.laws.trajectory.trajectory_adaptive import TRAJECTORY_ADAPTIVE
+from systems.laws.trajectory.trajectory_conventional import TRAJECTORY_CONVENTIONAL
+from systems.laws.trajectory.trajectory_filtered import TRAJECTORY_FILTERED
 from systems.laws.vector_field_histogram import VFH_PLUS
 
 #: The laws of the package by name.

@@ -16,13 +16,12 @@ from systems.base.wheel_speed_command import (
 )
 from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.planning.parameters import SafetyFilterParameters
 from systems.planning.velocity_filter import FilterNumbers, filtered_velocity
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Time, s, in which the robot moves out of the reach of a moving object that has come
-#: too near.
-_LEAVE_S = 0.1
+#: Distance kept between objects and the disc about the axle that contains the body, m.
+#: The lag of the motors uses up to 1 cm of it. It is our choice.
+_MARGIN_M = 0.05
 
 
 class SafetyNumbers(NamedTuple):
@@ -83,7 +82,6 @@ class SafetyFilter(Block):
     ``WheelCommand``.
 
     Args:
-        parameters: ``SafetyFilterParameters``.
         robot: Dimensions and top speed.
         tick_s: Period of the command, s.
 
@@ -111,7 +109,6 @@ class SafetyFilter(Block):
     def __init__(
         self,
         *,
-        parameters: SafetyFilterParameters = SafetyFilterParameters(),
         robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
@@ -119,12 +116,9 @@ class SafetyFilter(Block):
         self.set_name("safety_filter")
         epsilon = robot.control_point_m
         limits = FilterNumbers(
-            body_radius(robot) + epsilon + parameters.margin_m,
-            parameters.approach_rate,
-            parameters.horizon_s,
+            body_radius(robot) + epsilon + _MARGIN_M,
             robot.top_speed_m_s,
             robot.wheel_separation_m / (2.0 * epsilon),
-            _LEAVE_S,
         )
         numbers = SafetyNumbers(limits, robot, tick_s)
         self.declare(

@@ -15,6 +15,15 @@ from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 #: Objects below this speed count as at rest, m/s.
 _RESTS_M_S = 0.02
+#: alpha, 1/s: P may approach an obstacle at rest at most at alpha times the remaining
+#: distance (our choice).
+_APPROACH_RATE = 1.0
+#: Duration of the prediction, s (our choice). In this time, a velocity must not lead
+#: into moving objects.
+_HORIZON_S = 4.0
+#: Time, s, in which the robot moves out of the reach of a moving object that has come
+#: too near (our choice).
+_LEAVE_S = 0.1
 #: An object nearer to P than this distance, m, has no defined direction and is ignored.
 _TOUCHES_M = 1e-9
 
@@ -25,18 +34,10 @@ class FilterNumbers(NamedTuple):
     keep_m: float
     """Distance that P keeps from objects, m. It is the sum of the radius of the body
     about the axle, epsilon, and the margin."""
-    approach_rate: float
-    """alpha, 1/s."""
-    horizon_s: float
-    """Duration of the prediction, s. In this time, a velocity must not lead into moving
-    objects."""
     top_speed: float
     """Top speed of each wheel's rim and of P, m/s."""
     turn_share: float
     """L/(2 epsilon), with the wheel separation L."""
-    leave_s: float
-    """Time, s, in which the robot moves out of the reach of a moving object that has
-    come too near."""
 
 
 @njit(cache=True)
@@ -160,15 +161,15 @@ def filtered_velocity(
                 center,
                 radius + numbers.keep_m,
                 relative,
-                numbers.horizon_s,
-                numbers.leave_s,
+                _HORIZON_S,
+                _LEAVE_S,
             )
             share = 0.5 if is_robot else 1.0
             offset = nx * v_WP[0] + ny * v_WP[1] + share * inside
         else:
             # An object at rest. A hard plane limits the approach. If the object is too
             # near, a soft plane also requires P to move away.
-            offset = -numbers.approach_rate * (distance - numbers.keep_m)
+            offset = -_APPROACH_RATE * (distance - numbers.keep_m)
             kept[resting, 0], kept[resting, 1] = nx, ny
             kept[resting, 2] = min(offset, 0.0)
             resting += 1

@@ -19,22 +19,22 @@ from systems.ranging.collision_vector import foot_on_segment
 NEAR_X, NEAR_Y, MIDDLE_X, MIDDLE_Y, EXTENT, CHORD, OPEN = range(7)
 GROUP_SIZE = 7
 
+#: Adjacent hits belong to one surface if their distance is below the sum of two parts.
+#: The first part is constant, m. The second part is the spacing of the beams on a
+#: surface whose normal is turned from the beam by 60 deg: the spacing times a factor.
+_GAP_M, _STRETCH = 0.2, 1.0 / math.cos(math.radians(60.0))
+#: Rise of the distance from P that separates two objects, m. A surface is split where
+#: its distance from P exceeds the minima on both sides by more than this.
+_DIP_M = 0.08
+
 
 class BeamNumbers(NamedTuple):
-    """Directions of the beams, and limits that separate objects."""
+    """Directions and range of the beams."""
 
     apart_rad: NDArray[np.float64]
     """(n,) angle between each beam and its right neighbor, rad; 0 if it has none."""
     maximum_range_m: float
     """Largest range, m. Surfaces farther away give no echo."""
-    gap_m: float
-    """Constant part of the largest distance between adjacent hits on one surface, m."""
-    stretch: float
-    """Factor of the spacing of the beams in this largest distance. The result is added
-    to ``gap_m``."""
-    dip_m: float
-    """Rise of the distance from P that separates two objects, m. A surface is split
-    where its distance from P exceeds the minima on both sides by more than this."""
 
 
 @njit(cache=True)
@@ -48,7 +48,7 @@ def _goes_on(
         return False
     chord = 2.0 * min(ranges[k], ranges[other]) * math.sin(0.5 * apart)
     far = math.hypot(hits[other, 0] - hits[k, 0], hits[other, 1] - hits[k, 1])
-    return far < beams.gap_m + beams.stretch * chord
+    return far < _GAP_M + _STRETCH * chord
 
 
 @njit(cache=True)
@@ -68,7 +68,7 @@ def _is_open(
         own: Beam of the outer hit.
         other: Beam beside it.
         apart: Angle between the two beams, rad; 0 if there is no beam beside it.
-        beams: Limits of the beams.
+        beams: Range of the beams.
     """
     if apart == 0.0:
         return True
@@ -92,7 +92,7 @@ def _describe(
         ranges: (n,) ranges of the beams, m.
         heard: (n,) 1 where there is an echo, else 0.
         ends: First and last beam of the group; numbers of n or more wrap around.
-        beams: Directions and limits of the beams.
+        beams: Directions and range of the beams.
     """
     count = len(ranges)
     first, last = ends[0] % count, ends[1] % count
@@ -130,7 +130,7 @@ def group_beams(
         hits: (n, 2) hits from P, m, from left to right.
         ranges: (n,) ranges of the beams, m.
         heard: (n,) 1 where there is an echo, else 0.
-        beams: Directions and limits of the beams.
+        beams: Directions and range of the beams.
 
     Returns:
         (n, GROUP_SIZE) groups, and the number of groups.
@@ -154,9 +154,9 @@ def group_beams(
         # Split at the top, when the distance has risen by more than the dip and has
         # fallen by more than the dip again.
         low = min(low, far[now])
-        if far[now] > max(low + beams.dip_m, high):
+        if far[now] > max(low + _DIP_M, high):
             high, top = far[now], k
-        elif high > 0.0 and far[now] < high - beams.dip_m:
+        elif high > 0.0 and far[now] < high - _DIP_M:
             _describe(rows[used], hits, ranges, heard, (first, top), beams)
             used += 1
             first, low, high, top = top, far[now], -1.0, k

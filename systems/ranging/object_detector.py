@@ -14,17 +14,14 @@ from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.ranging.beam_groups import BeamNumbers, group_beams
 from systems.ranging.object_tracks import (
+    NOISE_M,
     TRACK_SIZE,
     TRACKS,
     TrackNumbers,
     track_objects,
 )
 from systems.ranging.objects import OBJECTS_PORT, OBJECTS_SIZE
-from systems.ranging.parameters import (
-    OBJECT_SIZE,
-    ObjectDetectorParameters,
-    UltrasonicParameters,
-)
+from systems.ranging.parameters import OBJECT_SIZE, UltrasonicParameters
 from systems.world.geometry import control_point
 
 #: State of one beam: its last hit in W, m, its range, m, and 1 if there was an echo.
@@ -40,9 +37,7 @@ class DetectorNumbers(NamedTuple):
     places: NDArray[np.float64]
     """(n, 2) origins of the beams from P in B, m."""
     beams: BeamNumbers
-    """Limits that separate objects."""
     tracks: TrackNumbers
-    """Parameters of the tracking."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     oldest_s: float
@@ -141,14 +136,13 @@ class ObjectDetector(Block):
     around. It is 15 % with 72 beams and 7 % with 360 beams. While the robot turns,
     bodies at rest seem to move at up to 0.3 m/s with 36 beams, 0.12 m/s with 72 beams
     and 0 m/s with 360 beams. No velocity is known where the spacing of the beams
-    exceeds ``coarse_m``. For the 7 beams, this is the case at distances above 0.48 m.
+    exceeds 0.25 m. For the 7 beams, this is the case at distances above 0.48 m.
 
     The discrete state holds the hits and the tracks, and is updated every tick. The
     output is a function of state and inputs. There is no latency, but the velocity
     takes about 0.5 s to follow a change.
 
     Args:
-        parameters: Limits of grouping and tracking, ``ObjectDetectorParameters``.
         sensors: Positions, directions and rate of the beams.
         robot: Position of P.
         tick_s: Control period of the robot, s.
@@ -171,14 +165,13 @@ class ObjectDetector(Block):
     def __init__(
         self,
         *,
-        parameters: ObjectDetectorParameters = ObjectDetectorParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
         robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("object_detector")
-        numbers = _numbers(parameters, sensors, robot, tick_s)
+        numbers = _numbers(sensors, robot, tick_s)
         size = _BEAM_SIZE * sensors.count + TRACKS * TRACK_SIZE
         self.declare(
             Step(object_detector_step, numbers, [0.0] * size),
@@ -189,32 +182,17 @@ class ObjectDetector(Block):
 
 
 def _numbers(
-    own: ObjectDetectorParameters,
-    sensors: UltrasonicParameters,
-    robot: RobotParameters,
-    tick_s: float,
+    sensors: UltrasonicParameters, robot: RobotParameters, tick_s: float
 ) -> DetectorNumbers:
     apart = np.zeros(sensors.count)
     for left, right in sensors.neighbours:
         apart[left] = (sensors.axes[left] - sensors.axes[right]) % math.tau
-    beams = BeamNumbers(
-        apart,
-        sensors.maximum_range_m,
-        own.gap_m,
-        1.0 / math.cos(math.radians(own.most_oblique_deg)),
-        own.dip_m,
-    )
-    tracks = TrackNumbers(
-        own.gate_m,
-        own.wide_m,
-        own.coarse_m,
-        math.hypot(own.noise_m, sensors.noise_m),
-        own.velocity_change_m_s**2,
-        own.confirmation_s,
-        own.memory_s,
-        own.resting_m_s,
-        tick_s,
-    )
     axes, places, _ = sensors.beams
-    oldest = (sensors.round_ticks(tick_s) + 0.5) * tick_s
-    return DetectorNumbers(axes, places, beams, tracks, robot.control_point_m, oldest)
+    return DetectorNumbers(
+        axes,
+        places,
+        BeamNumbers(apart, sensors.maximum_range_m),
+        TrackNumbers(math.hypot(NOISE_M, sensors.noise_m), tick_s),
+        robot.control_point_m,
+        oldest_s=(sensors.round_ticks(tick_s) + 0.5) * tick_s,
+    )

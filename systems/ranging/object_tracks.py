@@ -23,6 +23,26 @@ from systems.ranging.parameters import OBJECT_SIZE
 
 #: Largest number of tracks.
 TRACKS = 12
+#: Largest distance between a group and the predicted position of its track, m. A group
+#: farther away is another object.
+_GATE_M = 0.3
+#: Width of an object above which its motion along its surface is not visible, m.
+_WIDE_M = 0.8
+#: Spacing of the beams above which motion is not visible, m.
+_COARSE_M = 0.25
+#: Standard deviation of the distance of an object in addition to the noise of the
+#: ranges, m. The beams hit different points of an object from tick to tick.
+NOISE_M = 0.04
+#: Rate at which the variance of each velocity component grows, (m/s)^2/s: a velocity
+#: changes by 0.1 m/s within one second.
+_WALK = 0.1**2
+#: Time for which a motion must be visible without interruption before its velocity is
+#: known, s.
+_CONFIRMATION_S = 0.5
+#: Time for which a track is kept after its object was last seen, s.
+_MEMORY_S = 0.5
+#: Speed below which an object counts as at rest, m/s.
+_RESTING_M_S = 0.05
 
 # Elements of a track. EXISTS is 1 or 0. SURE is the time for which the motion has been
 # visible without interruption, s. UNSEEN is the time since the object was last seen, s.
@@ -45,22 +65,8 @@ _FORGET_S = 5.0
 class TrackNumbers(NamedTuple):
     """Parameters of the tracking."""
 
-    gate_m: float
-    """Largest distance between a group and the predicted position of its track, m."""
-    wide_m: float
-    """Width of an object above which its motion along its surface is not visible, m."""
-    coarse_m: float
-    """Spacing of the beams above which motion is not visible, m."""
     noise_m: float
     """Standard deviation of the distance of a group, m."""
-    walk: float
-    """Rate at which the variance of each velocity component grows, (m/s)^2/s."""
-    confirmation_s: float
-    """Time for which a motion must be visible before its velocity is known, s."""
-    memory_s: float
-    """Time for which a track is kept after its object was last seen, s."""
-    resting_m_s: float
-    """Speed below which an object counts as at rest, m/s."""
     tick_s: float
 
 
@@ -85,10 +91,10 @@ def _move_on(track: Any, own: TrackNumbers) -> None:  # pragma: no cover  (compi
             p[i, j] += t * p[i, 2 + j]
     # Noise of the acceleration.
     for i in range(2):
-        p[i, i] += own.walk * t**3 / 3.0
-        p[i, 2 + i] += own.walk * t**2 / 2.0
-        p[2 + i, i] += own.walk * t**2 / 2.0
-        p[2 + i, 2 + i] += own.walk * t
+        p[i, i] += _WALK * t**3 / 3.0
+        p[i, 2 + i] += _WALK * t**2 / 2.0
+        p[2 + i, i] += _WALK * t**2 / 2.0
+        p[2 + i, 2 + i] += _WALK * t
 
 
 @njit(cache=True)
@@ -165,8 +171,8 @@ def _hides_motion(
     group: Any, own: TrackNumbers
 ) -> bool:  # pragma: no cover  (compiled)
     """Whether motion along the surface of a group is not visible."""
-    wide = group[OPEN] > 0.5 or group[EXTENT] > own.wide_m
-    return bool(wide or group[CHORD] > own.coarse_m)
+    wide = group[OPEN] > 0.5 or group[EXTENT] > _WIDE_M
+    return bool(wide or group[CHORD] > _COARSE_M)
 
 
 @njit(cache=True)
@@ -189,7 +195,7 @@ def _take_in(
         own: Parameters of the tracking.
     """
     wide = _hides_motion(group, own)
-    sure = group[CHORD] < own.coarse_m and (not wide or group[EXTENT] > 0.0)
+    sure = group[CHORD] < _COARSE_M and (not wide or group[EXTENT] > 0.0)
     # Smooth the depth, which is the distance of the middle minus that of the nearest
     # point.
     near = math.hypot(group[NEAR_X], group[NEAR_Y])
@@ -228,7 +234,7 @@ def _take_in(
     track[_SURE] = track[_SURE] + own.tick_s if sure else 0.0
     track[_UNSEEN] = 0.0
     track[_QX], track[_QY] = p_WP[0] + group[NEAR_X], p_WP[1] + group[NEAR_Y]
-    flat = group[EXTENT] > own.wide_m
+    flat = group[EXTENT] > _WIDE_M
     track[_RADIUS] = 0.0 if flat else 0.5 * (group[EXTENT] + group[CHORD])
 
 
@@ -240,7 +246,7 @@ def _tracks_of(
 
     The function first assigns the group and the track with the smallest distance from
     each other. It then assigns the pair with the next distance, and so on up to
-    ``gate_m``. Each track gets at most one group.
+    ``_GATE_M``. Each track gets at most one group.
 
     Returns:
         (n,) number of the track of each group; -1 if the group has no track.
@@ -259,7 +265,7 @@ def _tracks_of(
     for _ in range(min(count, TRACKS)):
         best = int(np.argmin(away))
         g, t = best // TRACKS, best % TRACKS
-        if away[g, t] > own.gate_m:
+        if away[g, t] > _GATE_M:
             break
         of[g] = t
         away[g, :] = np.inf
@@ -301,7 +307,7 @@ def track_objects(
     for t in range(TRACKS):
         if tracks[t, _EXISTS] > 0.5:
             _move_on(tracks[t], own)
-            if tracks[t, _UNSEEN] > own.memory_s + 0.5 * own.tick_s:
+            if tracks[t, _UNSEEN] > _MEMORY_S + 0.5 * own.tick_s:
                 tracks[t, _EXISTS] = 0.0
     # Correct each track by its group.
     of = _tracks_of(tracks, groups, p_WP, own)
@@ -325,9 +331,9 @@ def track_objects(
             continue
         slot[THERE], slot[RADIUS] = 1.0, track[_RADIUS]
         slot[X], slot[Y] = track[_QX] - p_WP[0], track[_QY] - p_WP[1]
-        if track[_SURE] > own.confirmation_s - 0.5 * own.tick_s:
+        if track[_SURE] > _CONFIRMATION_S - 0.5 * own.tick_s:
             slot[KNOWN] = 1.0
             vx, vy = track[_STATE + 2], track[_STATE + 3]
-            if math.hypot(vx, vy) > own.resting_m_s:
+            if math.hypot(vx, vy) > _RESTING_M_S:
                 slot[VX], slot[VY] = vx, vy
     return nearest_objects(slots)

@@ -1,4 +1,4 @@
-"""Parameters of range sensors, contact switches, and object detectors."""
+"""Parameters of range sensors, contact switches, and object sensors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from systems.framework.parameters import (
     Period,
     Point,
     SoundSpeed,
-    Speed,
     Time,
     with_preset,
 )
@@ -277,38 +276,3 @@ class ObjectSensorParameters(Parameters):
     occlusion: bool = False
     """Whether bodies hide other bodies behind them. A body is hidden if its nearest
     point and all four corners are hidden."""
-
-
-class ObjectDetectorParameters(Parameters):
-    """Grouping of beams into objects, and tracking; the paper prints no values."""
-
-    gap_m: Length = 0.2
-    """Constant part of the largest distance between adjacent hits of one object, m. The
-    other part is the spacing of the beams on a surface that is tilted by
-    ``most_oblique_deg``."""
-    most_oblique_deg: float = Field(default=60.0, ge=0.0, le=85.0)
-    """Largest angle between a beam and the normal of a surface at which adjacent hits
-    still belong together, deg."""
-    dip_m: Length = 0.08
-    """Rise of the distance from P that separates two objects, m. A surface is split
-    where its distance from P rises by more than this and falls by more than this
-    again."""
-    wide_m: Length = 0.8
-    """Width of an object above which its motion along its surface is not visible, m."""
-    coarse_m: Length = 0.25
-    """Spacing of the beams above which no velocity is known, m."""
-    gate_m: Length = 0.3
-    """Largest distance between an object and its predicted position, m. An object
-    farther away counts as another object."""
-    noise_m: NonNegativeLength = 0.04
-    """Standard deviation of the distance of an object in addition to the noise of the
-    ranges, m. The beams hit different points of an object from tick to tick."""
-    velocity_change_m_s: Speed = 0.1
-    """Standard deviation of the change of a velocity within one second, m/s."""
-    confirmation_s: Time = 0.5
-    """Time for which a motion must be visible without interruption before its velocity
-    is known, s."""
-    memory_s: Time = 0.5
-    """Time for which an object is kept after it was last seen, s."""
-    resting_m_s: NonNegativeSpeed = 0.05
-    """Speed below which an object counts as at rest, m/s."""

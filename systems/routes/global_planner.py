@@ -15,13 +15,7 @@ from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.occupancy_grid import (
-    OccupancyGrid,
-    arena_about,
-    block_discs,
-    block_rectangles,
-    make_occupancy_grid,
-)
+from systems.routes.occupancy_grid import OccupancyGrid, block_discs, map_grid
 from systems.routes.parameters import RouteParameters
 from systems.routes.route import (
     ROUTE_SIZE,
@@ -41,6 +35,12 @@ from systems.world.geometry import control_point
 #: Indices of ``PlannerState.progress``: number of new routes; time of the last advance
 #: of P, s; and position of P along the route at that time, m.
 REPLANS, SINCE_S, FROM_M = range(3)
+#: The robot stalls if P advances by less than the first number, m, along the route
+#: within the second number, s.
+_STALL_M, _STALLED_S = 0.1, 6.0
+#: Distance from the goal, m. Within this distance, the robot has arrived and does not
+#: stall.
+_ARRIVED_M = 0.15
 
 
 class PlannerNumbers(NamedTuple):
@@ -52,10 +52,8 @@ class PlannerNumbers(NamedTuple):
     """(k, 5) known obstacles in W."""
     goal: tuple[float, float]
     clearance_m: float
-    stall_m: float
-    stalled_s: float
-    """If it is infinite, the planner makes no new routes."""
-    arrived_m: float
+    replans: bool
+    """Whether the planner makes new routes."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     tick_s: float
@@ -78,7 +76,7 @@ def _find_route_again(
     """Plan a route from P past known obstacles, seen points and robots at rest."""
     grid, clearance = numbers.grid, numbers.clearance_m
     discs = discs_to_avoid(seen, objects, p_WP)
-    now = OccupancyGrid(grid.blocked.copy(), grid.low, grid.cell_m)
+    now = OccupancyGrid(grid.blocked.copy(), grid.low)
     block_discs(now, discs, clearance)
     return find_route(now, p_WP, numbers.goal, numbers.rectangles, discs, clearance)
 
@@ -88,10 +86,10 @@ def planner_step(
 ) -> None:
     """Computes the route of the next tick.
 
-    The planner remembers the objects in view. If P has not advanced for ``stalled_s``,
-    the planner plans a new route.
+    The planner remembers the objects in view. If the robot stalls, the planner plans
+    a new route.
     """
-    if numbers.stalled_s == math.inf:
+    if not numbers.replans:
         return
     objects, pose, route_progress = inputs
     seen, progress, reached = state.seen, state.progress, route_progress[1]
@@ -100,10 +98,10 @@ def planner_step(
     time = tick * numbers.tick_s
     away = math.hypot(numbers.goal[0] - x, numbers.goal[1] - y)
     # P has advanced, or has arrived: restart the timer.
-    if reached >= progress[FROM_M] + numbers.stall_m or away <= numbers.arrived_m:
+    if reached >= progress[FROM_M] + _STALL_M or away <= _ARRIVED_M:
         progress[FROM_M], progress[SINCE_S] = reached, time
     # Half a tick exceeds the rounding of times.
-    if time - progress[SINCE_S] < numbers.stalled_s - 0.5 * numbers.tick_s:
+    if time - progress[SINCE_S] < _STALLED_S - 0.5 * numbers.tick_s:
         return
     progress[SINCE_S], progress[FROM_M] = time, reached
     points = _find_route_again(numbers, seen, objects, (x, y))
@@ -127,10 +125,10 @@ class GlobalPlanner(Block):
     The first route leads from the initial position of P past the known obstacles
     (``plan_route``). The planner remembers the nearest points of objects that are not
     known to move, one per cell of the grid. The robot stalls if P advances by less than
-    ``stall_m`` along the route in ``stalled_s``, and is farther from the goal than
-    ``arrived_m``. Then the block plans a new route from the position of P. The new
-    route also avoids the remembered points and robots at rest. If there is no such
-    route, the old route stays. The block tries again after ``stalled_s``.
+    10 cm along the route in 6 s, and is farther from the goal than 15 cm. Then the
+    block plans a new route from the position of P. The new route also avoids the
+    remembered points and robots at rest. If there is no such route, the old route
+    stays. The block tries again after 6 s.
 
     State, every tick: ``PlannerState``. An update at t reads the inputs at t. The block
     publishes the resulting route from t on, so other blocks read it in their next
@@ -202,24 +200,18 @@ def _make_step(
             goal,
             rectangles,
             clearance_m=parameters.clearance_m,
-            cell_m=parameters.cell_m,
-            arena_margin_m=parameters.arena_margin_m,
         )
     except InputError as error:
         field = "start.position_m" if error.field == "start" else error.field
         group = "" if error.field == "start" else "route."
         raise InputError(f"{group}{field}", error.message) from error
-    arena = arena_about([start, goal], rectangles, parameters.arena_margin_m)
-    grid = make_occupancy_grid(arena, parameters.cell_m, parameters.clearance_m)
-    block_rectangles(grid, rectangles, parameters.clearance_m)
+    grid = map_grid([start, goal], rectangles, parameters.clearance_m)
     numbers = PlannerNumbers(
         grid,
         rectangles,
         goal,
         parameters.clearance_m,
-        parameters.stall_m,
-        parameters.stalled_s if parameters.replan else math.inf,
-        parameters.arrived_m,
+        parameters.replan,
         robot.control_point_m,
         tick_s,
     )

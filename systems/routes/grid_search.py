@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
@@ -60,20 +59,22 @@ def _pop(bounds: Any, cells: Any, count: int) -> int:  # pragma: no cover  (comp
 def search_cells(
     blocked: Any, start: tuple[int, int], goal: tuple[int, int]
 ) -> Any:  # pragma: no cover  (compiled)
-    """Searches for a shortest path with A* on 8 neighbors; see ``find_cells``.
+    """Searches for a shortest path with A* on 8 neighbors.
 
-    The priority queue is a binary heap of cells, sorted by the cost so far plus the
-    octile distance to the goal. When a cheaper way to a cell is found, the cell enters
-    the heap again, and its older entries are skipped. This function is for compiled
-    code.
+    A diagonal step costs sqrt(2) times as much as a straight step. It is possible only
+    if both cells beside it are free. The priority queue is a binary heap of cells,
+    sorted by the cost so far plus the octile distance to the goal. When a cheaper way
+    to a cell is found, the cell enters the heap again, and its older entries are
+    skipped.
 
     Args:
         blocked: (n, m) cells that cannot be entered.
-        start: Cell.
-        goal: Cell.
+        start: Cell, numbers along both axes.
+        goal: Cell, numbers along both axes.
 
     Returns:
-        (k, 2) cells from start to goal, empty if there is no path.
+        (k, 2) cells from start to goal, empty if start or goal is blocked, or if no
+        path connects them.
     """
     n, m = blocked.shape
     si, sj = start
@@ -126,24 +127,3 @@ def search_cells(
         cells[k, 0], cells[k, 1] = cell // m, cell % m
         cell = before[cell // m, cell % m]
     return cells
-
-
-def find_cells(
-    blocked: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]
-) -> NDArray[np.int64] | None:
-    """Finds a shortest path between two cells.
-
-    Steps lead to the 8 neighbors. A diagonal step costs sqrt(2) times as much as a
-    straight step. It is possible only if both cells beside it are free.
-
-    Args:
-        blocked: (n, m) cells that cannot be entered.
-        start: Cell, numbers along both axes.
-        goal: Cell, numbers along both axes.
-
-    Returns:
-        (k, 2) cells from start to goal. None if start or goal is blocked, or if no path
-        connects them.
-    """
-    cells: NDArray[np.int64] = search_cells(blocked, start, goal)
-    return cells if len(cells) else None

@@ -10,9 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
-from systems.routes.parameters import check_cells
 from systems.world.geometry import beyond_rectangle, rectangle_corners
 
+#: Side of a cell, m. Its ratio to the least clearance is 1/3. With this ratio, the
+#: distance of a step between two free cells from an obstacle is at least 97 % of the
+#: clearance.
+CELL_M = 0.05
+#: Margin around the smallest rectangle that contains start, goal and known obstacles,
+#: m. Routes stay within this area.
+ARENA_MARGIN_M = 2.0
 #: Largest number of cells of a grid: a search among them takes 40 MB.
 _MOST_CELLS = 1_000_000
 #: (n, 3) positions and radii of discs, m; compiled code has no type for it.
@@ -27,61 +33,58 @@ class OccupancyGrid(NamedTuple):
     obstacle."""
     low: tuple[float, float]
     """Least x and y, m."""
-    cell_m: float
-    """Side of a cell, m."""
 
 
-def arena_about(
-    points: ArrayLike, rectangles: ArrayLike, margin_m: float
-) -> tuple[float, float, float, float]:
-    """Returns the smallest rectangle that contains points and obstacles, plus a margin.
+def map_grid(
+    points: ArrayLike, rectangles: ArrayLike, clearance_m: float
+) -> OccupancyGrid:
+    """Makes the grid of a map.
 
     Args:
-        points: (n, 2) m.
-        rectangles: (k, 5) obstacles, see ``systems.world.geometry``.
-        margin_m: Margin on each side, m.
+        points: (n, 2) start and goal, m.
+        rectangles: (k, 5) known obstacles in W, see ``systems.world.geometry``.
+        clearance_m: Distance from obstacles below which cells are blocked, m.
 
     Returns:
-        Least x and y, and greatest x and y, m.
+        The grid of the area that contains points and obstacles, plus a margin.
+
+    Raises:
+        InputError: There are too many cells.
     """
     boxes = np.asarray(rectangles, dtype=float).reshape(-1, 5)
     places = [np.asarray(points, dtype=float), *map(rectangle_corners, boxes)]
-    low = np.min([np.min(place, axis=0) for place in places], axis=0) - margin_m
-    high = np.max([np.max(place, axis=0) for place in places], axis=0) + margin_m
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    low = np.min([np.min(place, axis=0) for place in places], axis=0) - ARENA_MARGIN_M
+    high = np.max([np.max(place, axis=0) for place in places], axis=0) + ARENA_MARGIN_M
+    grid = make_occupancy_grid((*low.tolist(), *high.tolist()))
+    block_rectangles(grid, boxes, clearance_m)
+    return grid
 
 
-def make_occupancy_grid(
-    arena: tuple[float, float, float, float], cell_m: float, radius_m: float
-) -> OccupancyGrid:
+def make_occupancy_grid(arena: tuple[float, float, float, float]) -> OccupancyGrid:
     """Makes a grid of free cells.
 
     Args:
         arena: Least x and y, and greatest x and y, m.
-        cell_m: Side of a cell, m.
-        radius_m: Radius by which obstacles will be enlarged, m.
 
     Returns:
         The grid.
 
     Raises:
-        InputError: There are too many cells, or they are too coarse for the radius.
+        InputError: There are too many cells.
     """
-    check_cells(cell_m, radius_m)
     low_x, low_y, high_x, high_y = arena
     size = [
-        max(math.ceil(extent / cell_m - 1e-9), 1)
+        max(math.ceil(extent / CELL_M - 1e-9), 1)
         for extent in (high_x - low_x, high_y - low_y)
     ]
     if size[0] * size[1] > _MOST_CELLS:
-        least = math.sqrt((high_x - low_x) * (high_y - low_y) / _MOST_CELLS)
         raise InputError(
-            "cell_m",
-            f"{cell_m:g} m makes {size[0]} x {size[1]} cells of the floor about start, "
-            f"goal and obstacles, more than {_MOST_CELLS}; raise it above "
-            f"{least:.3g}, or lower arena_margin_m",
+            "goal_m",
+            f"start, goal and known obstacles spread over {high_x - low_x:.3g} m x "
+            f"{high_y - low_y:.3g} m, which makes more than {_MOST_CELLS} cells of "
+            f"{CELL_M:g} m; move them together",
         )
-    return OccupancyGrid(np.zeros(size, dtype=np.bool_), (low_x, low_y), cell_m)
+    return OccupancyGrid(np.zeros(size, dtype=np.bool_), (low_x, low_y))
 
 
 @njit(cache=True)
@@ -98,8 +101,8 @@ def cell_of(
     Returns:
         Numbers of the cell along x and y. They are (-1, -1) outside the grid.
     """
-    i = math.floor((x - grid.low[0]) / grid.cell_m)
-    j = math.floor((y - grid.low[1]) / grid.cell_m)
+    i = math.floor((x - grid.low[0]) / CELL_M)
+    j = math.floor((y - grid.low[1]) / CELL_M)
     n, m = grid.blocked.shape
     return (i, j) if 0 <= i < n and 0 <= j < m else (-1, -1)
 
@@ -118,20 +121,19 @@ def cell_middle(
     Returns:
         (x, y) m.
     """
-    cell = grid.cell_m
-    return grid.low[0] + (i + 0.5) * cell, grid.low[1] + (j + 0.5) * cell
+    return grid.low[0] + (i + 0.5) * CELL_M, grid.low[1] + (j + 0.5) * CELL_M
 
 
 @njit(cache=True)
 def _span(
-    low: float, high: float, first: float, cell: float, count: int
+    low: float, high: float, first: float, count: int
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
     """Return the range of cells whose middles may lie in an interval.
 
     The function returns the first cell of this range, and the cell after its last one.
     """
-    begin = math.floor((low - first) / cell - 0.5)
-    end = math.ceil((high - first) / cell - 0.5) + 1
+    begin = math.floor((low - first) / CELL_M - 0.5)
+    end = math.ceil((high - first) / CELL_M - 0.5) + 1
     return max(begin, 0), min(end, count)
 
 
@@ -159,8 +161,8 @@ def block_rectangles(
         half_y = 0.5 * (s * box[3] + c * box[4]) + radius
         low_x, high_x = box[0] - half_x, box[0] + half_x
         low_y, high_y = box[1] - half_y, box[1] + half_y
-        from_i, to_i = _span(low_x, high_x, grid.low[0], grid.cell_m, n)
-        from_j, to_j = _span(low_y, high_y, grid.low[1], grid.cell_m, m)
+        from_i, to_i = _span(low_x, high_x, grid.low[0], n)
+        from_j, to_j = _span(low_y, high_y, grid.low[1], m)
         for i in range(from_i, to_i):
             for j in range(from_j, to_j):
                 if not grid.blocked[i, j]:
@@ -182,8 +184,8 @@ def block_discs(
     n, m = grid.blocked.shape
     for k in range(len(discs)):
         x, y, reach = discs[k, 0], discs[k, 1], discs[k, 2] + radius
-        from_i, to_i = _span(x - reach, x + reach, grid.low[0], grid.cell_m, n)
-        from_j, to_j = _span(y - reach, y + reach, grid.low[1], grid.cell_m, m)
+        from_i, to_i = _span(x - reach, x + reach, grid.low[0], n)
+        from_j, to_j = _span(y - reach, y + reach, grid.low[1], m)
         for i in range(from_i, to_i):
             for j in range(from_j, to_j):
                 a, b = cell_middle(grid, i, j)

@@ -12,7 +12,7 @@ from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.routes.parameters import PathTargetParameters
+from systems.routes.parameters import RouteParameters
 from systems.routes.route import ROUTE_SIZE, ROUTE_UNIT
 from systems.world.geometry import control_point
 
@@ -23,6 +23,8 @@ ALONG, SPEED, REACHED, FINGERPRINT = range(4)
 #: come near to itself. The part begins at the first distance, m, behind both the last
 #: nearest point and the target. It ends at the second distance, m, ahead of both.
 _BEHIND_M, _AHEAD_M = 1.0, 0.5
+#: Largest lead of a waiting target over P along the route, m (our choice).
+LEAD_M = 0.5
 #: The target has arrived within this distance of the goal, m.
 _THERE_M = 1e-6
 
@@ -34,8 +36,6 @@ class TargetNumbers(NamedTuple):
     acceleration_m_s2: float
     waits: bool
     """Whether the target waits for the robot."""
-    lead_m: float
-    """Largest lead of a waiting target, m."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     tick_s: float
@@ -196,7 +196,7 @@ def path_target_step(
         # The target may come to rest within a tick. It then moves up to a T^2/8 farther
         # than with uniform braking.
         late = 0.125 * numbers.acceleration_m_s2 * numbers.tick_s**2
-        way = min(way, numbers.lead_m - late - along + reached)
+        way = min(way, LEAD_M - late - along + reached)
     after = next_speed(
         speed, way, numbers.speed_m_s, numbers.acceleration_m_s2, numbers.tick_s
     )
@@ -216,7 +216,7 @@ class PathTarget(Block):
 
     With ``timing: timed`` the speed of the target depends only on the time, whatever
     the robot does. The speed rises, stays constant, and falls. With ``waiting`` the
-    target brakes so that it leads P by at most ``lead_m``, unless P goes back. On a new
+    target brakes so that it leads P by at most ``LEAD_M``, unless P goes back. On a new
     route, the target begins at rest at the point nearest to P.
 
     Discrete state: arc length and speed of the target, arc length of P, and four
@@ -224,7 +224,7 @@ class PathTarget(Block):
     inputs, in every tick; no latency.
 
     Args:
-        parameters: ``PathTargetParameters``.
+        parameters: Motion of the target, ``RouteParameters``.
         robot: Position of P on the robot.
         tick_s: Period of the robot, s.
 
@@ -261,7 +261,7 @@ class PathTarget(Block):
     def __init__(
         self,
         *,
-        parameters: PathTargetParameters = PathTargetParameters(),
+        parameters: RouteParameters = RouteParameters(),
         robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
@@ -271,7 +271,6 @@ class PathTarget(Block):
             parameters.speed_m_s,
             parameters.acceleration_m_s2,
             parameters.timing == "waiting",
-            parameters.lead_m,
             robot.control_point_m,
             tick_s,
         )

@@ -17,13 +17,12 @@ from systems.framework.input_error import InputError
 from systems.framework.signals import read_only
 from systems.routes.grid_search import search_cells
 from systems.routes.occupancy_grid import (
+    CELL_M,
     Discs,
     OccupancyGrid,
-    arena_about,
-    block_rectangles,
     cell_middle,
     cell_of,
-    make_occupancy_grid,
+    map_grid,
 )
 from systems.world.geometry import beyond_rectangle, segment_clearance
 
@@ -46,7 +45,7 @@ _AVERAGES = 2
 _ROUNDING_M, _ROUNDING_SHARE = 0.015, 0.05
 #: A straight way out may come nearer to obstacles than its start, by at most the first
 #: number, m, and at most the second number times the clearance. Both shares and the 3 %
-#: of ``check_cells`` leave at least 92 % of the clearance.
+#: of ``CELL_M`` leave at least 92 % of the clearance.
 _WAY_OUT_M, _WAY_OUT_SHARE = 0.01, 0.03
 #: A goal may be nearer to obstacles than the clearance by this rounding error, m.
 _GRAZE_M = 1e-9
@@ -303,7 +302,7 @@ def _way_out(
     found, best = (-1, -1), np.inf
     if i < 0 or here <= 0.0:
         return found
-    reach = math.ceil(2.0 * clearance / grid.cell_m)
+    reach = math.ceil(2.0 * clearance / CELL_M)
     n, m = grid.blocked.shape
     for a in range(max(i - reach, 0), min(i + reach + 1, n)):
         for b in range(max(j - reach, 0), min(j + reach + 1, m)):
@@ -364,7 +363,7 @@ def find_route(
         points[0, axis], points[-1, axis] = start[axis], goal[axis]
     # Pull the path taut from each end: the second pass makes corners tauter.
     pulled = _pulled(points, rectangles, discs, clearance)
-    count = max(math.ceil(_length(pulled) / grid.cell_m), 1) + 1
+    count = max(math.ceil(_length(pulled) / CELL_M), 1) + 1
     back = np.ascontiguousarray(_with_corners(pulled, count)[::-1])
     pulled = np.ascontiguousarray(_pulled(back, rectangles, discs, clearance)[::-1])
     return _rounded(pulled, rectangles, discs, clearance)
@@ -392,8 +391,6 @@ def plan_route(
     rectangles: ArrayLike,
     *,
     clearance_m: float = 0.35,
-    cell_m: float = 0.05,
-    arena_margin_m: float = 2.0,
 ) -> Route:
     """Plans a short and smooth route for the center of a disc.
 
@@ -412,16 +409,13 @@ def plan_route(
         rectangles: (k, 5) known obstacles in W, see ``systems.world.geometry``.
         clearance_m: Clearance from known obstacles, m. The route keeps at least 92 % of
             this distance.
-        cell_m: Side of a cell, m.
-        arena_margin_m: Margin around the smallest rectangle that contains start, goal
-            and obstacles, m. The route stays within this area.
 
     Returns:
         The route.
 
     Raises:
         InputError: Start or goal lies in an obstacle; the goal is too near to an
-            obstacle or to the start; there is no route; or the grid does not fit. The
+            obstacle or to the start; there is no route; or the grid is too large. The
             error names the field.
 
     Reference: Engelbrecht, Steyn and Djouani (2021) name A* in sec. 2, but describe no
@@ -446,9 +440,7 @@ def plan_route(
         )
     if math.dist(start, goal) < _SHORTEST_M:
         raise InputError("goal_m", f"{_text(goal)} is where P starts; move it")
-    arena = arena_about([start, goal], known, arena_margin_m)
-    grid = make_occupancy_grid(arena, cell_m, clearance_m)
-    block_rectangles(grid, known, clearance_m)
+    grid = map_grid([start, goal], known, clearance_m)
     points = find_route(grid, start, goal, known, discs, clearance_m)
     if not len(points):
         raise InputError(

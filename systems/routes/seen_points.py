@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.occupancy_grid import OccupancyGrid, cell_of
+from systems.routes.occupancy_grid import CELL_M, OccupancyGrid, cell_of
 from systems.routes.route import place_clearance
 
 #: Largest number of remembered points; further points replace the oldest.
@@ -73,7 +73,7 @@ def remember_objects(
         i, j = cell_of(grid, x, y)
         if i < 0 or seen.taken[i, j]:
             continue
-        if place_clearance(x, y, rectangles, np.empty((0, 3))) < grid.cell_m:
+        if place_clearance(x, y, rectangles, np.empty((0, 3))) < CELL_M:
             continue
         # With a full memory, replace the oldest point.
         most = len(seen.points)

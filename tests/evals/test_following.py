@@ -19,7 +19,10 @@ def test_following_error_settles_and_stays_bounded():
     columns = result.columns
     path = result.scenario.source.path()
     moving = columns["t"] < path.length / result.scenario.source.speed_m_s
-    error = columns["source_range_true"] - result.scenario.follower.attraction.follow_distance_m
+    error = (
+        columns["source_range_true"]
+        - result.scenario.follower.attraction.follow_distance_m
+    )
     settled = (columns["t"] > 2.5) & moving
     assert np.count_nonzero(settled) > 1000
     assert np.max(np.abs(error[settled])) < 1.2

@@ -484,7 +484,8 @@ def test_places_to_jam_are_where_runs_end():
     rest = ends[np.linalg.norm(ends[:, 2:], axis=1) < 1e-3]
     behind = np.linalg.norm(rest[:, :2] - bodies(scenario)[-1, :2], axis=1)
     far = rest[
-        behind > scenario.follower.attraction.follow_distance_m + scenario.stop.goal_margin_m
+        behind
+        > scenario.follower.attraction.follow_distance_m + scenario.stop.goal_margin_m
     ]
     assert jams == len(np.unique(np.round(far[:, :2], 1), axis=0)) == 1
     assert len(far) < len(ends)

@@ -17,16 +17,14 @@ from systems import (
     TrajectoryImpedanceController,
     UltrasonicArray,
 )
-from systems.laws.trajectory.parameters import (
-    AdaptiveTrajectoryParameters,
-    FilteredTrajectoryParameters,
-)
+from systems.laws.trajectory.reference_model import nominal_poles
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
+from systems.laws.trajectory.trajectory_filtered import FilteredTrajectoryParameters
 
 
 def _adapting(own: Any) -> AdaptiveTrajectoryParameters | None:
     """The gains of a law if it adapts them; otherwise None."""
-    adaptive = isinstance(own, AdaptiveTrajectoryParameters)
-    return own if adaptive and own.adaptation.rule != "none" else None
+    return own if isinstance(own, AdaptiveTrajectoryParameters) else None
 
 
 def make_trajectory_controller(scenario: Scenario) -> Any:
@@ -58,12 +56,12 @@ def trajectory_command(scenario: Scenario) -> Any | None:
     """
     router = scenario.router
     own = router.gains
-    filtered = AdaptiveTrajectoryParameters, FilteredTrajectoryParameters
-    if not isinstance(own, filtered) or own.safety_filter is None:
+    filters = isinstance(own, FilteredTrajectoryParameters)
+    if isinstance(own, AdaptiveTrajectoryParameters):
+        filters = own.safety_filter
+    if not filters:
         return None
-    return SafetyFilter(
-        parameters=own.safety_filter, robot=router.robot, tick_s=scenario.tick_s
-    )
+    return SafetyFilter(robot=router.robot, tick_s=scenario.tick_s)
 
 
 def routed_blocks(
@@ -132,12 +130,7 @@ def _seen_objects(
             seed=seed_of("ultrasonic_array"),
             tick_s=tick_s,
         ),
-        ObjectDetector(
-            parameters=router.detector,
-            sensors=router.ultrasonic,
-            robot=robot,
-            tick_s=tick_s,
-        ),
+        ObjectDetector(sensors=router.ultrasonic, robot=robot, tick_s=tick_s),
     ]
 
 
@@ -146,12 +139,10 @@ def _adaptation(scenario: Scenario) -> list[Any]:
     if own is None:
         return []
     robot, tick_s = scenario.router.robot, scenario.tick_s
-    frequency, ratio = own.reference.poles(
+    frequency, ratio = nominal_poles(
         robot.mass_kg, own.stiffness_n_m, own.damping_n_s_m
     )
     return [
         ReferenceModel(frequency=frequency, ratio=ratio, tick_s=tick_s),
-        ImpedanceAdaptation(
-            parameters=own.adaptation, impedance=own, robot=robot, tick_s=tick_s
-        ),
+        ImpedanceAdaptation(parameters=own, robot=robot, tick_s=tick_s),
     ]

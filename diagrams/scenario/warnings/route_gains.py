@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from diagrams.scenario.participants import Router
 from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
 from systems.laws.catalogue import ROUTE_LAWS
-from systems.laws.trajectory.parameters import (
-    AdaptationParameters,
-    TrajectoryImpedanceParameters,
-)
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,
     damping_bound,
     pull_through_m,
     rate_bound,
     stiffness_bound,
+)
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
 )
 from systems.ranging.parameters import OBJECT_SLOTS
 from systems.world.plane import beyond_rectangle, rotate
@@ -55,16 +55,14 @@ def route_warnings(prefix: str, robot: Router, tick_s: float) -> list[ScenarioWa
             "touch an obstacle that P stays away from; raise it"
         )
         found.append(ScenarioWarning(f"{field}.block_distance_m", message))
-    adaptation = getattr(own, "adaptation", None)
-    if adaptation is not None and adaptation.rule != "none":
-        amplitude = pull_through_m(own)
-        found += _of_adaptation(f"{field}.adaptation", adaptation, amplitude, of)
-        if own.safety_filter is None and block is None:
-            found += _of_safety(f"{field}.adaptation", adaptation)
+    if isinstance(own, AdaptiveTrajectoryParameters):
+        found += _of_rate(field, own, of)
+        if not own.safety_filter and block is None:
+            found += _of_safety(field, own)
     return found
 
 
-def _of_safety(field: str, own: AdaptationParameters) -> list[ScenarioWarning]:
+def _of_safety(field: str, own: AdaptiveTrajectoryParameters) -> list[ScenarioWarning]:
     """Warns if an adaptive law lacks the safety term of eq. 27."""
     if own.rule == "lyapunov" and own.penalty > 0.0:
         message = (
@@ -72,13 +70,12 @@ def _of_safety(field: str, own: AdaptationParameters) -> list[ScenarioWarning]:
             "set rule: sensitivity"
         )
         return [ScenarioWarning(f"{field}.penalty", message)]
-    if own.penalty > 0.0 or own.freezes or own.rate == own.contact_rate == 0.0:
+    if own.penalty > 0.0 or own.rate == own.contact_rate == 0.0:
         return []
     message = (
         "is 0, so that the adaptation has no safety term, and such a robot "
         "collides more often than with trajectory_conventional; set rule: "
-        "sensitivity, penalty: 3, penalty_distance_m: 1, contact_rate: 10 and "
-        "projected: true, and damping_fades: true of the law, or use "
+        "sensitivity, penalty: 3, contact_rate: 10 and projected: true, or use "
         "trajectory_filtered"
     )
     return [ScenarioWarning(f"{field}.penalty", message)]
@@ -95,7 +92,7 @@ def _of_damping(
         )
         return [ScenarioWarning(f"{field}.damping_n_s_m", message)]
     each = own.contact_damping_n_s_m
-    if each == 0.0 or own.reading == "printed_force":
+    if each == 0.0:
         return []
     contacts = math.ceil((bound - damping) / each) - 1
     if contacts >= OBJECT_SLOTS:
@@ -126,26 +123,19 @@ def _of_stiffness(
     return [ScenarioWarning(f"{field}.{name}", message)]
 
 
-def _of_adaptation(
-    field: str, own: AdaptationParameters, amplitude_m: float, of: SampledMass
+def _of_rate(
+    field: str, own: AdaptiveTrajectoryParameters, of: SampledMass
 ) -> list[ScenarioWarning]:
-    if own.projected:
-        least, most = own.damping_box_n_s_m[0], own.stiffness_box_n_m[1]
-        bound = stiffness_bound(least, of)
-        message = (
-            f"ends at {most:g} N/m, but from {bound:.3g} on a robot with the "
-            f"lower end of damping_box_n_s_m, {least:g}, does not come to rest; "
-            "lower its upper end"
-        )
-        warning = ScenarioWarning(f"{field}.stiffness_box_n_m", message)
-        return [warning] if most >= bound else []
+    """Warns if K and D without limits can run away."""
+    amplitude_m = pull_through_m(own)
     bound = rate_bound(own.rule, amplitude_m, of)
+    if own.projected or own.rate < bound:
+        return []
     message = (
         f"is {own.rate:g}, but from about {bound:.3g} on K and D run away where the "
         f"target is {amplitude_m:.3g} m ahead; lower it, or set projected"
     )
-    warning = ScenarioWarning(f"{field}.rate", message)
-    return [warning] if own.rate >= bound and own.normalisation is None else []
+    return [ScenarioWarning(f"{field}.rate", message)]
 
 
 def goal_warnings(
@@ -181,12 +171,7 @@ def goal_warnings(
     if robot.route is None or robot.law not in ROUTE_LAWS:
         return []
     own = robot.gains
-    if own.reading != "restored":
-        return []
-    # Import compiled code only when it is used.
-    from systems.laws.trajectory.trajectory_impedance import contact_numbers
-
-    contact, goal = contact_numbers(own), robot.route.goal_m
+    zone_m, goal = own.security_zone_m, robot.route.goal_m
     p = np.array(goal)
     pull, push = own.stiffness_n_m, own.contact_stiffness_n_m
     pushing: list[str] = []
@@ -196,8 +181,8 @@ def goal_warnings(
         for name, each in resting.items():
             away = np.array(rotate(each[2], *beyond_rectangle(p, each)))
             distance = math.hypot(*away)
-            if 0.0 < distance < contact.begins_m:
-                force += push * (contact.rest_m - distance) / distance * away
+            if 0.0 < distance < zone_m:
+                force += push * (zone_m - distance) / distance * away
                 pushing.append(name)
         # Step to the equilibrium for the present directions of the pushes.
         step = force / (pull + push * len(pushing))
@@ -208,7 +193,7 @@ def goal_warnings(
     if off <= margin_m:
         return []
     # Distance of the goal from one wall at which the offset equals the margin.
-    room = contact.rest_m - margin_m * (pull + push) / push
+    room = zone_m - margin_m * (pull + push) / push
     names = ", ".join(map(repr, pushing))
     message = (
         f"{names} will hold P {off:.2g} m off the goal, farther than "

@@ -16,10 +16,7 @@ from systems.laws.trajectory.impedance_sensitivity import (
     penalty_gradient,
     sensitivity_sources,
 )
-from systems.laws.trajectory.parameters import (
-    AdaptationParameters,
-    TrajectoryImpedanceParameters,
-)
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 from systems.laws.trajectory.trajectory_impedance import (
     ContactNumbers,
     contact_numbers,
@@ -32,6 +29,15 @@ from systems.world.geometry import control_point
 _GAINS, _SENSITIVITIES = 0, 3
 #: Names of the gains that adapt.
 _ADAPTED = "stiffness", "damping", "contact_stiffness"
+#: Weight tau_v^2 of velocity errors, s^2: an error of 1 m/s counts as an error of 0.5
+#: m. All constants are our choice.
+_VELOCITY_WEIGHT_S2 = 0.5**2
+#: Least and greatest K and D of gains with limits, N/m and N s/m.
+STIFFNESS_BOX_N_M, DAMPING_BOX_N_S_M = (0.5, 6.0), (3.0, 8.0)
+#: Least and greatest K_e of gains with limits, N/m.
+_CONTACT_BOX_N_M = (0.5, 24.0)
+#: Limits of gains without limits.
+_WIDE = (-1e9, 1e9)
 
 
 class AdaptationNumbers(NamedTuple):
@@ -41,22 +47,14 @@ class AdaptationNumbers(NamedTuple):
     """Whether the rule is ``lyapunov``; otherwise it is ``sensitivity``."""
     rates: tuple[float, float, float]
     """Rates gamma of K, D, and K_e."""
-    velocity_weight: float
-    """Weight tau_v^2 of velocity errors, s^2."""
-    penalty: tuple[float, float]
-    """Weight lambda, without unit, and distance d_sec, m, of the safety term."""
-    normalised: bool
-    least_square: float
-    """Constant m_0 of the normalization."""
+    penalty: float
+    """Weight lambda of the safety term, without unit."""
     low: tuple[float, float, float]
     """Least K, D, and K_e."""
     high: tuple[float, float, float]
     """Greatest K, D, and K_e."""
     nominal: tuple[float, float, float]
-    """Nominal K, D, and K_e."""
-    leakage: float
-    """Rate sigma of the return to the nominal gains, 1/s."""
-    freezes: bool
+    """Initial K, D, and K_e."""
     contacts: ContactNumbers
     contact_damping: float
     """Contact damping D_e, N s/m."""
@@ -75,10 +73,8 @@ def adaptation_step(
     dp/dq and dv/dq (x and y each) follow.
 
     For each gain the step computes the gradient of the error, either by the Lyapunov
-    rule or from the sensitivities. If normalization is on, it divides the gradient by
-    the normalization. Then it moves the gain against the gradient and toward its
-    nominal value. Finally it limits the gain. The output has the gains from before this
-    change.
+    rule or from the sensitivities. Then it moves the gain against the gradient and
+    limits it. The output has the gains from before this change.
     """
     target, reference, pose, v_WP, objects = inputs
     for k in range(3):
@@ -93,40 +89,25 @@ def adaptation_step(
         numbers.mass,
         numbers.tick_s,
     )
-    # Errors against the reference, and gradient of the safety term.
+    # Errors against the reference, and gradient of the safety term. Its distance
+    # d_sec is S.
     ex, ey = p_WP[0] - reference[0], p_WP[1] - reference[1]
     evx, evy = v_WP[0] - reference[2], v_WP[1] - reference[3]
-    penalty, security_m = numbers.penalty
-    gx, gy = penalty_gradient(found, security_m, penalty)
-    frozen = numbers.freezes and len(found) > 0
-    outputs[1][0] = 0.0 if frozen else 1.0
+    gx, gy = penalty_gradient(found, numbers.contacts.begins_m, numbers.penalty)
     for k in range(3):
         source = sources[k]
         at = _SENSITIVITIES + 4 * k
         if numbers.lyapunov:
             gradient = evx * source[0] + evy * source[1]
-            square = source[0] * source[0] + source[1] * source[1]
         else:
             gradient = (ex + gx) * state[at] + (ey + gy) * state[at + 1]
-            gradient += numbers.velocity_weight * (
+            gradient += _VELOCITY_WEIGHT_S2 * (
                 evx * state[at + 2] + evy * state[at + 3]
             )
-            # Products instead of powers: a power in Python raises on overflow. Here the
-            # overflow reaches the next block, whose error message names it.
-            square = state[at] * state[at] + state[at + 1] * state[at + 1]
-            square += numbers.velocity_weight * (
-                state[at + 2] * state[at + 2] + state[at + 3] * state[at + 3]
-            )
             advance_sensitivity(state, at, source, found, loop)
-        if frozen or numbers.rates[k] == 0.0:
+        if numbers.rates[k] == 0.0:
             gradient = 0.0
-        if numbers.normalised:
-            gradient = gradient / (numbers.least_square + square)
-        # One step of the gain with leakage, then the limits.
-        value = state[_GAINS + k] - numbers.tick_s * (
-            numbers.rates[k] * gradient
-            + numbers.leakage * (state[_GAINS + k] - numbers.nominal[k])
-        )
+        value = state[_GAINS + k] - numbers.tick_s * (numbers.rates[k] * gradient)
         state[_GAINS + k] = min(max(value, numbers.low[k]), numbers.high[k])
 
 
@@ -144,12 +125,10 @@ class ImpedanceAdaptation(Block):
 
     The discrete state has K, D, K_e, and four sensitivities of each gain. It is updated
     every tick. The output ``impedance`` is part of the state, so it shows a change of
-    the gains from the next tick on. The output ``adaptation_active`` depends on the
-    present input.
+    the gains from the next tick on.
 
     Args:
-        parameters: ``AdaptationParameters``.
-        impedance: ``TrajectoryImpedanceParameters``: nominal gains, and contacts.
+        parameters: ``AdaptiveTrajectoryParameters``.
         robot: Mass, and position of P.
         tick_s: Period, s.
 
@@ -171,7 +150,6 @@ class ImpedanceAdaptation(Block):
     )
     outputs = (
         Port("impedance", 3, "number, K in N/m, D in N s/m and K_e in N/m", _ADAPTED),
-        Port("adaptation_active", 1, "0 or 1", ("adaptation_active",)),
     )
     states = (
         *_ADAPTED,
@@ -181,54 +159,41 @@ class ImpedanceAdaptation(Block):
     def __init__(
         self,
         *,
-        parameters: AdaptationParameters = AdaptationParameters(),
-        impedance: TrajectoryImpedanceParameters = TrajectoryImpedanceParameters(),
+        parameters: AdaptiveTrajectoryParameters = AdaptiveTrajectoryParameters(),
         robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("impedance_adaptation")
-        numbers = adaptation_numbers(parameters, impedance, robot, tick_s)
+        numbers = adaptation_numbers(parameters, robot, tick_s)
         state = [*numbers.nominal, *[0.0] * 12]
         self.declare(Step(adaptation_step, numbers, state), tick_s=tick_s)
 
 
 def adaptation_numbers(
-    own: AdaptationParameters,
-    law: TrajectoryImpedanceParameters,
-    robot: RobotParameters,
-    tick_s: float,
+    own: AdaptiveTrajectoryParameters, robot: RobotParameters, tick_s: float
 ) -> AdaptationNumbers:
     """Computes the constants of the step.
 
     Args:
-        own: Rule, rates, and limits of the adaptation.
-        law: Nominal gains, and contacts.
+        own: Rule, rates, initial gains, and contacts.
         robot: Mass, and position of P.
         tick_s: Period, s.
 
     Returns:
         The constants.
     """
-    boxes = own.stiffness_box_n_m, own.damping_box_n_s_m, own.contact_box_n_m
-    wide = (-1e9, 1e9)
-    low, high = zip(*(box if own.projected else wide for box in boxes), strict=True)
-    rate = 0.0 if own.rule == "none" else own.rate
-    contact_rate = 0.0 if own.rule == "none" else own.contact_rate
+    boxes = STIFFNESS_BOX_N_M, DAMPING_BOX_N_S_M, _CONTACT_BOX_N_M
+    low, high = zip(*(box if own.projected else _WIDE for box in boxes), strict=True)
     return AdaptationNumbers(
         own.rule == "lyapunov",
-        (rate, rate, contact_rate),
-        own.velocity_weight_s**2,
-        (own.penalty, own.penalty_distance_m),
-        own.normalisation is not None,
-        own.normalisation or 0.0,
+        (own.rate, own.rate, own.contact_rate),
+        own.penalty,
         low,
         high,
-        (law.stiffness_n_m, law.damping_n_s_m, law.contact_stiffness_n_m),
-        own.leakage,
-        own.freezes,
-        contact_numbers(law),
-        law.contact_damping_n_s_m,
+        (own.stiffness_n_m, own.damping_n_s_m, own.contact_stiffness_n_m),
+        contact_numbers(own),
+        own.contact_damping_n_s_m,
         robot.mass_kg,
         robot.control_point_m,
         tick_s,

@@ -127,7 +127,7 @@ def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
 
     Args:
         contacts: Result of ``contacts_of_objects``.
-        security_m: Distance d_sec, m.
+        security_m: Distance d_sec, m; in the adaptation it is S.
         penalty: Weight lambda.
 
     Returns:

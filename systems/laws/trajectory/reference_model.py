@@ -42,6 +42,20 @@ def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNum
     return ReferenceNumbers(tuple(a), tuple(b))
 
 
+def nominal_poles(mass: float, stiffness: float, damping: float) -> tuple[float, float]:
+    """Returns the poles of a mass on a spring and a damper.
+
+    Args:
+        mass: Virtual mass M, kg.
+        stiffness: Stiffness K, N/m, above 0.
+        damping: Damping D, N s/m.
+
+    Returns:
+        Natural frequency w_n, rad/s, and damping ratio xi. The paper prints neither.
+    """
+    return math.sqrt(stiffness / mass), damping / (2.0 * math.sqrt(stiffness * mass))
+
+
 @register_jitable
 def reference_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: ReferenceNumbers

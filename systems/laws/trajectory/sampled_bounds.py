@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 
 #: Bounds of gamma (a T/M)^2 by rule, where a is the amplitude of P's target, m. Below
 #: the bound K and D do not run away. The values are rounded down from the results of
@@ -132,8 +134,7 @@ def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
 def rate_bound(rule: str, amplitude_m: float, of: SampledMass) -> float:
     """Computes the rate gamma above which K and D may run away.
 
-    The bound applies to adaptation without limits of the gains and without
-    normalization.
+    The bound applies to adaptation without limits of the gains.
 
     Args:
         rule: ``lyapunov`` or ``sensitivity``.

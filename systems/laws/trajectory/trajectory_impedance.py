@@ -8,14 +8,20 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 from systems.ranging.objects import THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import safe_norm
 
 
 class ContactNumbers(NamedTuple):
-    """Constants of the contact force."""
+    """Constants of the contact force.
+
+    The laws of the package set both distances to S. Other values are other readings of
+    the paper, see docs/errata.md.
+    """
 
     begins_m: float
     """Distance at which a contact begins, m."""
@@ -24,8 +30,6 @@ class ContactNumbers(NamedTuple):
     fades: bool
     """Whether the damping is 0 at the distance ``begins_m`` and grows toward the
     object."""
-    spring_sign: float
-    damper_sign: float
 
 
 class Contact(NamedTuple):
@@ -52,19 +56,8 @@ def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
     Returns:
         The constants.
     """
-    security, horizon = own.security_zone_m, own.horizon_m
-    begins, rest = {
-        "security": (security, security),
-        "envelope": (horizon, horizon),
-        "jump": (security, horizon),
-    }[own.zone]
-    return ContactNumbers(
-        begins,
-        rest,
-        own.damping_fades,
-        -1.0 if own.reading == "printed_state" else 1.0,
-        -1.0 if own.reading == "printed_force" else 1.0,
-    )
+    zone_m = own.security_zone_m
+    return ContactNumbers(zone_m, zone_m, own.damping_fades)
 
 
 @register_jitable
@@ -115,33 +108,29 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
         if numbers.fades:
             share = 1.0 - distance / numbers.begins_m
         n = -x / distance, -y / distance
-        # In eq. 10 the spring pulls to the obstacle, not to the envelope point.
-        attracts = numbers.spring_sign < 0.0
-        overlap = distance if attracts else numbers.rest_m - distance
+        overlap = numbers.rest_m - distance
         found.append(Contact(n, distance, overlap, v_relative, share))
     return found
 
 
 @register_jitable
-def contact_force(contacts: Any, stiffness: Any, damping: Any, numbers: Any) -> Any:
+def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
     """Computes the force of all contacts, V = sum of K_e overlap n - D_e (v - v_j).
 
-    This is the force of eq. 4 and 5 with restored signs. ``numbers`` may select other
-    signs.
+    This is the force of eq. 4 and 5 with restored signs.
 
     Args:
         contacts: Result of ``contacts_of_objects``.
         stiffness: Stiffness K_e, N/m.
         damping: Damping D_e, N s/m.
-        numbers: ``ContactNumbers``.
 
     Returns:
         (Vx, Vy) in W, N.
     """
     fx = fy = 0.0
     for contact in contacts:
-        spring = numbers.spring_sign * stiffness * contact.overlap_m
-        damper = numbers.damper_sign * damping * contact.share
+        spring = stiffness * contact.overlap_m
+        damper = damping * contact.share
         fx = fx + spring * contact.n[0] - damper * contact.v_relative[0]
         fy = fy + spring * contact.n[1] - damper * contact.v_relative[1]
     return fx, fy

@@ -16,7 +16,9 @@ from systems.framework.block import Block_, Port, Step
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.laws.law import FORCE_COLUMNS
-from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 from systems.laws.trajectory.trajectory_impedance import (
     ContactNumbers,
     contact_force,
@@ -28,6 +30,8 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
+#: Largest acceleration of the virtual mass, m/s^2 (our choice).
+ACCELERATION_LIMIT_M_S2 = 2.5
 #: Speed in m/s. If a target moves straight back faster, its velocity turns aside.
 _BACK_M_S = 0.05
 
@@ -42,14 +46,37 @@ class TrajectoryNumbers(NamedTuple):
     contacts: ContactNumbers
     mass: float
     """Virtual mass M, kg."""
-    acceleration_limit: float
-    """Largest acceleration of the virtual mass, m/s^2."""
     control_point_m: float
     block_m: float
     """Distance L_block, m; 0: eq. 6 is off."""
     top_speed: float
     """Top speed of P, m/s."""
     tick_s: float
+
+
+def trajectory_numbers(
+    own: TrajectoryImpedanceParameters, robot: RobotParameters, tick_s: float
+) -> TrajectoryNumbers:
+    """Computes the constants of the step.
+
+    Args:
+        own: Parameters of the law.
+        robot: Mass, top speed, and position of P.
+        tick_s: Period, s.
+
+    Returns:
+        The constants.
+    """
+    return TrajectoryNumbers(
+        (own.stiffness_n_m, own.damping_n_s_m, own.contact_stiffness_n_m),
+        own.contact_damping_n_s_m,
+        contact_numbers(own),
+        robot.mass_kg,
+        robot.control_point_m,
+        own.block_distance_m or 0.0,
+        robot.top_speed_m_s,
+        tick_s,
+    )
 
 
 @register_jitable
@@ -62,11 +89,9 @@ def _command(
     moving = target[0], target[1], vx, vy
     ux, uy = target_force(p_WP, v_WP, moving, impedance[0], impedance[1])
     found = contacts_of_objects(objects, v_WP, numbers.contacts)
-    fx, fy = contact_force(
-        found, impedance[2], numbers.contact_damping, numbers.contacts
-    )
+    fx, fy = contact_force(found, impedance[2], numbers.contact_damping)
     ax, ay = (ux + fx) / numbers.mass, (uy + fy) / numbers.mass
-    ax, ay = clamped_velocity(ax, ay, numbers.acceleration_limit)
+    ax, ay = clamped_velocity(ax, ay, ACCELERATION_LIMIT_M_S2)
     if numbers.block_m > 0.0:
         T = numbers.tick_s
         vx, vy = integrate_velocity(v_WP, (ax, ay), T, numbers.top_speed)
@@ -157,18 +182,7 @@ def TrajectoryImpedanceController_(T):
         ) -> None:
             super().__init__(converter=converter)
             self.set_name("trajectory_impedance_controller")
-            own = parameters
-            numbers = TrajectoryNumbers(
-                (own.stiffness_n_m, own.damping_n_s_m, own.contact_stiffness_n_m),
-                own.contact_damping_n_s_m,
-                contact_numbers(own),
-                robot.mass_kg,
-                own.acceleration_limit_m_s2,
-                robot.control_point_m,
-                own.block_distance_m or 0.0,
-                robot.top_speed_m_s,
-                tick_s,
-            )
+            numbers = trajectory_numbers(parameters, robot, tick_s)
             step = trajectory_impedance_step
             if adapts:
                 step = adapted_impedance_step

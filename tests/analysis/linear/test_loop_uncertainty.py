@@ -71,7 +71,9 @@ def test_values_reach_their_fields():
     assert changed.only.plant.slip == pytest.approx((-0.02, -0.02))
     assert changed.follower.attraction.stiffness_n_m == pytest.approx(2.0)
     warm = with_values(scenario(), {"sound_speed_m_s": 352.5})
-    assert warm.follower.attraction.stiffness_n_m == pytest.approx(2.0 * 352.5 / 340, rel=5e-3)
+    assert warm.follower.attraction.stiffness_n_m == pytest.approx(
+        2.0 * 352.5 / 340, rel=5e-3
+    )
 
 
 @pytest.mark.parametrize("law", ["conventional", "active"])

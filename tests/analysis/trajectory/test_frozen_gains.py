@@ -13,7 +13,6 @@ from analysis.models.diagram_state import get_state, run_periods, set_state
 from analysis.trajectory.frozen_gains import (
     axis_damping_ratio,
     damped_stiffness,
-    frozen_gains,
     gain_bounds,
 )
 from analysis.trajectory.route_loop import (
@@ -200,18 +199,6 @@ def test_nothing_near_has_no_gains():
     own = route_law(scenario("trajectory_filtered"))
     assert contact_gains(own, own.security_zone_m) == (0.0, 0.0)
     assert contact_gains(own, 0.4) == pytest.approx((8.0, 2.0))
-    numbers = own.model_copy(update={"reading": "printed_force"})
-    assert contact_gains(numbers, 0.4) == pytest.approx((8.0, -2.0))
-
-
-def test_the_printed_sign_is_unstable_before_a_wall():
-    """D - D_e = 0 with one contact: the motors' lag makes it grow."""
-    where = scenario(
-        "trajectory_conventional",
-        "laws.trajectory_conventional.reading=printed_force",
-    )
-    growth = {each.at.name: each.growth_per_s for each in frozen_gains(where)}
-    assert growth["at rest"] < 0.0 < growth["in a zone"]
 
 
 def test_a_law_that_follows_a_sound_is_refused():

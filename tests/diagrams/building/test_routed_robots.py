@@ -33,6 +33,18 @@ def test_both_engines_do_the_same(name, law, fields):
         np.testing.assert_allclose(compiled.columns[column], values, atol=1e-9)
 
 
+#: Four walls around the goal.
+WALLED_IN = [
+    {"name": f"wall {k}", "waypoints_m": [place], "size_m": size}
+    for k, (place, size) in enumerate(
+        [
+            ([5.0, 0.0], [0.1, 2.1]),
+            ([7.0, 0.0], [0.1, 2.1]),
+            ([6.0, 1.0], [2.1, 0.1]),
+            ([6.0, -1.0], [2.1, 0.1]),
+        ]
+    )
+]
 HEAD_ON = "obstacles.0.waypoints_m=[[3.0, 0.0]]", "route.replan=false", "duration_s=45"
 
 
@@ -128,15 +140,15 @@ def test_the_same_seed_gives_the_same_bytes():
             r"^route.goal_m: \(3, 0.1\) lies in a known obstacle",
         ),
         (
-            ["obstacles.0.known=true", "route.arena_margin_m=0.2"],
+            [f"obstacles={WALLED_IN}"],
             "^route.goal_m: no route leads",
         ),
-        (["route.cell_m=0.5"], "^route.cell_m"),
+        (["route.clearance_m=0.1"], "^route.clearance_m"),
         (
             ["route.goal_m=[60, 0]"],
             "^route.goal_m: .* beyond stop.diverged_range_m, 20",
         ),
-        (["guard={}"], "^guard: is set, but only the safety_filter"),
+        (["guard={}"], "^guard: is set, but only the safety filter"),
     ],
 )
 def test_what_cannot_be_is_refused(fields, message):
@@ -152,7 +164,7 @@ def test_what_cannot_be_is_refused(fields, message):
             "0.141 m from another robot's goal",
         ),
         (["robots.second.start.position_m=[-3.0, 0.1]"], "overlaps robot 'first'"),
-        (["robots.second.route.cell_m=0.5"], "^robots.second.route.cell_m"),
+        (["robots.second.route.clearance_m=0"], "^robots.second.route.clearance_m"),
     ],
 )
 def test_nor_what_two_robots_cannot(fields, message):

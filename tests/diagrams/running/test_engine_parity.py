@@ -34,10 +34,8 @@ DISTURBING = re.compile(
 )
 #: Such by their names alone, and why they are not set.
 OTHERS = {
-    "laws.guarded.weave_period_s": "of a wave that the law weighs",
-    "laws.guarded.search_period_s": "of a wave that the law weighs",
-    "laws.trajectory_adaptive.safety_filter.approach_rate": "a gain",
-    "laws.trajectory_filtered.safety_filter.approach_rate": "a gain",
+    "repulsion.guarded.weave_period_s": "of a wave that the law weighs",
+    "repulsion.guarded.search_period_s": "of a wave that the law weighs",
     "sound_search.noise_s": "for how long a search listens",
     "cross_power.noise_cross_power": "on by default",
     "gas_sensors.mismatch": "0.01 by default",
@@ -182,8 +180,8 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             **OBJECTS,
             "duration_s": 20.0,
             "law": "trajectory_adaptive",
-            "laws.trajectory_adaptive.adaptation.rate": 5.0,
-            "laws.trajectory_adaptive.adaptation.contact_rate": 2.0,
+            "laws.trajectory_adaptive.rate": 5.0,
+            "laws.trajectory_adaptive.contact_rate": 2.0,
             "ideal_hearing.range_noise_fraction": 0.05,
         },
     ),
@@ -196,7 +194,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "ultrasonic.noise_m": 0.01,
             "ultrasonic.dropout_probability": 0.05,
             "ultrasonic.faults": [{"sensor": 3, "kind": "frozen", "start_s": 3.0}],
-            "detector.noise_m": 0.06,
         },
     ),
     "searching": (

@@ -62,7 +62,9 @@ def test_a_rows_command_moves_the_wheels_to_the_next_row(law, engine):
     for side, sign in (("left", -0.5), ("right", 0.5)):
         rim = forward + sign * robot.wheel_separation_m * turning
         wheel, command = rim / robot.wheel_radius_m, columns[f"wheel_speed_{side}"]
-        left = math.exp(-result.scenario.tick_s / result.scenario.only.plant.motor_lag_s)
+        left = math.exp(
+            -result.scenario.tick_s / result.scenario.only.plant.motor_lag_s
+        )
         after = command[:-1] + left * (wheel[:-1] - command[:-1])
         np.testing.assert_allclose(wheel[1:], after, rtol=0.0, atol=1e-8)
         # What the run shows: that of the next row would be off.
@@ -92,7 +94,11 @@ def _check_chain(result: RunResult, *, guarded: bool) -> None:
         free = lengths < robot.top_speed_m_s
         assert np.count_nonzero(free) > 0
         np.testing.assert_allclose(v[free], speed[free], rtol=0.0, atol=1e-9)
-    if "attraction_x" in columns and result.scenario.only.kind != "router" and not guarded:
+    if (
+        "attraction_x" in columns
+        and result.scenario.only.kind != "router"
+        and not guarded
+    ):
         tick_s, mass = result.scenario.tick_s, robot.mass_kg
         force = result.vector("attraction") + result.vector("repulsion")
         before = np.c_[np.zeros(2), result.vector("v_WP")[:, :-1]]

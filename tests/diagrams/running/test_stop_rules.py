@@ -443,7 +443,9 @@ def test_corners_are_not_cut_however_fast():
         }
         result = run(**WAITING, obstacles=[cart], duration_s=0.3)
         path = result.scenario.obstacles[0].path()
-        robot = robot_rectangle(result.scenario.only.start.pose, result.scenario.only.robot)
+        robot = robot_rectangle(
+            result.scenario.only.start.pose, result.scenario.only.robot
+        )
         dense = [
             rectangle_clearance(robot, np.array([*path.pose(t), 0.002, 0.002]))
             for t in np.linspace(0.0, 0.2, 8001)

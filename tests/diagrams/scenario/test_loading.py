@@ -120,7 +120,6 @@ def test_one_of_everything_runs(tmp_path):
     assert untouched == {
         "blocks",
         "engine",
-        "detector",
         "objects",
         "route",
         "sound",

@@ -18,7 +18,10 @@ from systems.world.geometry import rectangle_corners
 def test_default_scenario_is_complete():
     scenario = Scenario()
     assert scenario.only.law == "active"
-    assert (scenario.follower.hearing, scenario.follower.obstacle_sensing) == ("audio", "ultrasonic")
+    assert (scenario.follower.hearing, scenario.follower.obstacle_sensing) == (
+        "audio",
+        "ultrasonic",
+    )
 
 
 def test_goal_radius_is_follow_distance_and_margin():

@@ -10,7 +10,6 @@ import pytest
 
 from systems.base.robot import RobotParameters
 from systems.framework.block import Step
-from systems.planning.parameters import SafetyFilterParameters
 from systems.planning.safety_filter import SafetyFilter
 from systems.planning.velocity_filter import (
     FilterNumbers,
@@ -21,7 +20,7 @@ from systems.planning.velocity_filter import (
 
 BURGER = RobotParameters.model_validate({"preset": "turtlebot3_burger"})
 KEEP = 0.5 * math.hypot(0.138, 0.178) + 0.08 + 0.05
-NUMBERS = FilterNumbers(KEEP, 1.0, 4.0, 0.22, 1.0, 0.1)
+NUMBERS = FilterNumbers(KEEP, 0.22, 1.0)
 
 
 def objects_of(*slots):
@@ -161,7 +160,7 @@ def test_robots_share_the_way_out():
 
 
 def test_the_block_does_not_wind_up():
-    block = SafetyFilter(parameters=SafetyFilterParameters(), robot=BURGER)
+    block = SafetyFilter(robot=BURGER)
     step: Step = block.step
     state = list(step.state)
     wall = objects_of([1, KEEP, 0.0, 0.0, 0.0, 1]).tolist()

@@ -23,7 +23,7 @@ from systems.world.geometry import nearest_point_on_rectangle, rectangle_clearan
 BURGER = RobotParameters.model_validate({"preset": "turtlebot3_burger"})
 EPSILON, TOP, LAG_S, TICK_S = 0.08, 0.22, 0.05, 0.025
 KEEP = 0.5 * math.hypot(0.138, 0.178) + EPSILON + 0.05
-NUMBERS = FilterNumbers(KEEP, 1.0, 4.0, TOP, 1.0, 0.1)
+NUMBERS = FilterNumbers(KEEP, TOP, 1.0)
 
 
 def drawn(seed: int) -> Any:

@@ -13,7 +13,7 @@ from systems.base.robot import RobotParameters
 from systems.ranging.beam_groups import EXTENT, NEAR_X, NEAR_Y, OPEN, group_beams
 from systems.ranging.object_detector import ObjectDetector, object_detector_step
 from systems.ranging.objects import KNOWN, RADIUS, THERE, VX, VY, X, Y
-from systems.ranging.parameters import ObjectDetectorParameters, UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.ultrasonic_array import cone_ranges
 
 BURGER = RobotParameters.model_validate({"preset": "turtlebot3_burger"})
@@ -31,11 +31,9 @@ def ring(count: int, **fields: Any) -> UltrasonicParameters:
 class Driven:
     """A detector that is driven tick by tick."""
 
-    def __init__(self, sensors: UltrasonicParameters = SCAN, **own: Any) -> None:
+    def __init__(self, sensors: UltrasonicParameters = SCAN) -> None:
         self.sensors = sensors
-        self.block = ObjectDetector(
-            parameters=ObjectDetectorParameters(**own), sensors=sensors, robot=BURGER
-        )
+        self.block = ObjectDetector(sensors=sensors, robot=BURGER)
         self.state, self.tick = np.array(self.block.step.state), 0
 
     def see(self, ranges: Any, pose: Any = REST, ages: Any = None) -> Any:
@@ -260,27 +258,33 @@ def test_it_remembers_for_a_while():
 
 
 def test_it_forgets_a_sensor_that_fires_no_more():
-    driven = Driven(memory_s=0.0)
+    """Its range is held for a tick; then the object is remembered for 0.5 s."""
+    driven = Driven()
     ranges = [math.inf] * 3 + [1.0] + [math.inf] * 3
     assert len(there(driven.see(ranges))) == 1
-    assert len(there(driven.see(ranges, ages=[0.025] * 7))) == 1
+    for age, count in ((0.025, 30), (0.05, 20)):
+        for _ in range(count):
+            assert len(there(driven.see(ranges, ages=[age] * 7))) == 1
     assert len(there(driven.see(ranges, ages=[0.05] * 7))) == 0
 
 
 def test_held_ranges_stay_where_they_were_seen():
-    """Sensors in turn on a robot that drives at a wall: each hit is on it in W."""
+    """Sensors in turn on a robot that drives at a wall: each hit is on it in W.
+
+    Objects of single hits, at the first ticks, are forgotten by then.
+    """
     sensors = UltrasonicParameters(
         axes_deg=(40.0, 0.0, -40.0), beam_half_angle_deg=0.1, firing="sequential"
     )
-    driven, held = Driven(sensors, memory_s=0.0), [math.inf] * 3
-    for tick in range(9):
+    driven, held = Driven(sensors), [math.inf] * 3
+    for tick in range(31):
         pose = 0.02 * tick - EPSILON, 0.0, 0.0
         wall = np.array([[1.6, 0.0, 0.0, 0.2, 9.0]])
         held[tick % 3] = cone_ranges(pose, wall, sensors, EPSILON)[tick % 3]
         ages = [0.025 * ((tick - k) % 3) for k in range(3)]
         objects = driven.see(held, pose, ages)
     assert len(there(objects)) == 1
-    assert objects[0, X] == pytest.approx(1.5 - 0.02 * 8, abs=0.002)
+    assert objects[0, X] == pytest.approx(1.5 - 0.02 * 30, abs=0.002)
 
 
 def test_no_more_than_eight_and_the_nearest():

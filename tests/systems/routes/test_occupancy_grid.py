@@ -9,12 +9,13 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from systems.routes.occupancy_grid import (
-    arena_about,
+    ARENA_MARGIN_M,
     block_discs,
     block_rectangles,
     cell_middle,
     cell_of,
     make_occupancy_grid,
+    map_grid,
 )
 from systems.world.geometry import rectangle_clearance
 
@@ -27,7 +28,7 @@ def test_cells_near_rectangles_are_blocked_and_no_others():
     boxes = np.column_stack(
         [generator.uniform(-2.2, 2.2, (6, 3)), generator.uniform(0.05, 1.0, (6, 2))]
     )
-    grid = make_occupancy_grid(ARENA, 0.05, RADIUS)
+    grid = make_occupancy_grid(ARENA)
     block_rectangles(grid, boxes, RADIUS)
     assert grid.blocked.shape == (80, 60)
     for i in range(80):
@@ -40,7 +41,7 @@ def test_cells_near_rectangles_are_blocked_and_no_others():
 
 def test_discs_grow_as_a_distance_transform_does():
     """From a disc in the middle of a cell, the transform is exact."""
-    grid = make_occupancy_grid(ARENA, 0.05, RADIUS)
+    grid = make_occupancy_grid(ARENA)
     marks = np.ones((80, 60), dtype=bool)
     places = [(3, 5), (40, 22), (79, 59)]
     discs = np.array([[*cell_middle(grid, i, j), 0.1] for i, j in places])
@@ -52,7 +53,7 @@ def test_discs_grow_as_a_distance_transform_does():
 
 
 def test_cells_and_their_middles():
-    grid = make_occupancy_grid(ARENA, 0.05, RADIUS)
+    grid = make_occupancy_grid(ARENA)
     assert cell_of(grid, -1.99, -1.49) == (0, 0)
     assert cell_of(grid, 1.99, 1.49) == (79, 59)
     assert cell_of(grid, 2.01, 0.0) == (-1, -1)
@@ -60,8 +61,14 @@ def test_cells_and_their_middles():
     assert cell_middle(grid, 40, 30) == pytest.approx((0.025, 0.025))
 
 
-def test_the_arena_holds_points_and_corners():
+def test_the_grid_of_a_map_holds_points_and_corners():
     """A square of 1 m turned by 45 deg reaches sqrt(1/2) from its middle."""
-    arena = arena_about([(0, 0), (5, -1)], [[2, 3, math.pi / 4, 1, 1]], 0.5)
-    assert arena == pytest.approx((-0.5, -1.5, 5.5, 3.5 + math.sqrt(0.5)))
-    assert arena_about([(1, 2), (3, 4)], [], 1.0) == (0.0, 1.0, 4.0, 5.0)
+    box = np.array([[2.0, 3.0, math.pi / 4.0, 1.0, 1.0]])
+    grid = map_grid([(0, 0), (5, -1)], box, RADIUS)
+    assert grid.low == pytest.approx((-ARENA_MARGIN_M, -1.0 - ARENA_MARGIN_M))
+    top = 3.0 + math.sqrt(0.5) + ARENA_MARGIN_M
+    assert grid.blocked.shape == (180, math.ceil((top + 3.0) / 0.05))
+    expected = make_occupancy_grid((*grid.low, 7.0, top))
+    block_rectangles(expected, box, RADIUS)
+    np.testing.assert_array_equal(grid.blocked, expected.blocked)
+    assert map_grid([(1, 2), (3, 4)], [], RADIUS).low == (-1.0, 0.0)

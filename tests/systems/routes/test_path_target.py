@@ -9,8 +9,13 @@ import pytest
 
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
-from systems.routes.parameters import PathTargetParameters
-from systems.routes.path_target import PathTarget, nearest_on_route, point_on_route
+from systems.routes.parameters import RouteParameters
+from systems.routes.path_target import (
+    LEAD_M,
+    PathTarget,
+    nearest_on_route,
+    point_on_route,
+)
 from systems.routes.route import ROUTE_SIZE, Route, plan_route
 from systems.world.paths import WaypointPath
 
@@ -40,7 +45,7 @@ def run(bench, block, places, route=STRAIGHT):
 
 
 def make(**changes):
-    return PathTarget(parameters=PathTargetParameters(**changes), robot=ROBOT)
+    return PathTarget(parameters=RouteParameters(**changes), robot=ROBOT)
 
 
 @pytest.mark.parametrize("length", [3.0, 0.1])
@@ -61,25 +66,25 @@ def test_by_the_clock_it_is_a_body_on_waypoints(bench, length):
 
 def test_it_waits_for_who_stands(bench):
     """From its top speed it stops just where the lead ends."""
-    rows = run(bench, make(timing="waiting", lead_m=0.4), [(0.7, 0.2)] * 400)
+    rows = run(bench, make(timing="waiting"), [(0.7, 0.2)] * 400)
     lead = rows[:, 4] - rows[:, 5]
     assert rows[:, 5] == pytest.approx(0.7)
-    assert lead.max() <= 0.4 + 1e-9
-    assert rows[-1, :4] == pytest.approx([1.1, 0, 0, 0], abs=3e-5)
+    assert lead.max() <= LEAD_M + 1e-9
+    assert rows[-1, :4] == pytest.approx([0.7 + LEAD_M, 0, 0, 0], abs=3e-5)
     assert rows[:, 2].max() == pytest.approx(0.15)
     assert np.abs(np.diff(rows[:, 2])).max() <= 0.15 * TICK_S + 1e-12
 
 
 def test_it_keeps_the_lead_of_who_is_slow_and_goes_on(bench):
-    """P at 0.1 m/s, at rest from 10 s to 15 s, then at 0.3 m/s to the goal."""
-    times = np.arange(0.0, 30.0, TICK_S)
-    x = np.interp(times, [0, 10, 15, 21], [0, 1, 1, 2.8])
-    rows = run(bench, make(timing="waiting", lead_m=0.3), [(at, 0.0) for at in x])
+    """P at 0.1 m/s, at rest from 20 s to 25 s, then at 0.3 m/s to the goal."""
+    times = np.arange(0.0, 40.0, TICK_S)
+    x = np.interp(times, [0, 20, 25, 28], [0, 2, 2, 2.9])
+    rows = run(bench, make(timing="waiting"), [(at, 0.0) for at in x])
     lead = rows[:, 4] - rows[:, 5]
-    assert lead.max() <= 0.3 + 1e-9
-    behind = (times > 9.0) & (times < 10.0)
+    assert lead.max() <= LEAD_M + 1e-9
+    behind = (times > 19.0) & (times < 20.0)
     # Following a steady speed v, it stays v^2/(2 a) + v T/2 short of the lead's end.
-    expected = 0.3 - 0.1**2 / 0.3 - 0.1 * TICK_S / 2
+    expected = LEAD_M - 0.1**2 / 0.3 - 0.1 * TICK_S / 2
     assert lead[behind] == pytest.approx(expected, abs=2e-3)
     assert rows[behind, 2] == pytest.approx(0.1, abs=1e-3)
     assert np.abs(np.diff(rows[:, 2])).max() <= 0.15 * TICK_S + 1e-12
@@ -158,7 +163,7 @@ def test_nearest_is_the_nearest_of_many():
 
 def test_compiled_it_is_the_same(bench, compiled_tick):
     """To the last bit, a new route among the ticks."""
-    block = make(timing="waiting", lead_m=0.2)
+    block = make(timing="waiting")
     step = block.step
     routes = [STRAIGHT] * 60 + [arc()] * 60
     x = np.linspace(0.0, 0.4, 120)

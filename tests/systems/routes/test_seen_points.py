@@ -26,7 +26,7 @@ def slots(*objects):
 
 
 def remembered(*objects, rectangles=NOTHING):
-    grid = make_occupancy_grid(ARENA, 0.05, 0.35)
+    grid = make_occupancy_grid(ARENA)
     seen = make_seen_points(grid)
     remember_objects(seen, grid, rectangles, slots(*objects), P)
     return seen.points[: seen.added[0]]
@@ -63,7 +63,7 @@ def test_what_the_map_has_is_not_remembered():
 
 
 def test_one_point_a_cell_and_the_oldest_are_forgotten():
-    grid = make_occupancy_grid((0.0, 0.0, 6.0, 6.0), 0.05, 0.35)
+    grid = make_occupancy_grid((0.0, 0.0, 6.0, 6.0))
     seen = make_seen_points(grid)
     assert len(seen.points) == 4000
     for k in range(5000):
@@ -80,7 +80,7 @@ def test_one_point_a_cell_and_the_oldest_are_forgotten():
 
 
 def test_routes_keep_off_robots_that_rest_for_now():
-    grid = make_occupancy_grid(ARENA, 0.05, 0.35)
+    grid = make_occupancy_grid(ARENA)
     seen = make_seen_points(grid)
     box = (1, 0.6, 0.0, 0, 0, 0, 0, 0)
     rests, moves = (1, 0, -0.8, 0, 0, 1, 0.15, 1), (1, 0.9, 0, 0, 0.1, 1, 0.15, 1)

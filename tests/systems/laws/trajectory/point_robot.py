@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.trajectory.point_run import PointLoop, run_point
 from systems.base.robot import RobotParameters
-from systems.laws.trajectory.parameters import (
-    AdaptationParameters,
-    TrajectoryImpedanceParameters,
-)
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 
 TICK_S = 0.025
 ROBOT = RobotParameters(mass_kg=1.0, control_point_m=0.08)
@@ -24,8 +21,7 @@ def run(
     places: Any = (),
     start: Any = None,
     *,
-    law: TrajectoryImpedanceParameters,
-    adaptation: AdaptationParameters | None = None,
+    law: AdaptiveTrajectoryParameters,
     poles: tuple[float, float] | None = None,
     push: tuple[float, float] = (0.0, 0.0),
     held: float = math.inf,
@@ -37,12 +33,11 @@ def run(
         places: (ticks, n, 4) or (n, 4) points and their velocities.
         start: p and v; none: the first target.
         law: Its parameters.
-        adaptation: What adapts; none: nothing.
         poles: w_n and xi of the reference; none: those of the law.
         push: A constant force on P, N.
         held: P cannot pass this x, m.
     """
-    loop = PointLoop(law, adaptation or AdaptationParameters(), poles, ROBOT)
+    loop = PointLoop(law, poles, ROBOT)
     found = run_point(loop, targets, places, start, push=push, held=held)
     return np.hstack([found.motion, found.gains, found.sensitivities])
 

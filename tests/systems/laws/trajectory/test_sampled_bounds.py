@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,
     damping_bound,
@@ -16,6 +15,9 @@ from systems.laws.trajectory.sampled_bounds import (
     rate_bound,
     sampled_matrix,
     stiffness_bound,
+)
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
 )
 
 BUILT = SampledMass(1.0, 0.05, 0.025)

@@ -7,8 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
+from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
+from systems.laws.trajectory.trajectory_filtered import FilteredTrajectoryParameters
 from systems.laws.trajectory.trajectory_impedance import (
+    ContactNumbers,
     contact_force,
     contact_numbers,
     contacts_of_objects,
@@ -21,10 +26,10 @@ from systems.laws.trajectory.trajectory_impedance_controller import (
 )
 from tests.systems.laws.trajectory.point_robot import ROBOT, TICK_S, along, run
 
-#: As the paper has it, but for signs: K_e = K, S of table 1.
-CONVENTIONAL = TrajectoryImpedanceParameters(
-    contact_stiffness_n_m=3.0, security_zone_m=1.0
-)
+#: As the paper has it, but for signs: K_e = K, S of table 1; and gains that rest.
+CONVENTIONAL = AdaptiveTrajectoryParameters(rate=0.0)
+#: The same with damping that fades.
+FADING = CONVENTIONAL.model_copy(update={"rule": "sensitivity"})
 
 
 def objects_of(*slots):
@@ -46,19 +51,16 @@ def test_force_and_state_space_are_one_law():
             damping_n_s_m=d,
             contact_stiffness_n_m=draw.uniform(0.0, 10.0),
             contact_damping_n_s_m=draw.uniform(0.0, 10.0),
-            security_zone_m=1.0,
-            damping_fades=False,
         )
         bearing, far = draw.uniform(0, math.tau, count), draw.uniform(0.05, 0.95, count)
         offset = np.stack([far * np.cos(bearing), far * np.sin(bearing)], axis=1)
         v_o = draw.uniform(-1.0, 1.0, (count, 2))
         objects = objects_of(*([1, *offset[j], *v_o[j], 1] for j in range(count)))
-        numbers = contact_numbers(own)
-        contacts = contacts_of_objects(objects, v, numbers)
+        contacts = contacts_of_objects(objects, v, contact_numbers(own))
         gains = own.contact_stiffness_n_m, own.contact_damping_n_s_m
         target = *p_d, *v_d
         by_force = np.add(
-            target_force(p, v, target, k, d), contact_force(contacts, *gains, numbers)
+            target_force(p, v, target, k, d), contact_force(contacts, *gains)
         )
         a, b1, b2 = state_matrices(mass, (k, d), [gains] * count)
         for axis in range(2):
@@ -73,13 +75,16 @@ def test_force_and_state_space_are_one_law():
 
 @pytest.mark.parametrize("zone", ["security", "envelope", "jump"])
 def test_three_readings_of_the_zone(zone):
-    own = CONVENTIONAL.model_copy(update={"zone": zone, "horizon_m": 2.0})
-    numbers = contact_numbers(own)
+    numbers = {
+        "security": contact_numbers(CONVENTIONAL),
+        "envelope": ContactNumbers(2.0, 2.0, False),
+        "jump": ContactNumbers(1.0, 2.0, False),
+    }[zone]
     for distance in (0.4, 0.999, 1.001, 1.9, 2.1):
         contacts = contacts_of_objects(
             objects_of([1, distance, 0.0, 0, 0, 1]), (0.0, 0.0), numbers
         )
-        force = contact_force(contacts, 3.0, 4.0, numbers)
+        force = contact_force(contacts, 3.0, 4.0)
         expected = {
             "security": 3.0 * max(1.0 - distance, 0.0),
             "envelope": 3.0 * max(2.0 - distance, 0.0),
@@ -90,32 +95,38 @@ def test_three_readings_of_the_zone(zone):
 
 
 def test_damping_fades_in_from_the_edge_of_the_zone():
-    numbers = contact_numbers(CONVENTIONAL)
+    numbers = contact_numbers(FADING)
     for distance, share in ((0.999999, 0.0), (0.5, 0.5), (0.25, 0.75)):
         contacts = contacts_of_objects(
             objects_of([1, distance, 0.0, 0.1, 0.0, 1]), (0.3, 0.2), numbers
         )
-        force = contact_force(contacts, 0.0, 4.0, numbers)
+        force = contact_force(contacts, 0.0, 4.0)
         assert force == pytest.approx(
             (-4.0 * share * 0.2, -4.0 * share * 0.2), abs=1e-5
         )
 
 
+def test_the_damping_fades_where_the_force_must_not_jump():
+    """In the filtered law, and where sensitivities are computed."""
+    laws = CONVENTIONAL, FADING, FilteredTrajectoryParameters()
+    assert [law.damping_fades for law in laws] == [False, True, True]
+    assert not TrajectoryImpedanceParameters().damping_fades
+
+
 def test_lag_behind_a_target_that_moves():
     """Velocity feedforward: no lag but in a contact, then D_e v/K."""
     speed = 0.15
-    own = CONVENTIONAL.model_copy(update={"damping_fades": False})
     targets = along(speed, 60.0)
-    free = run(targets, law=own)
+    free = run(targets, law=CONVENTIONAL)
     assert abs(free[-1, 0] - targets[-1, 0]) < 0.005
     # A row of walls beside the way: a point that goes along abreast, at rest in W.
     beside = np.zeros((len(targets), 1, 4))
     beside[:, 0, 0], beside[:, 0, 1] = free[:, 0], -0.6
-    held = run(targets, beside, law=own)
+    held = run(targets, beside, law=CONVENTIONAL)
     lag = targets[-1, 0] - held[-1, 0]
     beside[:, 0, 0] = held[:, 0]
     for _ in range(6):  # until the point is abreast of where P then is
-        held = run(targets, beside, law=own)
+        held = run(targets, beside, law=CONVENTIONAL)
         beside[:, 0, 0] = held[:, 0]
         lag = targets[-1, 0] - held[-1, 0]
     assert lag == pytest.approx(4.0 * speed / 3.0, abs=0.005)
@@ -124,9 +135,7 @@ def test_lag_behind_a_target_that_moves():
 def test_offset_beside_a_wall():
     """At rest (S - b) K_e/(K + K_e) off a target that is b from a wall."""
     for contact_stiffness, beside in ((3.0, 0.4), (8.0, 0.5), (3.0, 0.7)):
-        own = CONVENTIONAL.model_copy(
-            update={"contact_stiffness_n_m": contact_stiffness}
-        )
+        own = FADING.model_copy(update={"contact_stiffness_n_m": contact_stiffness})
         targets = along(0.0, 40.0)
         # The nearest point of a wall stays abreast of P.
         last = run(targets, [[0.0, -beside, 0.0, 0.0]], law=own)[-1]
@@ -139,7 +148,7 @@ def test_pulled_through_an_obstacle_only_with_enough_lag():
     """Head-on: K lag = K_e (S - d_c) at the contact: nothing holds it any more."""
     touch = 0.1  # from P to the obstacle where the body touches it
     targets = along(0.15, 60.0)
-    rows = run(targets, [[3.0, 0.0, 0.0, 0.0]], law=CONVENTIONAL)
+    rows = run(targets, [[3.0, 0.0, 0.0, 0.0]], law=FADING)
     distance = np.abs(3.0 - rows[:, 0])
     first = int(np.argmax(distance <= touch))
     assert first > 0
@@ -149,7 +158,7 @@ def test_pulled_through_an_obstacle_only_with_enough_lag():
 
 
 def test_the_block_adds_both_and_limits_the_acceleration():
-    block = TrajectoryImpedanceController(parameters=CONVENTIONAL, robot=ROBOT)
+    block = TrajectoryImpedanceController(parameters=FADING, robot=ROBOT)
     context = block.CreateDefaultContext()
     values = {
         "target_state": [0.5, 0.0, 0.1, 0.0],

@@ -1,0 +1,57 @@
+"""The law of Engelbrecht 2021 whose gains adapt."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from systems.framework.parameters import NonNegative
+from systems.laws.law import Equation
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+    trajectory_law,
+)
+
+
+class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
+    """The conventional law, whose gains adapt; the paper prints no rates and limits."""
+
+    rule: Literal["lyapunov", "sensitivity"] = "lyapunov"
+    """Rule of the adaptation. ``lyapunov``: eq. 40 to 42 as printed, which are a
+    Lyapunov rule. ``sensitivity``: gradient of eq. 27 with the sensitivities that eq.
+    34 intends. With this rule, the damping of a contact is 0 at the edge of the zone
+    and grows toward the object, because sensitivities need a force that does not
+    jump."""
+    rate: NonNegative = 10.0
+    """Rate gamma = eta/T of K and D, (N/m)^2/(m^2 s)."""
+    contact_rate: NonNegative = 0.0
+    """Rate gamma of K_e, (N/m)^2/(m^2 s). With 0, K_e is fixed."""
+    penalty: NonNegative = 0.0
+    """Weight lambda of the safety term of eq. 27. With 0 the term is off. Eq. 27 prints
+    lambda/2 (d_sec^2 - d^2) for each object. Here the term is lambda/2 max(0, S - d)^2,
+    so lambda has no unit, and the gradient is -lambda (S - d) n. The term has an effect
+    only with ``rule: sensitivity``. Without the term, a robot that adapts its gains
+    collides more often than a robot with fixed gains."""
+    projected: bool = False
+    """Whether K stays between 0.5 and 6 N/m, D between 3 and 8 N s/m, and K_e between
+    0.5 and 24 N/m."""
+    safety_filter: bool = False
+    """Whether ``SafetyFilter`` keeps P away from objects, whatever the gains."""
+
+    @property
+    def damping_fades(self) -> bool:
+        """Whether contact damping is 0 at the edge of the zone: with sensitivities."""
+        return self.rule == "sensitivity"
+
+
+TRAJECTORY_ADAPTIVE = trajectory_law(
+    "trajectory_adaptive",
+    "Adaptive trajectory impedance (Engelbrecht et al. 2021)",
+    "trajectory, adaptive",
+    AdaptiveTrajectoryParameters,
+    Equation(
+        "Adaptation",
+        r"\dot{K}=\frac{\gamma}{M}e_v\cdot(p-p_d),\quad"
+        r"\dot{D}=\frac{\gamma}{M}e_v\cdot(v-v_d)",
+        "K' = (gamma/M) e_v . (p - p_d), D' = (gamma/M) e_v . (v - v_d)",
+    ),
+)
