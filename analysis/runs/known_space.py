@@ -101,13 +101,11 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
         plant=scenario.plant,
         tick_s=tick_s,
     )
-    integrator = scenario.integrator
     run = RunFacts(
         len(result.time),
         tick_s,
         scenario.start.pose,
-        integrator.scheme,
-        integrator.step_s,
+        scenario.integration_step_s,
         lambda _: 0,
         {},
     )

@@ -11,7 +11,7 @@ from diagrams.scenario.fields.near_miss import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
-from systems.framework.parameters import Angle, Parameters, Point
+from systems.framework.parameters import Angle, Parameters, Point, SoundSpeed
 from systems.heading.parameters import (
     CompassParameters,
     HeadingControlParameters,
@@ -74,6 +74,9 @@ class FollowerParameters(Parameters):
     """Sound that the robot itself plays at the origin of B, so that other robots can
     follow it."""
     start: StartParameters = StartParameters()
+    assumed_sound_speed_m_s: SoundSpeed | None = None
+    """Speed of sound that hearing and range sensors assume, m/s; null: the true speed
+    of sound."""
     microphones: MicArrayParameters = MicArrayParameters()
     tdoa: TDOAParameters = TDOAParameters()
     ideal_hearing: IdealHearingParameters = IdealHearingParameters()

@@ -253,6 +253,11 @@ class Scenario(FollowerParameters, RunParameters):
         return np.reshape(still, (-1, 5))
 
     @property
+    def believed_sound_speed_m_s(self) -> float:
+        """Speed of sound that the robot assumes, m/s."""
+        return self.assumed_sound_speed_m_s or self.sound_speed_m_s
+
+    @property
     def source_size(self) -> tuple[float, float]:
         """Length and width of ``source``, m."""
         return self.source.length_m, self.source.width_m
@@ -413,8 +418,6 @@ class Scenario(FollowerParameters, RunParameters):
                 (f"{prefix}microphones.frame_s", robot.microphones.frame_s),
                 (f"{prefix}ultrasonic.period_s", robot.ultrasonic.period_s),
             ]
-            if self.room and robot.listens:
-                self.room.update_frames(robot.microphones.frame_s)
         for field, period in periods:
             if not whole(period / tick):
                 ticks = max(1, round(period / tick))
@@ -425,23 +428,22 @@ class Scenario(FollowerParameters, RunParameters):
                 )
 
     def _check_step(self) -> None:
-        # Greatest stable ratio of step to lag. With longer steps, the integration
-        # scheme amplifies a solution that should decay.
-        limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
-        step = self.integrator.step_s
+        # Greatest stable ratio of step to lag is 3.3. With longer steps, the
+        # integration amplifies a solution that should decay.
+        step = self.integration_step_s
         for prefix, robot in self.robot_fields():
             lag = robot.plant.motor_lag_s
-            if lag < step / limits[self.integrator.scheme]:
+            if lag < step / 3.3:
                 raise InputError(
                     f"{prefix}plant.motor_lag_s",
                     f"{lag} s is too short for steps of {step} s, which "
-                    f"would be unstable; set integrator.step_s to {lag:g} or less",
+                    f"would be unstable; set integration_step_s to {lag:g} or less",
                 )
 
     def _check_room(self) -> None:
         if self.room is None:
             return
-        self.room.walls(self.acoustics.c)
+        self.room.walls(self.sound_speed_m_s)
         places: dict[str, Any] = {}
         for name, source in self.all_sources.items():
             group = f"sources.{name}" if self.sources else "source"

@@ -94,7 +94,7 @@ def scenario(law: str, velocity_term: str = "printed") -> Scenario:
             "tracker": {"hold": "world"},
             "attraction": ATTRACTION,
             "repulsion": {"velocity_term": velocity_term, **REPULSION},
-            "integrator": {"scheme": "runge_kutta5", "step_s": 0.005},
+            "integration_step_s": 0.005,
             "source": {"waypoints_m": [SOURCE_START.tolist(), [9.0, 0.3]]},
             "obstacles": [
                 {"name": "box", "waypoints_m": [BOX.tolist()], "size_m": BOX_SIZE},
@@ -433,10 +433,10 @@ def test_closed_loop_agrees_to_1e_6_over_40_s(law, velocity_term):
 
 @pytest.mark.slow
 def test_default_step_is_within_a_micrometer_of_a_fine_one():
-    """What ``IntegratorParameters`` claims."""
+    """What ``integration_step_s`` claims."""
     ends = []
-    for integrator in ({}, {"scheme": "runge_kutta5", "step_s": 0.0025}):
-        data = scenario("active").model_dump() | {"integrator": integrator}
+    for step_s in (Scenario().integration_step_s, 0.0025):
+        data = scenario("active").model_dump() | {"integration_step_s": step_s}
         follower = build_sound_follower(Scenario.model_validate(data))
         simulator = make_simulator(follower)
         simulator.Initialize()

@@ -69,7 +69,7 @@ def _hearing(
         MicArray(
             parameters=scenario.microphones,
             robot=scenario.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
             room=scenario.room,
             others=others,
             seed=seed_of("mic_array"),
@@ -77,7 +77,7 @@ def _hearing(
         TDOAEstimator(
             parameters=scenario.tdoa,
             robot=scenario.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.believed_sound_speed_m_s,
             sound=scenario.sound,
             microphones=scenario.microphones,
         ),
@@ -146,7 +146,8 @@ def _obstacle_sensing(
     sensing = [
         UltrasonicArray(
             parameters=scenario.ultrasonic,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
+            assumed_sound_speed_m_s=scenario.assumed_sound_speed_m_s,
             seed=seed_of("ultrasonic_array"),
             tick_s=scenario.tick_s,
             **seen,

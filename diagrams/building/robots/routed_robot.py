@@ -127,7 +127,8 @@ def _seen_objects(
     return [
         UltrasonicArray(
             parameters=scenario.ultrasonic,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
+            assumed_sound_speed_m_s=scenario.assumed_sound_speed_m_s,
             robot=robot,
             source_size=None,
             obstacle_count=bodies,

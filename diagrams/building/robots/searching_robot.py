@@ -120,7 +120,7 @@ def _ears(
         MicArray(
             parameters=scenario.microphones,
             robot=scenario.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
             room=scenario.room,
             others=others,
             seed=seed_of("mic_array"),
@@ -128,7 +128,7 @@ def _ears(
         CrossPowerEstimator(
             parameters=scenario.cross_power,
             robot=scenario.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.believed_sound_speed_m_s,
             microphones=scenario.microphones,
         ),
         RadioRange(

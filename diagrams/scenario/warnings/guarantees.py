@@ -261,8 +261,8 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
     """A2: no body is nearer than a range reading minus the margin."""
-    sensors, c = scenario.ultrasonic, scenario.acoustics.c
-    stretch = (sensors.assumed_sound_speed_m_s or c) / c
+    sensors = scenario.ultrasonic
+    stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s
     excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m
     margin = scenario.free_space.range_margin_m
     blind = sum(fault.number == BLIND for fault in sensors.faults)
@@ -284,7 +284,7 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
             excess,
             margin,
             "m",
-            field="ultrasonic.assumed_sound_speed_m_s",
+            field="assumed_sound_speed_m_s",
         ),
     )
 

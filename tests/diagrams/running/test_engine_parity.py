@@ -30,7 +30,7 @@ from systems.framework.noise import (
 DISTURBING = re.compile(
     r"noise|fault|dropout|loss$|error$|slip|mismatch|drift|fading|tolerance|friction"
     r"|latency|period_s$|frame_s$|sample_rate|rate$|lost_at|rounding|pulses|intensity"
-    r"|firing|tick_s|scheme|step_s|snr|spread"
+    r"|firing|tick_s|step_s|snr|spread"
 )
 #: Such by their names alone, and why they are not set.
 OTHERS = {
@@ -64,8 +64,7 @@ AIR = {
     "radio.loss": 0.1,
     "radio.byte_error": 0.02,
     "radio.fading_db": 6.0,
-    "integrator.scheme": "runge_kutta2",
-    "integrator.step_s": 0.01,
+    "integration_step_s": 0.01,
 }
 OBJECTS = {
     "objects.noise_m": 0.02,
@@ -98,7 +97,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "microphones.snr_db_at_1m": 15.0,
             "microphones.ego_noise_file": "noise.wav",
             "microphones.ego_noise_snr_db_at_1m": 25.0,
-            "microphones.ego_noise_share_at_rest": 0.3,
             "microphones.position_tolerance_m": 0.002,
             "microphones.delay_tolerance_s": 1e-6,
             "microphones.gain_tolerance_db": 1.0,
@@ -117,7 +115,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
                 "size_m": [14.0, 14.0, 3.0],
                 "absorption": 0.5,
                 "maximum_order": 1,
-                "update_period_s": 0.2,
             },
             "microphones.snr_db_at_1m": 20.0,
         },
