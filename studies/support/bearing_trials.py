@@ -76,9 +76,8 @@ def hear_once(
     microphones = MicArrayParameters(
         sample_rate_hz=32_000.0, snr_db_at_1m=at_1m, faults=trial.faults
     )
-    c = SOUND_SPEED_M_S
     listener = ArrayListener(
-        parameters or CrossPowerParameters(), robot, c, microphones
+        parameters or CrossPowerParameters(), robot, SOUND_SPEED_M_S, microphones
     )
     sums = listener.unpack(np.zeros(listener.sums_size))
     heard = {"noise": sums, "sound": sums}
