@@ -15,16 +15,16 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from systems.base.carrier_parameters import (
+from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
+from systems.base.parameters import PlantParameters
+from systems.base.robot import RobotParameters
+from systems.base.source_drive import (
     TOP_SPEED_M_S,
     WHEEL_ACCELERATION_M_S2,
     WHEEL_RADIUS_M,
     WHEEL_SEPARATION_M,
+    value_weights,
 )
-from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
-from systems.base.driven_path import value_weights
-from systems.base.parameters import PlantParameters
-from systems.base.robot import RobotParameters
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath

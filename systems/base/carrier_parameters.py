@@ -8,6 +8,11 @@ from functools import lru_cache
 from pydantic import model_validator
 
 from systems.base.driven_path import DrivenPath
+from systems.base.source_drive import (
+    TOP_SPEED_M_S,
+    WHEEL_ACCELERATION_M_S2,
+    WHEEL_SEPARATION_M,
+)
 from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Acceleration,
@@ -19,22 +24,6 @@ from systems.framework.parameters import (
     Waypoints,
 )
 from systems.world.paths import ACCELERATION_M_S2, AtEnd, WaypointPath
-
-#: Radius of the driven wheels, and distance between them, m (Han 2019, table 5).
-WHEEL_RADIUS_M, WHEEL_SEPARATION_M = 0.06, 0.29
-
-#: Limit of the rim speed of each wheel, m/s.
-TOP_SPEED_M_S = 1.0
-
-#: Mass, kg (Han 2019, table 5), and largest force of each motor at the rim of its
-#: wheel, N (our choice).
-_MASS_KG, _WHEEL_FORCE_N = 5.3, 5.3
-
-#: Limit of the acceleration of the rim of each wheel, m/s^2. Straight ahead, both
-#: wheels accelerate by 2 F/m. In a turn the limit is about the same. The reason is that
-#: the moment of inertia of the body is about that of two point masses at the wheels,
-#: each half of the mass of the body.
-WHEEL_ACCELERATION_M_S2 = 2.0 * _WHEEL_FORCE_N / _MASS_KG
 
 #: Least ratio of the wheels' acceleration to the acceleration along the path. It is
 #: above 1 because commands are held for a tick (half a motor lag), and because the

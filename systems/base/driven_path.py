@@ -7,11 +7,11 @@ is imported only when a pose or velocity of a moving robot is needed.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from systems.base.source_drive import value_weights
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath
 
@@ -21,22 +21,6 @@ _SETTLING_S = 10.0
 
 #: Least number of ticks that are computed at once.
 _CHUNK_TICKS = 400
-
-
-def value_weights(s: Any) -> tuple[Any, Any, Any]:
-    """Computes the weights p, q, and r of the cubic Hermite polynomial over a tick.
-
-    A tick starts with the value a and the slope a', and ends with the value b and the
-    slope b'. The value in between is a + p (b - a) + q a' + r b'.
-
-    Args:
-        s: Elapsed share of the tick, from 0 to 1.
-
-    Returns:
-        (p, q, r). p has no unit, q and r are in s.
-    """
-    rest = TICK_S * s * (1.0 - s)
-    return s * s * (3.0 - 2.0 * s), rest * (1.0 - s), -rest * s
 
 
 class DrivenPath:
