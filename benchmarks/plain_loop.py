@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from diagrams import Scenario
 from diagrams.building.robot import block_seed
 from systems.base.diff_drive_plant import (
-    SCHEMES,
     PlantNumbers,
+    advance,
     body_twist,
     plant_derivatives,
 )
@@ -63,7 +63,7 @@ class PlainLoop:
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        c = scenario.acoustics.c
+        c = scenario.sound_speed_m_s
         self.path = scenario.source.path()
         self.obstacles = [o.path() for o in scenario.obstacles]
         self.sizes = np.array([e for o in scenario.obstacles for e in o.size_m])
@@ -83,9 +83,7 @@ class PlainLoop:
             scenario.follower.tracker, scenario.only.robot, 1.5 * T
         )
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
-        self.localiser, self.p_PA_B = robot_localiser(
-            scenario.follower.tdoa, scenario.only.robot, scenario.acoustics
-        )
+        self.localiser, self.p_PA_B = robot_localiser(scenario.follower.tdoa, scenario.only.robot, c)
 
     def run(self) -> NDArray[np.float64]:
         """(ticks + 1, 7) states of the plant at every tick."""
@@ -153,7 +151,6 @@ class PlainLoop:
         ranges, echo = measured_ranges(
             true,
             scenario.follower.ultrasonic,
-            scenario.acoustics.c,
             standard_normals(
                 (2, scenario.follower.ultrasonic.count), self.ultrasonic_seed, tick
             ),
@@ -218,8 +215,7 @@ class PlainLoop:
         """The steps of the scenario's integrator, those that Drake takes."""
         numbers = PlantNumbers.of(self.scenario.only.robot, self.scenario.only.plant)
         commanded, moved = np.array(wheels), np.array(state)
-        integrator = self.scenario.integrator
-        advance = SCHEMES[integrator.scheme]
-        for _ in range(round(T / integrator.step_s)):
-            advance(moved, integrator.step_s, commanded, plant_derivatives, numbers)
+        step_s = self.scenario.integration_step_s
+        for _ in range(round(T / step_s)):
+            advance(moved, step_s, commanded, plant_derivatives, numbers)
         return moved.tolist()

@@ -276,9 +276,7 @@ def run_cell(
 
 def _fitted_converter(peak_pa: float) -> MicArrayParameters:
     """The default converter with a full scale of 1.2 times a peak in Pa."""
-    default = MicArrayParameters()
-    volt_per_pa = default.counts_per_pa * default.adc_full_scale_v / default.full_scale
-    return MicArrayParameters(adc_full_scale_v=_HEADROOM * peak_pa * volt_per_pa)
+    return MicArrayParameters(full_scale_pa=_HEADROOM * peak_pa)
 
 
 def _cell(

@@ -133,7 +133,7 @@ class Listener:
             (MicArray.POSITION_ERRORS, errors.position_errors.ravel()),
             (MicArray.CHANNEL_DELAYS, errors.channel_delays),
             (MicArray.GAINS, errors.gains),
-            (MicArray.SOUND_SPEED, [scenario.acoustics.c * speed]),
+            (MicArray.SOUND_SPEED, [scenario.sound_speed_m_s * speed]),
         ):
             context.get_mutable_numeric_parameter(index).SetFromVector(values)
 
@@ -170,7 +170,7 @@ class Listener:
                 self.shape.p_AM,
                 math.hypot(noise_pa, rounding_pa),
                 sample_rate_hz=microphones.sample_rate_hz,
-                c=scenario.acoustics.c,
+                c=scenario.sound_speed_m_s,
             )
             for end in ends
         ]

@@ -187,7 +187,7 @@ class LocalizationExperiment:
                     self.array_errors,
                     heard.p_AS,
                     self.shape,
-                    self.scenario.acoustics.c,
+                    self.scenario.sound_speed_m_s,
                 )
                 cells.append(
                     LocalizationCell(place, name, self.trials, heard, tolerance)

@@ -38,7 +38,7 @@ def localization_summary(
         Plain values, to be written as JSON.
     """
     scenario, shape = experiment.scenario, experiment.shape
-    microphones, c = scenario.follower.microphones, scenario.acoustics.c
+    microphones, c = scenario.follower.microphones, scenario.sound_speed_m_s
     # Whatever the errors of the array do to a range is to be seen.
     tdoa = scenario.follower.tdoa.model_copy(update={"maximum_relative_range_std": 1e6})
     estimate = frame_estimator(tdoa, shape, c)

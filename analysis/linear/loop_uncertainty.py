@@ -95,7 +95,7 @@ def _share(
 
 
 def _sound_speed(scenario: Scenario) -> UncertainParameter:
-    c = scenario.acoustics.c
+    c = scenario.sound_speed_m_s
     ends = [331.5 + 0.6 * t for t in _TEMPERATURES_C]
     return UncertainParameter(
         "sound_speed_m_s",
@@ -152,7 +152,7 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
     Returns:
         A ratio; 1 where the believed speed is the true one.
     """
-    k = (scenario.follower.tdoa.sound_speed_m_s or scenario.acoustics.c) / true_speed
+    k = scenario.believed_sound_speed_m_s / true_speed
     half = max(abs(y) for _, y in scenario.only.robot.microphones_m)
     distance = scenario.follower.attraction.follow_distance_m
     h = math.hypot(distance, half)

@@ -16,7 +16,7 @@ from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Point, Positive
-from systems.sound.acoustics import AcousticParameters, sound_speed
+from systems.sound.acoustics import SOUND_SPEED_M_S, sound_speed
 from systems.sound.array_shape import ArrayShape
 
 # Positions that are farther apart are in other units than metres.
@@ -175,7 +175,9 @@ class ArrayGeometry(Parameters):
         """Speed of sound, m/s."""
         if self.sound_speed is not None:
             return self.sound_speed
-        return AcousticParameters(temperature_c=self.temperature_c).c
+        if self.temperature_c is not None:
+            return sound_speed(self.temperature_c)
+        return SOUND_SPEED_M_S
 
     @property
     def known(self) -> KnownArray:

@@ -101,13 +101,11 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
         plant=scenario.only.plant,
         tick_s=tick_s,
     )
-    integrator = scenario.integrator
     run = RunFacts(
         len(result.time),
         tick_s,
         scenario.only.start.pose,
-        integrator.scheme,
-        integrator.step_s,
+        scenario.integration_step_s,
         lambda _: 0,
         {},
     )

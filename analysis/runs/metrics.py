@@ -353,7 +353,7 @@ def _sounding(result: RunResult) -> NDArray[np.bool_]:
     travel = np.zeros(len(time))
     if scenario.follower.hearing == "audio":
         # The distance as it is at the frame's end, half a frame too late.
-        travel = result.columns["source_range_true"] / scenario.acoustics.c
+        travel = result.columns["source_range_true"] / scenario.sound_speed_m_s
     elif not scenario.follower.ideal_hearing.burst_gaps:
         return np.ones(len(time), dtype=bool)
     middle = 0.5 * scenario.follower.microphones.frame_s

@@ -372,8 +372,8 @@ def _emitter(
 ) -> SoundEmitter:
     return SoundEmitter(
         sound=sound,
-        acoustics=scenario.acoustics,
-        maximum_range_m=microphone_reach(scenario.room, scenario.acoustics),
+        sound_speed_m_s=scenario.sound_speed_m_s,
+        maximum_range_m=microphone_reach(scenario.room, scenario.sound_speed_m_s),
         frame_s=frame_s,
         tick_s=scenario.tick_s,
         seed=seed_of(scenario, "sound_emitter", name),

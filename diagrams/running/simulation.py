@@ -32,17 +32,17 @@ _LOADED: set[tuple[object, ...]] = set()
 
 
 def make_simulator(follower: SoundFollower) -> Simulator:
-    """Makes a simulator of the diagram, with the integrator of the scenario."""
+    """Makes a simulator of the diagram, with the integration step of the scenario."""
     simulator = Simulator(follower.diagram)
     ApplySimulatorConfig(simulator_config(follower.scenario), simulator)
     return simulator
 
 
 def simulator_config(scenario: Scenario) -> SimulatorConfig:
-    """The integrator of the scenario, as a Drake configuration."""
+    """The integrator of a run, as a Drake configuration."""
     return SimulatorConfig(
-        integration_scheme=scenario.integrator.scheme,
-        max_step_size=scenario.integrator.step_s,
+        integration_scheme="runge_kutta5",
+        max_step_size=scenario.integration_step_s,
         use_error_control=False,
     )
 

@@ -41,9 +41,6 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
         "x ahead, y to the left.",
         *_faults(own.microphones),
     ]
-    if scenario.room is not None and scenario.room.rise_m:
-        rise = scenario.room.rise_m
-        comments.append(f"The microphones are {rise:g} m above the loudspeakers.")
     # Positions are uniformly distributed within the tolerance. The least standard
     # deviation is the rounding of a drawing.
     drawn = own.microphones.position_tolerance_m / 3.0**0.5
@@ -51,7 +48,7 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
         {
             "microphones": places,
             "position_std_m": max(drawn, _LEAST_POSITION_STD_M),
-            "sound_speed": scenario.acoustics.c,
+            "sound_speed": scenario.sound_speed_m_s,
             "sound_speed_std": _SOUND_SPEED_STD,
         }
     )

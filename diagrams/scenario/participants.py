@@ -25,7 +25,7 @@ from diagrams.scenario.fields.near_miss import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
-from systems.framework.parameters import Angle, Parameters, Point
+from systems.framework.parameters import Angle, Parameters, Point, SoundSpeed
 from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
     CrossPowerParameters,
@@ -118,6 +118,9 @@ class Robot(Parameters):
     """Sound that the robot itself plays at the origin of B, so that other robots can
     follow it. Fields that are missing are those of ``sound``."""
     start: StartParameters = StartParameters()
+    assumed_sound_speed_m_s: SoundSpeed | None = None
+    """Speed of sound that hearing and range sensors assume, m/s; null: the true speed
+    of sound."""
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()

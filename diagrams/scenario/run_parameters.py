@@ -12,11 +12,12 @@ from systems.framework.parameters import (
     Parameters,
     Period,
     Size,
+    SoundSpeed,
 )
 from systems.framework.signals import TICK_S
 from systems.odor.parameters import OdorParameters, WindParameters
 from systems.radio.parameters import RadioParameters
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.parameters import RoomParameters
 from systems.world.parameters import ObstacleParameters
 
@@ -51,17 +52,6 @@ class StopParameters(Parameters):
     for a sound that counts as found."""
 
 
-class IntegratorParameters(Parameters):
-    """How Drake integrates the plant, with a fixed step."""
-
-    scheme: Literal["runge_kutta2", "runge_kutta3", "runge_kutta5"] = "runge_kutta5"
-    """Integration scheme. The errors of the path over 20 s with the default step and
-    motor lag, for all commands, are at most 1 um with ``runge_kutta5`` and up to 0.6 mm
-    with ``runge_kutta3``."""
-    step_s: float = Field(default=0.0125, ge=1e-5, le=0.025)
-    """Largest step, s."""
-
-
 class RunParameters(Parameters):
     """Fields of a run that do not belong to one robot, such as seed and obstacles."""
 
@@ -86,10 +76,14 @@ class RunParameters(Parameters):
         tuple[ObstacleParameters, ...], Strict(False), Field(max_length=100)
     ] = ()
     stop: StopParameters = StopParameters()
-    acoustics: AcousticParameters = AcousticParameters()
+    sound_speed_m_s: SoundSpeed = SOUND_SPEED_M_S
+    """Speed of sound, m/s (Han 2019, 2.1)."""
     room: RoomParameters | None = None
     wind: WindParameters = WindParameters()
     odor: OdorParameters | None = None
     """A source of odor in the wind, for robots that search for it."""
     radio: RadioParameters = RadioParameters()
-    integrator: IntegratorParameters = IntegratorParameters()
+    integration_step_s: float = Field(default=0.0125, ge=1e-5, le=0.025)
+    """Largest step of the Runge-Kutta integration of fifth order, s. The error of the
+    path over 20 s with the default step and motor lag is at most 1 um for all
+    commands."""

@@ -324,6 +324,11 @@ class Scenario(RunParameters):
         return np.reshape(still, (-1, 5))
 
     @property
+    def believed_sound_speed_m_s(self) -> float:
+        """Speed of sound that the only robot assumes, m/s."""
+        return self.only.assumed_sound_speed_m_s or self.sound_speed_m_s
+
+    @property
     def source_size(self) -> tuple[float, float]:
         """Length and width of ``source``, m."""
         return self.source.length_m, self.source.width_m
@@ -454,8 +459,6 @@ class Scenario(RunParameters):
         periods = []
         for name, robot in self.robots.items():
             periods += [(f"robots.{name}.{f}", p) for f, p in _periods(robot)]
-            if self.room and robot.listens:
-                self.room.update_frames(frame_of(robot))
         for field, period in periods:
             if not whole(period / tick):
                 ticks = max(1, round(period / tick))
@@ -466,23 +469,22 @@ class Scenario(RunParameters):
                 )
 
     def _check_step(self) -> None:
-        # Greatest stable ratio of step to lag. With longer steps, the integration
-        # scheme amplifies a solution that should decay.
-        limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
-        step = self.integrator.step_s
+        # Greatest stable ratio of step to lag is 3.3. With longer steps, the
+        # integration amplifies a solution that should decay.
+        step = self.integration_step_s
         for name, robot in self.robots.items():
             lag = robot.plant.motor_lag_s
-            if lag < step / limits[self.integrator.scheme]:
+            if lag < step / 3.3:
                 raise InputError(
                     f"robots.{name}.plant.motor_lag_s",
                     f"{lag} s is too short for steps of {step} s, which "
-                    f"would be unstable; set integrator.step_s to {lag:g} or less",
+                    f"would be unstable; set integration_step_s to {lag:g} or less",
                 )
 
     def _check_room(self) -> None:
         if self.room is None:
             return
-        self.room.walls(self.acoustics.c)
+        self.room.walls(self.sound_speed_m_s)
         places: dict[str, Any] = {}
         for name, source in self.sources.items():
             places[f"sources.{name}.waypoints_m"] = source.waypoints_m

@@ -14,7 +14,7 @@ from systems.framework.signals import AudioFrame, Emission
 from systems.hearing.cross_power_estimator import ArrayListener, Direction
 from systems.hearing.cross_powers import CrossPowers, gather_frame
 from systems.hearing.parameters import CrossPowerParameters
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import (
     MicArrayParameters,
@@ -76,9 +76,8 @@ def hear_once(
     microphones = MicArrayParameters(
         sample_rate_hz=32_000.0, snr_db_at_1m=at_1m, faults=trial.faults
     )
-    c = AcousticParameters().c
     listener = ArrayListener(
-        parameters or CrossPowerParameters(), robot, c, microphones
+        parameters or CrossPowerParameters(), robot, SOUND_SPEED_M_S, microphones
     )
     sums = listener.unpack(np.zeros(listener.sums_size))
     heard = {"noise": sums, "sound": sums}
@@ -97,10 +96,9 @@ def _frames(
     trial: BearingTrial, robot: RobotParameters, microphones: MicArrayParameters
 ) -> list[AudioFrame]:
     """All frames of the stop; the sound begins, and has arrived, after the noise."""
-    acoustics = AcousticParameters()
     middle = np.add(robot.microphones_m[0], (robot.control_point_m, 0.0))
     middle = middle + trial.position_m
-    begin = trial.noise_s - trial.distance / acoustics.c
+    begin = trial.noise_s - trial.distance / SOUND_SPEED_M_S
     sounds = [
         (
             trial.sound.model_copy(
@@ -124,14 +122,14 @@ def _frames(
     recorder = Recorder(
         microphones,
         robot,
-        acoustics.c,
+        SOUND_SPEED_M_S,
         room=trial.room,
         sources=len(sounds),
         seed=trial.seed,
     )
     count = round((trial.noise_s + trial.listen_s) / _FRAME_S)
-    reach = microphone_reach(trial.room, acoustics)
-    ticks = history_ticks(reach, acoustics.c, _FRAME_S)
+    reach = microphone_reach(trial.room, SOUND_SPEED_M_S)
+    ticks = history_ticks(reach, SOUND_SPEED_M_S, _FRAME_S)
     played = []
     for number, (sound, place) in enumerate(sounds):
         p_WS = np.tile(place, (ticks + count + 1, 1))

@@ -30,7 +30,7 @@ from systems.hearing.tracking.tracker_model import (
     track_step,
     tracker_numbers,
 )
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.adc import convert
 from systems.sound.parameters import MicArrayParameters, RoomParameters, SoundParameters
 from systems.sound.room import room_images, room_impulse_responses
@@ -47,8 +47,6 @@ LARGEST_BEARING_DEG = 60.0
 #: as a share of it.
 BEARING_WITHIN_DEG = 2.0
 RANGE_WITHIN = 0.1
-
-_AIR = AcousticParameters()
 
 
 @dataclass(frozen=True)
@@ -153,9 +151,11 @@ def locate_bursts(
     """
     robot = RobotParameters()
     microphones = MicArrayParameters(snr_db_at_1m=snr_db_at_1m)
-    images = room_images(room, _AIR.c)
+    images = room_images(room, SOUND_SPEED_M_S)
     burst = make_waveform(sound, seed)[: round(sound.on_s * SAMPLE_RATE_HZ)]
-    localiser, p_PA_B = robot_localiser(parameters or TDOAParameters(), robot, _AIR)
+    localiser, p_PA_B = robot_localiser(
+        parameters or TDOAParameters(), robot, SOUND_SPEED_M_S
+    )
     tracking = (tracking or TrackerParameters()).model_copy(
         update={"resolve_front_back": False}
     )
@@ -164,7 +164,7 @@ def locate_bursts(
     for k, layout in enumerate(layouts):
         p_WM = microphones_W(layout.pose_WB, robot)
         response = room_impulse_responses(
-            room, layout.p_WS, p_WM, _AIR.c, images=images
+            room, layout.p_WS, p_WM, SOUND_SPEED_M_S, images=images
         )
         frames = _frames(response, burst, microphones, seed + k)
         estimates = _estimates(frames, localiser, p_PA_B)

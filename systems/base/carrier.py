@@ -16,17 +16,33 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
-from systems.base.hermite import value_weights
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
+from systems.base.source_drive import (
+    TOP_SPEED_M_S,
+    WHEEL_ACCELERATION_M_S2,
+    WHEEL_RADIUS_M,
+    WHEEL_SEPARATION_M,
+    value_weights,
+)
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath
 
 register_jitable(value_weights)
 
-#: Motors of the carrier. They have the same lag as those of the follower.
+#: Wheels of the carrier, and its motors, which have the lag of those of the follower.
+_ROBOT = RobotParameters(
+    wheel_radius_m=WHEEL_RADIUS_M,
+    wheel_separation_m=WHEEL_SEPARATION_M,
+    top_speed_m_s=TOP_SPEED_M_S,
+)
 _PLANT = PlantParameters()
+_NUMBERS = tuple(PlantNumbers.of(_ROBOT, _PLANT))
+
+#: Limit of the difference between a commanded and a present wheel speed, rad/s. The
+#: acceleration of a wheel is this difference divided by the motor lag.
+_MOST = WHEEL_ACCELERATION_M_S2 / WHEEL_RADIUS_M * _PLANT.motor_lag_s
 
 #: Time from a command to its mean effect, s: the motor lag plus half a tick, because
 #: the command is held for a tick. The feed-forward uses the plan this far ahead.
@@ -42,17 +58,11 @@ _STEPS_A_TICK = 5
 
 
 def drive_along(
-    robot: RobotParameters,
-    wheel_acceleration_m_s2: float,
-    plan: WaypointPath,
-    ticks: tuple[int, int],
-    knot: Sequence[float],
+    plan: WaypointPath, ticks: tuple[int, int], knot: Sequence[float]
 ) -> NDArray[np.float64]:
     """Continues the motion of a carrier from one tick to another.
 
     Args:
-        robot: Wheels, mass, and top speed of the carrier.
-        wheel_acceleration_m_s2: Limit of the acceleration of each wheel's rim, m/s^2.
         plan: Path that the carrier follows.
         ticks: First and last tick of the interval.
         knot: (8,) state at the first tick: pose in W (m, m, rad), velocity in W (m/s,
@@ -67,14 +77,9 @@ def drive_along(
         np.array([*knot[:3], 0.0, 0.0, *knot[6:]]),
         plan.poses(times),
         plan.twists(times + LEAD_S),
-        wheel_acceleration_m_s2 / robot.wheel_radius_m,
-        robot.wheel_radius_m,
-        robot.wheel_separation_m,
-        _PLANT.motor_lag_s,
-        *PlantNumbers.of(robot, _PLANT),
     )[1:]
     theta, wheels = states[:, 2], states[:, 5:]
-    v, omega = body_twist(wheels.T, robot)
+    v, omega = body_twist(wheels.T, _ROBOT)
     velocities = np.stack([v * np.cos(theta), v * np.sin(theta), omega], axis=1)
     return np.hstack([states[:, :3], velocities, wheels])
 
@@ -84,11 +89,6 @@ def drive(
     state: NDArray[np.float64],
     poses: NDArray[np.float64],
     twists: NDArray[np.float64],
-    wheel_acceleration: float,
-    radius: float,
-    separation: float,
-    lag: float,
-    *numbers: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Follows planned poses with feed-forward and feedback, tick by tick.
 
@@ -102,11 +102,6 @@ def drive(
         poses: (n, 3) planned pose at each tick in W, m and rad.
         twists: (n, 2) planned speed, m/s, and yaw rate, rad/s, at the time ``LEAD_S``
             after each tick, when the commands take effect.
-        wheel_acceleration: Limit of the acceleration of each wheel, rad/s^2.
-        radius: Radius of the wheels, m.
-        separation: Distance between the wheels, m.
-        lag: Time constant of the motors, s.
-        *numbers: ``PlantNumbers``.
 
     Returns:
         (n + 1, 7) states at the ticks.
@@ -128,17 +123,16 @@ def drive(
         speed = twists[k, 0] * math.cos(turn) + _AHEAD * (c * dx + s * dy)
         aside = twists[k, 0] * (c * dy - s * dx)
         yaw_rate = twists[k, 1] + _ASIDE * aside + _TURN * math.sin(turn)
-        # The acceleration of a wheel is (command - wheel speed) / lag.
-        most = wheel_acceleration * lag
         for wheel, side in enumerate((-0.5, 0.5)):
-            ahead = (speed + side * yaw_rate * separation) / radius - now[5 + wheel]
-            command[wheel] = now[5 + wheel] + min(max(ahead, -most), most)
+            wanted = (speed + side * yaw_rate * WHEEL_SEPARATION_M) / WHEEL_RADIUS_M
+            ahead = wanted - now[5 + wheel]
+            command[wheel] = now[5 + wheel] + min(max(ahead, -_MOST), _MOST)
         after = now
         for _ in range(_STEPS_A_TICK):
-            k1 = plant_derivatives(after, command, *numbers)
-            k2 = plant_derivatives(after + 0.5 * step * k1, command, *numbers)
-            k3 = plant_derivatives(after + 0.5 * step * k2, command, *numbers)
-            k4 = plant_derivatives(after + step * k3, command, *numbers)
+            k1 = plant_derivatives(after, command, *_NUMBERS)
+            k2 = plant_derivatives(after + 0.5 * step * k1, command, *_NUMBERS)
+            k3 = plant_derivatives(after + 0.5 * step * k2, command, *_NUMBERS)
+            k4 = plant_derivatives(after + step * k3, command, *_NUMBERS)
             after = after + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         for i in range(7):
             states[k + 1, i] = after[i]

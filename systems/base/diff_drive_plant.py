@@ -232,8 +232,6 @@ class PlantStepNumbers(NamedTuple):
     """Function ``derivatives(state, commanded, *of_plant)``."""
     of_plant: tuple[Any, ...]
     """``PlantNumbers``, and ``GripNumbers`` with friction."""
-    advance: Any
-    """Function from ``SCHEMES`` that advances the state by one integrator step."""
     step_s: float
     """Largest step of the integrator, s."""
     tick_s: float
@@ -244,7 +242,7 @@ class PlantStepNumbers(NamedTuple):
 
 
 def plant_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Advances the robot by one tick with the explicit Runge-Kutta steps of Drake.
+    """Advances the robot by one tick with Runge-Kutta steps of fifth order.
 
     The state is that of ``plant_derivatives`` or ``slipping_derivatives``.
     """
@@ -256,27 +254,8 @@ def plant_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
         h = end - time
         if h > _STRETCH * numbers.step_s:
             h = (time + numbers.step_s) - time
-        numbers.advance(state, h, commanded, derivatives, of_plant)
+        advance(state, h, commanded, derivatives, of_plant)
         time += h
-
-
-def _second_order(state, h, commanded, derivatives, of_plant):
-    k1 = derivatives(state, commanded, *of_plant)
-    k2 = derivatives(state + h * k1, commanded, *of_plant)
-    change = h * k1
-    correction = h / 2.0 * k2 + -h / 2.0 * k1
-    for k in range(len(state)):
-        state[k] = state[k] + change[k] + correction[k]
-
-
-def _third_order(state, h, commanded, derivatives, of_plant):
-    k1 = derivatives(state, commanded, *of_plant)
-    k2 = derivatives(state + h / 2.0 * k1, commanded, *of_plant)
-    k3 = derivatives(state + (-h * k1 + 2.0 * h * k2), commanded, *of_plant)
-    part = h / 6.0
-    change = part * k1 + 4.0 * part * k2 + part * k3
-    for k in range(len(state)):
-        state[k] += change[k]
 
 
 #: Weights of the earlier slopes in the stages of Dormand and Prince (1980). The last
@@ -291,7 +270,19 @@ _STAGES = (
 )
 
 
-def _fifth_order(state, h, commanded, derivatives, of_plant):
+@register_jitable
+def advance(
+    state: Any, h: Any, commanded: Any, derivatives: Any, of_plant: Any
+) -> None:
+    """Advances the state by one step of Dormand and Prince, as Drake does.
+
+    Args:
+        state: (n,) state, changed.
+        h: Length of the step, s.
+        commanded: (2,) commanded left and right wheel speed, rad/s.
+        derivatives: Function ``derivatives(state, commanded, *of_plant)``.
+        of_plant: ``PlantNumbers``, and ``GripNumbers`` with friction.
+    """
     size = len(state)
     slopes, reached = np.empty((6, size)), np.copy(state)
     for stage in range(6):
@@ -304,15 +295,6 @@ def _fifth_order(state, h, commanded, derivatives, of_plant):
             reached[k] = state[k] + change
     for k in range(size):
         state[k] = reached[k]
-
-
-#: Drake's explicit Runge-Kutta steps by the names of ``integrator.scheme``. The
-#: functions ``advance(state, h, commanded, derivatives, of_plant)`` change the state.
-SCHEMES = {
-    "runge_kutta2": _second_order,
-    "runge_kutta3": _third_order,
-    "runge_kutta5": _fifth_order,
-}
 
 
 def _publish_plant(state, outputs, numbers):
@@ -387,7 +369,6 @@ def DiffDrivePlant_(T):
             self._numbers = PlantStepNumbers(
                 derivatives,
                 tuple(of_plant),
-                _third_order,
                 TICK_S,
                 TICK_S,
                 of_plant[0],
@@ -420,10 +401,8 @@ def DiffDrivePlant_(T):
             derivatives.SetFromVector(rates)
 
         def step_for(self, run: RunFacts) -> Step:
-            """Returns the step with the initial pose and the integrator of the run."""
-            numbers = self._numbers._replace(
-                advance=SCHEMES[run.scheme], step_s=run.step_s, tick_s=run.tick_s
-            )
+            """Returns the step with the initial pose and the step length of the run."""
+            numbers = self._numbers._replace(step_s=run.step_s, tick_s=run.tick_s)
             at_rest = [0.0] * (len(self.states) - 3)
             state = [*run.initial_pose, *at_rest]
             return Step(plant_step, numbers, state, _publish_plant)

@@ -11,8 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.base.hermite import value_weights
-from systems.base.robot import RobotParameters
+from systems.base.source_drive import value_weights
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath
 
@@ -35,23 +34,12 @@ class DrivenPath:
 
     Args:
         plan: Planned path.
-        robot: Wheels, mass, and top speed.
-        wheel_acceleration_m_s2: Limit of the acceleration of each wheel's rim, m/s^2.
         start_time_s: Time until which the robot rests at the first waypoint, s.
         stops: Whether the robot rests at the end of its plan.
     """
 
-    def __init__(
-        self,
-        plan: WaypointPath,
-        robot: RobotParameters,
-        *,
-        wheel_acceleration_m_s2: float,
-        start_time_s: float,
-        stops: bool,
-    ) -> None:
-        self._start, self._plan, self._robot = start_time_s, plan, robot
-        self._wheel_acceleration = wheel_acceleration_m_s2
+    def __init__(self, plan: WaypointPath, *, start_time_s: float, stops: bool) -> None:
+        self._start, self._plan = start_time_s, plan
         self.moves = plan.moves
         """Whether the robot ever leaves its first waypoint."""
         self.length = plan.length
@@ -74,13 +62,7 @@ class DrivenPath:
         if first == self._end:
             return
         last = min(first + max(tick + 1 - first, _CHUNK_TICKS), self._end)
-        rows = drive_along(
-            self._robot,
-            self._wheel_acceleration,
-            self._plan,
-            (first, int(last)),
-            knots[-1],
-        )
+        rows = drive_along(self._plan, (first, int(last)), knots[-1])
         if last == self._end:
             rows[-1, 3:] = 0.0
         self._knots = knots + rows.tolist()

@@ -10,9 +10,8 @@ from numba.extending import register_jitable
 from systems.base.robot import RobotParameters
 
 GRAVITY_M_S2 = 9.81
-#: Time constant with which the remaining slip decays when a wheel grips again, s. One
-#: step of the third-order integrator, 25 ms, removes 98 % of the slip. All integrators
-#: are stable with this time constant.
+#: Time constant with which the remaining slip decays when a wheel grips again, s. The
+#: longest step of the integrator, 25 ms, is stable with this time constant.
 _REGRIP_S = 0.016
 #: Number of iterations of the search for forces. Each iteration multiplies the error by
 #: 0.4 with the printed dimensions (Han 2019). If the body is no wider than the distance

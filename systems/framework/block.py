@@ -126,8 +126,6 @@ class RunFacts(NamedTuple):
     tick_s: float
     initial_pose: tuple[float, float, float]
     """x, y and heading of the robot in W at the start, m, m and rad."""
-    scheme: str
-    """Name of the integrator, for example ``runge_kutta3``."""
     step_s: float
     """Largest step of the integrator, s."""
     seed_of: Callable[[str], int]

@@ -38,7 +38,7 @@ from systems.hearing.spherical_interpolation import (
     plane_wave_bearing,
 )
 from systems.hearing.steer_near import near_grid, steer
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.parameters import MicArrayParameters
 
 #: Least bandwidth of a sound, Hz. With less bandwidth, the correlation repeats within
@@ -345,7 +345,7 @@ class CrossPowerEstimator(Block):
     Args:
         parameters: ``CrossPowerParameters``.
         robot: Positions of the microphones.
-        acoustics: Speed of sound.
+        sound_speed_m_s: Speed of sound that the robot assumes, m/s.
         microphones: Sample rate and length of the frames.
 
     Raises:
@@ -367,12 +367,12 @@ class CrossPowerEstimator(Block):
         *,
         parameters: CrossPowerParameters = CrossPowerParameters(),
         robot: RobotParameters = RobotParameters(preset="song2011_hearing"),
-        acoustics: AcousticParameters = AcousticParameters(),
+        sound_speed_m_s: float = SOUND_SPEED_M_S,
         microphones: MicArrayParameters = MicArrayParameters(),
     ) -> None:
         super().__init__()
         self._microphones = microphones
-        self._listener = ArrayListener(parameters, robot, acoustics.c, microphones)
+        self._listener = ArrayListener(parameters, robot, sound_speed_m_s, microphones)
         self.set_name("cross_power_estimator")
         self._audio, self._listening = self.declare_ports()
         facts = self._listener.facts

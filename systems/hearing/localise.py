@@ -138,7 +138,7 @@ class Localiser:
     Args:
         parameters: Method, band and thresholds.
         shape: The microphones.
-        c: True speed of sound, m/s.
+        c: Speed of sound, m/s.
         sample_rate_hz: Sample rate of the frames, Hz.
         frame_samples: Samples per channel of a frame.
 
@@ -161,7 +161,7 @@ class Localiser:
         divisor = 2 if self._halved else 1
         plan = DelayPlan(
             shape=shape,
-            c=parameters.sound_speed_m_s or c,
+            c=c,
             sample_rate_hz=sample_rate_hz / divisor,
             frame_samples=frame_samples // divisor,
             low_hz=parameters.low_hz,

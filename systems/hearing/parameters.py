@@ -17,7 +17,6 @@ from systems.framework.parameters import (
     NonNegativeLength,
     Parameters,
     Positive,
-    SoundSpeed,
     Speed,
 )
 from systems.framework.signals import SAMPLE_RATE_HZ
@@ -38,9 +37,6 @@ class TDOAParameters(Parameters):
     band: Literal["set", "found"] = "set"
     """``set``: use the whole band. ``found``: use the part of the band that the sound
     of each frame occupies."""
-    sound_speed_m_s: SoundSpeed | None = None
-    """Speed of sound that the estimator assumes, m/s. Unset: the true speed of
-    sound."""
     false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
     """Largest share of frames of steady noise in which a sound is detected by
     mistake."""

@@ -24,7 +24,7 @@ from systems.hearing.localise import HearingMemory, Localiser
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_choice import Belief, ChoiceMemory, SourceChoice
 from systems.hearing.source_fix import NOTHING_HEARD, REJECTED, SourceFix
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
@@ -33,7 +33,7 @@ from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 def robot_localiser(
     parameters: TDOAParameters,
     robot: RobotParameters,
-    acoustics: AcousticParameters,
+    sound_speed_m_s: float,
     microphones: MicArrayParameters = MicArrayParameters(),
 ) -> tuple[Localiser, NDArray[np.float64]]:
     """Makes the localizer of the robot's own microphones.
@@ -41,7 +41,7 @@ def robot_localiser(
     Args:
         parameters: Parameters of the estimator.
         robot: Positions of the microphones.
-        acoustics: Speed of sound.
+        sound_speed_m_s: Speed of sound that the robot assumes, m/s.
         microphones: Sample rate and length of the frames.
 
     Returns:
@@ -51,7 +51,7 @@ def robot_localiser(
     localiser = Localiser(
         parameters,
         shape,
-        acoustics.c,
+        sound_speed_m_s,
         sample_rate_hz=microphones.sample_rate_hz,
         frame_samples=microphones.frame_samples,
     )
@@ -149,7 +149,7 @@ class TDOAEstimator(Block):
     Args:
         parameters: Method, band and thresholds.
         robot: Positions of the microphones.
-        acoustics: Speed of sound.
+        sound_speed_m_s: Speed of sound that the robot assumes, m/s.
         sound: The sound of the source. Its gate is the schedule, which has an effect
             only if ``schedule_known`` is set.
         microphones: Sample rate and length of the frames.
@@ -177,16 +177,16 @@ class TDOAEstimator(Block):
         *,
         parameters: TDOAParameters = TDOAParameters(),
         robot: RobotParameters = RobotParameters(),
-        acoustics: AcousticParameters = AcousticParameters(),
+        sound_speed_m_s: float = SOUND_SPEED_M_S,
         sound: SoundParameters = SoundParameters(),
         microphones: MicArrayParameters = MicArrayParameters(),
     ) -> None:
         super().__init__()
         self._microphones = microphones
         self._schedule = sound if parameters.schedule_known else None
-        self._longest_way_s = MAXIMUM_RANGE_M / acoustics.c
+        self._longest_way_s = MAXIMUM_RANGE_M / sound_speed_m_s
         self._localiser, self._p_PA_B = robot_localiser(
-            parameters, robot, acoustics, microphones
+            parameters, robot, sound_speed_m_s, microphones
         )
         self.set_name("tdoa_estimator")
         self._choice = None

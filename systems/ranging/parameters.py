@@ -21,7 +21,6 @@ from systems.framework.parameters import (
     Parameters,
     Period,
     Point,
-    SoundSpeed,
     Time,
     with_preset,
 )
@@ -73,9 +72,6 @@ class UltrasonicParameters(Parameters):
     firing: Literal["simultaneous", "sequential"] = "simultaneous"
     """Whether all sensors fire at once, or one after the other with one period between
     them."""
-    assumed_sound_speed_m_s: SoundSpeed | None = None
-    """Speed of sound with which the sensors convert time to range, m/s. If unset, it is
-    the true speed of sound."""
     faults: _Faults = ()
     """Sensors that fail during a run."""
 
@@ -191,17 +187,17 @@ class UltrasonicParameters(Parameters):
         turns = np.arange(self.count) * self.period_ticks(tick_s)
         return turns if self.firing == "sequential" else 0 * turns
 
-    def errors(self, sound_speed: float) -> tuple[float, float, float, float, float]:
+    def errors(self, stretch: float) -> tuple[float, float, float, float, float]:
         """Errors and limits of the ranges.
 
         Args:
-            sound_speed: True speed of sound, m/s.
+            stretch: Assumed divided by true speed of sound.
 
         Returns:
-            Factor of the ranges; standard deviation of the noise, m; the number
-            ``least_luck``; smallest range, m; and largest range, m.
+            The stretch, by which the ranges are too long; standard deviation of the
+            noise, m; the number ``least_luck``; smallest range, m; and largest range,
+            m.
         """
-        stretch = (self.assumed_sound_speed_m_s or sound_speed) / sound_speed
         limits = self.minimum_range_m, self.maximum_range_m
         return stretch, self.noise_m, self.least_luck, *limits
 

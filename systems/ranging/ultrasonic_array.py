@@ -24,7 +24,7 @@ from systems.ranging.sensor_faults import (
     NOISY,
     SILENT,
 )
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.world.geometry import fan_ranges
 
 #: Additional standard deviation of the ranges of a noisy sensor, m.
@@ -107,24 +107,24 @@ def cone_ranges(
 def measured_ranges(
     true_ranges: NDArray[np.float64],
     parameters: UltrasonicParameters,
-    sound_speed: float,
     numbers: NDArray[np.floating],
+    stretch: float = 1.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Ranges that the sensors report.
 
     Args:
         true_ranges: (n,) true ranges, m; infinite where a cone is empty.
         parameters: Errors of the sensors.
-        sound_speed: True speed of sound, m/s.
         numbers: (2, n) standard normal numbers. The first row is the noise. The second
             row decides about dropouts: an echo is lost if its number is below the
             quantile of the dropout probability.
+        stretch: Assumed divided by true speed of sound.
 
     Returns:
         (n,) ranges in [minimum, maximum], m, and (n,) echoes, 0 or 1. Without an echo,
         the range is finite but has no meaning.
     """
-    return _measured_ranges(true_ranges, numbers, *parameters.errors(sound_speed))
+    return _measured_ranges(true_ranges, numbers, *parameters.errors(stretch))
 
 
 @njit(cache=True)
@@ -266,7 +266,9 @@ class UltrasonicArray(Block):
     Args:
         parameters: Positions, directions, errors and faults of the sensors.
         robot: Position of P.
-        acoustics: Speed of sound, from which the time of flight follows.
+        sound_speed_m_s: True speed of sound, m/s.
+        assumed_sound_speed_m_s: Speed of sound with which the sensors convert time to
+            range, m/s; None: the true speed.
         source_size: Length and width of the leader, m; None if there is no leader.
         obstacle_count: Number of boxes on the obstacle ports.
         seed: Seed of the noise.
@@ -294,7 +296,8 @@ class UltrasonicArray(Block):
         *,
         parameters: UltrasonicParameters = UltrasonicParameters(),
         robot: RobotParameters = RobotParameters(),
-        acoustics: AcousticParameters = AcousticParameters(),
+        sound_speed_m_s: float = SOUND_SPEED_M_S,
+        assumed_sound_speed_m_s: float | None = None,
         source_size: Size | None = (0.326, 0.352),
         obstacle_count: int = 0,
         seed: int = 0,
@@ -308,7 +311,9 @@ class UltrasonicArray(Block):
             *parameters.beams,
             robot.control_point_m,
             source_size or (0.0, 0.0),
-            parameters.errors(acoustics.c),
+            parameters.errors(
+                (assumed_sound_speed_m_s or sound_speed_m_s) / sound_speed_m_s
+            ),
             tick_noise(seed),
             parameters.turns(tick_s),
             parameters.round_ticks(tick_s),

@@ -32,25 +32,6 @@ def check_faults(parameters: MicArrayParameters, count: int) -> None:
 
 
 @njit(cache=True)
-def _silent_counts(
-    noise: NDArray[np.float32],
-    gains: NDArray[np.float64],
-    sigma: float,
-    full_scale: np.float32,
-    out: NDArray[np.int16],
-) -> int:  # pragma: no cover  (compiled)
-    """``_counts`` without sound pressure."""
-    spoiled: Any = 0
-    for m in range(noise.shape[0]):
-        level = np.float32(gains[m] * sigma)
-        for k in range(noise.shape[1]):
-            x = np.rint(level * noise[m, k])
-            spoiled |= np.int32(x - x != np.float32(0.0))
-            out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
-    return spoiled
-
-
-@njit(cache=True)
 def _counts(
     pressure: NDArray[np.float32],
     noise: NDArray[np.float32],
@@ -84,7 +65,7 @@ def convert(
         pressure: (m, n) sound pressure, Pa; None for silence.
         noise: (m, n) noise of unit variance.
         noise_pa: RMS of the noise, Pa.
-        parameters: Sensitivity, gain and resolution.
+        parameters: Full scale and resolution.
         gains: (m,) true gain divided by stated gain of each channel. None: all are 1.
 
     Returns:
@@ -96,21 +77,13 @@ def convert(
     """
     if gains is None:
         gains = np.ones(len(noise))
+    if pressure is None:
+        pressure = np.zeros_like(noise)
     gain = parameters.counts_per_pa
-    sigma = gain * noise_pa
     full_scale = np.float32(parameters.full_scale)
     out = np.empty(noise.shape, dtype=np.int16)
-    if pressure is None:
-        spoiled = _silent_counts(noise, gains, sigma, full_scale, out)
-    else:
-        spoiled = _counts(pressure, noise, gains, gain, sigma, full_scale, out)
-    if spoiled:
-        _check_parts(pressure=pressure, noise=noise, gains=gains)
+    if _counts(pressure, noise, gains, gain, gain * noise_pa, full_scale, out):
+        check_finite("MicArray: pressure", pressure)
+        check_finite("MicArray: noise", noise)
+        check_finite("MicArray: gains", gains)
     return out
-
-
-def _check_parts(**parts: Any) -> None:
-    """Refuses arrays that are not finite."""
-    for name, values in parts.items():
-        if values is not None:
-            check_finite(f"MicArray: {name}", values)

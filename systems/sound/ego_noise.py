@@ -6,9 +6,8 @@ from copy import copy
 
 import numpy as np
 import soxr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.noise import BEFORE_THE_RUN, tick_generator
 from systems.framework.signals import SAMPLE_RATE_HZ
@@ -20,23 +19,8 @@ from systems.sound.waveforms import band_limited
 FADE_S = 0.05
 
 
-def driving_share(velocity: ArrayLike, robot: RobotParameters) -> float:
-    """Rim speed of the faster wheel as a share of the top speed, at most 1.
-
-    Args:
-        velocity: (3,) vx, vy in W and omega, m/s and rad/s.
-        robot: Wheel separation and top speed.
-
-    Returns:
-        Share from 0 to 1.
-    """
-    vx, vy, omega = np.abs(velocity)
-    rim = np.hypot(vx, vy) + omega * robot.wheel_separation_m / 2.0
-    return float(min(rim / robot.top_speed_m_s, 1.0))
-
-
 class EgoNoise:
-    """Noise of motors and fans that is added to each channel.
+    """Noise of motors and fans that is added to each channel, always at the same level.
 
     The recording is resampled to the sample rate, limited to the band of the
     microphones, and repeated without a seam. A recording with one channel per
@@ -59,7 +43,6 @@ class EgoNoise:
         )
         self._samples = parameters.frame_samples
         self._level = 10.0 ** (-parameters.ego_noise_snr_db_at_1m / 20.0)
-        self._at_rest = parameters.ego_noise_share_at_rest
         together = len(self._loops) > 1
         self._rows = np.arange(count) if together else np.zeros(count, dtype=int)
         self._starts = self._drawn_starts(seed)
@@ -78,20 +61,18 @@ class EgoNoise:
         other._starts = self._drawn_starts(seed)
         return other
 
-    def frame(self, number: int, share: float) -> NDArray[np.float32]:
+    def frame(self, number: int) -> NDArray[np.float32]:
         """Noise in one frame.
 
         Args:
             number: Number of the frame; frame 0 ends at time zero.
-            share: Rim speed as a share of the top speed, from ``driving_share``.
 
         Returns:
             (n, samples) pressure divided by the RMS pressure of the source at 1 m.
         """
         first = self._starts + (number - 1) * self._samples
         places = (first[:, None] + np.arange(self._samples)) % self._loops.shape[1]
-        level = self._level * (self._at_rest + (1.0 - self._at_rest) * share)
-        return np.float32(level) * self._loops[self._rows[:, None], places]
+        return np.float32(self._level) * self._loops[self._rows[:, None], places]
 
 
 def _read_loops(file: str, count: int, rate_hz: float) -> NDArray[np.float32]:

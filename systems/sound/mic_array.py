@@ -19,7 +19,7 @@ from systems.framework.signals import (
     AudioFrame,
     Emission,
 )
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.array_tolerances import (
     RealArray,
     Tolerances,
@@ -31,22 +31,20 @@ from systems.sound.room import room_images
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
 
-def microphone_reach(
-    room: RoomParameters | None, acoustics: AcousticParameters
-) -> float:
+def microphone_reach(room: RoomParameters | None, sound_speed_m_s: float) -> float:
     """Longest distance for which emissions must be stored, m.
 
     Args:
         room: Room whose reflections are also heard; None for the free field.
-        acoustics: Speed of sound.
+        sound_speed_m_s: Speed of sound, m/s.
 
     Returns:
         Distance, m, at least MAXIMUM_RANGE_M.
     """
     if room is None:
         return MAXIMUM_RANGE_M
-    c = acoustics.c
-    return max(MAXIMUM_RANGE_M, room_images(room, c).length / SAMPLE_RATE_HZ * c)
+    longest_s = room_images(room, sound_speed_m_s).length / SAMPLE_RATE_HZ
+    return max(MAXIMUM_RANGE_M, longest_s * sound_speed_m_s)
 
 
 class MicArray(Block):
@@ -60,8 +58,8 @@ class MicArray(Block):
     velocity.
 
     A room does not change the direct sound. For the reflections, the block assumes that
-    robot and source are at rest. It uses their positions at the last multiple of the
-    room's ``update_period_s``. The geometry is therefore older than the sound by up to
+    robot and source are at rest. It uses their positions at the last update, every
+    ``UPDATE_PERIOD_S`` (0.1 s). The geometry is therefore older than the sound by up to
     this period plus the travel time of the sound. The frame that ends at an update
     fades from the previous positions to the new positions.
 
@@ -85,7 +83,7 @@ class MicArray(Block):
     Args:
         parameters: Microphones, amplifier and converter.
         robot: Positions of the microphones.
-        acoustics: Speed of sound.
+        sound_speed_m_s: Speed of sound, m/s.
         room: Walls, if there are any.
         others: Names of further sources that the robot does not follow. Each name adds
             an input port ``emission_<name>`` [Emission].
@@ -110,7 +108,7 @@ class MicArray(Block):
         *,
         parameters: MicArrayParameters = MicArrayParameters(),
         robot: RobotParameters = RobotParameters(),
-        acoustics: AcousticParameters = AcousticParameters(),
+        sound_speed_m_s: float = SOUND_SPEED_M_S,
         room: RoomParameters | None = None,
         others: Sequence[str] = (),
         seed: int = 0,
@@ -122,12 +120,12 @@ class MicArray(Block):
         self._recorder = Recorder(
             parameters,
             robot,
-            acoustics.c,
+            sound_speed_m_s,
             room=room,
             sources=1 + len(others),
             seed=seed,
         )
-        self._declare_errors(acoustics.c)
+        self._declare_errors(sound_speed_m_s)
         followed, *motion = self.inputs
         further = [followed._replace(name=f"emission_{name}") for name in others]
         self.inputs = (followed, *further, *motion)

@@ -13,7 +13,6 @@ from pydantic import Field, Strict, model_validator
 from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Duration,
-    Fraction,
     Frequency,
     Length,
     Parameters,
@@ -28,6 +27,11 @@ from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, whole
 #: the waveform: a linear filter common to all microphones commutes with propagation,
 #: apart from a Doppler shift of about 0.1 %.
 MICROPHONE_BAND_HZ = (50.0, 18_000.0)
+
+#: Sound pressure at full scale, Pa: the sensitivity of the microphones is -23 dB re 1
+#: V/Pa, the gain of the preamplifier is 40 dB (Han 2019, 4.1), and the converter clips
+#: at 1.65 V (our choice).
+FULL_SCALE_PA = 1.65 / 10.0 ** ((-23.0 + 40.0) / 20.0)
 
 #: Length of the raised-cosine edges of every burst, s. The edges prevent clicks.
 EDGE_S = 0.004
@@ -124,12 +128,8 @@ class MicArrayParameters(Parameters):
     The noise is white and Gaussian up to half the sample rate. It has equal power in
     every channel and does not depend on distance.
     """
-    sensitivity_db: float = Field(default=-23.0, ge=-120.0, le=40.0)
-    """Sensitivity of the microphones, dB re 1 V/Pa."""
-    preamplifier_gain_db: float = Field(default=40.0, ge=-40.0, le=120.0)
-    """Gain between microphone and converter, dB."""
-    adc_full_scale_v: Positive = 1.65
-    """Magnitude of the largest voltage that the converter does not clip, V."""
+    full_scale_pa: Positive = FULL_SCALE_PA
+    """Magnitude of the largest sound pressure that the converter does not clip, Pa."""
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
     channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
@@ -146,10 +146,7 @@ class MicArrayParameters(Parameters):
     microphone.
     """
     ego_noise_snr_db_at_1m: float = Field(default=20.0, ge=-40.0, le=150.0)
-    """Level of the source at 1 m relative to the ego noise at top speed, dB."""
-    ego_noise_share_at_rest: Fraction = 1.0
-    """Amplitude of the ego noise at rest divided by its amplitude at top speed. Between
-    rest and top speed, the amplitude is a linear function of the speed."""
+    """Level of the source at 1 m relative to the ego noise, dB."""
     position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
     """Largest error of the position of each microphone in x and in y, m.
 
@@ -201,8 +198,7 @@ class MicArrayParameters(Parameters):
     @cached_property
     def counts_per_pa(self) -> float:
         """Number of counts per pascal."""
-        gain = 10.0 ** ((self.sensitivity_db + self.preamplifier_gain_db) / 20.0)
-        return gain * self.full_scale / self.adc_full_scale_v
+        return self.full_scale / self.full_scale_pa
 
 
 def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
@@ -230,6 +226,13 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
 
 #: Largest allowed order of reflections. It leads to more than four million images.
 GREATEST_ORDER = 150
+
+#: Height of all loudspeakers and microphones above the floor of a room, m.
+HEIGHT_M = 0.3
+
+#: Period at which the poses for the reflections in a room are updated, s. It is rounded
+#: to a whole number of frames.
+UPDATE_PERIOD_S = 0.1
 
 
 class RoomParameters(Parameters):
@@ -263,40 +266,16 @@ class RoomParameters(Parameters):
 
     If unset, all reflections that arrive within the reverberation time are computed.
     """
-    source_height_m: Length = 0.3
-    """Height of every loudspeaker above the floor, m."""
-    microphone_height_m: Length = 0.3
-    """Height of the microphones above the floor, m."""
-    update_period_s: float = Field(default=0.1, ge=1e-3, le=60.0)
-    """Period at which the poses for the reflections are updated, s. It is a multiple of
-    the length of a frame."""
 
     @model_validator(mode="after")
     def _check(self) -> RoomParameters:
-        for name in ("source_height_m", "microphone_height_m"):
-            if getattr(self, name) >= self.size_m[2]:
-                raise InputError(
-                    f"{name}",
-                    f"{getattr(self, name)} is not below the ceiling at "
-                    f"{self.size_m[2]} m; lower it",
-                )
-        return self
-
-    def update_frames(self, frame_s: float) -> int:
-        """Number of frames from one update of the reflections to the next.
-
-        Raises:
-            InputError: The period of the updates is not a multiple of a frame.
-        """
-        frames = self.update_period_s / frame_s
-        if not whole(frames):
+        if self.size_m[2] <= HEIGHT_M:
             raise InputError(
-                "room.update_period_s",
-                f"{self.update_period_s:g} s is not a multiple of a frame of the "
-                f"microphones, {frame_s:g} s; use "
-                f"{max(1, round(frames)) * frame_s:g}",
+                "size_m",
+                f"the ceiling at {self.size_m[2]} m is not above the loudspeakers and "
+                f"microphones at {HEIGHT_M} m; raise it",
             )
-        return round(frames)
+        return self
 
     @property
     def corner(self) -> NDArray[np.float64]:
@@ -304,11 +283,6 @@ class RoomParameters(Parameters):
         if self.corner_m is None:
             return np.array(self.size_m[:2]) / -2.0
         return np.array(self.corner_m)
-
-    @property
-    def rise_m(self) -> float:
-        """Height of the microphones above the loudspeakers, m."""
-        return self.microphone_height_m - self.source_height_m
 
     def contains(self, p_W: ArrayLike) -> bool:
         """Whether all points (..., 2) in W lie between the walls."""

@@ -142,7 +142,6 @@ def retarded_delays(
     p_WS: NDArray[np.float64],
     v_WS: NDArray[np.float64],
     c: float,
-    rise: float = 0.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     """Travel times of the sound that arrives at given instants.
 
@@ -158,7 +157,6 @@ def retarded_delays(
         p_WS: (n, 2) source at the knots, m.
         v_WS: (n, 2) velocity of the source at the knots, m/s.
         c: Speed of sound, m/s.
-        rise: Height of the microphones above the source, m.
 
     Returns:
         (m, k) travel times d, s, and (m, k) rates of change of d, s/s.
@@ -184,7 +182,7 @@ def retarded_delays(
                 dx, dy = p_WM[m, k, 0] - x, p_WM[m, k, 1] - y
                 # Newton step; ``away`` is the speed of the source towards the
                 # microphone.
-                r = max(math.sqrt(dx * dx + dy * dy + rise * rise), 1e-9)
+                r = max(math.sqrt(dx * dx + dy * dy), 1e-9)
                 away = (dx * vx + dy * vy) / r
                 step = (r - c * d) / (c - away)
                 d += step
@@ -206,7 +204,7 @@ def _sample_delays(
     knot_times: NDArray[np.float64],
     p_WS: NDArray[np.float64],
     v_WS: NDArray[np.float64],
-    air: tuple[float, float],
+    c: float,
     samples: tuple[float, float],
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float
@@ -220,7 +218,7 @@ def _sample_delays(
         knot_times: (n,) knots of the motion of the source, s.
         p_WS: (n, 2) source at the knots, m.
         v_WS: (n, 2) velocity of the source at the knots, m/s.
-        air: Speed of sound, m/s, and height of the microphones above the source, m.
+        c: Speed of sound, m/s.
         samples: Time of the first emitted sample, s, and rate of the samples, Hz.
 
     Returns:
@@ -228,9 +226,7 @@ def _sample_delays(
         samples; (m, k) rates of change of the delays; and the position of the earliest
         sample that is heard.
     """
-    delays, rates = retarded_delays(
-        times, p_WM, v_WM, knot_times, p_WS, v_WS, air[0], air[1]
-    )
+    delays, rates = retarded_delays(times, p_WM, v_WM, knot_times, p_WS, v_WS, c)
     first, earliest = np.empty(len(times)), np.inf
     for m in range(len(times)):
         first[m] = (times[m, 0] - samples[0]) * samples[1]
@@ -400,7 +396,6 @@ def propagate(
     v_WM: NDArray[np.float64],
     count: int,
     c: float,
-    rise: float = 0.0,
 ) -> NDArray[np.float32]:
     """Sound pressure at moving microphones over one frame.
 
@@ -418,7 +413,6 @@ def propagate(
         v_WM: (m, k, 2) velocities of the microphones, m/s.
         count: Number of samples per channel, a multiple of k - 1.
         c: Speed of sound, m/s.
-        rise: Height of the microphones above the source, m.
 
     Returns:
         (m, count) sound pressure, Pa. At distances below 1 cm, the amplitude is that at
@@ -436,7 +430,7 @@ def propagate(
         emission.knot_times,
         emission.p_WS,
         emission.v_WS,
-        (c, rise),
+        c,
         (emission.start_time, rate),
     )
     if earliest < KERNEL_REACH:

@@ -14,8 +14,12 @@ from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.framework.signals import AudioFrame, Emission, read_only
 from systems.sound.adc import check_faults, convert
 from systems.sound.array_tolerances import RealArray, draw_tolerances, real_array
-from systems.sound.ego_noise import EgoNoise, driving_share
-from systems.sound.parameters import MicArrayParameters, RoomParameters
+from systems.sound.ego_noise import EgoNoise
+from systems.sound.parameters import (
+    UPDATE_PERIOD_S,
+    MicArrayParameters,
+    RoomParameters,
+)
 from systems.sound.propagation import check_reach, microphone_paths, propagate
 from systems.sound.reverberation import Reverberation
 
@@ -32,7 +36,6 @@ def record_frame(
     *,
     parameters: MicArrayParameters,
     seed: int,
-    rise: float = 0.0,
     reflections: Sequence[NDArray[np.float32] | None] = (),
     ego_noise: NDArray[np.float32] | None = None,
 ) -> AudioFrame:
@@ -46,7 +49,6 @@ def record_frame(
         array: True array, from ``real_array``.
         parameters: Microphones, amplifier, converter and length of the frame.
         seed: Seed of the noise.
-        rise: Height of the microphones above the sources, m.
         reflections: For each source: (n, samples) sound pressure of its reflections,
             Pa, or None if the source is silent.
         ego_noise: (n, samples) ego noise divided by the level of the first source at 1
@@ -58,7 +60,7 @@ def record_frame(
     Raises:
         ValueError: A source is too far away for its stored emission.
     """
-    direct = _direct_sound(emissions, time, before, now, array, parameters, rise)
+    direct = _direct_sound(emissions, time, before, now, array, parameters)
     pressure = _total([*direct, *reflections])
     number = round(time / parameters.frame_s)
     noise = frame_noise((len(array.p_BM), parameters.frame_samples), seed, number)
@@ -87,7 +89,6 @@ def _direct_sound(
     now: tuple[NDArray[np.float64], NDArray[np.float64]],
     array: RealArray,
     parameters: MicArrayParameters,
-    rise: float,
 ) -> list[NDArray[np.float32]]:
     """(n, samples) direct sound pressure of each sounding source, Pa."""
     begin = time - parameters.frame_s
@@ -99,7 +100,7 @@ def _direct_sound(
         return []
     times = begin + array.instants
     p_WM, v_WM = microphone_paths(times, begin, *before, time, *now, array.p_BM)
-    arriving = (times, p_WM, v_WM, parameters.frame_samples, array.c, rise)
+    arriving = (times, p_WM, v_WM, parameters.frame_samples, array.c)
     return [propagate(emission, *arriving) for emission in sounding]
 
 
@@ -151,10 +152,9 @@ class Recorder:
         check_faults(parameters, len(robot.microphones_m))
         self._parameters, self._robot, self._c = parameters, robot, c
         self._reverberation, self._ego_noise, places = None, None, None
-        self._rise = room.rise_m if room else 0.0
         if room:
             self._reverberation = Reverberation(room, c, parameters)
-            self._update_frames = room.update_frames(parameters.frame_s)
+            self._update_frames = max(1, round(UPDATE_PERIOD_S / parameters.frame_s))
             places = np.r_[-np.inf, np.zeros(3 + 2 * sources)]
         if parameters.ego_noise_file is not None:
             self._ego_noise = EgoNoise(parameters, len(robot.microphones_m), seed)
@@ -259,8 +259,7 @@ class Recorder:
         frame_s, ego_noise = self._parameters.frame_s, None
         pose, velocity = now
         if self._ego_noise is not None:
-            share = driving_share(velocity, self._robot)
-            ego_noise = self._ego_noise.frame(round(time / frame_s), share)
+            ego_noise = self._ego_noise.frame(round(time / frame_s))
         # Without a state from one frame ago, extrapolate the present velocity backward.
         last = memory.last
         before = last[1:4], last[4:7]
@@ -274,7 +273,6 @@ class Recorder:
             array,
             parameters=self._parameters,
             seed=self._seed,
-            rise=self._rise,
             reflections=self._reflections(emissions, time, pose, memory.places, array),
             ego_noise=ego_noise,
         )

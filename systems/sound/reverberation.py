@@ -65,11 +65,6 @@ class Reverberation:
         self._size = int(fft.next_fast_len(self._needed, real=True))
         self._spectrum = lru_cache(maxsize=_KEPT)(self._compute_spectrum)
 
-    @property
-    def maximum_range_m(self) -> float:
-        """Longest way of an audible reflection, m; emissions must cover it."""
-        return self._images.length / SAMPLE_RATE_HZ * self._c
-
     def frames(
         self,
         emissions: Sequence[Emission],
@@ -113,11 +108,11 @@ class Reverberation:
         """Reflections of one source over the frame, or None if it is silent."""
         end = round((time - emission.start_time) * SAMPLE_RATE_HZ) + self._margin
         if end < self._needed:
+            longest_m = self._images.length / SAMPLE_RATE_HZ * self._c
             raise InputError(
                 "MicArray",
-                f"reflections travel {self.maximum_range_m:.0f} m, farther than "
-                "the stored emission reaches; raise maximum_range_m of "
-                "SoundEmitter",
+                f"reflections travel {longest_m:.0f} m, farther than the stored "
+                "emission reaches; raise maximum_range_m of SoundEmitter",
             )
         if not emission.sounding:
             return None

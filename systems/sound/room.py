@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.compiling import njit
 from systems.framework.signals import SAMPLE_RATE_HZ
-from systems.sound.parameters import RoomParameters
+from systems.sound.parameters import HEIGHT_M, RoomParameters
 from systems.sound.propagation import (
     INTERPOLATION_KERNEL,
     KERNEL_REACH,
@@ -177,8 +177,8 @@ def room_impulse_responses(
     images = images or room_images(room, c)
     microphones = np.atleast_2d(np.asarray(p_WM, dtype=float)) - room.corner
     count = len(microphones)
-    p_M = np.column_stack([microphones, np.full(count, room.microphone_height_m)])
-    p_S = np.array([*(np.asarray(p_WS) - room.corner), room.source_height_m])
+    p_M = np.column_stack([microphones, np.full(count, HEIGHT_M)])
+    p_S = np.array([*(np.asarray(p_WS) - room.corner), HEIGHT_M])
     early = np.full(count, SAMPLE_RATE_HZ) * np.asarray(late, dtype=float)
     out = np.zeros((count, images.length), dtype=np.float32)
     fixed = (p_S, p_M, early, SAMPLE_RATE_HZ / c, MINIMUM_RANGE_M, INTERPOLATION_KERNEL)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from systems.framework.block import OBJECT, Block, Port
 from systems.framework.finite import check_finite, read_arrays
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, Emission, read_only
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.parameters import SoundParameters
 from systems.sound.waveforms import make_waveform
 
@@ -211,7 +211,7 @@ class SoundEmitter(Block):
 
     Args:
         sound: Waveform, level and schedule of the sound.
-        acoustics: Speed of sound.
+        sound_speed_m_s: Speed of sound, m/s.
         maximum_range_m: Largest distance that sound travels to a listener, including
             reflections, m.
         frame_s: Longest frame of a listener, s.
@@ -236,7 +236,7 @@ class SoundEmitter(Block):
         self,
         *,
         sound: SoundParameters = SoundParameters(),
-        acoustics: AcousticParameters = AcousticParameters(),
+        sound_speed_m_s: float = SOUND_SPEED_M_S,
         maximum_range_m: float = MAXIMUM_RANGE_M,
         frame_s: float = TICK_S,
         seed: int = 0,
@@ -248,7 +248,7 @@ class SoundEmitter(Block):
         self._waveform = make_waveform(sound, seed)
         check_finite("SoundEmitter: maximum_range_m", maximum_range_m)
         self._tick_s = tick_s
-        self._ticks = history_ticks(maximum_range_m, acoustics.c, frame_s, tick_s)
+        self._ticks = history_ticks(maximum_range_m, sound_speed_m_s, frame_s, tick_s)
         self.set_name("sound_emitter")
         if called:
             self.inputs = (*self.inputs, Port("calling", 1, "0 or 1"))

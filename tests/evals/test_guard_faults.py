@@ -8,7 +8,9 @@ import pytest
 from analysis.runs.guarded_motion import halts_of
 from analysis.runs.run_report import run_summary, summary_text
 from diagrams import load_scenario, simulate
+from systems.base.carrier_parameters import SourceRobotParameters
 from systems.safety.braking import HALTED
+from systems.world.paths import WaypointPath
 
 #: What the model of the motors leaves of a braking from top speed, s: 0.72 m/s less
 #: 1.5 m/s^2, and five times the lag.
@@ -64,19 +66,12 @@ def test_sound_sensing_halts_nothing():
 
 
 @pytest.mark.parametrize("law", ["guarded", "active"])
-def test_a_sound_that_jumps_leads_into_nothing(law):
+def test_a_sound_that_jumps_leads_into_nothing(law, monkeypatch):
     """After 4 s it is 4 m farther to the right half a second later."""
-    run = faulty(
-        law,
-        "source.waypoints_m=[[4,2],[4,-2]]",
-        "source.speed_m_s=8",
-        "source.top_speed_m_s=100",
-        "source.wheel_separation_m=0.02",
-        "source.wheel_force_n=1e6",
-        "source.acceleration_m_s2=100",
-        "source.start_time_s=4",
-        "duration_s=20",
-    )
+    waypoints = (4.0, 2.0), (4.0, -2.0)
+    jump = WaypointPath(waypoints, speed=8.0, acceleration=100.0, start_time=4.0)
+    monkeypatch.setattr(SourceRobotParameters, "path", lambda _: jump)
+    run = faulty(law, "source.waypoints_m=[[4,2],[4,-2]]", "duration_s=20")
     assert run.collision is None
     speeds = np.hypot(*np.diff([run.columns["p_WS_x"], run.columns["p_WS_y"]])) / 0.025
     assert speeds.max() > 5.0

@@ -102,17 +102,18 @@ def test_a2_noise_stays_below_the_margin_but_for_one_range_in_millions(noise_m):
     draw = np.random.default_rng(1)
     numbers = draw.standard_normal((2, 300_000))
     true = draw.uniform(0.1, 3.2, 300_000)
-    ranges, echo = measured_ranges(true, sensors, 340.0, numbers)
+    ranges, echo = measured_ranges(true, sensors, numbers)
     seen = np.where(echo > 0.5, ranges, 3.0) - margin
     assert (seen < true).all()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "sensors", [{"dropout_probability": 0.3}, {"assumed_sound_speed_m_s": 400.0}]
+    "fields",
+    [{"ultrasonic": {"dropout_probability": 0.3}}, {"assumed_sound_speed_m_s": 400.0}],
 )
-def test_a2_broken_by_missed_echoes_or_by_ranges_that_are_too_long(sensors):
-    assert collides(2, {"ultrasonic": sensors})
+def test_a2_broken_by_missed_echoes_or_by_ranges_that_are_too_long(fields):
+    assert collides(2, fields)
 
 
 # A3: nothing stands in the bubble at the start.

@@ -93,8 +93,9 @@ def scenario(law: str, velocity_term: str = "printed") -> Scenario:
             "odometry": {"rounding": False},
             "tracker": {"hold": "world"},
             "attraction": ATTRACTION,
-            "collision_vector": {"velocity_term": velocity_term, **REPULSION},
-            "integrator": {"scheme": "runge_kutta5", "step_s": 0.005},
+            "collision_vector": {"velocity_term": velocity_term},
+            "laws": REPULSION,
+            "integration_step_s": 0.005,
             "source": {"waypoints_m": [SOURCE_START.tolist(), [9.0, 0.3]]},
             "obstacles": [
                 {"name": "box", "waypoints_m": [BOX.tolist()], "size_m": BOX_SIZE},
@@ -434,10 +435,10 @@ def test_closed_loop_agrees_to_1e_6_over_40_s(law, velocity_term):
 
 @pytest.mark.slow
 def test_default_step_is_within_a_micrometer_of_a_fine_one():
-    """What ``IntegratorParameters`` claims."""
+    """What ``integration_step_s`` claims."""
     ends = []
-    for integrator in ({}, {"scheme": "runge_kutta5", "step_s": 0.0025}):
-        data = scenario("active").model_dump() | {"integrator": integrator}
+    for step_s in (Scenario().integration_step_s, 0.0025):
+        data = scenario("active").model_dump() | {"integration_step_s": step_s}
         follower = build_sound_follower(Scenario.model_validate(data))
         simulator = make_simulator(follower)
         simulator.Initialize()

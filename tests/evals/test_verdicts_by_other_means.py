@@ -397,7 +397,7 @@ def stretch(scenario, true_speed):
     (h - R)/c_true, which is read with c.
     """
     half = max(abs(y) for _, y in scenario.robot.microphones_m)
-    k = scenario.acoustics.c / true_speed
+    k = scenario.sound_speed_m_s / true_speed
 
     def read(R):
         path = k * (math.hypot(R, half) - R)

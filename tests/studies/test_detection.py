@@ -62,11 +62,14 @@ def test_loud_is_heard_and_faint_is_not():
     assert (faint.heard, faint.ranged, faint.wrong) == (0, 0, 0)
 
 
-def test_what_is_off_by_more_than_it_says_is_wrong():
+def test_what_is_off_by_more_than_it_says_is_wrong(monkeypatch):
     """An estimator that takes sound for 15 % faster: sin(bearing) is 1.15 times it."""
-    (point,) = curve(
-        [20.0], 25, range_m=20.0, parameters=TDOAParameters(sound_speed_m_s=1.15 * C)
-    )
+
+    def mistaken(parameters, shape, c):
+        return Localiser(parameters, shape, 1.15 * c)
+
+    monkeypatch.setattr(detection, "Localiser", mistaken)
+    (point,) = curve([20.0], 25, range_m=20.0)
     bearings = [
         abs(tick_generator(2, trial).uniform(-math.pi / 3.0, math.pi / 3.0))
         for trial in range(25)

@@ -16,7 +16,7 @@ from analysis.arrays.voting.source_listener import (
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.block import OBJECT, Block, Port
 from systems.hearing.audio_port import check_rate, read_audio
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters
 
@@ -45,7 +45,7 @@ class SourceListener(Block):
     Args:
         parameters: How votes become tracks.
         robot: Places of the microphones.
-        acoustics: Speed of sound.
+        sound_speed_m_s: Speed of sound, m/s.
         microphones: Rate and length of the frames.
         band_hz: Lowest and highest frequency that is used, Hz.
 
@@ -62,7 +62,7 @@ class SourceListener(Block):
         *,
         parameters: ListenerParameters = ListenerParameters(),
         robot: RobotParameters = RobotParameters(),
-        acoustics: AcousticParameters = AcousticParameters(),
+        sound_speed_m_s: float = SOUND_SPEED_M_S,
         microphones: MicArrayParameters = MicArrayParameters(),
         band_hz: tuple[float, float] = (200.0, 8_000.0),
     ) -> None:
@@ -70,7 +70,7 @@ class SourceListener(Block):
         self._parameters = parameters
         self._plan = vote_plan(
             ArrayShape.of(microphones_B(robot)),
-            acoustics.c,
+            sound_speed_m_s,
             microphones.sample_rate_hz,
             band_hz,
         )

@@ -74,7 +74,7 @@ def _hearing(
         MicArray(
             parameters=robot.microphones,
             robot=robot.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
             room=scenario.room,
             others=others,
             seed=seed_of("mic_array"),
@@ -82,7 +82,7 @@ def _hearing(
         TDOAEstimator(
             parameters=robot.tdoa,
             robot=robot.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.believed_sound_speed_m_s,
             sound=scenario.source.sound,
             microphones=robot.microphones,
         ),
@@ -156,7 +156,8 @@ def _obstacle_sensing(
     sensing = [
         UltrasonicArray(
             parameters=robot.ultrasonic,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
+            assumed_sound_speed_m_s=robot.assumed_sound_speed_m_s,
             seed=seed_of("ultrasonic_array"),
             tick_s=scenario.tick_s,
             **seen,

@@ -123,7 +123,8 @@ def _seen_objects(
     return [
         UltrasonicArray(
             parameters=router.ultrasonic,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
+            assumed_sound_speed_m_s=router.assumed_sound_speed_m_s,
             robot=robot,
             source_size=None,
             obstacle_count=bodies,

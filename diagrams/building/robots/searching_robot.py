@@ -126,7 +126,7 @@ def _ears(
         MicArray(
             parameters=robot.microphones,
             robot=robot.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
             room=scenario.room,
             others=others,
             seed=seed_of("mic_array"),
@@ -134,8 +134,9 @@ def _ears(
         CrossPowerEstimator(
             parameters=robot.cross_power,
             robot=robot.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.believed_sound_speed_m_s,
             microphones=robot.microphones,
         ),
+        RadioRange(seed=seed_of("radio_range"), tick_s=scenario.tick_s),
         RadioRange(seed=seed_of("radio_range"), tick_s=scenario.tick_s),
     ]

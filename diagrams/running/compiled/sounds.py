@@ -54,8 +54,8 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
     sounds = Sounds({name: {} for name in robots}, {}, {})
     hearing = [name for name, own in robots.items() if own.listens]
     ticks = history_ticks(
-        microphone_reach(scenario.room, scenario.acoustics),
-        scenario.acoustics.c,
+        microphone_reach(scenario.room, scenario.sound_speed_m_s),
+        scenario.sound_speed_m_s,
         scenario.longest_frame_s,
         scenario.tick_s,
     )

@@ -265,8 +265,8 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
     """A2: no body is nearer than a range reading minus the margin."""
-    sensors, c = scenario.follower.ultrasonic, scenario.acoustics.c
-    stretch = (sensors.assumed_sound_speed_m_s or c) / c
+    sensors = scenario.follower.ultrasonic
+    stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s
     excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m
     margin = scenario.follower.free_space.range_margin_m
     blind = sum(fault.number == BLIND for fault in sensors.faults)
@@ -288,7 +288,7 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
             excess,
             margin,
             "m",
-            field="ultrasonic.assumed_sound_speed_m_s",
+            field="assumed_sound_speed_m_s",
         ),
     )
 

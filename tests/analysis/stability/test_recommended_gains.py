@@ -25,7 +25,7 @@ ALONE = ["law=none", "obstacles=[]", "source.waypoints_m=[[2, 0]]"]
 def test_loop_is_that_of_the_whole_diagram(at, share):
     # AutoDiff of the built diagram, tracker and odometry included: what hearing says
     # is placed by odometry, so that its tick delays nothing while the source rests.
-    # The diagram's integrator takes one third-order step a tick, ours is exact.
+    # The diagram's integrator takes steps, ours is exact.
     scenario = load_scenario("default", ALONE)
     point = follow_equilibrium(scenario)
     omega = np.geomspace(0.05, 2.5, 20)
@@ -38,7 +38,7 @@ def test_loop_without_lag_is_the_closed_form():
     # v+ = v + T a is held, so that p+ = p + T v+: the spring sees no delay,
     # T^2 z/(z - 1)^2, and the damper half a tick of it, T/(z - 1).
     fast = load_scenario(
-        "default", ["law=none", "plant.motor_lag_s=1e-5", "integrator.step_s=1e-5"]
+        "default", ["law=none", "plant.motor_lag_s=1e-5", "integration_step_s=1e-5"]
     )
     omega, T = np.geomspace(0.05, 20.0, 20), 0.025
     z = np.exp(1j * omega * T)

@@ -13,7 +13,7 @@ from systems.framework.input_error import InputError
 pytestmark = pytest.mark.drake
 
 TOUCHING = ("robots.second.attraction={follow_distance_m: 0.1}",)
-RK2 = "integrator.scheme=runge_kutta2", "integrator.step_s=0.01"
+FINER = ("integration_step_s=0.01",)
 
 OWN_LAW = """
 from pydrake.math import exp
@@ -103,8 +103,8 @@ def assert_same(name, *overrides):
         ("default", ("sound.start_s=30", "stop.lost_after_s=5")),
         ("default", ("start.heading_deg=180", "stop.diverged_range_m=2.5")),
         ("u_trap", ("ultrasonic.axes_deg=8", "collision_vector.aggregation=sum")),
-        ("convoy", ("ideal_hearing.range_noise_fraction=0.01", "law=none", *RK2)),
-        ("convoy", (*TOUCHING, "law=none", *RK2)),
+        ("convoy", ("ideal_hearing.range_noise_fraction=0.01", "law=none", *FINER)),
+        ("convoy", (*TOUCHING, "law=none", *FINER)),
     ],
 )
 def test_runs_are_those_of_drake(name, overrides):
@@ -115,9 +115,9 @@ def test_runs_are_those_of_drake(name, overrides):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["wall", "one_moving_obstacle"])
 def test_a_users_law_on_wheels_that_slip(own_law, name):
-    law, scheme = f"law={own_law}:gaussian", "integrator.scheme=runge_kutta5"
+    law = f"law={own_law}:gaussian"
     slip = "plant.friction=0.05", "obstacle_sensing=ideal"
-    assert_same(name, law, scheme, *slip)
+    assert_same(name, law, *slip)
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ from systems.framework.noise import (
 DISTURBING = re.compile(
     r"noise|fault|dropout|loss$|error$|slip|mismatch|drift|fading|tolerance|friction"
     r"|latency|period_s$|frame_s$|sample_rate|rate$|lost_at|rounding|pulses|intensity"
-    r"|firing|tick_s|scheme|step_s|snr|spread"
+    r"|firing|tick_s|step_s|snr|spread"
 )
 #: Such by their names alone, and why they are not set.
 OTHERS = {
@@ -55,8 +55,7 @@ AIR = {
     "compass.noise_deg": 2.0,
     "radio.latency_s": 0.075,
     "radio.loss": 0.1,
-    "integrator.scheme": "runge_kutta2",
-    "integrator.step_s": 0.01,
+    "integration_step_s": 0.01,
 }
 OBJECTS = {
     "objects.noise_m": 0.02,
@@ -89,7 +88,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "microphones.snr_db_at_1m": 15.0,
             "microphones.ego_noise_file": "noise.wav",
             "microphones.ego_noise_snr_db_at_1m": 25.0,
-            "microphones.ego_noise_share_at_rest": 0.3,
             "microphones.position_tolerance_m": 0.002,
             "microphones.delay_tolerance_s": 1e-6,
             "microphones.gain_tolerance_db": 1.0,
@@ -108,7 +106,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
                 "size_m": [14.0, 14.0, 3.0],
                 "absorption": 0.5,
                 "maximum_order": 1,
-                "update_period_s": 0.2,
             },
             "microphones.snr_db_at_1m": 20.0,
         },

@@ -38,7 +38,7 @@ class Listener(SourceListener):
     def __init__(self, scenario):
         super().__init__(
             robot=scenario.robot,
-            acoustics=scenario.acoustics,
+            sound_speed_m_s=scenario.sound_speed_m_s,
             microphones=scenario.microphones,
         )
 

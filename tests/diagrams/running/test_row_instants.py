@@ -18,7 +18,7 @@ from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import WORLD
 from systems.laws.catalogue import LAWS
 
-EXACT = ("integrator.scheme=runge_kutta5", "integrator.step_s=0.002")
+EXACT = ("integration_step_s=0.002",)
 HEARING = "hearing=ideal", "duration_s=3"
 BOX = "obstacles=[{name: box, size_m: [0.2, 0.2], waypoints_m: [[1.4, 0.5]]}]"
 #: By law a scenario in which it moves.

@@ -182,7 +182,7 @@ def test_geometry_says_where_microphones_are_and_what_may_be_off(tmp_path):
     fields = (
         "microphones.channel_skew_s=[0,2e-6,4e-6]",
         "microphones.position_tolerance_m=0.005",
-        "acoustics.temperature_c=10",
+        "sound_speed_m_s=337.5",
     )
     scenario = load_scenario("default", [*fields, "duration_s=1"])
     with RunAudio(scenario, tmp_path):

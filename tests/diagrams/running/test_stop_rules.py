@@ -288,7 +288,7 @@ def test_a_finer_integration_is_judged_no_more_often():
         "speed_m_s": 0.5,
     }
     for step_s in (0.025, 0.005):
-        result = run(**WAITING, obstacles=[cart], integrator={"step_s": step_s})
+        result = run(**WAITING, obstacles=[cart], integration_step_s=step_s)
         assert result.collision is not None
         assert result.collision.time == pytest.approx(2.705)
         assert result.simulated_s == pytest.approx(2.725)

@@ -45,7 +45,7 @@ sources: {source: {}, fan: {waypoints_m: [[0, 3]], sound: {kind: band_noise}}}
 robots:
   robot: {obstacle_sensing: ultrasonic}
   second: {hearing: audio, obstacle_sensing: ultrasonic, start: {position_m: [-2, -1]}}
-acoustics: {temperature_c: 25}
+sound_speed_m_s: 346.5
 ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
 ultrasonic: {noise_m: 0, firing: sequential}
@@ -58,7 +58,7 @@ plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
 odometry: {rounding: false}
 guard: {margin_m: 0.02}
 free_space: {cell_m: 0.04}
-integrator: {scheme: runge_kutta2, step_s: 0.005}
+integration_step_s: 0.005
 """
 
 
@@ -263,7 +263,7 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
             "laws.active.reference_stiffness_n_m",
             "above",
         ),
-        ("acoustics.temperature_c=99", "acoustics.temperature_c", "60"),
+        ("sound_speed_m_s=20", "sound_speed_m_s", "50"),
         ("seed", "seed", "key=value"),
         ("=3", "=3", "key=value"),
         ("seed=[1", "seed", "is not valid YAML"),
@@ -323,7 +323,7 @@ def test_the_walk_finds_the_fields():
     assert {
         "duration_s",
         "robot.wheel_radius_m",
-        "acoustics.temperature_c",
+        "assumed_sound_speed_m_s",
         "sound.level_pa",
         "attraction.follow_distance_m",
     } <= set(FLOAT_FIELDS)

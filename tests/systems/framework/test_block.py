@@ -119,7 +119,7 @@ class Noisy(Block):
         self.declare(Step(noisy_step, NoiseNumbers(tick_noise(3))), tick_s=0.1)
 
 
-RUN = RunFacts(5, 0.1, (0.0, 0.0, 0.0), "runge_kutta3", 0.1, lambda _: 7, {})
+RUN = RunFacts(5, 0.1, (0.0, 0.0, 0.0), 0.1, lambda _: 7, {})
 
 
 def value(block: Any, port: str, context: Any) -> Any:

@@ -52,7 +52,7 @@ knots = np.zeros((2, 8))
 knots[1, 0] = 1.0
 print(poses_between(knots, np.array([0.5]))[0, 0], len(poses_between.stats.cache_hits))
 """
-CALLED = Path("systems", "base", "hermite.py")
+CALLED = Path("systems", "base", "source_drive.py")
 
 
 def clone(folder: Path) -> Path:

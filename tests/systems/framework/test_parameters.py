@@ -22,7 +22,7 @@ from systems.framework.parameters import (
 )
 from systems.laws.active import ActiveParameters
 from systems.ranging.parameters import UltrasonicParameters
-from systems.sound.acoustics import AcousticParameters, sound_speed
+from systems.sound.acoustics import sound_speed
 
 
 class Example(Parameters):
@@ -132,14 +132,6 @@ def test_microphones_that_are_no_array(places, message):
 )
 def test_sound_speed(temperature, speed):
     assert sound_speed(temperature) == pytest.approx(speed)
-    assert AcousticParameters(temperature_c=temperature).c == pytest.approx(speed)
-
-
-def test_temperature_overrules_the_set_speed():
-    assert AcousticParameters().c == 340.0
-    assert AcousticParameters(sound_speed_m_s=300.0).c == 300.0
-    both = AcousticParameters(sound_speed_m_s=300.0, temperature_c=20.0)
-    assert both.c == pytest.approx(343.5)
 
 
 def test_a_changed_copy_keeps_nothing_that_was_worked_out():

@@ -127,7 +127,6 @@ def facts(carried: dict[str, Any]) -> RunFacts:
         ticks=len(ASKED),
         tick_s=0.025,
         initial_pose=(0.0, 0.0, 0.0),
-        scheme="runge_kutta3",
         step_s=0.025,
         seed_of=lambda _: 0,
         carried=carried,

@@ -20,7 +20,7 @@ from systems.hearing.tdoa_estimator import (
     robot_localiser,
 )
 from systems.hearing.tracking.target_filter import NEVER_HEARD_S
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.adc import convert
 from systems.sound.parameters import MicArrayParameters
 
@@ -82,7 +82,7 @@ class Ear:
         parameters = TDOAParameters(
             choose="followed", first_bearing_deg=first_bearing_deg
         )
-        self.localiser, p_PA = robot_localiser(parameters, ROBOT, AcousticParameters())
+        self.localiser, p_PA = robot_localiser(parameters, ROBOT, SOUND_SPEED_M_S)
         self.choice = robot_choice(self.localiser, ROBOT, p_PA, FRAME_S)
         self.hearing, self.memory = self.localiser.blank(), self.choice.blank()
 

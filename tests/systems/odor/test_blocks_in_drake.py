@@ -37,7 +37,7 @@ def blocks(kind="meandering", seed=1):
 
 
 def facts(seed):
-    return RunFacts(10, TICK_S, (0.0, 0.0, 0.0), "", TICK_S, lambda name: seed, {})
+    return RunFacts(10, TICK_S, (0.0, 0.0, 0.0), TICK_S, lambda name: seed, {})
 
 
 def in_drake(four, ticks):

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.ultrasonic_array import UltrasonicArray
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import sound_speed
 
 QUIET = UltrasonicParameters(noise_m=0.0)
 FAR = [50.0, 0.0, 0.0]
@@ -95,11 +95,11 @@ def test_limits(bench, distance, reading, echo):
 
 def test_time_of_flight_at_the_true_speed_of_sound(bench):
     """Sensors that assume 340 m/s in air of 25 deg C (346.5 m/s) read short."""
-    parameters = UltrasonicParameters(noise_m=0.0, assumed_sound_speed_m_s=340.0)
-    warm = AcousticParameters(temperature_c=25.0)
-    at = bench(make_array(parameters, acoustics=warm), **wall_ahead(1.2))
+    warm = sound_speed(25.0)
+    array = make_array(sound_speed_m_s=warm, assumed_sound_speed_m_s=340.0)
+    at = bench(array, **wall_ahead(1.2))
     assert at.output("ranges")[1] == pytest.approx(1.2 * 340.0 / 346.5)
-    at = bench(make_array(acoustics=warm), **wall_ahead(1.2))
+    at = bench(make_array(sound_speed_m_s=warm), **wall_ahead(1.2))
     assert at.output("ranges")[1] == pytest.approx(1.2)
 
 

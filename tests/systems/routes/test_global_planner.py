@@ -138,7 +138,7 @@ def make(parameters=WAITS, known=(), start=(0.0, 0.0)):
 
 def facts(start=(0.0, 0.0), mapped=()):
     pose = (start[0] - EPSILON, start[1], 0.0)
-    return RunFacts(0, TICK_S, pose, "runge_kutta3", TICK_S, lambda _: 0, {}, mapped)
+    return RunFacts(0, TICK_S, pose, TICK_S, lambda _: 0, {}, mapped)
 
 
 def test_the_first_route_is_that_of_the_map(bench):

@@ -173,7 +173,7 @@ STILL = (0.0, 0.0)
 
 def space_map(**given: Any) -> Any:
     """The numbers of a map whose steps are called by hand."""
-    run = RunFacts(0, 0.025, (0, 0, 0), "runge_kutta5", 0.0125, len, {})
+    run = RunFacts(0, 0.025, (0, 0, 0), 0.0125, len, {})
     step = FreeSpaceMap(**given).step_for(run)
     return step.state, step.numbers
 

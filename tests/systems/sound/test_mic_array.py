@@ -13,7 +13,7 @@ from pydrake.common.value import Value
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame, Emission
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import sound_speed
 from systems.sound.mic_array import MicArray
 from systems.sound.parameters import MicArrayParameters, MicrophoneFaultParameters
 
@@ -117,7 +117,7 @@ def test_warmer_air_is_faster():
     audio = recorded(
         emission(source),
         parameters=parameters,
-        acoustics=AcousticParameters(temperature_c=30.0),
+        sound_speed_m_s=sound_speed(30.0),
     )
     phases, _ = phase_and_amplitude(audio.counts)
     expected = np.exp(-2j * np.pi * TONE * 2.0 / (331.5 + 18.0))

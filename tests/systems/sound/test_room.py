@@ -11,8 +11,7 @@ import scipy.signal
 from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 
-from systems.framework.input_error import InputError
-from systems.sound.parameters import RoomParameters
+from systems.sound.parameters import HEIGHT_M, RoomParameters
 from systems.sound.room import room_images, room_impulse_responses
 
 FS = 100_000
@@ -35,8 +34,8 @@ def simulated(room, source, microphones, c):
         room.size_m, fs=FS, materials=pra.Material(absorption), max_order=order
     )
     box.set_sound_speed(c)
-    box.add_source([*(source - room.corner), room.source_height_m])
-    heights = np.full(len(microphones), room.microphone_height_m)
+    box.add_source([*(source - room.corner), HEIGHT_M])
+    heights = np.full(len(microphones), HEIGHT_M)
     box.add_microphone_array(np.vstack([(microphones - room.corner).T, heights]))
     box.compute_rir()
     half = pra.constants.get("frac_delay_length") // 2
@@ -49,12 +48,7 @@ def test_as_pyroomacoustics_simulates(time):
 
     Within the band, for the other has a high-pass at 10 Hz in the end.
     """
-    room = RoomParameters(
-        corner_m=(-4.0, -3.0),
-        reverberation_time_s=time,
-        source_height_m=0.5,
-        microphone_height_m=0.31,
-    )
+    room = RoomParameters(corner_m=(-4.0, -3.0), reverberation_time_s=time)
     ours = room_impulse_responses(room, SOURCE, ROW, 343.0)
     for response, other in zip(ours, simulated(room, SOURCE, ROW, 343.0), strict=True):
         count = len(response) - 20
@@ -70,14 +64,13 @@ def spectrum(response, frequencies):
 def test_first_reflections_are_mirror_images():
     """Six walls by hand, at 0.5 to 15 kHz: delays to 0.1 us, levels to 0.1 %."""
     room = RoomParameters(
-        size_m=(6.0, 5.0, 3.0), corner_m=(-3.0, -1.0), absorption=0.4, maximum_order=1,
-        source_height_m=0.7, microphone_height_m=0.3,
-    )  # fmt: skip
+        size_m=(6.0, 5.0, 3.0), corner_m=(-3.0, -1.0), absorption=0.4, maximum_order=1
+    )
     x, y = SOURCE
-    places = [(x, y, 0.7)]
-    places += [(2 * wall - x, y, 0.7) for wall in (-3.0, 3.0)]
-    places += [(x, 2 * wall - y, 0.7) for wall in (-1.0, 4.0)]
-    places += [(x, y, 2 * wall - 0.7) for wall in (0.0, 3.0)]
+    places = [(x, y, 0.3)]
+    places += [(2 * wall - x, y, 0.3) for wall in (-3.0, 3.0)]
+    places += [(x, 2 * wall - y, 0.3) for wall in (-1.0, 4.0)]
+    places += [(x, y, 2 * wall - 0.3) for wall in (0.0, 3.0)]
     gains = np.array([1.0] + 6 * [math.sqrt(0.6)])
     frequencies = np.linspace(500.0, 15_000.0, 30)
     responses = room_impulse_responses(room, SOURCE, ROW, C)
@@ -96,20 +89,13 @@ inside = st.tuples(st.floats(-2.9, 2.9), st.floats(-1.9, 1.9))
 
 
 @settings(max_examples=20)
-@given(inside, inside, st.floats(0.1, 2.4), st.floats(0.1, 2.4))
-def test_source_and_microphone_may_change_places(p, q, low, high):
+@given(inside, inside)
+def test_source_and_microphone_may_change_places(p, q):
     """Reciprocity, of the reflections."""
 
-    def response(source, microphone, source_height, microphone_height):
-        room = RoomParameters(
-            size_m=(6.0, 4.0, 2.5),
-            maximum_order=6,
-            source_height_m=source_height,
-            microphone_height_m=microphone_height,
-        )
-        return room_impulse_responses(room, source, [microphone], C, direct=False)
-
-    there, back = response(p, q, low, high), response(q, p, high, low)
+    room = RoomParameters(size_m=(6.0, 4.0, 2.5), maximum_order=6)
+    there = room_impulse_responses(room, p, [q], C, direct=False)
+    back = room_impulse_responses(room, q, [p], C, direct=False)
     np.testing.assert_allclose(there, back, atol=2e-5 * np.abs(there).max())
 
 
@@ -146,12 +132,7 @@ def mean_decay_time(room):
     ("size", "time"), [((4.0, 4.0, 3.0), 0.4), ((5.0, 4.5, 4.0), 0.5)]
 )
 def test_compact_rooms_decay_as_sabine_says(size, time):
-    room = RoomParameters(
-        size_m=size,
-        reverberation_time_s=time,
-        source_height_m=0.4 * size[2],
-        microphone_height_m=0.55 * size[2],
-    )
+    room = RoomParameters(size_m=size, reverberation_time_s=time)
     assert mean_decay_time(room) == pytest.approx(time, rel=0.1)
 
 
@@ -227,8 +208,7 @@ def test_walls_that_cannot_be(fields, message):
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"source_height_m": 3.0}, r"source_height_m.*ceiling"),
-        ({"microphone_height_m": 3.5}, r"microphone_height_m.*ceiling"),
+        ({"size_m": (7.0, 7.0, 0.3)}, r"size_m.*ceiling"),
         ({"size_m": (7.0, 0.0, 3.0)}, "greater than"),
         ({"absorption": 0.0}, "greater than 0"),
     ],
@@ -236,10 +216,3 @@ def test_walls_that_cannot_be(fields, message):
 def test_bad_parameters(fields, message):
     with pytest.raises(ValidationError, match=message):
         RoomParameters(**fields)
-
-
-def test_places_are_taken_every_so_many_frames():
-    room = RoomParameters(update_period_s=0.1)
-    assert [room.update_frames(frame) for frame in (0.025, 0.05, 0.1)] == [4, 2, 1]
-    with pytest.raises(InputError, match=r"room\.update_period_s.*0\.03 s; use 0\.09"):
-        room.update_frames(0.03)

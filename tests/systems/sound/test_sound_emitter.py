@@ -11,7 +11,6 @@ from pydrake.systems.framework import DiagramBuilder
 
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.source_robot import SourceRobot
-from systems.sound.acoustics import AcousticParameters
 from systems.sound.mic_array import MicArray
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import (
@@ -83,8 +82,7 @@ def test_reaches_back_a_frame_and_the_largest_travel():
 
 def test_reaches_back_30_m_and_no_farther_unless_told():
     """At 301 m/s they take 99.7 ms, just below four ticks; and there is the frame."""
-    air = AcousticParameters(sound_speed_m_s=301.0)
-    context = SoundEmitter(acoustics=air).CreateDefaultContext()
+    context = SoundEmitter(sound_speed_m_s=301.0).CreateDefaultContext()
     # x, y and their rates at five past ticks, and at the one that they end on.
     assert context.get_discrete_state(0).size() == 4 * (1 + 4 + 1)
 

@@ -20,7 +20,7 @@ from analysis.arrays.voting.source_listener_block import SourceListener
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters
 
@@ -37,7 +37,7 @@ def noise_from(bearing_deg: float) -> np.ndarray:
     spectrum[(f < 200.0) | (f > 7_000.0)] = 0.0
     turn = np.radians(bearing_deg)
     ahead = np.array([np.cos(turn), np.sin(turn)])
-    late = -(microphones_B(RobotParameters()) @ ahead) / AcousticParameters().c
+    late = -(microphones_B(RobotParameters()) @ ahead) / SOUND_SPEED_M_S
     waves = np.fft.irfft(spectrum * np.exp(-2j * np.pi * f * late[:, None]), count)
     waves *= (np.arange(count) % 8_000) > 2_000
     return np.rint(4_000.0 * waves + rng.standard_normal(waves.shape)).astype(np.int16)
@@ -71,7 +71,7 @@ def listening(counts: np.ndarray, rate: float = 16_000.0):
 def test_frames_through_the_block_give_the_tracks_of_the_pure_function():
     counts = noise_from(35.0)
     shape = ArrayShape.of(microphones_B(RobotParameters()))
-    plan = vote_plan(shape, AcousticParameters().c, 16_000.0, (200.0, 8_000.0))
+    plan = vote_plan(shape, SOUND_SPEED_M_S, 16_000.0, (200.0, 8_000.0))
     steps, _ = hear_sources(
         counts, ListenerMemory.blank(plan), plan, ListenerParameters()
     )

@@ -31,7 +31,7 @@ def test_by_default_nothing_that_rests_is_touched():
     ("settings", "name"),
     [
         (["ultrasonic.dropout_probability=0.1"], "A2"),
-        (["ultrasonic.assumed_sound_speed_m_s=400"], "A2"),
+        (["assumed_sound_speed_m_s=400"], "A2"),
         (["ultrasonic.faults=[{sensor: 1, kind: blind}]"], "A2"),
         (["plant.slip=[0.01, -0.01]"], "A4"),
         (["plant.friction=0.15"], "A5"),
