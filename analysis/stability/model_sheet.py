@@ -26,10 +26,6 @@ _OTHERS = frozenset(
         "robot.microphones_m",
         *(f"sound.{name}" for name in ("kind", "file", "level_pa")),
         *(f"sound.{name}_hz" for name in ("low", "high", "tone")),
-        *(
-            f"tracker.{name}"
-            for name in ("assumed_range_m", "resolve_front_back", "believed_outliers")
-        ),
     }
 )
 
@@ -273,7 +269,6 @@ _SEARCH_PARTS = {
         "heading_control",
         "motor_driver",
         "sound_search",
-        "cross_power",
     ),
 }
 

@@ -18,7 +18,6 @@ from systems.heading.parameters import (
     MotorDriverParameters,
 )
 from systems.hearing.parameters import (
-    CrossPowerParameters,
     IdealHearingParameters,
     TDOAParameters,
     TrackerParameters,
@@ -100,7 +99,6 @@ class FollowerParameters(Parameters):
     airflow_sensors: AirflowParameters = AirflowParameters()
     contact_switches: ContactParameters = ContactParameters()
     sound_search: SoundSearchParameters = SoundSearchParameters()
-    cross_power: CrossPowerParameters = CrossPowerParameters()
     compass: CompassParameters = CompassParameters()
     heading_control: HeadingControlParameters = HeadingControlParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()

@@ -29,18 +29,15 @@ from systems.hearing.cross_powers import (
     gather_frame,
     signal_powers,
 )
-from systems.hearing.parameters import CrossPowerParameters
-from systems.hearing.source_fix import RANGED, range_status
-from systems.hearing.spherical_interpolation import (
-    interpolate_sphere,
-    inverse_of,
-    near_or_far,
-    plane_wave_bearing,
-)
+from systems.hearing.source_fix import range_status
+from systems.hearing.spherical_interpolation import near_or_far, plane_wave_bearing
 from systems.hearing.steer_near import near_grid, steer
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.parameters import MicArrayParameters
 
+#: Band of the sound, Hz (Song 2011, 4.3). At low sample rates, half the rate is the
+#: upper edge.
+_LOW_HZ, _HIGH_HZ = 200.0, 8_000.0
 #: Least bandwidth of a sound, Hz. With less bandwidth, the correlation repeats within
 #: the delays of the array, so that any bearing fits. A steady tone has a bandwidth of
 #: up to 310 Hz because of its ends and of echoes. A siren has some thousand
@@ -56,7 +53,10 @@ _COHERENT = 0.15
 #: root.
 _CHANCE = 5.5
 #: Fewer frames than this give no estimate.
-_LEAST_FRAMES = 4
+LEAST_FRAMES = 4
+#: The result is ambiguous if the response of another direction is at least this share
+#: of the strongest response.
+_AMBIGUOUS_SHARE = 0.9
 
 
 class Direction(NamedTuple):
@@ -79,21 +79,16 @@ class ArrayListener:
     """Gathers spectra and estimates directions, without a Drake context.
 
     Args:
-        parameters: Method, band and thresholds.
         robot: Positions of the microphones, the middle one first.
         c: Speed of sound, m/s.
         microphones: Sample rate and length of the frames.
 
     Raises:
-        InputError: There are fewer than four microphones, or the band is empty.
+        InputError: There are fewer than four microphones.
     """
 
     def __init__(
-        self,
-        parameters: CrossPowerParameters,
-        robot: RobotParameters,
-        c: float,
-        microphones: MicArrayParameters,
+        self, robot: RobotParameters, c: float, microphones: MicArrayParameters
     ) -> None:
         places = np.array(robot.microphones_m)
         if len(places) < 4:
@@ -102,23 +97,20 @@ class ArrayListener:
                 f"has {len(places)} microphones; give four or more, with the "
                 "first in the middle",
             )
-        top = min(parameters.high_hz, 0.5 * microphones.sample_rate_hz)
-        if parameters.low_hz >= top:
-            raise InputError(
-                "cross_power.low_hz",
-                f"{parameters.low_hz:g} Hz is not below {top:g} Hz, the upper edge or "
-                "half the sample rate; lower it",
-            )
-        self._own, self._c = parameters, c
-        self.band_hz = parameters.low_hz, top
+        self.c = c
+        """Speed of sound, m/s."""
+        self.band_hz = _LOW_HZ, min(_HIGH_HZ, 0.5 * microphones.sample_rate_hz)
+        """Lowest and highest frequency to use, Hz."""
         self.p_PR_B = places[0]
         """(2,) position of the middle microphone relative to P, in B axes, m."""
         self.p_RM = places - places[0]
         """(n, 2) positions of the microphones relative to the middle one, m."""
         self.facts = FrameSpectra(
-            len(places), microphones.frame_samples, microphones.sample_rate_hz, top
+            len(places),
+            microphones.frame_samples,
+            microphones.sample_rate_hz,
+            self.band_hz[1],
         )
-        self.sample_rate_hz = microphones.sample_rate_hz
 
     @cached_property
     def sums_size(self) -> int:
@@ -171,27 +163,23 @@ class ArrayListener:
             work.
         """
         lost, facts = self.lost(sound), self.facts
-        if sound.frames < _LEAST_FRAMES or facts.channels - len(lost) < 3:
+        if sound.frames < LEAST_FRAMES or facts.channels - len(lost) < 3:
             return None
         heard = [
             k for k, pair in enumerate(facts.pairs) if not {*pair}.intersection(lost)
         ]
-        subtracted = noise if self._own.noise_cross_power else None
-        mean, occupied = signal_powers(facts, sound, subtracted, self.band_hz)
+        mean, occupied = signal_powers(facts, sound, noise, self.band_hz)
         if not occupied[heard].any():
             return None
         # The phases of the cross powers carry the delays (whitening).
         narrow = self._bandwidth(occupied[heard]) < _LEAST_BANDWIDTH_HZ
         size = np.maximum(np.abs(mean), 1e-300)
-        if self._own.method == "gcc_si":
-            inside = facts.frequencies_hz >= self.band_hz[0]
-            return self._printed(np.where(inside, mean / size, 0.0), lost)
         # Sum of the correlations of all pairs at each position of the grid.
         weighted = np.where(occupied, mean / size, 0.0)
         correlations = cross_correlations(facts, weighted)[heard]
         pairs = [facts.pairs[k] for k in heard]
         found = steer(
-            near_grid(self.p_RM, pairs, self._c),
+            near_grid(self.p_RM, pairs, self.c),
             correlations,
             FINE * facts.rate_hz,
         )
@@ -203,10 +191,18 @@ class ArrayListener:
         # Position from the exact delays of the peaks.
         delays = self._refined(correlations, found.delays)
         bearing, place, status = self._interpolated(pairs, delays, lost)
-        if self._own.method == "srp_near":
-            bearing = found.bearing
-        ambiguous = narrow or found.other_share >= self._own.ambiguous_share
+        ambiguous = narrow or found.other_share >= _AMBIGUOUS_SHARE
+        bearing = self.bearing_of(found.bearing, bearing)
         return Direction(bearing, status, place, ambiguous, found.other)
+
+    def bearing_of(self, steered: float, interpolated: float) -> float:
+        """Returns the bearing of a sound, rad.
+
+        Args:
+            steered: Bearing of the strongest position of the grid, rad.
+            interpolated: Bearing from the delays of the peaks, rad.
+        """
+        return steered
 
     def _bandwidth(self, occupied: NDArray[np.bool_]) -> float:
         """Returns the bandwidth of the sound in the median pair, Hz."""
@@ -254,40 +250,12 @@ class ArrayListener:
                 row[rest.index(j)] += 1.0
             if i != base:
                 row[rest.index(i)] -= 1.0
-        d = self._c * (np.linalg.pinv(rows) @ delays)
+        d = self.c * (np.linalg.pinv(rows) @ delays)
         p_RM = self.p_RM[rest] - self.p_RM[base]
         if lost:  # the middle microphone may be silent
             status = range_status(0.0, enough=False)
             return plane_wave_bearing(p_RM, d), None, status
         return near_or_far(p_RM, d)
-
-    def _printed(
-        self, weighted: NDArray[np.complex128], lost: list[int]
-    ) -> Direction | None:
-        """Estimates the direction by the method printed in the paper.
-
-        The method uses delays in whole samples, pairs with the middle microphone, and
-        spherical interpolation.
-        """
-        if lost:
-            return None
-        facts = self.facts
-        correlations = cross_correlations(facts, weighted, 1)
-        most = math.ceil(
-            np.linalg.norm(self.p_RM, axis=1).max() / self._c * facts.rate_hz
-        )
-        lags = np.arange(-most, most + 1)
-        d = []
-        for k, (i, _) in enumerate(facts.pairs):
-            if i == 0:
-                best = lags[int(correlations[k][lags].argmax())]
-                d.append(self._c * best / facts.rate_hz)
-        place, distance = interpolate_sphere(self.p_RM[1:], d)
-        status = range_status(inverse_of(distance))
-        if not math.isfinite(distance):
-            return Direction(plane_wave_bearing(self.p_RM[1:], d), status)
-        bearing = math.atan2(place[1], place[0])
-        return Direction(bearing, status, place if status == RANGED else None)
 
 
 #: Output ports.
@@ -343,7 +311,6 @@ class CrossPowerEstimator(Block):
     outputs change one tick later.
 
     Args:
-        parameters: ``CrossPowerParameters``.
         robot: Positions of the microphones.
         acoustics: Speed of sound.
         microphones: Sample rate and length of the frames.
@@ -351,8 +318,8 @@ class CrossPowerEstimator(Block):
     Raises:
         InputError: As for ``ArrayListener``.
 
-    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17. The methods ``srp_near`` and
-    ``gcc_plane`` are not in the paper.
+    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17. The paper takes delays in whole
+    samples; the bearing of the strongest position of a grid is not in it.
     """
 
     part, stage = "hearing", "hearing"
@@ -361,18 +328,19 @@ class CrossPowerEstimator(Block):
         Port("listening", 1, "number, 0 nothing, 1 noise alone, 2 sound"),
     )
     outputs = _PORTS
+    listener: type[ArrayListener] = ArrayListener
+    """Class that estimates the directions."""
 
     def __init__(
         self,
         *,
-        parameters: CrossPowerParameters = CrossPowerParameters(),
         robot: RobotParameters = RobotParameters(preset="song2011_hearing"),
         acoustics: AcousticParameters = AcousticParameters(),
         microphones: MicArrayParameters = MicArrayParameters(),
     ) -> None:
         super().__init__()
         self._microphones = microphones
-        self._listener = ArrayListener(parameters, robot, acoustics.c, microphones)
+        self._listener = self.listener(robot, acoustics.c, microphones)
         self.set_name("cross_power_estimator")
         self._audio, self._listening = self.declare_ports()
         facts = self._listener.facts
@@ -433,20 +401,20 @@ class CrossPowerEstimator(Block):
         return audio.counts.astype(np.float64)
 
     def _estimate(self, sound: CrossPowers, noise: CrossPowers) -> NDArray[np.float64]:
-        outputs, listener = np.zeros(_SIZE), self._listener
-        if sound.frames > 0.0 and (lost := listener.lost(sound)):
-            outputs[8] = 1.0 + lost[0]
+        """Returns the values of the output ports in order."""
+        listener = self._listener
+        lost = listener.lost(sound) if sound.frames > 0.0 else []
+        first_lost = 1.0 + lost[0] if lost else 0.0
         found = listener.direction(sound, noise)
         if found is None:
-            return outputs
-        outputs[0], outputs[4] = found.bearing, 1.0
-        outputs[2:4] = math.cos(found.bearing), math.sin(found.bearing)
+            return np.array([0.0] * (_SIZE - 2) + [first_lost, 0.0])
+        distance, p_PS_B = 0.0, [math.cos(found.bearing), math.sin(found.bearing)]
         if found.place is not None:
-            outputs[1], outputs[5] = float(np.linalg.norm(found.place)), 1.0
-            outputs[2:4] = listener.p_PR_B + found.place
-        outputs[6], outputs[7] = float(found.ambiguous), found.other
-        outputs[9] = found.range_status
-        return outputs
+            distance = float(np.linalg.norm(found.place))
+            p_PS_B = (listener.p_PR_B + found.place).tolist()
+        ranged, ambiguous = float(found.place is not None), float(found.ambiguous)
+        directions = found.bearing, distance, *p_PS_B, 1.0, ranged, ambiguous
+        return np.array((*directions, found.other, first_lost, found.range_status))
 
     def _listen(self, context: Any, discrete_state: Any) -> None:
         asked = round(float(read_arrays(context, [self._listening])[0][0]))

@@ -35,6 +35,8 @@ def robot_localiser(
     robot: RobotParameters,
     acoustics: AcousticParameters,
     microphones: MicArrayParameters = MicArrayParameters(),
+    *,
+    limited: bool = True,
 ) -> tuple[Localiser, NDArray[np.float64]]:
     """Makes the localizer of the robot's own microphones.
 
@@ -43,6 +45,7 @@ def robot_localiser(
         robot: Positions of the microphones.
         acoustics: Speed of sound.
         microphones: Sample rate and length of the frames.
+        limited: See ``Localiser``.
 
     Returns:
         The localizer, and (2,) centroid of the microphones from P in B axes, m.
@@ -54,6 +57,7 @@ def robot_localiser(
         acoustics.c,
         sample_rate_hz=microphones.sample_rate_hz,
         frame_samples=microphones.frame_samples,
+        limited=limited,
     )
     return localiser, np.mean(robot.microphones_m, axis=0)
 
@@ -147,12 +151,13 @@ class TDOAEstimator(Block):
     later, which models the computing time.
 
     Args:
-        parameters: Method, band and thresholds.
+        parameters: Method, band and rate of false alarms.
         robot: Positions of the microphones.
         acoustics: Speed of sound.
         sound: The sound of the source. Its gate is the schedule, which has an effect
             only if ``schedule_known`` is set.
         microphones: Sample rate and length of the frames.
+        limited: See ``Localiser``.
 
     Raises:
         InputError: The array cannot be used at this sample rate and band.
@@ -180,13 +185,14 @@ class TDOAEstimator(Block):
         acoustics: AcousticParameters = AcousticParameters(),
         sound: SoundParameters = SoundParameters(),
         microphones: MicArrayParameters = MicArrayParameters(),
+        limited: bool = True,
     ) -> None:
         super().__init__()
         self._microphones = microphones
         self._schedule = sound if parameters.schedule_known else None
         self._longest_way_s = MAXIMUM_RANGE_M / acoustics.c
         self._localiser, self._p_PA_B = robot_localiser(
-            parameters, robot, acoustics, microphones
+            parameters, robot, acoustics, microphones, limited=limited
         )
         self.set_name("tdoa_estimator")
         self._choice = None

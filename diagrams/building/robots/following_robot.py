@@ -88,20 +88,15 @@ def _tracker(scenario: Scenario) -> Any:
     """Makes the tracker for the kind of hearing.
 
     An ideal estimate is one tick old; an estimate from audio is older by half a frame.
-    For ideal estimates, the tracker uses the exact covariance and does not resolve
-    front and back.
     """
     tick, frame = scenario.tick_s, scenario.microphones.frame_s
-    tracker, age = scenario.tracker, tick + 0.5 * frame
-    if scenario.hearing == "ideal":
-        exact = {"resolve_front_back": False, "measurement_floor_m": 0.0}
-        tracker = tracker.model_copy(update=exact)
-        age = tick
+    exact = scenario.hearing == "ideal"
     return SourceTracker(
         robot=scenario.robot,
-        tracker=tracker,
-        measurement_age_s=age,
+        tracker=scenario.tracker,
+        measurement_age_s=tick if exact else tick + 0.5 * frame,
         frame_s=frame,
+        exact=exact,
         initial_pose=scenario.start.pose,
         tick_s=tick,
     )

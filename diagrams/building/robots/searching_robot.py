@@ -126,7 +126,6 @@ def _ears(
             seed=seed_of("mic_array"),
         ),
         CrossPowerEstimator(
-            parameters=scenario.cross_power,
             robot=scenario.robot,
             acoustics=scenario.acoustics,
             microphones=scenario.microphones,

@@ -39,7 +39,6 @@ OTHERS = {
     "repulsion.trajectory_adaptive.safety_filter.approach_rate": "a gain",
     "repulsion.trajectory_filtered.safety_filter.approach_rate": "a gain",
     "sound_search.noise_s": "for how long a search listens",
-    "cross_power.noise_cross_power": "on by default",
     "odor.mean_intensity": "of the steady plume, which has no noise",
     "gas_sensors.slope_mismatch": "0.03 by default",
     "gas_sensors.mismatch": "0.01 by default",

@@ -49,7 +49,6 @@ WIDER = {
     "HeadingControlParameters.largest_integral_deg",
     "HeadingControlParameters.turning_beyond_deg",
     "IdealHearingParameters.bearing_noise_deg",
-    "TDOAParameters.maximum_bearing_std_deg",
 }
 
 
