@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
+from systems.delays.correlations import parabola_vertex
 from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
 from systems.framework.finite import read_arrays
 from systems.framework.host_step import host_step
@@ -220,9 +221,7 @@ class ArrayListener:
             at = round(delay * rate) + around
             values = pair[at % length]
             m = min(max(int(values.argmax()), 1), len(values) - 2)
-            bend = values[m - 1] - 2.0 * values[m] + values[m + 1]
-            shift = 0.5 * (values[m - 1] - values[m + 1]) / bend if bend < 0.0 else 0.0
-            refined[k] = (at[m] + min(max(shift, -1.0), 1.0)) / rate
+            refined[k] = (at[m] + parabola_vertex(*values[m - 1 : m + 2])) / rate
         return refined
 
     def _interpolated(
