@@ -24,7 +24,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
 from systems.hearing.localise import Candidate
-from systems.hearing.tracking.target_filter import NEVER_HEARD_S
+from systems.hearing.tracking.target_filter import NEVER_HEARD_S, SPEED_STD
 from systems.sound.array_shape import ArrayShape
 
 # Number of other sources that are remembered, and time until they are forgotten, s.
@@ -60,8 +60,6 @@ _SECOND = 0.6
 _DELAY_FLOOR_M = 0.008
 # Error of the position that the tracker gives, m.
 _PLACE_FLOOR_M = 0.03
-# Unknown velocity of a source, m/s.
-_SPEED_M_S = 0.35
 
 # Assumed range if only the direction is known, m. Its standard deviation is half of
 # this value.
@@ -383,7 +381,7 @@ def _grown(row: NDArray[np.float64]) -> _Place | None:
     """Returns where another source may be now; None: this row holds no source."""
     if row[0] >= NEVER_HEARD_S:
         return None
-    covariance = row[5:9].reshape(2, 2) + (_SPEED_M_S * row[0]) ** 2 * np.eye(2)
+    covariance = row[5:9].reshape(2, 2) + (SPEED_STD * row[0]) ** 2 * np.eye(2)
     return _Place(row[3:5], covariance, _Line(row[9:11], row[11:13]))
 
 
