@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from systems.base.robot import RobotParameters
 from systems.framework.signals import AudioFrame, Emission
 from systems.hearing.cross_power_estimator import ArrayListener, Direction
-from systems.hearing.cross_powers import CrossPowers, gather_frame
+from systems.hearing.cross_powers import CrossPowers, gather_frame, no_powers
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import (
@@ -81,7 +81,7 @@ def hear_once(
     )
     c = AcousticParameters().c
     listener = method(robot, c, microphones)
-    nothing = listener.unpack(np.zeros(listener.sums_size))
+    nothing = no_powers(listener.facts)
     heard = {"noise": nothing, "sound": nothing}
     frames = _frames(trial, robot, microphones)
     quiet = round(trial.noise_s / _FRAME_S)

@@ -3,33 +3,27 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
 from systems.delays.correlations import parabola_vertex
-from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
-from systems.framework.finite import read_arrays
-from systems.framework.host_step import host_step
+from systems.framework.block import OBJECT, Port
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.hearing.audio_port import (
-    audio_of_run,
-    check_rate,
-    declare_state_outputs,
-    read_audio,
-)
 from systems.hearing.cross_powers import (
     FINE,
     CrossPowers,
     FrameSpectra,
     cross_correlations,
     gather_frame,
+    no_powers,
     signal_powers,
 )
+from systems.hearing.frame_block import FrameBlock
 from systems.hearing.source_fix import range_status
 from systems.hearing.spherical_interpolation import near_or_far, plane_wave_bearing
 from systems.hearing.steer_near import near_grid, steer
@@ -111,28 +105,6 @@ class ArrayListener:
             microphones.frame_samples,
             microphones.sample_rate_hz,
             self.band_hz[1],
-        )
-
-    @cached_property
-    def sums_size(self) -> int:
-        """Number of elements of a packed ``CrossPowers``."""
-        facts = self.facts
-        return 1 + facts.bins * (2 * len(facts.pairs) + facts.channels)
-
-    def pack(self, sums: CrossPowers) -> NDArray[np.float64]:
-        """Converts sums to a (sums_size,) vector."""
-        pairs = np.ascontiguousarray(sums.pairs).view(np.float64).ravel()
-        return np.concatenate(([sums.frames], pairs, sums.own.ravel()))
-
-    def unpack(self, numbers: NDArray[np.float64]) -> CrossPowers:
-        """Converts a (sums_size,) vector to sums."""
-        facts = self.facts
-        split = 1 + 2 * len(facts.pairs) * facts.bins
-        pairs = np.ascontiguousarray(numbers[1:split]).view(np.complex128)
-        return CrossPowers(
-            pairs.reshape(-1, facts.bins),
-            numbers[split:].reshape(-1, facts.bins),
-            float(numbers[0]),
         )
 
     def lost(self, sound: CrossPowers) -> list[int]:
@@ -257,21 +229,7 @@ class ArrayListener:
         return near_or_far(p_RM, d)
 
 
-#: Output ports.
-_PORTS = (
-    Port("source_bearing", 1, "rad"),
-    Port("source_range", 1, "m"),
-    Port("p_PS_B", 2, "m, m", ("p_PS_B_x", "p_PS_B_y")),
-    Port("detected", 1, "0 or 1", "detected"),
-    Port("range_valid", 1, "0 or 1", "range_valid"),
-    Port("ambiguous", 1, "0 or 1", "ambiguous"),
-    Port("alternative_bearing", 1, "rad"),
-    Port("lost_microphone", 1, "number, 0 none", "lost_microphone"),
-    Port("range_status", 1, "number, 0 nothing heard", "range_status"),
-)
-_SIZE = sum(port.elements({}) for port in _PORTS)
-# Groups of the discrete state.
-_OUTPUTS, _FRAME, _SUMS = range(3)
+#: What ``listening`` requests.
 _NOTHING, _NOISE, _SOUND = range(3)
 
 
@@ -285,9 +243,10 @@ class _Memory(NamedTuple):
     noise: CrossPowers
     sound: CrossPowers
     outputs: NDArray[np.float64]
+    """Values of the output ports in order."""
 
 
-class CrossPowerEstimator(Block):
+class CrossPowerEstimator(FrameBlock):
     """Estimates where the source is while the search listens.
 
     The block gathers cross-power spectra while ``listening`` requests them. The sums
@@ -326,7 +285,17 @@ class CrossPowerEstimator(Block):
         Port("audio", OBJECT, "AudioFrame"),
         Port("listening", 1, "number, 0 nothing, 1 noise alone, 2 sound"),
     )
-    outputs = _PORTS
+    outputs = (
+        Port("source_bearing", 1, "rad"),
+        Port("source_range", 1, "m"),
+        Port("p_PS_B", 2, "m, m", ("p_PS_B_x", "p_PS_B_y")),
+        Port("detected", 1, "0 or 1", "detected"),
+        Port("range_valid", 1, "0 or 1", "range_valid"),
+        Port("ambiguous", 1, "0 or 1", "ambiguous"),
+        Port("alternative_bearing", 1, "rad"),
+        Port("lost_microphone", 1, "number, 0 none", "lost_microphone"),
+        Port("range_status", 1, "number, 0 nothing heard", "range_status"),
+    )
     listener: type[ArrayListener] = ArrayListener
     """Class that estimates the directions."""
 
@@ -338,56 +307,43 @@ class CrossPowerEstimator(Block):
         microphones: MicArrayParameters = MicArrayParameters(),
     ) -> None:
         super().__init__()
-        self._microphones = microphones
         self._listener = self.listener(robot, acoustics.c, microphones)
         self.set_name("cross_power_estimator")
-        self._audio, self._listening = self.declare_ports()
         facts = self._listener.facts
-        self.DeclareDiscreteState(_SIZE)
-        self.DeclareDiscreteState(1 + facts.channels * facts.samples)
-        self.DeclareDiscreteState(self._listener.sums_size)
-        self.DeclareDiscreteState(self._listener.sums_size)
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=microphones.frame_s, offset_sec=0.0, update=self._listen
-        )
-        declare_state_outputs(self)
-
-    def _blank(self) -> _Memory:
-        listener, facts = self._listener, self._listener.facts
-        none = listener.unpack(np.zeros(listener.sums_size))
+        self._none = no_powers(facts)
         frame = np.zeros((facts.channels, facts.samples))
-        return _Memory(_NOTHING, frame, none, none, np.zeros(_SIZE))
+        blank = _Memory(_NOTHING, frame, self._none, self._none, self._values())
+        self.declare_frames(blank, microphones)
 
-    def hear(self, asked: int, audio: Any, memory: _Memory) -> _Memory:
-        """Returns the memory after a frame.
+    def hear(
+        self,
+        inputs: NDArray[np.float64],
+        audio: Callable[[], AudioFrame],
+        memory: _Memory,
+    ) -> tuple[NDArray[np.float64], _Memory]:
+        """Gathers one frame or estimates, see ``FrameBlock.hear``.
 
-        Args:
-            asked: Value of ``listening``.
-            audio: Function that returns the frame. It is called only if the frame is
-                required.
-            memory: Memory after the previous frame.
-
-        Returns:
-            The new memory.
-
-        Raises:
-            InputError: The frame has another sample rate.
+        ``audio`` is called only if the frame is required.
         """
+        after = self._gathered(round(float(inputs[0])), audio, memory)
+        return after.outputs, after
+
+    def _gathered(
+        self, asked: int, audio: Callable[[], AudioFrame], memory: _Memory
+    ) -> _Memory:
+        """Returns the memory after a frame. ``asked`` is the value of ``listening``."""
         if asked == _NOTHING and memory.asked == _NOTHING:
             return memory
-        blank = self._blank()
         noise, sound, outputs = memory.noise, memory.sound, memory.outputs
         if memory.asked == _SOUND and asked != _SOUND:
             outputs = self._estimate(sound, noise)
         if asked == _NOTHING:
             return memory._replace(asked=asked, outputs=outputs)
-        frame = self._counts(audio())
+        frame = audio().counts.astype(np.float64)
         if asked != memory.asked:  # a spectrum needs two frames
             if asked == _NOISE:
-                return memory._replace(
-                    asked=asked, before=frame, noise=blank.noise, outputs=outputs
-                )
-            return _Memory(asked, frame, noise, blank.sound, blank.outputs)
+                return _Memory(asked, frame, self._none, sound, outputs)
+            return _Memory(asked, frame, noise, self._none, self._values())
         facts = self._listener.facts
         if asked == _NOISE:
             noise = gather_frame(facts, noise, memory.before, frame)
@@ -395,75 +351,22 @@ class CrossPowerEstimator(Block):
             sound = gather_frame(facts, sound, memory.before, frame)
         return _Memory(asked, frame, noise, sound, outputs)
 
-    def _counts(self, audio: AudioFrame) -> NDArray[np.float64]:
-        check_rate(audio, self._microphones.sample_rate_hz, "CrossPowerEstimator")
-        return audio.counts.astype(np.float64)
-
     def _estimate(self, sound: CrossPowers, noise: CrossPowers) -> NDArray[np.float64]:
-        """Returns the values of the output ports in order."""
         listener = self._listener
         lost = listener.lost(sound) if sound.frames > 0.0 else []
+        return self._values(listener.direction(sound, noise), lost)
+
+    def _values(
+        self, found: Direction | None = None, lost: Sequence[int] = ()
+    ) -> NDArray[np.float64]:
+        """Returns the values of the output ports in order."""
         first_lost = 1.0 + lost[0] if lost else 0.0
-        found = listener.direction(sound, noise)
         if found is None:
-            return np.array([0.0] * (_SIZE - 2) + [first_lost, 0.0])
+            return np.array([0.0] * 8 + [first_lost, 0.0])
         distance, p_PS_B = 0.0, [math.cos(found.bearing), math.sin(found.bearing)]
         if found.place is not None:
             distance = float(np.linalg.norm(found.place))
-            p_PS_B = (listener.p_PR_B + found.place).tolist()
+            p_PS_B = (self._listener.p_PR_B + found.place).tolist()
         ranged, ambiguous = float(found.place is not None), float(found.ambiguous)
         directions = found.bearing, distance, *p_PS_B, 1.0, ranged, ambiguous
         return np.array((*directions, found.other, first_lost, found.range_status))
-
-    def _listen(self, context: Any, discrete_state: Any) -> None:
-        asked = round(float(read_arrays(context, [self._listening])[0][0]))
-        if asked == _NOTHING and not context.get_discrete_state(_FRAME).value()[0]:
-            return  # unpacking the sums takes time
-        memory = self._remembered(context)
-
-        def frame() -> AudioFrame:
-            return read_audio(context, self._audio, "CrossPowerEstimator")
-
-        after = self.hear(asked, frame, memory)
-        if after is memory:
-            return
-        discrete_state.set_value(_OUTPUTS, after.outputs)
-        head = np.concatenate(([float(after.asked)], after.before.ravel()))
-        discrete_state.set_value(_FRAME, head)
-        pairs = (after.noise, memory.noise), (after.sound, memory.sound)
-        for group, (sums, old) in enumerate(pairs, start=_SUMS):
-            if sums is not old:
-                discrete_state.set_value(group, self._listener.pack(sums))
-
-    def _remembered(self, context: Any) -> _Memory:
-        facts = self._listener.facts
-        head = context.get_discrete_state(_FRAME).value()
-        noise, sound = (
-            self._listener.unpack(context.get_discrete_state(k).CopyToVector())
-            for k in (_SUMS, _SUMS + 1)
-        )
-        outputs = context.get_discrete_state(_OUTPUTS).CopyToVector()
-        before = head[1:].reshape(facts.channels, facts.samples)
-        return _Memory(round(float(head[0])), before, noise, sound, outputs)
-
-    def step_for(self, run: RunFacts) -> Step:
-        """Returns the step of the block for the frames of a compiled loop.
-
-        Args:
-            run: Provides the frames.
-
-        Returns:
-            The step, which calls Python.
-
-        Raises:
-            InputError: No block with a step publishes audio.
-        """
-        audio, memory = audio_of_run(run), self._blank()
-
-        def listen(tick: int, inputs: Any, outputs: Any) -> None:
-            nonlocal memory
-            memory = self.hear(round(float(inputs[0])), lambda: audio(tick), memory)
-            outputs[:] = memory.outputs
-
-        period = round(self._microphones.frame_s / run.tick_s)
-        return host_step(listen, 1, _SIZE, period)
