@@ -96,7 +96,7 @@ class FrameBlock(Block):
         sizes = [int(port.size) for port in self.outputs]
         silence = np.zeros(sum(sizes))
         self.DeclareAbstractState(Value(_Heard(silence, memory)))
-        self.DeclareDiscreteState(silence)
+        self.DeclareDiscreteState(silence.size)
         event = {"period_sec": microphones.frame_s, "offset_sec": 0.0}
         self.DeclarePeriodicUnrestrictedUpdateEvent(**event, update=self._listen)
         self.DeclarePeriodicDiscreteUpdateEvent(**event, update=self._publish)

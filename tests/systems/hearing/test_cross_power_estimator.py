@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from pydrake.common.value import Value
+from pydrake.systems.analysis import Simulator
 
 from studies.support.bearing_trials import BearingTrial, hear_once
 from studies.support.listening_methods import PlaneListener, PrintedListener
@@ -103,7 +105,7 @@ def frames(count, rate=32_000.0):
 
 def test_it_asks_for_sound_only_while_it_listens():
     block = CrossPowerEstimator(microphones=MicArrayParameters(sample_rate_hz=32_000.0))
-    memory, asked = block._blank(), []
+    values, memory, asked = np.zeros(10), block._blank, []
     played = list(frames(12))
     for k, listening in enumerate([0, 0, 1, 1, 2, 2, 2, 2, 2, 2, 0, 0]):
 
@@ -111,17 +113,20 @@ def test_it_asks_for_sound_only_while_it_listens():
             asked.append(k)
             return played[k]
 
-        memory = block.hear(listening, audio, memory)
+        values, memory = block.hear(np.array([listening]), audio, memory)
     assert asked == list(range(2, 10))
-    assert memory.outputs[4] == 1.0
-    assert abs(memory.outputs[0]) < math.radians(3.0)
+    assert values[4] == 1.0
+    assert abs(values[0]) < math.radians(3.0)
 
 
 def test_frames_of_another_rate_are_refused():
     block = CrossPowerEstimator(microphones=MicArrayParameters(sample_rate_hz=32_000.0))
     frame = next(frames(1, 48_000.0))
+    context = block.CreateDefaultContext()
+    block.GetInputPort("audio").FixValue(context, Value(frame))
+    block.GetInputPort("listening").FixValue(context, [2.0])
     with pytest.raises(InputError, match="48000"):
-        block.hear(2, lambda: frame, block._blank())
+        Simulator(block, context).AdvancePendingEvents()
 
 
 def test_three_microphones_at_the_start_are_refused():

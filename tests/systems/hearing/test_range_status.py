@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.random import Generator, Philox
 from pydrake.common.value import Value
+from pydrake.systems.analysis import Simulator
 
 from diagrams import load_scenario, simulate
 from systems.framework.signals import AudioFrame
@@ -71,8 +72,7 @@ class Ears:
         counts = np.round(100.0 * np.asarray(rows)).astype(np.int16)
         audio = AudioFrame(counts, 512, FS, 0.025)
         self.block.GetInputPort("audio").FixValue(self.context, Value(audio))
-        update = self.block.EvalUniquePeriodicDiscreteUpdate(self.context).Clone()
-        self.context.SetDiscreteState(update)
+        Simulator(self.block, self.context).AdvancePendingEvents()
         status = self.read("range_status")
         assert self.read("range_valid") == (status == RANGED)
         assert self.read("detected") == (status not in {NOTHING_HEARD, REJECTED})
