@@ -83,7 +83,9 @@ class PlainLoop:
             scenario.follower.tracker, scenario.only.robot, 1.5 * T
         )
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
-        self.localiser, self.p_PA_B = robot_localiser(scenario.follower.tdoa, scenario.only.robot, c)
+        self.localiser, self.p_PA_B = robot_localiser(
+            scenario.follower.tdoa, scenario.only.robot, c
+        )
 
     def run(self) -> NDArray[np.float64]:
         """(ticks + 1, 7) states of the plant at every tick."""

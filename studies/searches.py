@@ -22,6 +22,12 @@ from analysis.comparison.plans import library_layouts
 from analysis.reporting.intervals import wilson_interval
 from analysis.runs.search_metrics import ARMS_M
 from studies.support.bearing_trials import FAN_M, BearingTrial, hear_once
+from studies.support.listening_methods import (
+    PlaneEstimator,
+    PlaneListener,
+    PrintedEstimator,
+    PrintedListener,
+)
 from studies.support.search_outcomes import (
     SEED as SEED,
     SearchOutcomes,
@@ -29,7 +35,6 @@ from studies.support.search_outcomes import (
     search_runs,
 )
 from studies.tables import Table
-from systems.hearing.parameters import CrossPowerParameters
 from systems.sound.parameters import RoomParameters, SoundParameters
 
 _SONG = {"search.rules": "song2011", "search.gate": False}
@@ -141,8 +146,14 @@ SOUND_ROWS: Sequence[tuple[str, _Changes]] = (
     ("T60 0.25 s", {}),
     ("T60 0.4 s", {"room.reverberation_time_s": 0.4}),
     ("T60 0.25 s, noise", {"sound.kind": "band_noise"}),
-    ("T60 0.25 s, `gcc_plane`", {"cross_power.method": "gcc_plane"}),
-    ("T60 0.25 s, `gcc_si`, as printed", {"cross_power.method": "gcc_si"}),
+    (
+        "T60 0.25 s, `gcc_plane`",
+        {"blocks": [f"{PlaneEstimator.__module__}:PlaneEstimator"]},
+    ),
+    (
+        "T60 0.25 s, `gcc_si`, as printed",
+        {"blocks": [f"{PrintedEstimator.__module__}:PrintedEstimator"]},
+    ),
     (
         "T60 0.25 s, stop by radio at 0.2 m, as printed",
         {"sound_search.stop": "radio", "sound_search.radio_stop_m": 0.2},
@@ -195,10 +206,10 @@ def mission_table(runs: int = 100) -> Table:
     return Table("mission", _HEAD, rows)
 
 
-def _trial(task: tuple[BearingTrial, CrossPowerParameters]) -> tuple[float, bool]:
+def _trial(task: tuple[BearingTrial, dict[str, Any]]) -> tuple[float, bool]:
     """Error, deg, infinite where nothing is heard; and whether it is ambiguous."""
-    trial, parameters = task
-    heard = hear_once(trial, parameters)
+    trial, how = task
+    heard = hear_once(trial, **how)
     if heard is None:
         return math.inf, False
     off = math.degrees(math.remainder(heard.bearing - trial.bearing, math.tau))
@@ -268,11 +279,11 @@ def bearings_table(count: int = 100) -> Table:
         for name, sound in (("siren", siren), ("noise", noise))
     ]
     rows.append(("steady tone of 2.7 kHz", {"sound": tone}))
-    methods = [
-        ("`srp_near`", CrossPowerParameters()),
-        ("without subtraction", CrossPowerParameters(noise_cross_power=False)),
-        ("`gcc_plane`", CrossPowerParameters(method="gcc_plane")),
-        ("`gcc_si`, as printed", CrossPowerParameters(method="gcc_si")),
+    methods: list[tuple[str, dict[str, Any]]] = [
+        ("`srp_near`", {}),
+        ("without subtraction", {"subtract": False}),
+        ("`gcc_plane`", {"method": PlaneListener}),
+        ("`gcc_si`, as printed", {"method": PrintedListener}),
     ]
     text = []
     context = get_context("forkserver")
@@ -280,8 +291,8 @@ def bearings_table(count: int = 100) -> Table:
         for name, changes in rows:
             trials = _trials(count, SEED, **changes)
             cells, ambiguous = [], 0
-            for number, (_, parameters) in enumerate(methods):
-                tasks = [(trial, parameters) for trial in trials]
+            for number, (_, how) in enumerate(methods):
+                tasks = [(trial, how) for trial in trials]
                 found = list(pool.map(_trial, tasks, chunksize=4))
                 good = sum(off <= 10.0 for off, _ in found)
                 cells.append(_percent((good / count, *wilson_interval(good, count))))

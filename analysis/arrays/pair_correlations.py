@@ -9,7 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from systems.delays.delay_peaks import whitening
+from systems.delays.correlations import (
+    correlations_at_lags,
+    parabola_vertex,
+    whitening,
+)
 
 # Loudest frames that are looked at; they lie anywhere in the recording.
 _FRAMES = 64
@@ -130,9 +134,9 @@ def _correlation(
     total = np.sum(np.abs(cross), axis=1, keepdims=True)
     grid = _DENSITY * 2 * (cross.shape[1] - 1)
     # All values lie between -1 and 1: the bins' sizes add up to 1.
-    values = fft.irfft(cross / np.maximum(total, 1e-30), grid) * (grid / 2.0)
-    reach = _DENSITY * gate
-    return np.concatenate((values[:, -reach:], values[:, : reach + 1]), axis=1)
+    band = slice(cross.shape[1])
+    share = cross / np.maximum(total, 1e-30)
+    return correlations_at_lags(share, band, grid, _DENSITY * gate) * (grid / 2.0)
 
 
 def _extremes(values: NDArray[np.float64], gate: int) -> NDArray[np.float64]:
@@ -145,5 +149,4 @@ def _vertex(values: NDArray[np.float64]) -> NDArray[np.float64]:
     rows = np.arange(len(values))
     best = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
     left, top, right = (values[rows, best + k] for k in (-1, 0, 1))
-    curve = np.minimum(left - 2.0 * top + right, -1e-12)
-    return best + np.clip(0.5 * (left - right) / curve, -1.0, 1.0)
+    return best + parabola_vertex(left, top, right)

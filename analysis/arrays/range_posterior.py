@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from analysis.arrays.array_budget import ArrayBudget
 from systems.framework.compiling import njit
+from systems.hearing.delay_fit import across
 from systems.sound.array_shape import ArrayShape
 
 #: Ranges beyond are told by no array, m.
@@ -165,18 +166,7 @@ def _across(a: NDArray[np.float64]) -> NDArray[np.float64]:  # pragma: no cover
     """(q, q - 1) orthonormal directions across a unit vector."""
     if a.size == 2:
         return np.array([[-a[1]], [a[0]]])
-    least = 0
-    for i in range(1, 3):
-        if abs(a[i]) < abs(a[least]):
-            least = i
-    size = np.sqrt(1.0 - a[least] ** 2)
-    out = np.empty((3, 2))
-    for i in range(3):
-        out[i, 0] = ((1.0 if i == least else 0.0) - a[least] * a[i]) / size
-    for i in range(3):
-        j, m = (i + 1) % 3, (i + 2) % 3
-        out[i, 1] = a[j] * out[m, 0] - a[m] * out[j, 0]
-    return out
+    return across(a)
 
 
 @njit(cache=True)

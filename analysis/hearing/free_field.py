@@ -51,7 +51,7 @@ Estimator = Callable[[NDArray[np.float32]], SourceFix | None]
 
 
 def frame_estimator(
-    parameters: TDOAParameters, shape: ArrayShape, c: float
+    parameters: TDOAParameters, shape: ArrayShape, c: float, *, limited: bool = True
 ) -> Estimator:
     """What ``TDOAEstimator`` does to a (n, samples) frame, the first that it hears.
 
@@ -59,11 +59,12 @@ def frame_estimator(
         parameters: Of the estimator.
         shape: The n microphones.
         c: Speed of sound, m/s.
+        limited: See ``Localiser``.
 
     Returns:
         From a frame to a fix, or None where nothing is heard.
     """
-    localiser = Localiser(parameters, shape, c)
+    localiser = Localiser(parameters, shape, c, limited=limited)
     return lambda frame: localiser.localise(frame, localiser.blank())[0]
 
 

@@ -21,6 +21,7 @@ from analysis.hearing.paper_tables import PAPER_CELLS, PaperCell
 from analysis.hearing.sensitivity import ArrayErrors, PolarStd, predicted_std
 from analysis.hearing.trial_counts import check_trials
 from diagrams import Scenario, load_scenario
+from systems.hearing.tdoa_estimator import TDOAEstimator
 from systems.sound.array_shape import ArrayShape
 
 #: What the experiment changes in the default scenario: nothing moves the
@@ -43,21 +44,23 @@ REALISTIC_TOLERANCES = (
 #: The same of the speed of sound, as a share of it: 1 deg C.
 SOUND_SPEED_TOLERANCE = 0.002
 
-#: Settings of ``tdoa`` by the estimators' names. The papers take every result
-#: of the closed form as it comes: no threshold.
-ESTIMATORS: dict[str, dict[str, Any]] = {
-    "paper": {
-        "method": "amdf",
-        "false_alarm_rate": 1.0 - 1e-12,
-        "suppress_echoes": False,
-        "maximum_closure_s": 1.0,
-        "maximum_ambiguity": 1.0,
-        "maximum_bearing_std_deg": 1e6,
-        "maximum_relative_range_std": 1e6,
-    },
-    "fast": {"method": "gcc"},
-    "ml": {"method": "ml"},
-}
+#: Methods of ``tdoa`` by the estimators' names.
+ESTIMATORS = {"paper": "amdf", "fast": "gcc", "ml": "ml"}
+
+
+class PaperEstimator(TDOAEstimator):
+    """The papers' estimator: delays in whole samples, and no limit of anything."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__(
+            parameters=scenario.follower.tdoa.model_copy(
+                update={"false_alarm_rate": 1.0 - 1e-12, "suppress_echoes": False}
+            ),
+            robot=scenario.only.robot,
+            sound_speed_m_s=scenario.believed_sound_speed_m_s,
+            microphones=scenario.follower.microphones,
+            limited=False,
+        )
 
 
 @dataclass(frozen=True)
@@ -223,5 +226,6 @@ def prepare_localization(
 
 
 def _with_estimator(scenario: Scenario, name: str) -> Scenario:
-    tdoa = scenario.follower.tdoa.model_copy(update=ESTIMATORS[name])
-    return scenario.with_robot(tdoa=tdoa)
+    tdoa = scenario.follower.tdoa.model_copy(update={"method": ESTIMATORS[name]})
+    blocks = (f"{__name__}:PaperEstimator",) if name == "paper" else ()
+    return scenario.with_robot(tdoa=tdoa, blocks=blocks)

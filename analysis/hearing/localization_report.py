@@ -40,8 +40,7 @@ def localization_summary(
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.follower.microphones, scenario.sound_speed_m_s
     # Whatever the errors of the array do to a range is to be seen.
-    tdoa = scenario.follower.tdoa.model_copy(update={"maximum_relative_range_std": 1e6})
-    estimate = frame_estimator(tdoa, shape, c)
+    estimate = frame_estimator(scenario.follower.tdoa, shape, c, limited=False)
     return {
         "schema_version": SCHEMA_VERSION,
         "seed": scenario.seed,

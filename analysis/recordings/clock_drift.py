@@ -16,6 +16,7 @@ from scipy import fft
 from scipy.stats import theilslopes
 
 from analysis.recordings.channel_faults import ChannelFault
+from systems.delays.correlations import correlations_at_lags
 
 #: Length of a stretch, s: clocks that are off by 100 ppm drift by 50 us in it.
 STRETCH_S = 0.5
@@ -64,8 +65,7 @@ def common_lags(
     size_of = np.abs(cross)
     white = np.divide(cross, size_of, out=np.zeros_like(cross), where=size_of > 0.0)
     reach = min(round(_REACH_S * sample_rate_hz), length - 1)
-    values = fft.irfft(white, size)
-    values = np.concatenate((values[:, -reach:], values[:, : reach + 1]), axis=1)
+    values = correlations_at_lags(white, slice(None), size, reach)
     lags = (values.argmax(axis=1) - reach) / sample_rate_hz
     noise = np.sqrt(np.mean(values**2, axis=1))
     heard = values.max(axis=1) > _STANDS_OUT * np.maximum(noise, 1e-12)

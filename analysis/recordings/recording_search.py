@@ -20,7 +20,8 @@ from analysis.arrays.steered_response import (
 )
 from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
 from analysis.recordings.recording_spectra import RecordingSpectra
-from systems.delays.consistent_lags import consistent_lags
+from systems.delays.correlations import correlations_at_lags
+from systems.delays.delay_sets import consistent_lags
 from systems.sound.array_shape import ArrayShape
 
 # Least mean weight of a stretch's snapshots: the rest is silence or echo.
@@ -104,11 +105,9 @@ class RecordingSearch:
         self, cross: NDArray[np.complex64], slack: int = 0
     ) -> NDArray[np.float32]:
         """(p, 2 m + 1) of the pairs' cross-spectra (p, f), which add up to 1."""
-        whole = np.zeros((len(cross), self._length // 2 + 1), dtype=np.complex64)
-        whole[:, self.recording.bins] = cross
-        correlation = fft.irfft(whole, self._length) * (0.5 * self._length)
         m = self.grid.max_lag + slack
-        return np.concatenate((correlation[:, -m:], correlation[:, : m + 1]), axis=1)
+        values = correlations_at_lags(cross, self.recording.bins, self._length, m)
+        return values * (0.5 * self._length)
 
     def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
         """(g,) of the pairs' cross-spectra (p, f), which add up to 1."""

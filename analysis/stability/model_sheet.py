@@ -37,7 +37,6 @@ _PARTS = {
         "compass",
         "motor_driver",
         "sound_search",
-        "cross_power",
     ),
 }
 #: Fields of theirs that it does not depend on.
@@ -46,10 +45,6 @@ _OTHERS = frozenset(
         "robot.microphones_m",
         *(f"sound.{name}" for name in ("kind", "file", "level_pa")),
         *(f"sound.{name}_hz" for name in ("low", "high", "tone")),
-        *(
-            f"tracker.{name}"
-            for name in ("assumed_range_m", "resolve_front_back", "believed_outliers")
-        ),
     }
 )
 

@@ -28,7 +28,6 @@ from systems.base.robot import RobotParameters
 from systems.framework.parameters import Angle, Parameters, Point, SoundSpeed
 from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
-    CrossPowerParameters,
     IdealHearingParameters,
     TDOAParameters,
     TrackerParameters,
@@ -250,7 +249,6 @@ class SoundSearcher(Robot):
     """Name of the source or the robot to search for; empty: the first source."""
     microphones: MicArrayParameters = MicArrayParameters()
     sound_search: SoundSearchParameters = SoundSearchParameters()
-    cross_power: CrossPowerParameters = CrossPowerParameters()
     compass: CompassParameters = CompassParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
 

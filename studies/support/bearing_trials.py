@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from systems.base.robot import RobotParameters
 from systems.framework.signals import AudioFrame, Emission
 from systems.hearing.cross_power_estimator import ArrayListener, Direction
-from systems.hearing.cross_powers import CrossPowers, gather_frame
-from systems.hearing.parameters import CrossPowerParameters
+from systems.hearing.cross_powers import CrossPowers, gather_frame, no_powers
 from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import (
@@ -60,13 +59,17 @@ class BearingTrial:
 
 
 def hear_once(
-    trial: BearingTrial, parameters: CrossPowerParameters | None = None
+    trial: BearingTrial,
+    method: type[ArrayListener] = ArrayListener,
+    *,
+    subtract: bool = True,
 ) -> Direction | None:
     """What is heard of a sound in a stop.
 
     Args:
         trial: The stop.
-        parameters: Of the estimator.
+        method: How directions are estimated.
+        subtract: Whether the noise before the sound is known and subtracted.
 
     Returns:
         As ``ArrayListener.direction``.
@@ -76,11 +79,9 @@ def hear_once(
     microphones = MicArrayParameters(
         sample_rate_hz=32_000.0, snr_db_at_1m=at_1m, faults=trial.faults
     )
-    listener = ArrayListener(
-        parameters or CrossPowerParameters(), robot, SOUND_SPEED_M_S, microphones
-    )
-    sums = listener.unpack(np.zeros(listener.sums_size))
-    heard = {"noise": sums, "sound": sums}
+    listener = method(robot, SOUND_SPEED_M_S, microphones)
+    nothing = no_powers(listener.facts)
+    heard = {"noise": nothing, "sound": nothing}
     frames = _frames(trial, robot, microphones)
     quiet = round(trial.noise_s / _FRAME_S)
     for kind, part in (("noise", frames[:quiet]), ("sound", frames[quiet:])):
@@ -89,7 +90,7 @@ def hear_once(
             both = before.counts.astype(float), now.counts.astype(float)
             gathered = gather_frame(listener.facts, gathered, *both)
         heard[kind] = gathered
-    return listener.direction(heard["sound"], heard["noise"])
+    return listener.direction(heard["sound"], heard["noise"] if subtract else nothing)
 
 
 def _frames(

@@ -156,10 +156,9 @@ def locate_bursts(
     localiser, p_PA_B = robot_localiser(
         parameters or TDOAParameters(), robot, SOUND_SPEED_M_S
     )
-    tracking = (tracking or TrackerParameters()).model_copy(
-        update={"resolve_front_back": False}
+    tracker = tracker_numbers(
+        tracking or TrackerParameters(), robot, 1.5 * TICK_S, resolve_front_back=False
     )
-    tracker = tracker_numbers(tracking, robot, 1.5 * TICK_S)
     errors = []
     for k, layout in enumerate(layouts):
         p_WM = microphones_W(layout.pose_WB, robot)

@@ -8,20 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.delays.correlation_peak import measure_peaks
+from systems.delays.correlations import whitening
 from systems.delays.overlap import EDGE_SAMPLES, cut_rows
 from systems.delays.transforms import filled_rows, transform_filled_rows
 from systems.framework.compiling import njit
-
-# The whitened spectrum decreases to zero where the cross-spectrum is below this share
-# of its mean. Otherwise bins of noise would count as much as bins of sound.
-_PHAT_FLOOR = 0.1
-
-
-def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Computes the weights of the phase transform for (pairs, bins) cross-spectra."""
-    size = np.abs(cross)
-    floor = _PHAT_FLOOR * size.mean(axis=-1, keepdims=True)
-    return 1.0 / (size + floor + np.finfo(np.float32).tiny)
 
 
 @njit(cache=True)

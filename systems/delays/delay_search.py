@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rocket_fft import c2r
 
-from systems.delays.delay_peaks import whitening
+from systems.delays.correlations import whitening
 from systems.delays.delay_plan import DelayPlan
 from systems.framework.compiling import njit
 
@@ -43,9 +43,10 @@ class DelaySearch(NamedTuple):
     frame squared."""
 
 
+@njit(cache=True)
 def amdf(
     x_i: NDArray[np.float32], x_j: NDArray[np.float32], max_lag: int
-) -> NDArray[np.float64]:
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the average magnitude difference of two channels (Han 2019, eq. 4-6).
 
     The papers maximize 1 / sum_k |x_i(k) - x_j(k + lag)| over lag = 0 ... n-1. This
@@ -62,13 +63,6 @@ def amdf(
         (2 max_lag + 1,) differences for the lags -max_lag ... max_lag. The minimum is
         at the delay t_j - t_i.
     """
-    return _amdf(np.ascontiguousarray(x_i), np.ascontiguousarray(x_j), max_lag)
-
-
-@njit(cache=True)
-def _amdf(
-    x_i: NDArray[np.float32], x_j: NDArray[np.float32], max_lag: int
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     n = x_i.size
     out = np.empty(2 * max_lag + 1)
     for lag in range(-max_lag, max_lag + 1):

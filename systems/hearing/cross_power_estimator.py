@@ -3,44 +3,36 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
-from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
-from systems.framework.finite import read_arrays
-from systems.framework.host_step import host_step
+from systems.delays.correlations import parabola_vertex
+from systems.framework.block import OBJECT, Port
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.hearing.audio_port import (
-    audio_of_run,
-    check_rate,
-    declare_state_outputs,
-    read_audio,
-)
 from systems.hearing.cross_powers import (
     FINE,
     CrossPowers,
     FrameSpectra,
     cross_correlations,
     gather_frame,
+    no_powers,
     signal_powers,
 )
-from systems.hearing.parameters import CrossPowerParameters
-from systems.hearing.source_fix import RANGED, range_status
-from systems.hearing.spherical_interpolation import (
-    interpolate_sphere,
-    inverse_of,
-    near_or_far,
-    plane_wave_bearing,
-)
+from systems.hearing.frame_block import FrameBlock
+from systems.hearing.source_fix import range_status
+from systems.hearing.spherical_interpolation import near_or_far, plane_wave_bearing
 from systems.hearing.steer_near import near_grid, steer
 from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.parameters import MicArrayParameters
 
+#: Band of the sound, Hz (Song 2011, 4.3). At low sample rates, half the rate is the
+#: upper edge.
+_LOW_HZ, _HIGH_HZ = 200.0, 8_000.0
 #: Least bandwidth of a sound, Hz. With less bandwidth, the correlation repeats within
 #: the delays of the array, so that any bearing fits. A steady tone has a bandwidth of
 #: up to 310 Hz because of its ends and of echoes. A siren has some thousand
@@ -56,7 +48,10 @@ _COHERENT = 0.15
 #: root.
 _CHANCE = 5.5
 #: Fewer frames than this give no estimate.
-_LEAST_FRAMES = 4
+LEAST_FRAMES = 4
+#: The result is ambiguous if the response of another direction is at least this share
+#: of the strongest response.
+_AMBIGUOUS_SHARE = 0.9
 
 
 class Direction(NamedTuple):
@@ -79,21 +74,16 @@ class ArrayListener:
     """Gathers spectra and estimates directions, without a Drake context.
 
     Args:
-        parameters: Method, band and thresholds.
         robot: Positions of the microphones, the middle one first.
         c: Speed of sound, m/s.
         microphones: Sample rate and length of the frames.
 
     Raises:
-        InputError: There are fewer than four microphones, or the band is empty.
+        InputError: There are fewer than four microphones.
     """
 
     def __init__(
-        self,
-        parameters: CrossPowerParameters,
-        robot: RobotParameters,
-        c: float,
-        microphones: MicArrayParameters,
+        self, robot: RobotParameters, c: float, microphones: MicArrayParameters
     ) -> None:
         places = np.array(robot.microphones_m)
         if len(places) < 4:
@@ -102,44 +92,19 @@ class ArrayListener:
                 f"has {len(places)} microphones; give four or more, with the "
                 "first in the middle",
             )
-        top = min(parameters.high_hz, 0.5 * microphones.sample_rate_hz)
-        if parameters.low_hz >= top:
-            raise InputError(
-                "cross_power.low_hz",
-                f"{parameters.low_hz:g} Hz is not below {top:g} Hz, the upper edge or "
-                "half the sample rate; lower it",
-            )
-        self._own, self._c = parameters, c
-        self.band_hz = parameters.low_hz, top
+        self.c = c
+        """Speed of sound, m/s."""
+        self.band_hz = _LOW_HZ, min(_HIGH_HZ, 0.5 * microphones.sample_rate_hz)
+        """Lowest and highest frequency to use, Hz."""
         self.p_PR_B = places[0]
         """(2,) position of the middle microphone relative to P, in B axes, m."""
         self.p_RM = places - places[0]
         """(n, 2) positions of the microphones relative to the middle one, m."""
         self.facts = FrameSpectra(
-            len(places), microphones.frame_samples, microphones.sample_rate_hz, top
-        )
-        self.sample_rate_hz = microphones.sample_rate_hz
-
-    @cached_property
-    def sums_size(self) -> int:
-        """Number of elements of a packed ``CrossPowers``."""
-        facts = self.facts
-        return 1 + facts.bins * (2 * len(facts.pairs) + facts.channels)
-
-    def pack(self, sums: CrossPowers) -> NDArray[np.float64]:
-        """Converts sums to a (sums_size,) vector."""
-        pairs = np.ascontiguousarray(sums.pairs).view(np.float64).ravel()
-        return np.concatenate(([sums.frames], pairs, sums.own.ravel()))
-
-    def unpack(self, numbers: NDArray[np.float64]) -> CrossPowers:
-        """Converts a (sums_size,) vector to sums."""
-        facts = self.facts
-        split = 1 + 2 * len(facts.pairs) * facts.bins
-        pairs = np.ascontiguousarray(numbers[1:split]).view(np.complex128)
-        return CrossPowers(
-            pairs.reshape(-1, facts.bins),
-            numbers[split:].reshape(-1, facts.bins),
-            float(numbers[0]),
+            len(places),
+            microphones.frame_samples,
+            microphones.sample_rate_hz,
+            self.band_hz[1],
         )
 
     def lost(self, sound: CrossPowers) -> list[int]:
@@ -171,27 +136,23 @@ class ArrayListener:
             work.
         """
         lost, facts = self.lost(sound), self.facts
-        if sound.frames < _LEAST_FRAMES or facts.channels - len(lost) < 3:
+        if sound.frames < LEAST_FRAMES or facts.channels - len(lost) < 3:
             return None
         heard = [
             k for k, pair in enumerate(facts.pairs) if not {*pair}.intersection(lost)
         ]
-        subtracted = noise if self._own.noise_cross_power else None
-        mean, occupied = signal_powers(facts, sound, subtracted, self.band_hz)
+        mean, occupied = signal_powers(facts, sound, noise, self.band_hz)
         if not occupied[heard].any():
             return None
         # The phases of the cross powers carry the delays (whitening).
         narrow = self._bandwidth(occupied[heard]) < _LEAST_BANDWIDTH_HZ
         size = np.maximum(np.abs(mean), 1e-300)
-        if self._own.method == "gcc_si":
-            inside = facts.frequencies_hz >= self.band_hz[0]
-            return self._printed(np.where(inside, mean / size, 0.0), lost)
         # Sum of the correlations of all pairs at each position of the grid.
         weighted = np.where(occupied, mean / size, 0.0)
         correlations = cross_correlations(facts, weighted)[heard]
         pairs = [facts.pairs[k] for k in heard]
         found = steer(
-            near_grid(self.p_RM, pairs, self._c),
+            near_grid(self.p_RM, pairs, self.c),
             correlations,
             FINE * facts.rate_hz,
         )
@@ -203,10 +164,18 @@ class ArrayListener:
         # Position from the exact delays of the peaks.
         delays = self._refined(correlations, found.delays)
         bearing, place, status = self._interpolated(pairs, delays, lost)
-        if self._own.method == "srp_near":
-            bearing = found.bearing
-        ambiguous = narrow or found.other_share >= self._own.ambiguous_share
+        ambiguous = narrow or found.other_share >= _AMBIGUOUS_SHARE
+        bearing = self.bearing_of(found.bearing, bearing)
         return Direction(bearing, status, place, ambiguous, found.other)
+
+    def bearing_of(self, steered: float, interpolated: float) -> float:
+        """Returns the bearing of a sound, rad.
+
+        Args:
+            steered: Bearing of the strongest position of the grid, rad.
+            interpolated: Bearing from the delays of the peaks, rad.
+        """
+        return steered
 
     def _bandwidth(self, occupied: NDArray[np.bool_]) -> float:
         """Returns the bandwidth of the sound in the median pair, Hz."""
@@ -224,9 +193,7 @@ class ArrayListener:
             at = round(delay * rate) + around
             values = pair[at % length]
             m = min(max(int(values.argmax()), 1), len(values) - 2)
-            bend = values[m - 1] - 2.0 * values[m] + values[m + 1]
-            shift = 0.5 * (values[m - 1] - values[m + 1]) / bend if bend < 0.0 else 0.0
-            refined[k] = (at[m] + min(max(shift, -1.0), 1.0)) / rate
+            refined[k] = (at[m] + parabola_vertex(*values[m - 1 : m + 2])) / rate
         return refined
 
     def _interpolated(
@@ -254,57 +221,15 @@ class ArrayListener:
                 row[rest.index(j)] += 1.0
             if i != base:
                 row[rest.index(i)] -= 1.0
-        d = self._c * (np.linalg.pinv(rows) @ delays)
+        d = self.c * (np.linalg.pinv(rows) @ delays)
         p_RM = self.p_RM[rest] - self.p_RM[base]
         if lost:  # the middle microphone may be silent
             status = range_status(0.0, enough=False)
             return plane_wave_bearing(p_RM, d), None, status
         return near_or_far(p_RM, d)
 
-    def _printed(
-        self, weighted: NDArray[np.complex128], lost: list[int]
-    ) -> Direction | None:
-        """Estimates the direction by the method printed in the paper.
 
-        The method uses delays in whole samples, pairs with the middle microphone, and
-        spherical interpolation.
-        """
-        if lost:
-            return None
-        facts = self.facts
-        correlations = cross_correlations(facts, weighted, 1)
-        most = math.ceil(
-            np.linalg.norm(self.p_RM, axis=1).max() / self._c * facts.rate_hz
-        )
-        lags = np.arange(-most, most + 1)
-        d = []
-        for k, (i, _) in enumerate(facts.pairs):
-            if i == 0:
-                best = lags[int(correlations[k][lags].argmax())]
-                d.append(self._c * best / facts.rate_hz)
-        place, distance = interpolate_sphere(self.p_RM[1:], d)
-        status = range_status(inverse_of(distance))
-        if not math.isfinite(distance):
-            return Direction(plane_wave_bearing(self.p_RM[1:], d), status)
-        bearing = math.atan2(place[1], place[0])
-        return Direction(bearing, status, place if status == RANGED else None)
-
-
-#: Output ports.
-_PORTS = (
-    Port("source_bearing", 1, "rad"),
-    Port("source_range", 1, "m"),
-    Port("p_PS_B", 2, "m, m", ("p_PS_B_x", "p_PS_B_y")),
-    Port("detected", 1, "0 or 1", "detected"),
-    Port("range_valid", 1, "0 or 1", "range_valid"),
-    Port("ambiguous", 1, "0 or 1", "ambiguous"),
-    Port("alternative_bearing", 1, "rad"),
-    Port("lost_microphone", 1, "number, 0 none", "lost_microphone"),
-    Port("range_status", 1, "number, 0 nothing heard", "range_status"),
-)
-_SIZE = sum(port.elements({}) for port in _PORTS)
-# Groups of the discrete state.
-_OUTPUTS, _FRAME, _SUMS = range(3)
+#: What ``listening`` requests.
 _NOTHING, _NOISE, _SOUND = range(3)
 
 
@@ -318,9 +243,10 @@ class _Memory(NamedTuple):
     noise: CrossPowers
     sound: CrossPowers
     outputs: NDArray[np.float64]
+    """Values of the output ports in order."""
 
 
-class CrossPowerEstimator(Block):
+class CrossPowerEstimator(FrameBlock):
     """Estimates where the source is while the search listens.
 
     The block gathers cross-power spectra while ``listening`` requests them. The sums
@@ -343,7 +269,6 @@ class CrossPowerEstimator(Block):
     outputs change one tick later.
 
     Args:
-        parameters: ``CrossPowerParameters``.
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound that the robot assumes, m/s.
         microphones: Sample rate and length of the frames.
@@ -351,8 +276,8 @@ class CrossPowerEstimator(Block):
     Raises:
         InputError: As for ``ArrayListener``.
 
-    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17. The methods ``srp_near`` and
-    ``gcc_plane`` are not in the paper.
+    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17. The paper takes delays in whole
+    samples; the bearing of the strongest position of a grid is not in it.
     """
 
     part, stage = "hearing", "hearing"
@@ -360,67 +285,65 @@ class CrossPowerEstimator(Block):
         Port("audio", OBJECT, "AudioFrame"),
         Port("listening", 1, "number, 0 nothing, 1 noise alone, 2 sound"),
     )
-    outputs = _PORTS
+    outputs = (
+        Port("source_bearing", 1, "rad"),
+        Port("source_range", 1, "m"),
+        Port("p_PS_B", 2, "m, m", ("p_PS_B_x", "p_PS_B_y")),
+        Port("detected", 1, "0 or 1", "detected"),
+        Port("range_valid", 1, "0 or 1", "range_valid"),
+        Port("ambiguous", 1, "0 or 1", "ambiguous"),
+        Port("alternative_bearing", 1, "rad"),
+        Port("lost_microphone", 1, "number, 0 none", "lost_microphone"),
+        Port("range_status", 1, "number, 0 nothing heard", "range_status"),
+    )
+    listener: type[ArrayListener] = ArrayListener
+    """Class that estimates the directions."""
 
     def __init__(
         self,
         *,
-        parameters: CrossPowerParameters = CrossPowerParameters(),
         robot: RobotParameters = RobotParameters(preset="song2011_hearing"),
         sound_speed_m_s: float = SOUND_SPEED_M_S,
         microphones: MicArrayParameters = MicArrayParameters(),
     ) -> None:
         super().__init__()
-        self._microphones = microphones
-        self._listener = ArrayListener(parameters, robot, sound_speed_m_s, microphones)
+        self._listener = self.listener(robot, sound_speed_m_s, microphones)
         self.set_name("cross_power_estimator")
-        self._audio, self._listening = self.declare_ports()
         facts = self._listener.facts
-        self.DeclareDiscreteState(_SIZE)
-        self.DeclareDiscreteState(1 + facts.channels * facts.samples)
-        self.DeclareDiscreteState(self._listener.sums_size)
-        self.DeclareDiscreteState(self._listener.sums_size)
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=microphones.frame_s, offset_sec=0.0, update=self._listen
-        )
-        declare_state_outputs(self)
-
-    def _blank(self) -> _Memory:
-        listener, facts = self._listener, self._listener.facts
-        none = listener.unpack(np.zeros(listener.sums_size))
+        self._none = no_powers(facts)
         frame = np.zeros((facts.channels, facts.samples))
-        return _Memory(_NOTHING, frame, none, none, np.zeros(_SIZE))
+        blank = _Memory(_NOTHING, frame, self._none, self._none, self._values())
+        self.declare_frames(blank, microphones)
 
-    def hear(self, asked: int, audio: Any, memory: _Memory) -> _Memory:
-        """Returns the memory after a frame.
+    def hear(
+        self,
+        inputs: NDArray[np.float64],
+        audio: Callable[[], AudioFrame],
+        memory: _Memory,
+    ) -> tuple[NDArray[np.float64], _Memory]:
+        """Gathers one frame or estimates, see ``FrameBlock.hear``.
 
-        Args:
-            asked: Value of ``listening``.
-            audio: Function that returns the frame. It is called only if the frame is
-                required.
-            memory: Memory after the previous frame.
-
-        Returns:
-            The new memory.
-
-        Raises:
-            InputError: The frame has another sample rate.
+        ``audio`` is called only if the frame is required.
         """
+        after = self._gathered(round(float(inputs[0])), audio, memory)
+        return after.outputs, after
+
+    def _gathered(
+        self, asked: int, audio: Callable[[], AudioFrame], memory: _Memory
+    ) -> _Memory:
+        """Returns the memory after a frame. ``asked`` is the value of ``listening``."""
         if asked == _NOTHING and memory.asked == _NOTHING:
             return memory
-        blank = self._blank()
         noise, sound, outputs = memory.noise, memory.sound, memory.outputs
         if memory.asked == _SOUND and asked != _SOUND:
             outputs = self._estimate(sound, noise)
         if asked == _NOTHING:
             return memory._replace(asked=asked, outputs=outputs)
-        frame = self._counts(audio())
+        frame = audio().counts.astype(np.float64)
         if asked != memory.asked:  # a spectrum needs two frames
             if asked == _NOISE:
-                return memory._replace(
-                    asked=asked, before=frame, noise=blank.noise, outputs=outputs
-                )
-            return _Memory(asked, frame, noise, blank.sound, blank.outputs)
+                return _Memory(asked, frame, self._none, sound, outputs)
+            return _Memory(asked, frame, noise, self._none, self._values())
         facts = self._listener.facts
         if asked == _NOISE:
             noise = gather_frame(facts, noise, memory.before, frame)
@@ -428,75 +351,22 @@ class CrossPowerEstimator(Block):
             sound = gather_frame(facts, sound, memory.before, frame)
         return _Memory(asked, frame, noise, sound, outputs)
 
-    def _counts(self, audio: AudioFrame) -> NDArray[np.float64]:
-        check_rate(audio, self._microphones.sample_rate_hz, "CrossPowerEstimator")
-        return audio.counts.astype(np.float64)
-
     def _estimate(self, sound: CrossPowers, noise: CrossPowers) -> NDArray[np.float64]:
-        outputs, listener = np.zeros(_SIZE), self._listener
-        if sound.frames > 0.0 and (lost := listener.lost(sound)):
-            outputs[8] = 1.0 + lost[0]
-        found = listener.direction(sound, noise)
+        listener = self._listener
+        lost = listener.lost(sound) if sound.frames > 0.0 else []
+        return self._values(listener.direction(sound, noise), lost)
+
+    def _values(
+        self, found: Direction | None = None, lost: Sequence[int] = ()
+    ) -> NDArray[np.float64]:
+        """Returns the values of the output ports in order."""
+        first_lost = 1.0 + lost[0] if lost else 0.0
         if found is None:
-            return outputs
-        outputs[0], outputs[4] = found.bearing, 1.0
-        outputs[2:4] = math.cos(found.bearing), math.sin(found.bearing)
+            return np.array([0.0] * 8 + [first_lost, 0.0])
+        distance, p_PS_B = 0.0, [math.cos(found.bearing), math.sin(found.bearing)]
         if found.place is not None:
-            outputs[1], outputs[5] = float(np.linalg.norm(found.place)), 1.0
-            outputs[2:4] = listener.p_PR_B + found.place
-        outputs[6], outputs[7] = float(found.ambiguous), found.other
-        outputs[9] = found.range_status
-        return outputs
-
-    def _listen(self, context: Any, discrete_state: Any) -> None:
-        asked = round(float(read_arrays(context, [self._listening])[0][0]))
-        if asked == _NOTHING and not context.get_discrete_state(_FRAME).value()[0]:
-            return  # unpacking the sums takes time
-        memory = self._remembered(context)
-
-        def frame() -> AudioFrame:
-            return read_audio(context, self._audio, "CrossPowerEstimator")
-
-        after = self.hear(asked, frame, memory)
-        if after is memory:
-            return
-        discrete_state.set_value(_OUTPUTS, after.outputs)
-        head = np.concatenate(([float(after.asked)], after.before.ravel()))
-        discrete_state.set_value(_FRAME, head)
-        pairs = (after.noise, memory.noise), (after.sound, memory.sound)
-        for group, (sums, old) in enumerate(pairs, start=_SUMS):
-            if sums is not old:
-                discrete_state.set_value(group, self._listener.pack(sums))
-
-    def _remembered(self, context: Any) -> _Memory:
-        facts = self._listener.facts
-        head = context.get_discrete_state(_FRAME).value()
-        noise, sound = (
-            self._listener.unpack(context.get_discrete_state(k).CopyToVector())
-            for k in (_SUMS, _SUMS + 1)
-        )
-        outputs = context.get_discrete_state(_OUTPUTS).CopyToVector()
-        before = head[1:].reshape(facts.channels, facts.samples)
-        return _Memory(round(float(head[0])), before, noise, sound, outputs)
-
-    def step_for(self, run: RunFacts) -> Step:
-        """Returns the step of the block for the frames of a compiled loop.
-
-        Args:
-            run: Provides the frames.
-
-        Returns:
-            The step, which calls Python.
-
-        Raises:
-            InputError: No block with a step publishes audio.
-        """
-        audio, memory = audio_of_run(run), self._blank()
-
-        def listen(tick: int, inputs: Any, outputs: Any) -> None:
-            nonlocal memory
-            memory = self.hear(round(float(inputs[0])), lambda: audio(tick), memory)
-            outputs[:] = memory.outputs
-
-        period = round(self._microphones.frame_s / run.tick_s)
-        return host_step(listen, 1, _SIZE, period)
+            distance = float(np.linalg.norm(found.place))
+            p_PS_B = (self._listener.p_PR_B + found.place).tolist()
+        ranged, ambiguous = float(found.place is not None), float(found.ambiguous)
+        directions = found.bearing, distance, *p_PS_B, 1.0, ranged, ambiguous
+        return np.array((*directions, found.other, first_lost, found.range_status))

@@ -64,6 +64,12 @@ class CrossPowers(NamedTuple):
     """Number of frames."""
 
 
+def no_powers(facts: FrameSpectra) -> CrossPowers:
+    """Returns the sums before the first frame."""
+    pairs = np.zeros((len(facts.pairs), facts.bins), dtype=np.complex128)
+    return CrossPowers(pairs, np.zeros((facts.channels, facts.bins)), 0.0)
+
+
 @cache
 def _window(length: int) -> NDArray[np.float64]:
     return 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)

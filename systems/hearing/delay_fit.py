@@ -187,6 +187,24 @@ def _dot(
 
 
 @njit(cache=True)
+def across(u: NDArray[np.float64]) -> NDArray[np.float64]:  # pragma: no cover
+    """Returns (3, 2) orthonormal vectors perpendicular to a unit vector (3,)."""
+    # The first one is made from the axis that is farthest from u.
+    least = 0
+    for i in range(1, 3):
+        if abs(u[i]) < abs(u[least]):
+            least = i
+    size = math.sqrt(1.0 - u[least] ** 2)
+    out = np.empty((3, 2))
+    for i in range(3):
+        out[i, 0] = ((1.0 if i == least else 0.0) - u[least] * u[i]) / size
+    for i in range(3):
+        j, m = (i + 1) % 3, (i + 2) % 3
+        out[i, 1] = u[j] * out[m, 0] - u[m] * out[j, 0]
+    return out
+
+
+@njit(cache=True)
 def _coordinates(
     problem: DelayProblem, u: NDArray[np.float64], bound: Any
 ) -> tuple[NDArray[np.float64], int]:  # pragma: no cover  (compiled)
@@ -219,18 +237,9 @@ def _coordinates(
         for i in range(dim):
             basis[i, 0] = a * span[1, i] - b * span[0, i]
     if rank == 3:
-        # Two unit vectors perpendicular to u. The first one is made from the axis that
-        # is farthest from u.
-        least = 0
-        for i in range(1, 3):
-            if abs(u[i]) < abs(u[least]):
-                least = i
-        size = math.sqrt(1.0 - u[least] ** 2)
+        turned = across(u)
         for i in range(3):
-            basis[i, 0] = ((1.0 if i == least else 0.0) - u[least] * u[i]) / size
-        for i in range(3):
-            j, m = (i + 1) % 3, (i + 2) % 3
-            basis[i, 1] = u[j] * basis[m, 0] - u[m] * basis[j, 0]
+            basis[i, 0], basis[i, 1] = turned[i, 0], turned[i, 1]
     return basis, rank - 1
 
 
@@ -511,7 +520,7 @@ def _covariance(
 
 
 @njit(cache=True)
-def _carried(
+def carried(
     T: NDArray[np.float64], C: NDArray[np.float64], size: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes T C T^T with the first ``size`` columns of T."""
@@ -577,17 +586,17 @@ def fit_delays(
         C, by, k = _covariance(problem, u, w, 0.0)
         status = range_status(w, C[k, k], w * w)
         if status == RANGED:
-            of_u = _carried(by, C, k)
+            of_u = carried(by, C, k)
             to_p = np.empty((dim, 4))
             for i in range(dim):
                 for j in range(k):
                     to_p[i, j] = by[i, j] / w
                 to_p[i, k] = -u[i] / (w * w)
-            of_p = _carried(to_p, C, k + 1)
+            of_p = carried(to_p, C, k + 1)
             return u, w, C[k, k], of_u, of_p, cost, twin, status
     # Otherwise a direction alone.
     far = n > 0  # numba would compile a literal True anew
     u, _, cost_far = _descend_within(problem, u, 0.0, far)
     C, by, k = _covariance(problem, u, 0.0, 1.0 / (prior_w * prior_w))
-    of_u = _carried(by, C, k)
+    of_u = carried(by, C, k)
     return u, 0.0, np.inf, of_u, of_u, min(cost, cost_far), twin, status

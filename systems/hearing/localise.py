@@ -82,6 +82,23 @@ _ALIKE_M = 1e-3
 _WHOLE_FRAME = 0.8
 
 
+# Limits of the delays and of the position of a sound. The papers have no such limits.
+# Largest disagreement between the delay of a pair and the delays of all pairs, s.
+_LARGEST_CLOSURE_S = 5e-6
+# Largest ratio of the second peak of a correlation to its highest peak.
+_LARGEST_AMBIGUITY = 0.8
+# Largest difference between a measured delay and the delay of the estimated position,
+# as a share of the longest delay across the array. _LARGEST_CLOSURE_S is added. The
+# limit has an effect only if there are more delays than unknowns, for example with four
+# or more microphones in a row.
+_LARGEST_MISFIT = 0.05
+# Largest standard deviation of a bearing, rad.
+_LARGEST_BEARING_STD = math.radians(3.0)
+# Largest standard deviation of a range, as a share of the range. If the standard
+# deviation is larger, only the bearing is used.
+_LARGEST_RANGE_STD = 0.25
+
+
 class HearingMemory(NamedTuple):
     """Values that the localizer keeps from one frame to the next one."""
 
@@ -129,6 +146,11 @@ def _averaged(known: float, new: float) -> float:
     return known + (min(new, _LOUDEST_NOISE * known) - known) / _NOISE_FRAMES
 
 
+def _is_doubtful(delays: DelayEstimate) -> bool:
+    """Returns whether the delays of a sound may be wrong."""
+    return delays.closure > _LARGEST_CLOSURE_S or delays.ambiguity > _LARGEST_AMBIGUITY
+
+
 class Localiser:
     """Locates the sources of sound in successive frames.
 
@@ -136,11 +158,13 @@ class Localiser:
     their sample rate if the band allows it. Delays are not restricted to whole samples.
 
     Args:
-        parameters: Method, band and thresholds.
+        parameters: Method, band and rate of false alarms.
         shape: The microphones.
         c: Speed of sound, m/s.
         sample_rate_hz: Sample rate of the frames, Hz.
         frame_samples: Samples per channel of a frame.
+        limited: Whether to reject estimates that are not reliable. Off: every estimate
+            counts, as in the papers.
 
     Raises:
         InputError: The array cannot be used at this sample rate and band.
@@ -154,6 +178,7 @@ class Localiser:
         *,
         sample_rate_hz: float = SAMPLE_RATE_HZ,
         frame_samples: int = FRAME_SAMPLES,
+        limited: bool = True,
     ) -> None:
         whole = parameters.method == "amdf" or frame_samples % 2 == 1
         self._halved = not whole and parameters.high_hz <= PASSED * sample_rate_hz
@@ -169,6 +194,7 @@ class Localiser:
         )
         self.plan = plan
         self.parameters = parameters
+        self._limited = limited
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
         band = plan.band.stop - plan.band.start
         self._band_samples = plan.frame_samples * band / plan.length
@@ -383,10 +409,9 @@ class Localiser:
         shape, c = self.plan.shape, self.plan.c
         if fix.range_valid and fix.range < NEAREST_M:
             return False
-        if shape.freedom <= 0:
+        if shape.freedom <= 0 or not self._limited:
             return True
-        limit = self.parameters.maximum_closure_s
-        limit += self.parameters.maximum_misfit * shape.max_delay(c)
+        limit = _LARGEST_CLOSURE_S + _LARGEST_MISFIT * shape.max_delay(c)
         return bool(np.abs(arrival_delays(fix, shape, c) - tau).max() <= limit)
 
     def _is_copied(
@@ -475,12 +500,8 @@ class Localiser:
         Returns:
             The candidate, or None if the delays or the position are rejected.
         """
-        parameters, plan = self.parameters, self.plan
-        if (
-            delays is None
-            or delays.closure > parameters.maximum_closure_s
-            or delays.ambiguity > parameters.maximum_ambiguity
-        ):
+        plan = self.plan
+        if delays is None or (self._limited and _is_doubtful(delays)):
             return None
         covariance = delays.covariance
         if echoes is not None:
@@ -488,7 +509,7 @@ class Localiser:
         fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
         if not self._is_place(fix, delays.tau):
             return None
-        if parameters.method == "ml" and frame is not None:
+        if self.parameters.method == "ml" and frame is not None:
             bins = delays.band
             hertz = plan.sample_rate_hz / plan.length
             fix = (
@@ -502,7 +523,8 @@ class Localiser:
                 )
                 or fix
             )
-        if fix.bearing_std > math.radians(parameters.maximum_bearing_std_deg):
-            return None
-        fix = fix.within_error(parameters.maximum_relative_range_std)
+        if self._limited:
+            if fix.bearing_std > _LARGEST_BEARING_STD:
+                return None
+            fix = fix.within_error(_LARGEST_RANGE_STD)
         return Candidate(fix, delays.tau, covariance, delays.correlation)

@@ -16,9 +16,6 @@ from systems.hearing.delay_fit import DelayProblem, fit_delays
 from systems.hearing.source_fix import RANGED, SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# Keeps the error of the azimuth finite for a source straight above an array.
-_LEAST_COSINE = 1e-3
-
 
 def locate_source(
     tau: NDArray[np.float64],
@@ -94,7 +91,7 @@ def angles_of(
     """
     level = math.hypot(u[0], u[1])
     x, y = (u[0] / level, u[1] / level) if level > 0.0 else (1.0, 0.0)
-    cosine = max(level, _LEAST_COSINE)
+    cosine = max(level, near_field.LEAST_COSINE)
     variance = y * y * of_u[0, 0] - 2.0 * x * y * of_u[0, 1] + x * x * of_u[1, 1]
     bearing_std = math.sqrt(max(variance, 0.0)) / cosine
     if shape.dimension == 2 or shape.angles == ("bearing",):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
+from systems.hearing.delay_fit import carried
 from systems.hearing.source_fix import RANGED, SourceFix, range_status
 from systems.sound.array_shape import EqualRow
 
@@ -22,8 +23,9 @@ from systems.sound.array_shape import EqualRow
 # zero, and the wave is a plane wave.
 _LEAST_GAP_M = 1e-9
 
-# Keeps the covariance finite for a source on the line of the microphones.
-_LEAST_COSINE = 1e-3
+#: Keeps errors finite for a source on the line of the microphones, or straight above
+#: an array.
+LEAST_COSINE = 1e-3
 
 
 @njit(cache=True)
@@ -64,21 +66,6 @@ def source_from_delays(
 
 
 @njit(cache=True)
-def _spread(
-    slopes: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes J C J^T."""
-    rows = slopes.shape[0]
-    spread = np.zeros((rows, rows))
-    for i in range(rows):
-        for j in range(rows):
-            for m in range(2):
-                for n in range(2):
-                    spread[i, j] += slopes[i, m] * covariance[m, n] * slopes[j, n]
-    return spread
-
-
-@njit(cache=True)
 def _slopes(
     bearing: float, r2: float, a: float, b: float, spacing: float, c: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
@@ -92,7 +79,7 @@ def _slopes(
     to_range = np.array([c * (r1 + r3) / gap, -c * r3 / gap])
     to_y = np.array([c * b * r2, -c * a * r3]) / (spacing * gap)
     slopes = np.empty((4, 2))
-    across = r2 * max(cosine, _LEAST_COSINE)
+    across = r2 * max(cosine, LEAST_COSINE)
     for k in range(2):
         slopes[0, k] = to_range[k]
         slopes[1, k] = (to_y[k] - sine * to_range[k]) / across
@@ -120,23 +107,23 @@ def _locate(
     """
     tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
     tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]
-    of_delays = _spread(to_delays, covariance)
+    of_delays = carried(to_delays, covariance, 2)
     bearing, r2, status = source_from_delays(tau_12, tau_13, spacing, c)
     sine, cosine = math.sin(bearing), math.cos(bearing)
     if status == RANGED:
         slopes = _slopes(bearing, r2, c * tau_12, c * tau_13, spacing, c)
         place = np.array([r2 * cosine, r2 * sine])
     else:
-        turn = c / (2.0 * spacing * max(cosine, _LEAST_COSINE))
+        turn = c / (2.0 * spacing * max(cosine, LEAST_COSINE))
         slopes = np.zeros((4, 2))
         slopes[1, 1], slopes[2, 1], slopes[3, 1] = turn, -turn * sine, turn * cosine
         place = np.array([cosine, sine])
-    errors = _spread(slopes, of_delays)
+    errors = carried(slopes, of_delays, 2)
     p_AS = np.zeros(axes.shape[0])
     for k in range(2):
         p_AS += axes[:, k] * place[k]
     range_std = math.sqrt(errors[0, 0]) if status == RANGED else np.inf
-    of_p = _spread(axes, errors[2:, 2:])
+    of_p = carried(axes, errors[2:, 2:], 2)
     return p_AS, of_p, math.sqrt(errors[1, 1]), r2, status, range_std
 
 

@@ -24,7 +24,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
 from systems.hearing.localise import Candidate
-from systems.hearing.tracking.target_filter import NEVER_HEARD_S
+from systems.hearing.tracking.target_filter import NEVER_HEARD_S, SPEED_STD
 from systems.sound.array_shape import ArrayShape
 
 # Number of other sources that are remembered, and time until they are forgotten, s.
@@ -60,8 +60,6 @@ _SECOND = 0.6
 _DELAY_FLOOR_M = 0.008
 # Error of the position that the tracker gives, m.
 _PLACE_FLOOR_M = 0.03
-# Unknown velocity of a source, m/s.
-_SPEED_M_S = 0.35
 
 # Assumed range if only the direction is known, m. Its standard deviation is half of
 # this value.
@@ -109,24 +107,36 @@ class _Place(NamedTuple):
     line: _Line
 
 
+class _Other(NamedTuple):
+    """A source that is not followed."""
+
+    place: _Place
+    """Position when it was last heard."""
+    silence: float
+    """Time since it was last heard, s."""
+    times: int
+    """Number of times that it was heard."""
+    together: bool
+    """Whether it was heard together with the followed source."""
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether it was heard so often that it is not due to chance."""
+        return self.times >= _TIMES
+
+    def grown(self) -> _Place:
+        """Returns where the source may be now."""
+        spread = (SPEED_STD * self.silence) ** 2 * np.eye(2)
+        return self.place._replace(covariance=self.place.covariance + spread)
+
+
 class ChoiceMemory(NamedTuple):
     """Values that the choice keeps from one frame to the next one."""
 
-    line: NDArray[np.float64]
-    """(4,) point and normal of the row when the followed source was last heard."""
-    others: NDArray[np.float64]
-    """(k, 13) other sources. Columns: time since the source was last heard, s; number
-    of times that it was heard; 1 if it was heard together with the followed source;
-    position (2); covariance (4); point (2) and normal (2) of the row at that time."""
-
-    @classmethod
-    def unpack(cls, values: NDArray[np.float64]) -> ChoiceMemory:
-        """Converts the (n,) vector of ``pack`` to a memory."""
-        return cls(values[:4].copy(), values[4:].reshape(_OTHERS, -1).copy())
-
-    def pack(self) -> NDArray[np.float64]:
-        """Returns the memory as one vector."""
-        return np.concatenate((self.line, self.others.ravel()))
+    line: _Line
+    """Line of the row when the followed source was last heard."""
+    others: tuple[_Other | None, ...]
+    """The other sources. None: there is no source at this index."""
 
 
 class SourceChoice:
@@ -158,9 +168,7 @@ class SourceChoice:
 
     def blank(self) -> ChoiceMemory:
         """Returns the memory before anything is heard."""
-        others = np.zeros((_OTHERS, 13))
-        others[:, 0] = NEVER_HEARD_S
-        return ChoiceMemory(np.zeros(4), others)
+        return ChoiceMemory(_Line(np.zeros(2), np.zeros(2)), (None,) * _OTHERS)
 
     def choose(
         self,
@@ -187,13 +195,14 @@ class SourceChoice:
             Index of the sound in ``candidates``, or None if the source is not heard;
             and the new memory.
         """
-        others = _aged(memory.others, self._frame_s, doubted=belief.age > _DOUBTED_S)
+        doubted = belief.age > _DOUBTED_S
+        others = [_aged(o, self._frame_s, doubted=doubted) for o in memory.others]
         if not candidates:
-            return None, memory._replace(others=others)
+            return None, memory._replace(others=tuple(others))
         # Costs of each sound for each known source.
         centre, turn, line = self._array(belief.pose)
         microphones = centre + self._shape.p_AM @ turn.T
-        places = [_grown(row) for row in others]
+        places = [None if o is None else o.grown() for o in others]
         costs = np.array(
             [[self._cost(c, p, microphones) for p in places] for c in candidates]
         )
@@ -204,10 +213,11 @@ class SourceChoice:
         elif may_sound and _is_alone(candidates):
             # The first sound that is alone becomes the followed source.
             own[0] = _NOWHERE - 1.0
-        counts = others[:, 1] >= _TIMES
+        counts = np.array([o is not None and o.is_confirmed for o in others])
         # A sound may fit a confirmed source that still sounds better than the followed
         # source. It is then a side peak of the confirmed source.
-        beside = counts & (others[:, 0] <= _SILENCE_S)
+        recent = [o is not None and o.silence <= _SILENCE_S for o in others]
+        beside = counts & np.array(recent)
         own[own > costs.min(axis=1, initial=math.inf, where=beside)] = math.inf
         # After a silence, a sound that is not sure must be heard twice.
         sure = np.array([c.sure for c in candidates])
@@ -223,14 +233,17 @@ class SourceChoice:
         chosen = belongs.index(0) if 0 in belongs else None
         for candidate, place in zip(candidates, belongs, strict=True):
             if place != 0:
-                self._remember(others, place, candidate, (centre, turn, line))
+                where = self._located(candidate, centre, turn, line)
+                _remember(others, place, where)
         if chosen is None or _is_ambiguous(chosen, own, belongs, candidates):
-            return None, memory._replace(others=others)
-        # Unconfirmed sources that the chosen sound also fits are dropped.
-        others[~counts & np.isfinite(costs[chosen]), 0] = NEVER_HEARD_S
-        # These other sources were heard together with the followed source.
-        others[(others[:, 0] == 0.0) & (others[:, 1] > 1.0), 2] = 1.0
-        return chosen, ChoiceMemory(np.concatenate(line), others)
+            return None, memory._replace(others=tuple(others))
+        for k, other in enumerate(others):
+            if not counts[k] and np.isfinite(costs[chosen, k]):
+                # The chosen sound also fits this source, which is not confirmed.
+                others[k] = None
+            elif other is not None and other.silence == 0.0 and other.times > 1:
+                others[k] = other._replace(together=True)
+        return chosen, ChoiceMemory(line, tuple(others))
 
     def _array(
         self, pose: NDArray[np.float64]
@@ -256,7 +269,7 @@ class SourceChoice:
         """Returns the expected position of the followed source; None: unknown."""
         if belief.age < NEVER_HEARD_S:
             covariance = belief.covariance + _PLACE_FLOOR_M**2 * np.eye(2)
-            return _Place(belief.p_WS, covariance, _Line(*memory.line.reshape(2, 2)))
+            return _Place(belief.p_WS, covariance, memory.line)
         if self._first_bearing is None:
             return None
         angle = self._first_bearing
@@ -290,33 +303,19 @@ class SourceChoice:
                 least = min(least, squared + float(np.linalg.slogdet(spread)[1]))
         return least
 
-    def _remember(
+    def _located(
         self,
-        others: NDArray[np.float64],
-        place: int | None,
         candidate: Candidate,
-        array: tuple[NDArray[np.float64], NDArray[np.float64], _Line],
-    ) -> None:
-        """Stores the position of another source that was heard.
-
-        Args:
-            others: Other sources, changed.
-            place: Number of the known source, from 1. None: a new source, which
-                replaces the source with the longest silence.
-            candidate: The sound.
-            array: Return value of ``_array``.
-        """
-        centre, turn, line = array
-        row = int(others[:, 0].argmax()) if place is None else place - 1
+        centre: NDArray[np.float64],
+        turn: NDArray[np.float64],
+        line: _Line,
+    ) -> _Place:
+        """Returns the position of a sound in W. The arguments are as of ``_array``."""
         fix = candidate.fix
         p, covariance = turn @ fix.p_AS, turn @ fix.covariance @ turn.T
         if fix.range_valid:
-            p = p + centre
-        else:
-            p, covariance = _placed(centre, p, covariance)
-        times, together = (0.0, 0.0) if place is None else others[row, 1:3]
-        where = *p, *covariance.ravel(), *np.concatenate(line)
-        others[row] = 0.0, times + 1.0, together, *where
+            return _Place(p + centre, covariance, line)
+        return _Place(*_placed(centre, p, covariance), line)
 
 
 def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
@@ -356,17 +355,34 @@ def _is_ambiguous(
     )
 
 
-def _aged(
-    others: NDArray[np.float64], seconds: float, *, doubted: bool
-) -> NDArray[np.float64]:
-    """Ages the other sources by some seconds and drops those to be forgotten."""
-    others = others.copy()
-    others[:, 0] += seconds
-    gone = others[:, 0] > _FORGOTTEN_S
-    gone |= (others[:, 1] < _TIMES) & (others[:, 0] > _GAP_S)
-    gone |= doubted & (others[:, 2] < 0.5) & (others[:, 1] >= _TIMES)
-    others[gone, 0] = NEVER_HEARD_S
-    return others
+def _aged(other: _Other | None, seconds: float, *, doubted: bool) -> _Other | None:
+    """Returns another source some seconds later; None: it is forgotten."""
+    if other is None:
+        return None
+    silence = other.silence + seconds
+    is_wrong = doubted and other.is_confirmed and not other.together
+    is_chance = silence > _GAP_S and not other.is_confirmed
+    if silence > _FORGOTTEN_S or is_chance or is_wrong:
+        return None
+    return other._replace(silence=silence)
+
+
+def _remember(others: list[_Other | None], number: int | None, place: _Place) -> None:
+    """Stores the position of another source that was heard.
+
+    Args:
+        others: Other sources, changed.
+        number: Number of the known source, from 1. None: a new source, which replaces
+            the source with the longest silence.
+        place: Position of the sound.
+    """
+    if number is None:
+        silences = [math.inf if o is None else o.silence for o in others]
+        others[silences.index(max(silences))] = _Other(place, 0.0, 1, together=False)
+        return
+    known = others[number - 1]
+    assert known is not None
+    others[number - 1] = known._replace(place=place, silence=0.0, times=known.times + 1)
 
 
 def _placed(
@@ -377,14 +393,6 @@ def _placed(
     """Returns the position of a source with unknown range, and its covariance."""
     along = np.outer(u, u) / 4.0
     return centre + _RANGE_M * u, _RANGE_M**2 * (covariance + along)
-
-
-def _grown(row: NDArray[np.float64]) -> _Place | None:
-    """Returns where another source may be now; None: this row holds no source."""
-    if row[0] >= NEVER_HEARD_S:
-        return None
-    covariance = row[5:9].reshape(2, 2) + (_SPEED_M_S * row[0]) ** 2 * np.eye(2)
-    return _Place(row[3:5], covariance, _Line(row[9:11], row[11:13]))
 
 
 def _expected_delays(

@@ -83,18 +83,8 @@ def near_or_far(
     if distance < math.inf:
         bearing = math.atan2(place[1], place[0])
         off = math.remainder(bearing - plane, 2.0 * math.pi)
-    inverse_range = inverse_of(distance if distance < FARTHEST_M else math.inf)
+    inverse_range = math.nan if distance <= 0.0 else 0.0
+    if 0.0 < distance < FARTHEST_M:
+        inverse_range = 1.0 / distance
     status = range_status(inverse_range, abs(off), math.radians(AGREEMENT_DEG))
     return (bearing, place, status) if status == RANGED else (plane, None, status)
-
-
-def inverse_of(distance: float) -> float:
-    """Inverts a range of ``interpolate_sphere`` for ``range_status``.
-
-    Args:
-        distance: Range, m; 0 or less if no position fits.
-
-    Returns:
-        Inverse range, 1/m; 0 for a plane wave, NaN if no position fits.
-    """
-    return 1.0 / distance if distance > 0.0 else math.nan

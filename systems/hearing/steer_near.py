@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from systems.delays.correlations import parabola_vertex
+
 #: Ranges of the grid, m, one near and one far. More ranges would find more echoes.
 _RANGES_M = (0.4, 3.0)
 #: Step of the bearings of the grid, deg. The peak is refined between them.
@@ -63,6 +65,7 @@ def near_grid(
 
 
 def _wrapped(angle: Any) -> Any:
+    """Returns an angle within [-pi, pi)."""
     return np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi
 
 
@@ -91,13 +94,10 @@ def steer(
     best = response.max(axis=0)
     k = int(best.argmax())
     row = int(response[:, k].argmax())
-    here, before, after = best[k], best[k - 1], best[(k + 1) % len(best)]
-    bend = before - 2.0 * here + after
-    shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    here = best[k]
+    shift = parabola_vertex(best[k - 1], here, best[(k + 1) % len(best)])
     bearing = grid.bearings[k] + shift * np.radians(_STEP_DEG)
-    off = np.abs(
-        np.remainder(grid.bearings - grid.bearings[k] + np.pi, 2 * np.pi) - np.pi
-    )
+    off = np.abs(_wrapped(grid.bearings - grid.bearings[k]))
     peak = (best >= np.roll(best, 1)) & (best >= np.roll(best, -1))
     elsewhere = np.where(peak & (off > np.radians(_APART_DEG)), best, -np.inf)
     other = int(elsewhere.argmax())

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
-from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
-from systems.framework.finite import read_arrays
-from systems.framework.host_step import host_step
+from systems.framework.block import OBJECT, Port
 from systems.framework.signals import AudioFrame
-from systems.hearing.audio_port import (
-    audio_of_run,
-    check_rate,
-    declare_state_outputs,
-    read_audio,
-)
+from systems.hearing.frame_block import FrameBlock
 from systems.hearing.localise import HearingMemory, Localiser
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_choice import Belief, ChoiceMemory, SourceChoice
@@ -35,6 +28,8 @@ def robot_localiser(
     robot: RobotParameters,
     sound_speed_m_s: float,
     microphones: MicArrayParameters = MicArrayParameters(),
+    *,
+    limited: bool = True,
 ) -> tuple[Localiser, NDArray[np.float64]]:
     """Makes the localizer of the robot's own microphones.
 
@@ -43,6 +38,7 @@ def robot_localiser(
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound that the robot assumes, m/s.
         microphones: Sample rate and length of the frames.
+        limited: See ``Localiser``.
 
     Returns:
         The localizer, and (2,) centroid of the microphones from P in B axes, m.
@@ -54,6 +50,7 @@ def robot_localiser(
         sound_speed_m_s,
         sample_rate_hz=microphones.sample_rate_hz,
         frame_samples=microphones.frame_samples,
+        limited=limited,
     )
     return localiser, np.mean(robot.microphones_m, axis=0)
 
@@ -113,11 +110,17 @@ _BELIEF = (
     Port("age", 1, "s"),
     Port("pose_WB_estimated", 3, "m, m, rad"),
 )
-# Groups of the discrete state: the outputs in order, and three memories.
-_OUTPUTS, _MEMORY, _ECHOES, _CHOICE = range(4)
 
 
-class TDOAEstimator(Block):
+class _Memory(NamedTuple):
+    """Values that the estimator keeps from one frame to the next one."""
+
+    hearing: HearingMemory
+    choice: ChoiceMemory | None
+    """Memory for ``choose: followed``; otherwise None."""
+
+
+class TDOAEstimator(FrameBlock):
     """Estimates where the source is.
 
     ``systems.hearing.localise`` measures the delays of all pairs of channels, finds the
@@ -140,19 +143,20 @@ class TDOAEstimator(Block):
     ``SourceTracker`` publishes the first three, and ``WheelOdometry`` publishes the
     pose. The four ports affect only the state, so there is no algebraic loop.
 
-    State: the outputs, ``HearingMemory``, and ``ChoiceMemory`` with ``choose:
-    followed``.
+    State: ``HearingMemory``, ``ChoiceMemory`` with ``choose: followed``, and the
+    outputs.
     Rate and latency: the block updates once per ``frame_s`` of the microphones (25 ms).
     It then processes the frame that ends at this moment. The outputs change one tick
     later, which models the computing time.
 
     Args:
-        parameters: Method, band and thresholds.
+        parameters: Method, band and rate of false alarms.
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound that the robot assumes, m/s.
         sound: The sound of the source. Its gate is the schedule, which has an effect
             only if ``schedule_known`` is set.
         microphones: Sample rate and length of the frames.
+        limited: See ``Localiser``.
 
     Raises:
         InputError: The array cannot be used at this sample rate and band.
@@ -180,13 +184,13 @@ class TDOAEstimator(Block):
         sound_speed_m_s: float = SOUND_SPEED_M_S,
         sound: SoundParameters = SoundParameters(),
         microphones: MicArrayParameters = MicArrayParameters(),
+        limited: bool = True,
     ) -> None:
         super().__init__()
-        self._microphones = microphones
         self._schedule = sound if parameters.schedule_known else None
         self._longest_way_s = MAXIMUM_RANGE_M / sound_speed_m_s
         self._localiser, self._p_PA_B = robot_localiser(
-            parameters, robot, sound_speed_m_s, microphones
+            parameters, robot, sound_speed_m_s, microphones, limited=limited
         )
         self.set_name("tdoa_estimator")
         self._choice = None
@@ -195,108 +199,35 @@ class TDOAEstimator(Block):
                 self._localiser, robot, self._p_PA_B, microphones.frame_s
             )
             self.inputs = (*self.inputs, *_BELIEF)
-        self._audio, *self._belief = self.declare_ports()
-        self._output_size = sum(int(port.size) for port in self.outputs)
-        self.DeclareDiscreteState(self._output_size)
-        self.DeclareDiscreteState(4)
-        self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
-        if self._choice is not None:
-            self.DeclareDiscreteState(self._choice.blank().pack().tolist())
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=microphones.frame_s, offset_sec=0.0, update=self._listen
-        )
-        declare_state_outputs(self)
-
-    def _listen(self, context: Any, discrete_state: Any) -> None:
-        audio = read_audio(context, self._audio, "TDOAEstimator")
-        before = self._remembered(context)
-        choice = None
-        if self._choice is not None:
-            state = context.get_discrete_state(_CHOICE).value()
-            belief = _belief(np.concatenate(read_arrays(context, self._belief)))
-            choice = ChoiceMemory.unpack(state), belief
-        values, after, chosen = self.hear(audio, before, choice)
-        flags = after.echoes is not None, after.heard
-        discrete_state.set_value(_MEMORY, np.array((*after[:2], *flags)))
-        if after.echoes is not None and after.echoes is not before.echoes:
-            discrete_state.set_value(_ECHOES, after.echoes.ravel())
-        if chosen is not None:
-            discrete_state.set_value(_CHOICE, chosen.pack())
-        discrete_state.set_value(_OUTPUTS, values)
+        choice = None if self._choice is None else self._choice.blank()
+        self.declare_frames(_Memory(self._localiser.blank(), choice), microphones)
 
     def hear(
         self,
-        audio: AudioFrame,
-        memory: HearingMemory,
-        choice: tuple[ChoiceMemory, Belief] | None = None,
-    ) -> tuple[NDArray[np.float64], HearingMemory, ChoiceMemory | None]:
-        """Processes one frame.
-
-        Args:
-            audio: The frame.
-            memory: Memory after the previous frame.
-            choice: Memory and present belief for ``choose: followed``; otherwise None.
-
-        Returns:
-            Values of the output ports in order, and the new memories.
-
-        Raises:
-            InputError: The frame has another sample rate or shape than this array
-                needs.
-        """
-        check_rate(audio, self._microphones.sample_rate_hz, "TDOAEstimator")
+        inputs: NDArray[np.float64],
+        audio: Callable[[], AudioFrame],
+        memory: _Memory,
+    ) -> tuple[NDArray[np.float64], _Memory]:
+        """Locates the sound of one frame, see ``FrameBlock.hear``."""
+        frame, before, chosen = audio(), memory.hearing, memory.choice
         sounds = self._schedule is None or may_sound(
             self._schedule,
-            audio.time,
+            frame.time,
             self._longest_way_s,
             self._microphones.frame_s,
         )
-        if self._choice is None or choice is None:
-            fix, after = self._localiser.localise(audio.counts, memory)
-            chosen = None
+        if self._choice is None or chosen is None:
+            fix, after = self._localiser.localise(frame.counts, before)
         else:
-            found, after = self._localiser.candidates(audio.counts, memory)
-            best, chosen = self._choice.choose(found, *choice, may_sound=sounds)
+            found, after = self._localiser.candidates(frame.counts, before)
+            best, chosen = self._choice.choose(
+                found, chosen, _belief(inputs), may_sound=sounds
+            )
             fix = None if best is None else found[best].fix
         # A frame with a silent channel does not change the memory.
-        heard = sounds and after.heard and after is not memory
+        heard = sounds and after.heard and after is not before
         values = port_values(fix if sounds else None, self._p_PA_B, heard=heard)
-        return np.concatenate(values), after, chosen
-
-    def step_for(self, run: RunFacts) -> Step:
-        """Returns the step of the block for the frames of a compiled loop.
-
-        Args:
-            run: Provides the frames.
-
-        Returns:
-            The step, which calls Python.
-
-        Raises:
-            InputError: No block with a step publishes audio.
-        """
-        audio = audio_of_run(run)
-        memory = self._localiser.blank()
-        chosen = None if self._choice is None else self._choice.blank()
-
-        def listen(tick: int, inputs: Any, outputs: Any) -> None:
-            nonlocal memory, chosen
-            choice = None if chosen is None else (chosen, _belief(inputs))
-            outputs[:], memory, chosen = self.hear(audio(tick), memory, choice)
-
-        inputs = sum(port.size() for port in self._belief)
-        period = round(self._microphones.frame_s / run.tick_s)
-        return host_step(listen, inputs, self._output_size, period)
-
-    def _remembered(self, context: Any) -> HearingMemory:
-        """Returns the memory that the previous frame left."""
-        numbers = context.get_discrete_state(_MEMORY).value().tolist()
-        energy, noise_energy, echoing, heard = numbers
-        echoes = None
-        if echoing:
-            held = context.get_discrete_state(_ECHOES).value()
-            echoes = held.astype(np.float32).reshape(self._localiser.echo_shape)
-        return HearingMemory(energy, noise_energy, echoes, bool(heard))
+        return np.concatenate(values), _Memory(after, chosen)
 
 
 def _belief(values: NDArray[np.float64]) -> Belief:

@@ -15,7 +15,7 @@ from analysis.arrays.voting.source_listener import (
 )
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.block import OBJECT, Block, Port
-from systems.hearing.audio_port import check_rate, read_audio
+from systems.hearing.frame_block import check_rate, read_audio
 from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters

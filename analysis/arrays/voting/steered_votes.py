@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from analysis.arrays.steered_response import LAG_DENSITY, SearchGrid, steered_response
+from systems.delays.correlations import correlations_at_lags
 from systems.sound.array_shape import ArrayShape
 
 # A frame's peaks count above this share of its highest, and above so many deviations
@@ -105,11 +106,9 @@ class SteeredSearch:
         return self.azimuth[peaks], self.elevation[peaks], response[peaks]
 
     def _response(self, cross: NDArray[np.complex64]) -> NDArray[np.float64]:
-        whole = np.zeros((len(cross), self.length // 2 + 1), dtype=np.complex64)
-        whole[:, self.bins] = cross / cross.shape[1]
-        correlation = fft.irfft(whole, self.length) * np.float32(0.5 * self.length)
-        m = self.grid.max_lag
-        gated = np.concatenate((correlation[:, -m:], correlation[:, : m + 1]), axis=1)
+        share = cross / cross.shape[1]
+        gated = correlations_at_lags(share, self.bins, self.length, self.grid.max_lag)
+        gated = gated * np.float32(0.5 * self.length)
         return steered_response(gated, self.grid).astype(np.float64)
 
     def _peaks(self, response: NDArray[np.float64], least: float) -> NDArray[np.int64]:

@@ -93,20 +93,15 @@ def _tracker(scenario: Scenario, robot: Follower) -> Any:
     """Makes the tracker for the kind of hearing.
 
     An ideal estimate is one tick old; an estimate from audio is older by half a frame.
-    For ideal estimates, the tracker uses the exact covariance and does not resolve
-    front and back.
     """
     tick, frame = scenario.tick_s, robot.microphones.frame_s
-    tracker, age = robot.tracker, tick + 0.5 * frame
-    if robot.hearing == "ideal":
-        exact = {"resolve_front_back": False, "measurement_floor_m": 0.0}
-        tracker = tracker.model_copy(update=exact)
-        age = tick
+    exact = robot.hearing == "ideal"
     return SourceTracker(
         robot=robot.robot,
-        tracker=tracker,
-        measurement_age_s=age,
+        tracker=robot.tracker,
+        measurement_age_s=tick if exact else tick + 0.5 * frame,
         frame_s=frame,
+        exact=exact,
         initial_pose=robot.start.pose,
         tick_s=tick,
     )

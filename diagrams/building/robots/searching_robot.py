@@ -132,11 +132,9 @@ def _ears(
             seed=seed_of("mic_array"),
         ),
         CrossPowerEstimator(
-            parameters=robot.cross_power,
             robot=robot.robot,
             sound_speed_m_s=scenario.believed_sound_speed_m_s,
             microphones=robot.microphones,
         ),
-        RadioRange(seed=seed_of("radio_range"), tick_s=scenario.tick_s),
         RadioRange(seed=seed_of("radio_range"), tick_s=scenario.tick_s),
     ]

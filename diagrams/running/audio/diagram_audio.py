@@ -9,7 +9,7 @@ from diagrams.building.builder import SoundFollower
 from diagrams.running.audio.run_audio import LISTENING, RunAudio
 from diagrams.running.stop_rules import ROUNDING_S
 from systems.framework.input_error import InputError
-from systems.hearing.audio_port import read_audio
+from systems.hearing.frame_block import read_audio
 
 
 class DiagramAudio:

@@ -17,7 +17,7 @@ from diagrams.scenario.participants import HasMicrophones
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ, AudioFrame, Emission
-from systems.hearing.audio_port import check_rate
+from systems.hearing.frame_block import check_rate
 from systems.sound.parameters import MicArrayParameters
 from systems.sound.wav_writer import (
     WavWriter,

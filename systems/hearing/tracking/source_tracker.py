@@ -11,6 +11,7 @@ from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S, whole
 from systems.hearing.parameters import TrackerParameters
 from systems.hearing.tracking.tracker_model import (
+    MEASUREMENT_FLOOR_M,
     blank_track,
     track_names,
     track_step,
@@ -51,6 +52,8 @@ def SourceTracker_(T):
                 its estimate, s. It is at most 2 s. It is one tick for the ideal sensor,
                 and one tick and half a frame for the audio chain.
             frame_s: Period of the estimates, s.
+            exact: Whether the estimates are those of ideal hearing. They have no mirror
+                image and no errors that are not in their covariance.
             initial_pose: (x, y, theta) before time zero, m and rad.
             tick_s: Period of the robot, s.
 
@@ -82,6 +85,7 @@ def SourceTracker_(T):
             tracker: TrackerParameters = TrackerParameters(),
             measurement_age_s: float = TICK_S,
             frame_s: float = TICK_S,
+            exact: bool = False,
             initial_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
             tick_s: float = TICK_S,
             converter: Any = None,
@@ -101,7 +105,13 @@ def SourceTracker_(T):
                 )
             self.set_name("source_tracker")
             numbers = tracker_numbers(
-                tracker, robot, measurement_age_s, frame_s=frame_s, tick_s=tick_s
+                tracker,
+                robot,
+                measurement_age_s,
+                frame_s=frame_s,
+                tick_s=tick_s,
+                resolve_front_back=not exact,
+                floor_m=0.0 if exact else MEASUREMENT_FLOOR_M,
             )
             self.states = track_names(numbers)
             state = blank_track(numbers, initial_pose).tolist()

@@ -51,6 +51,17 @@ HYPOTHESIS = 2 + 2 * TRACK
 
 #: Age of a track that never had a sighting, s. It is finite and exceeds every limit.
 NEVER_HEARD_S = 1e6
+#: Standard deviation of each component of the velocity of a source, m/s: half the speed
+#: of a fast source.
+SPEED_STD = 0.35
+#: Time constant with which a velocity is forgotten, s.
+VELOCITY_FADE_S = 5.0
+#: Assumed range of the first target if only its bearing is known, m.
+ASSUMED_RANGE_M = 3.0
+#: Standard deviation that is added to the covariances in the test for outliers, m.
+GATE_FLOOR_M = 0.2
+#: Number of consecutive outliers that are accepted if they agree with each other.
+BELIEVED_OUTLIERS = 3
 #: Squared normalized innovation in two dimensions that chance exceeds in 1 % of the
 #: cases.
 GATE = 9.21
@@ -74,22 +85,10 @@ LARGEST_COST = 12.0
 
 
 class FilterSettings(NamedTuple):
-    """Assumptions about sources and estimates."""
+    """Properties of the sightings of one kind of hearing."""
 
-    speed_std: float
-    """Standard deviation of each component of the velocity, m/s."""
-    velocity_fade: float
-    """Time constant with which a velocity is forgotten, s."""
     floor: float
-    """Standard deviation of errors that are not in the covariance of an estimate, m."""
-    gate_floor: float
-    """Standard deviation that is added to the covariances in the test for outliers,
-    m."""
-    believed_outliers: int
-    """Number of consecutive outliers that are accepted if they agree with each
-    other."""
-    assumed_range: float
-    """Assumed range of a target if only its bearing is known, m."""
+    """Standard deviation of errors that are not in the covariance of a sighting, m."""
     measurement_age: float
     """Time from the moment of a sighting to its arrival, s."""
 
@@ -139,9 +138,9 @@ def _copy(values: NDArray[Any], out: NDArray[Any]) -> None:
 
 
 @register_jitable
-def _predict(track: NDArray[Any], seconds: Any, fade: float, speed_std: float) -> None:
+def _predict(track: NDArray[Any], seconds: Any) -> None:
     """Predicts a track some seconds ahead; its age stays unchanged."""
-    variance = speed_std**2
+    fade, variance = VELOCITY_FADE_S, SPEED_STD**2
     kept = np.exp(-seconds / fade)
     lost = 1.0 - kept
     gain = fade * lost
@@ -217,7 +216,7 @@ def _robust_innovation(
 
     An innovation above ``GATE`` does not agree with the model. Such a sighting gets a
     larger covariance, so that its effect stays bounded (Huber's weight). A sighting is
-    rejected if it is also outside a second gate, which ``gate_floor`` widens.
+    rejected if it is also outside a second gate, which ``GATE_FLOOR_M`` widens.
 
     Returns:
         Whether the sighting is accepted; the squared normalized innovation before the
@@ -228,7 +227,7 @@ def _robust_innovation(
     squared = found[5]
     if squared <= GATE:
         return True, squared, found
-    extra = settings.gate_floor**2
+    extra = GATE_FLOOR_M**2
     if _innovation(track, sighting, floor, scale, extra)[5] > GATE:
         return False, squared, found
     scale *= np.sqrt(squared / GATE)
@@ -287,14 +286,14 @@ def _begin(
     else:
         # The ranges 0 and twice the assumed range are two standard deviations from the
         # assumed range.
-        distance, along = settings.assumed_range, settings.assumed_range**2 / 4.0
+        distance, along = ASSUMED_RANGE_M, ASSUMED_RANGE_M**2 / 4.0
         track[1], track[2] = ox + distance * zx, oy + distance * zy
         track[5] = distance**2 * rxx + along * zx * zx
         track[6] = distance**2 * rxy + along * zx * zy
         track[7] = distance**2 * ryy + along * zy * zy
     track[5] += settings.floor**2
     track[7] += settings.floor**2
-    track[12] = track[14] = settings.speed_std**2
+    track[12] = track[14] = SPEED_STD**2
     track[15] = 1.0
 
 
@@ -310,7 +309,7 @@ def _follow(
     """
     moved = track.copy()
     seconds = track[0] - settings.measurement_age
-    _predict(moved, seconds, settings.velocity_fade, settings.speed_std)
+    _predict(moved, seconds)
     counts, squared, found = _robust_innovation(moved, sighting, settings)
     if counts:
         _correct(moved, found)
@@ -376,7 +375,7 @@ def _inherit(
         else:
             _begin(outliers, candidate, settings)
             child[1] = 1.0
-        if child[1] < settings.believed_outliers:
+        if child[1] < BELIEVED_OUTLIERS:
             return cost, step, history
         _copy(outliers, _track(child))
     child[1] = 0.0
@@ -456,15 +455,11 @@ def fold(
 
 
 @njit(cache=True)
-def expected(
-    memory: NDArray[Any], velocity_fade: float, speed_std: float
-) -> NDArray[Any]:
+def expected(memory: NDArray[Any]) -> NDArray[Any]:
     """Returns a copy of the chosen track, predicted to the present.
 
     Args:
         memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) with present ages.
-        velocity_fade: Time constant with which a velocity is forgotten, s.
-        speed_std: Standard deviation of each component of the velocity, m/s.
 
     Returns:
         (TRACK,) elements as in TRACK_NAMES. A track without any sighting is copied
@@ -472,5 +467,5 @@ def expected(
     """
     track = chosen_track(memory).copy()
     if track[0] < NEVER_HEARD_S:
-        _predict(track, track[0], velocity_fade, speed_std)
+        _predict(track, track[0])
     return track

@@ -27,6 +27,10 @@ from systems.hearing.tracking.target_filter import (
 from systems.sound.array_shape import ArrayShape
 from systems.world.geometry import rotate
 
+#: Standard deviation of errors that are not in the covariance of an estimate from
+#: audio, m.
+MEASUREMENT_FLOOR_M = 0.01
+
 #: Rules for the target between bursts.
 _HOLDS = "motion", "world", "robot"
 
@@ -72,6 +76,8 @@ def tracker_numbers(
     *,
     frame_s: float = TICK_S,
     tick_s: float = TICK_S,
+    resolve_front_back: bool = True,
+    floor_m: float = MEASUREMENT_FLOOR_M,
 ) -> TrackerNumbers:
     """Returns the data of the step for one robot and one kind of hearing.
 
@@ -82,13 +88,18 @@ def tracker_numbers(
             estimate, s.
         frame_s: Period of the estimates, s, a multiple of the tick.
         tick_s: Period of the robot, s.
+        resolve_front_back: Whether the motion of the robot distinguishes the source
+            from its mirror image behind a row of microphones. Off: every source is in
+            front.
+        floor_m: Standard deviation of errors that are not in the covariance of an
+            estimate, m.
 
     Returns:
         Data for ``track_step``.
     """
     centre_P = np.mean(robot.microphones_m, axis=0).tolist()
     ahead = ArrayShape.of(robot.microphones_m).ahead
-    both = tracker.resolve_front_back and ahead is not None
+    both = resolve_front_back and ahead is not None
     ahead_B = (1.0, 0.0) if ahead is None else ahead.tolist()
     age_ticks = measurement_age_s / tick_s
     return TrackerNumbers(
@@ -98,15 +109,7 @@ def tracker_numbers(
         age_ticks,
         round(frame_s / tick_s),
         _Microphones(robot.control_point_m, *centre_P, *ahead_B),
-        FilterSettings(
-            speed_std=tracker.source_top_speed_m_s / 2.0,
-            velocity_fade=tracker.velocity_fade_s,
-            floor=tracker.measurement_floor_m,
-            gate_floor=tracker.gate_floor_m,
-            believed_outliers=tracker.believed_outliers,
-            assumed_range=tracker.assumed_range_m,
-            measurement_age=measurement_age_s,
-        ),
+        FilterSettings(floor_m, measurement_age_s),
         tick_s * ages(2 if both else 1),
     )
 
@@ -289,9 +292,8 @@ def track_step(
             # A loop, because assignment to a slice takes long to compile.
             for k in range(3):
                 pose_heard[k] = then[k]
-    settings = numbers.settings
     chosen = chosen_track(memory)
-    likely = _expected(memory, settings.velocity_fade, settings.speed_std)
+    likely = _expected(memory)
     x, y = _held_position(numbers.hold, chosen, likely, pose_heard, pose)
     position[0], position[1] = x, y
     velocity[0], velocity[1] = likely[3], likely[4]

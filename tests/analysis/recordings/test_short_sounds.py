@@ -12,7 +12,7 @@ import soundfile
 from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.locate import locate
 from analysis.recordings.onset_spectra import OnsetSpectra
-from systems.delays.consistent_lags import consistent_lags
+from systems.delays.delay_sets import consistent_lags
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 48_000, 343.0

@@ -34,6 +34,8 @@ BASE: dict[str, Any] = {
 }
 #: Neither spring nor avoidance: the robot waits where it is.
 WAITING: dict[str, Any] = {"attraction": {"stiffness_n_m": 0.0}}
+#: The source does not sound during the run.
+SILENT: dict[str, Any] = {"sound": {"start_s": 60.0}, "ideal_hearing": {}}
 
 
 def run(**data: Any) -> RunResult:
@@ -153,11 +155,10 @@ def test_causes_are_the_same_elsewhere(shift, distance, cause):
 
 def test_at_rest_in_the_goal_without_a_target_is_not_reached():
     """It rests because it is blind."""
-    deaf = {"maximum_range_m": 0.5, "burst_gaps": False}
-    result = at_rest_ahead(1.2, ideal_hearing=deaf)
+    result = at_rest_ahead(1.2, **SILENT)
     assert result.cause == "lost"
     assert result.simulated_s == pytest.approx(3.0)
-    result = at_rest_ahead(1.2, ideal_hearing=deaf, stop={"lost_after_s": 2.0})
+    result = at_rest_ahead(1.2, **SILENT, stop={"lost_after_s": 2.0})
     assert result.cause == "lost"
     assert result.simulated_s == pytest.approx(2.0, abs=0.03)
 
@@ -204,7 +205,8 @@ def test_a_moving_source_that_is_not_followed_and_gone_is_lost():
         **WAITING,
         source=source,
         tracker={"maximum_age_s": 1.0},
-        ideal_hearing={"maximum_range_m": 2.015, "burst_gaps": False},
+        sound={"on_s": 2.1, "period_s": 20.0},
+        ideal_hearing={},
         duration_s=8.0,
     )
     assert result.simulated_s == pytest.approx(8.0)
@@ -214,8 +216,7 @@ def test_a_moving_source_that_is_not_followed_and_gone_is_lost():
 def test_a_moving_source_that_is_never_heard_is_lost():
     """Though P is within the band all the time."""
     source = {"waypoints_m": [[1.5, 0.0], [1.6, 0.0]], "speed_m_s": 0.05}
-    deaf = {"maximum_range_m": 0.5, "burst_gaps": False}
-    result = run(**WAITING, source=source, ideal_hearing=deaf)
+    result = run(**WAITING, **SILENT, source=source)
     assert result.simulated_s == pytest.approx(3.0)
     assert result.cause == "lost"
 
@@ -234,10 +235,7 @@ def test_a_robot_in_the_band_of_a_moving_source_is_not_stuck():
 
 
 def test_lost():
-    result = run(
-        ideal_hearing={"maximum_range_m": 1.0, "burst_gaps": False},
-        stop={"lost_after_s": 1.5},
-    )
+    result = run(**SILENT, stop={"lost_after_s": 1.5})
     assert result.cause == "lost"
     assert result.simulated_s == pytest.approx(1.5, abs=0.03)
 
@@ -367,7 +365,7 @@ def test_a_fast_robot_does_not_pass_through_a_film(engine):
             | {
                 "robot": {"mass_kg": 0.05, "top_speed_m_s": 25.0},
                 "attraction": {"stiffness_n_m": 100.0},
-                "ideal_hearing": {"burst_gaps": False, "maximum_range_m": 50.0},
+                "ideal_hearing": {"burst_gaps": False},
                 "source": {"waypoints_m": [[18.0, 0.0]]},
                 "obstacles": [
                     {

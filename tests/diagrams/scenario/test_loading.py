@@ -99,7 +99,6 @@ SEARCHING = {
     "airflow_sensors",
     "compass",
     "contact_switches",
-    "cross_power",
     "gas_sensors",
     "motor_driver",
     "odor",

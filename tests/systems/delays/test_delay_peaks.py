@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from systems.delays.delay_peaks import whitening
+from systems.delays.correlations import whitening
 
 
 def test_weights_level_the_bins_down_to_a_tenth_of_their_mean():

@@ -44,7 +44,6 @@ KINDS = {
 #: Fields whose range is wider than their kind: bounds that may be without effect.
 WIDER = {
     "IdealHearingParameters.bearing_noise_deg",
-    "TDOAParameters.maximum_bearing_std_deg",
 }
 
 

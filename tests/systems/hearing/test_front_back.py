@@ -26,15 +26,7 @@ from systems.hearing.tracking.target_filter import (
 T = TICK_S
 #: Standard deviation of a measured position, m.
 NOISE = 0.004
-SETTINGS = FilterSettings(
-    speed_std=0.35,
-    velocity_fade=5.0,
-    floor=0.005,
-    gate_floor=0.1,
-    believed_outliers=3,
-    assumed_range=3.0,
-    measurement_age=0.0,
-)
+SETTINGS = FilterSettings(floor=0.005, measurement_age=0.0)
 coordinate = st.floats(-5.0, 5.0)
 
 

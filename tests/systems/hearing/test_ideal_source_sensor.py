@@ -86,8 +86,8 @@ def test_gate_is_set_by_its_parameters(bench):
 
 
 def test_a_source_too_far_is_not_heard(bench):
-    hearing = IdealHearingParameters(burst_gaps=False, maximum_range_m=2.2)
-    at = bench(IdealSourceSensor(hearing=hearing), **POSES)
+    far = POSES | {"pose_WS": [0.0, 31.3, 0.3]}
+    at = bench(IdealSourceSensor(hearing=ALWAYS), **far)
     np.testing.assert_array_equal(at.updated(), [0, 0, 0])
 
 

@@ -388,7 +388,7 @@ def test_exchanged_neighbours_of_four_give_no_wrong_place(pair, taken_for_places
 @pytest.mark.parametrize("pair", [(0, 3), (1, 2)])
 def test_delays_that_do_not_fit_together_betray_exchanged_neighbours(pair):
     """Without that check the frames of the test above give bearings that are off."""
-    localiser = listener(SQUARE, maximum_closure_s=1.0, maximum_misfit=1.0)
+    localiser = Localiser(TDOAParameters(), SQUARE, C, limited=False)
     wrong = 0
     for seed in range(12):
         place = polar(-165.0 + 30.0 * seed, 1.5)
@@ -419,11 +419,11 @@ def test_noise_puts_no_source_at_a_tiny_array():
     assert heard_ones > 10
 
 
-def test_a_range_too_uncertain_is_left_out():
-    place = polar(10.0, 2.0)
-    frame = heard(ROW, [place], snr_db=15.0)
+def test_a_range_too_uncertain_is_left_out(monkeypatch):
+    frame = heard(ROW, [polar(10.0, 2.0)], snr_db=15.0)
+    localiser = listener()
     for share, valid in ((0.25, True), (1e-5, False)):
-        localiser = listener(maximum_relative_range_std=share)
+        monkeypatch.setattr(localise, "_LARGEST_RANGE_STD", share)
         fix, _ = localiser.localise(frame, localiser.blank())
         assert fix is not None
         assert fix.range_valid == valid

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from numpy.random import Generator, Philox
 from pydrake.common.value import Value
+from pydrake.systems.analysis import Simulator
 
 from diagrams import load_scenario, simulate
 from systems.framework.signals import AudioFrame
+from systems.hearing import localise
 from systems.hearing.multilateration import locate_source
-from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_fix import (
     NO_PLACE,
     NOTHING_HEARD,
@@ -58,8 +59,8 @@ def sound_at(x, y):
 class Ears:
     """An estimator that hears one frame after the other."""
 
-    def __init__(self, **parameters):
-        self.block = TDOAEstimator(parameters=TDOAParameters(**parameters))
+    def __init__(self):
+        self.block = TDOAEstimator()
         self.context = self.block.CreateDefaultContext()
 
     def read(self, name):
@@ -71,8 +72,7 @@ class Ears:
         counts = np.round(100.0 * np.asarray(rows)).astype(np.int16)
         audio = AudioFrame(counts, 512, FS, 0.025)
         self.block.GetInputPort("audio").FixValue(self.context, Value(audio))
-        update = self.block.EvalUniquePeriodicDiscreteUpdate(self.context).Clone()
-        self.context.SetDiscreteState(update)
+        Simulator(self.block, self.context).AdvancePendingEvents()
         status = self.read("range_status")
         assert self.read("range_valid") == (status == RANGED)
         assert self.read("detected") == (status not in {NOTHING_HEARD, REJECTED})
@@ -110,9 +110,9 @@ def test_delays_that_no_place_has():
     assert Ears().hear(sound_with([0.0, -0.2 / C, 0.203 / C])) == NO_PLACE
 
 
-def test_a_range_that_is_too_uncertain():
-    frame = sound_at(1.5, 0.5)
-    assert Ears(maximum_relative_range_std=1e-5).hear(frame) == UNCERTAIN
+def test_a_range_that_is_too_uncertain(monkeypatch):
+    monkeypatch.setattr(localise, "_LARGEST_RANGE_STD", 1e-5)
+    assert Ears().hear(sound_at(1.5, 0.5)) == UNCERTAIN
 
 
 def test_a_source_too_near_is_rejected():
@@ -120,9 +120,9 @@ def test_a_source_too_near_is_rejected():
     assert Ears().hear(sound_at(0.4, 0.0)) == RANGED
 
 
-def test_an_estimate_too_uncertain_is_rejected():
-    frame = sound_at(1.5, 0.5)
-    assert Ears(maximum_bearing_std_deg=1e-6).hear(frame) == REJECTED
+def test_an_estimate_too_uncertain_is_rejected(monkeypatch):
+    monkeypatch.setattr(localise, "_LARGEST_BEARING_STD", 1e-8)
+    assert Ears().hear(sound_at(1.5, 0.5)) == REJECTED
 
 
 def located(places, p_AS, std):

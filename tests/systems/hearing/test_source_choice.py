@@ -13,7 +13,7 @@ from systems.delays.delay_sets import estimate_delay_sets
 from systems.delays.delays import look
 from systems.delays.half_band import halve_rate
 from systems.hearing.parameters import TDOAParameters
-from systems.hearing.source_choice import Belief, ChoiceMemory
+from systems.hearing.source_choice import Belief
 from systems.hearing.tdoa_estimator import (
     TDOAEstimator,
     robot_choice,
@@ -190,15 +190,6 @@ def test_a_schedule_excludes_it():
     ear = Ear()
     assert ear.listen(heard(), believed(CHOSEN), may_sound=False) is None
     assert ear.listen(heard(1), believed(CHOSEN)) is not None
-
-
-def test_memory_goes_through_a_vector():
-    ear = Ear()
-    ear.listen(heard(), believed(CHOSEN))
-    packed = ear.memory.pack()
-    again = ChoiceMemory.unpack(packed)
-    np.testing.assert_array_equal(again.line, ear.memory.line)
-    np.testing.assert_array_equal(again.others, ear.memory.others)
 
 
 def test_ports_of_what_is_believed():

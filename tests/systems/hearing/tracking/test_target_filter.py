@@ -12,9 +12,12 @@ from scipy.stats import chi2
 
 from systems.framework.signals import TICK_S
 from systems.hearing.tracking.target_filter import (
+    BELIEVED_OUTLIERS,
     GATE,
     HYPOTHESIS,
     NEVER_HEARD_S,
+    SPEED_STD,
+    VELOCITY_FADE_S,
     FilterSettings,
     ages,
     blank_memory,
@@ -24,16 +27,7 @@ from systems.hearing.tracking.target_filter import (
 )
 
 T = TICK_S
-SETTINGS = FilterSettings(
-    speed_std=0.3,
-    velocity_fade=4.0,
-    floor=0.0,
-    gate_floor=0.1,
-    believed_outliers=3,
-    assumed_range=3.0,
-    measurement_age=0.0,
-)
-MOTION = (SETTINGS.velocity_fade, SETTINGS.speed_std)
+SETTINGS = FilterSettings(floor=0.0, measurement_age=0.0)
 H = np.eye(2, 4)
 #: Where in a track the upper triangles of a 4 x 4 covariance stand.
 PLACES = {(0, 0): 5, (0, 1): 6, (1, 1): 7, (0, 2): 8, (0, 3): 9} | {
@@ -61,11 +55,11 @@ def bearing(direction: float, std: float, **kwargs):
     return sighting(u, std**2 * np.outer(n, n), **kwargs, ranged=False)
 
 
-def model(seconds: float, settings=SETTINGS):
+def model(seconds: float):
     """Transition and noise of the Ornstein-Uhlenbeck velocity, by van Loan."""
-    fade = settings.velocity_fade
+    fade = VELOCITY_FADE_S
     A = np.block([[np.zeros((2, 2)), np.eye(2)], [np.zeros((2, 2)), -np.eye(2) / fade]])
-    Q = np.diag([0.0, 0.0, 1.0, 1.0]) * 2.0 * settings.speed_std**2 / fade
+    Q = np.diag([0.0, 0.0, 1.0, 1.0]) * 2.0 * SPEED_STD**2 / fade
     E = expm(np.block([[-A, Q], [np.zeros((4, 4)), A.T]]) * seconds)
     F = E[4:, 4:].T
     return F, F @ E[:4, 4:]
@@ -85,7 +79,7 @@ def test_prediction_is_that_of_the_matrix_exponential(seconds):
     x, P = matrices(chosen_track(memory))
     F, Q = model(seconds)
     memory += seconds * ages(1)
-    later, covariance = matrices(expected(memory, *MOTION))
+    later, covariance = matrices(expected(memory))
     np.testing.assert_allclose(later, F @ x, atol=1e-12)
     np.testing.assert_allclose(covariance, F @ P @ F.T + Q, rtol=1e-6, atol=1e-12)
 
@@ -97,7 +91,7 @@ def test_a_run_agrees_with_the_textbook_filter(seed):
     settings = SETTINGS._replace(floor=0.02)
     memory = blank_memory(1)
     R = random_covariance(rng, 0.05)
-    x, P = np.zeros(4), np.diag([0.0, 0.0, 0.09, 0.09])
+    x, P = np.zeros(4), np.diag([0.0, 0.0, SPEED_STD**2, SPEED_STD**2])
     P[:2, :2] = R + 0.02**2 * np.eye(2)
     fold(memory, sighting([0.0, 0.0], R), settings)
     for _ in range(30):
@@ -116,11 +110,11 @@ def test_a_run_agrees_with_the_textbook_filter(seed):
         np.testing.assert_allclose(covariance, P, atol=1e-10)
 
 
-def simulated_source(rng, ticks: int, settings=SETTINGS):
+def simulated_source(rng, ticks: int):
     """(ticks, 4) states of a source of the filter's own kind."""
-    F, Q = model(T, settings)
+    F, Q = model(T)
     root = np.linalg.cholesky(Q + 1e-15 * np.eye(4))
-    x = np.array([2.0, 0.0, *rng.normal(0.0, settings.speed_std, 2)])
+    x = np.array([2.0, 0.0, *rng.normal(0.0, SPEED_STD, 2)])
     states = []
     for _ in range(ticks):
         states.append(x)
@@ -148,7 +142,7 @@ def test_errors_and_innovations_are_what_the_covariances_say():
             track = chosen_track(memory)
             heard = tick % 80 < 20
             if track[0] < NEVER_HEARD_S:
-                mean, P = matrices(expected(memory, *MOTION))
+                mean, P = matrices(expected(memory))
                 if tick % 80 in (0, 19):
                     e = mean[:2] - x[:2]
                     errors.append(e @ np.linalg.solve(P[:2, :2], e))
@@ -187,7 +181,7 @@ def test_a_bearing_counts_across_itself_alone(direction, off):
     at = np.array([0.4, -0.3])
     fold(memory, sighting(at + 2.0 * u + off * n, 0.01 * np.eye(2)), SETTINGS)
     memory += 0.5 * ages(len(memory) // HYPOTHESIS)
-    before, P = matrices(expected(memory, *MOTION))
+    before, P = matrices(expected(memory))
     fold(memory, bearing(direction, 0.02, centre=at), SETTINGS)
     after, covariance = matrices(chosen_track(memory))
     h = np.array([*n, 0.0, 0.0])
@@ -207,16 +201,15 @@ def test_first_bearing_takes_the_assumed_range():
     fold(memory, bearing(0.0, 0.02, centre=(1.0, 1.0)), SETTINGS)
     x, P = matrices(chosen_track(memory))
     np.testing.assert_allclose(x, [4.0, 1.0, 0.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(np.sqrt(np.diag(P)), [1.5, 0.06, 0.3, 0.3])
+    np.testing.assert_allclose(np.sqrt(np.diag(P)), [1.5, 0.06, 0.35, 0.35])
 
 
 def test_bearings_from_two_places_find_the_range():
-    """Triangulation of a source that hardly moves, 2 m from a path of 1.5 m."""
-    settings = SETTINGS._replace(speed_std=0.01)
+    """Triangulation, 2 m from a path of 1.5 m, in which a source hardly moves."""
     memory = blank_memory(1)
     for y in np.linspace(0.0, 1.5, 61):
-        fold(memory, bearing(math.atan2(-y, 2.0), 0.01, centre=(0.0, y)), settings)
-        memory += T * ages(len(memory) // HYPOTHESIS)
+        fold(memory, bearing(math.atan2(-y, 2.0), 0.01, centre=(0.0, y)), SETTINGS)
+        memory += 1e-3 * ages(len(memory) // HYPOTHESIS)
     x, P = matrices(chosen_track(memory))
     assert np.all(np.abs(x[:2] - [2.0, 0.0]) < 3.0 * np.sqrt(np.diag(P)[:2]))
     assert np.sqrt(P[0, 0]) < 0.15
@@ -239,7 +232,7 @@ def rested(hypotheses: int = 1):
     return memory
 
 
-@given(st.floats(0.4, 20.0), st.floats(-math.pi, math.pi), st.integers(1, 2))
+@given(st.floats(0.8, 20.0), st.floats(-math.pi, math.pi), st.integers(1, 2))
 def test_an_outlier_changes_nothing(distance, direction, hypotheses):
     memory = rested(hypotheses)
     before = chosen_track(memory).copy()
@@ -270,17 +263,15 @@ def test_scattered_outliers_are_never_believed():
     np.testing.assert_allclose(chosen_track(memory)[1:3], [2.0, 0.0], atol=1e-3)
 
 
-@pytest.mark.parametrize("needed", [1, 2, 3, 5])
-def test_outliers_that_agree_are_believed(needed):
-    settings = SETTINGS._replace(believed_outliers=needed)
+def test_outliers_that_agree_are_believed():
     memory = rested()
-    for k in range(1, needed + 1):
+    for k in range(1, BELIEVED_OUTLIERS + 1):
         memory += T * ages(len(memory) // HYPOTHESIS)
         z = [4.0 + 0.003 * k, 1.0]
-        believed = fold(memory, sighting(z, 2.5e-5 * np.eye(2)), settings)
-        assert believed == (k == needed)
+        believed = fold(memory, sighting(z, 2.5e-5 * np.eye(2)), SETTINGS)
+        assert believed == (k == BELIEVED_OUTLIERS)
     np.testing.assert_allclose(chosen_track(memory)[1:3], z, atol=0.01)
-    assert chosen_track(memory)[0] == settings.measurement_age
+    assert chosen_track(memory)[0] == SETTINGS.measurement_age
 
 
 def test_outliers_need_to_be_in_a_row():
@@ -295,11 +286,11 @@ def test_outliers_need_to_be_in_a_row():
 
 
 def test_the_gate_widens_with_silence():
-    """After 1.5 s a source may be 0.5 m on; after a tick it may not."""
+    """After 1.5 s a source may be 0.8 m on; after a tick it may not."""
     for silence, believed in ((T, False), (1.5, True)):
         memory = rested()
         memory += silence * ages(len(memory) // HYPOTHESIS)
-        z = sighting([2.5, 0.0], 2.5e-5 * np.eye(2))
+        z = sighting([2.8, 0.0], 2.5e-5 * np.eye(2))
         assert fold(memory, z, SETTINGS) == believed
 
 

@@ -1,0 +1,177 @@
+"""Blocks that process frames of sound in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+
+from systems.framework.block import Block, RunFacts, Step
+from systems.framework.finite import check_record, read_arrays
+from systems.framework.host_step import host_step
+from systems.framework.input_error import InputError
+from systems.framework.signals import AudioFrame
+from systems.sound.parameters import MicArrayParameters
+
+
+def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
+    """Returns the frame on a port.
+
+    Args:
+        context: Context of the block.
+        port: Input port ``audio`` of the block.
+        block: Name of the block, for messages.
+
+    Returns:
+        The frame.
+
+    Raises:
+        TypeError: The port carries something else.
+        InputError: A value of the frame is not finite.
+    """
+    audio = port.Eval(context)
+    if not isinstance(audio, AudioFrame):
+        raise TypeError(
+            f"{block}: port audio carries a {type(audio).__name__}; connect the audio "
+            "of a MicArray"
+        )
+    check_record(context, port, audio)
+    return audio
+
+
+def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
+    """Raises an error if a frame has another sample rate.
+
+    Args:
+        audio: The frame.
+        rate_hz: Sample rate that the block expects, Hz.
+        block: Name of the block, for messages.
+
+    Raises:
+        InputError: The rates differ.
+    """
+    if audio.sample_rate_hz != rate_hz:
+        raise InputError(
+            block,
+            f"audio has a rate of {audio.sample_rate_hz:g} Hz; record at {rate_hz:g} "
+            "Hz",
+        )
+
+
+class _Heard(NamedTuple):
+    """State after a frame."""
+
+    values: NDArray[np.float64]
+    """Values of the output ports in order."""
+    memory: Any
+    """Values that the block keeps for the next frame."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _Heard:
+        """Returns the state itself, because nothing in it changes."""
+        return self
+
+
+class FrameBlock(Block):
+    """The base class of blocks that process frames of sound in Python.
+
+    The first input port of a subclass is ``audio``. All other ports carry numbers. A
+    subclass defines ``hear``.
+
+    State: the memory (abstract), and the values of the output ports (discrete), which
+    change one tick after the end of a frame.
+    """
+
+    def declare_frames(self, memory: Any, microphones: MicArrayParameters) -> None:
+        """Declares the ports, the state and the update.
+
+        Args:
+            memory: Memory before the first frame.
+            microphones: Sample rate and length of the frames.
+        """
+        self._microphones, self._blank = microphones, memory
+        self._audio, *self._numbers = self.declare_ports()
+        sizes = [int(port.size) for port in self.outputs]
+        silence = np.zeros(sum(sizes))
+        self.DeclareAbstractState(Value(_Heard(silence, memory)))
+        self.DeclareDiscreteState(silence.size)
+        event = {"period_sec": microphones.frame_s, "offset_sec": 0.0}
+        self.DeclarePeriodicUnrestrictedUpdateEvent(**event, update=self._listen)
+        self.DeclarePeriodicDiscreteUpdateEvent(**event, update=self._publish)
+        ends = np.cumsum(sizes).tolist()
+        for port, size, end in zip(self.outputs, sizes, ends, strict=True):
+
+            def calc(
+                context: Any, output: Any, part: Any = slice(end - size, end)
+            ) -> None:
+                output.SetFromVector(context.get_discrete_state(0).value()[part])
+
+            self.declare_output(port.name, calc, {self.xd_ticket()})
+
+    def hear(
+        self, inputs: NDArray[np.float64], audio: Callable[[], AudioFrame], memory: Any
+    ) -> tuple[NDArray[np.float64], Any]:
+        """Processes one frame.
+
+        Args:
+            inputs: Elements of the input ports after ``audio``, in order.
+            audio: Function that returns the frame.
+            memory: Memory after the previous frame.
+
+        Returns:
+            Values of the output ports in order, and the new memory.
+
+        Raises:
+            InputError: The frame does not fit this block.
+        """
+        raise NotImplementedError
+
+    def _frame(self, audio: AudioFrame) -> AudioFrame:
+        check_rate(audio, self._microphones.sample_rate_hz, type(self).__name__)
+        return audio
+
+    def _listen(self, context: Any, state: Any) -> None:
+        def frame() -> AudioFrame:
+            return self._frame(read_audio(context, self._audio, type(self).__name__))
+
+        inputs = np.concatenate([np.empty(0), *read_arrays(context, self._numbers)])
+        before: _Heard = context.get_abstract_state(0).get_value()
+        after = _Heard(*self.hear(inputs, frame, before.memory))
+        state.get_mutable_abstract_state(0).set_value(after)
+
+    def _publish(self, context: Any, discrete_state: Any) -> None:
+        heard: _Heard = context.get_abstract_state(0).get_value()
+        discrete_state.set_value(0, heard.values)
+
+    def step_for(self, run: RunFacts) -> Step:
+        """Returns the step of the block for the frames of a compiled loop.
+
+        Args:
+            run: Provides the frames.
+
+        Returns:
+            The step, which calls Python.
+
+        Raises:
+            InputError: No block with a step publishes audio.
+        """
+        if "audio" not in run.carried:
+            raise InputError(
+                "engine",
+                "compiled loops take frames of sound from a MicArray only; run with "
+                "engine drake",
+            )
+        audio, memory = run.carried["audio"], self._blank
+
+        def listen(tick: int, inputs: Any, outputs: Any) -> None:
+            nonlocal memory
+            outputs[:], memory = self.hear(
+                inputs, lambda: self._frame(audio(tick)), memory
+            )
+
+        inputs = sum(port.size() for port in self._numbers)
+        outputs = sum(int(port.size) for port in self.outputs)
+        period = round(self._microphones.frame_s / run.tick_s)
+        return host_step(listen, inputs, outputs, period)
