@@ -36,9 +36,9 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     the law at a few distances and speeds as a test.
 
     A class derives from LeafSystem. Its arguments may be ``robot``, ``attraction``,
-    ``repulsion``, ``sensors``, ``tick_s``, ``following``, ``known``, ``bodies`` and
-    ``seed``. Each of its inputs has the name of an output port in the diagram. The
-    class has exactly one of the outputs that ``make_command`` accepts.
+    ``repulsion``, ``sensors``, ``tick_s``, ``guard``, ``bodies`` and ``seed``. Each of
+    its inputs has the name of an output port in the diagram. The class has exactly one
+    of the outputs that ``make_command`` accepts.
 
     Args:
         scenario: Scenario with the law and the parameters of its block.
@@ -63,7 +63,7 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         "sensors": sensors,
     }
     more = {
-        "known": scenario.free_space,
+        "guard": scenario.own_map,
         "bodies": bodies,
         "seed": seed,
     }

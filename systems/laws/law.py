@@ -87,8 +87,7 @@ class Law:
     """Whether the block decides on a motion instead of a force.
 
     Such a block has no linear model. Its class may also take the arguments
-    ``following``, ``known`` (parameters of the map), ``bodies`` (number of bodies), and
-    ``seed``."""
+    ``guard`` (parameters of the map), ``bodies`` (number of bodies), and ``seed``."""
     on_route: bool = False
     """Whether the robot drives to a goal on a planned route instead of following a
     sound. Such a law also has ``plans``."""
