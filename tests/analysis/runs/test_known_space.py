@@ -24,8 +24,8 @@ KINDS = {
     "sequential": (
         "ultrasonic.firing=sequential",
         "ultrasonic.dropout_probability=0.1",
-        "free_space.wheel_error=0.02",
-        "free_space.place_error_m=0.03",
+        "guard.wheel_error=0.02",
+        "guard.place_error_m=0.03",
     ),
 }
 
@@ -143,9 +143,9 @@ def test_snapshots_lie_on_one_grid(guarded_run):
             )
 
 
-def test_the_window_that_leaves_a_place_forgets_it():
-    scenario = guarded("duration_s=6", "free_space.window_m=4")
-    result = simulate(scenario)
+def test_the_window_that_leaves_a_place_forgets_it(monkeypatch):
+    monkeypatch.setattr("systems.safety.parameters.WINDOW_M", 4.0)
+    result = simulate(guarded("duration_s=6"))
     known = known_space(result, [0.0, result.simulated_s])
     assert known is not None
     first, final = (known.middles(free) for free in known.free)
