@@ -73,8 +73,8 @@ _FORGET_S, _FAR_M = 12.0, 5.0
 _LIKELY, _LATELY_S, _BODY_M = 0.3, 3.0, 0.5
 #: Largest number of draws for a particle that no sensor would have seen before.
 _TRIES = 12
-#: The oldest look is not compared with a particle if it is older than this multiple of
-#: the time between the last two looks.
+#: A look is not compared with a new particle if it is older than this multiple of the
+#: time between the last two looks.
 _TOO_OLD = 10.0
 
 
@@ -397,8 +397,8 @@ def _begin(
     3. The tangential speed is unknown. It is drawn uniformly from the values for which
        the total speed does not exceed ``TOP_SPEED_M_S``.
     4. A body that begins to echo was out of view shortly before. The draw is repeated,
-       up to 12 times, if a sensor would have seen the body in its oldest look. This
-       check is omitted if the oldest look of sensor ``k`` is too old.
+       up to 12 times, if a sensor would have seen the body in its oldest look
+       (``_was_visible``).
     """
     random, top = hazards.random, TOP_SPEED_M_S
     look, then = look_of(hazards.looks, 0, k), look_of(hazards.looks, 1, k)
@@ -406,7 +406,6 @@ def _begin(
     rate = (look.range_m - then.range_m) / since
     rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m / since)
     own_x, own_y = (look.x - then.x) / since, (look.y - then.y) / since
-    ago = look.time_s - hazards.looks.time_s[2, k]
     at = look.range_m + _BEYOND_M
     t = int(np.argmin(hazards.exists))
     p = _particles_of(hazards, t)
@@ -421,7 +420,7 @@ def _begin(
             p.x[n], p.y[n] = look.x + at * ux, look.y + at * uy
             p.vx[n] = radial * ux - across * uy
             p.vy[n] = radial * uy + across * ux
-            if ago > _TOO_OLD * since or not _was_visible(hazards, p, n, ago, sensors):
+            if not _was_visible(hazards, p, n, look.time_s, _TOO_OLD * since, sensors):
                 break
         p.weight[n] = 1.0 / len(p.x)
     hazards.exists[t], hazards.seen_s[t] = _CERTAIN, look.time_s
@@ -430,19 +429,27 @@ def _begin(
 
 @njit(cache=True)
 def _was_visible(
-    hazards: Hazards, p: Particles, n: int, ago: float, sensors: HazardSensors
+    hazards: Hazards,
+    p: Particles,
+    n: int,
+    time: float,
+    oldest_s: float,
+    sensors: HazardSensors,
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether the oldest looks contradict particle ``n``.
+    """Return whether the oldest looks of the sensors contradict particle ``n``.
 
-    The function moves the particle back in time by ``ago`` seconds. A look contradicts
+    The function moves the particle back to the time of each look. A look contradicts
     the particle if two conditions hold. The particle was inside the aperture, at least
     3 cm from the edge. It was also at least 3 cm nearer than the reading. The sensor
-    would have seen such a body, but did not.
+    would have seen such a body, but did not. Looks older than ``oldest_s`` do not
+    count.
     """
-    x, y = p.x[n] - ago * p.vx[n], p.y[n] - ago * p.vy[n]
     for k in range(len(sensors.directions)):
         look, half = look_of(hazards.looks, 2, k), sensors.directions[k, 1]
-        distance, off = seen_from(look, x, y)
+        ago = time - look.time_s
+        if ago > oldest_s:
+            continue
+        distance, off = seen_from(look, p.x[n] - ago * p.vx[n], p.y[n] - ago * p.vy[n])
         reach = look.range_m if look.heard > 0.5 else sensors.farthest_m
         inside = off < half - 0.03 / max(distance, 0.1)
         if inside and distance + 0.03 < reach:
