@@ -46,7 +46,6 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
         return None
     guard = MotionGuard(
         parameters=scenario.only.own_guard,
-        known=scenario.follower.free_space,
         robot=scenario.only.robot,
         plant=scenario.only.plant,
         tick_s=scenario.tick_s,

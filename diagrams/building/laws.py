@@ -43,7 +43,7 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
 
     A class derives from LeafSystem. Its arguments may be ``robot``, ``attraction``,
     ``laws``, ``gains`` (those of the law of the package from whose block the class
-    derives), ``velocity_term``, ``sensors``, ``tick_s``, ``known``, ``bodies`` and
+    derives), ``velocity_term``, ``sensors``, ``tick_s``, ``guard``, ``bodies`` and
     ``seed``. Each of its inputs has the name of an output port in the diagram. The
     class has exactly one of the outputs that ``make_command`` accepts.
 
@@ -81,7 +81,7 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         parts |= {
             "attraction": robot.attraction,
             "velocity_term": robot.collision_vector.velocity_term,
-            "known": robot.free_space,
+            "guard": robot.own_map,
         }
     if name in LAWS:
         controller = LAWS[name].controller

@@ -402,7 +402,6 @@ def _driving(scenario: Scenario, controller: Any) -> Any:
         return make_command(controller, robot.robot, scenario.tick_s)
     return MotionGuard(
         parameters=robot.own_guard,
-        known=robot.free_space,
         robot=robot.robot,
         plant=robot.plant,
         command=commanded(controller),

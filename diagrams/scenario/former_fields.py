@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from diagrams.scenario.participants import KINDS, kind_of
 from diagrams.scenario.shorthand import ROBOT_FIELDS
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
 
 _TABLE = Path(__file__).with_suffix(".tsv")
 #: Names of sensor elements in the lists of faults of the previous version.
@@ -130,7 +131,9 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
         value = _taken(fields, path.split("."))
         if value is _MISSING:
             continue
-        if former.new:
+        if former.new.startswith("guard.") and not _has_guard(fields):
+            yield f"{where}{path} has no effect without a guard"
+        elif former.new:
             _put(fields, former.new.split("."), value)
             yield f"{where}{path} is now {former.new}"
         elif value != former.value:
@@ -148,6 +151,11 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
                 _fault(group, each) for each in faults
             )
             yield f"{where}{group}.faults is now faults"
+
+
+def _has_guard(fields: Mapping[str, Any]) -> bool:
+    law = LAWS.get(str(fields.get("law")))
+    return fields.get("guard") is not None or (law is not None and law.guarded)
 
 
 def _fault(group: str, fault: Any) -> Any:
@@ -178,8 +186,10 @@ def _taken(fields: dict[str, Any], path: list[str]) -> Any:
 def _put(fields: dict[str, Any], path: list[str], value: Any) -> None:
     *groups, last = path
     for group in groups:
-        below = fields.setdefault(group, {})
-        if not isinstance(below, dict):
+        below = fields.get(group)
+        if below is None:
+            below = fields[group] = {}
+        elif not isinstance(below, dict):
             return
         fields = below
     if isinstance(value, dict) and isinstance(fields.get(last), dict):

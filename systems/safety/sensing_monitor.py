@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port, Step
@@ -15,16 +17,6 @@ from systems.ranging.parameters import UltrasonicParameters
 #: Names of the faults; the index is the number on the port.
 SENSING_FAULTS = "none", "odometry lost", "silent", "frozen", "noisy"
 _NONE, _LOST, _SILENT, _FROZEN, _NOISY = range(5)
-
-#: Indices in the state of a sensor: its last two ranges, m; number of consecutive
-#: echoes; number of consecutive equal echoes; heading at the first equal echo, rad;
-#: mean share of recent readings that no motion explains; tick until which the last
-#: fault counts; and number of the last fault.
-_LAST, _BEFORE, _HEARD, _EQUAL, _HEADING, _STRANGE, _UNTIL, _FOUND = range(8)
-_EACH = 8
-
-#: Indices in the state before the sensors: pose, m and rad; whether odometry was lost.
-_POSE, _IS_LOST, _SENSORS = 0, 3, 4
 
 #: The odometry is lost if the pose moves in one tick by more than this multiple of the
 #: largest motion that the wheels can cause.
@@ -68,66 +60,89 @@ class MonitorNumbers(NamedTuple):
     tick_s: float
 
 
+class MonitorState(NamedTuple):
+    """State of ``SensingMonitor``.
+
+    All arrays change. Those without a form have one entry per sensor.
+    """
+
+    pose: NDArray[np.float64]
+    """(3,) pose in the last tick, m and rad."""
+    is_lost: NDArray[np.float64]
+    """(1,) 1 if the odometry was lost, else 0."""
+    last: NDArray[np.float64]
+    """Last range, m."""
+    before: NDArray[np.float64]
+    """Range before the last one, m."""
+    heard: NDArray[np.float64]
+    """Number of consecutive echoes."""
+    equal: NDArray[np.float64]
+    """Number of consecutive equal echoes."""
+    heading: NDArray[np.float64]
+    """Heading at the first equal echo, rad."""
+    strange: NDArray[np.float64]
+    """Mean share of recent readings that no motion explains."""
+    found: NDArray[np.float64]
+    """Number of the last fault."""
+    until: NDArray[np.float64]
+    """Tick until which the last fault counts."""
+
+
 @register_jitable
-def _judged(state, at, range_, heading, slow, numbers):  # type: ignore[no-untyped-def]
-    """Judge a new echo of the sensor whose state begins at ``at``; return the fault.
+def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untyped-def]
+    """Judge a new echo of sensor ``k``; return the fault.
 
     The function counts equal echoes, and remembers the heading at which they began.
     While the robot turns slowly, it checks the second difference of the last three
     ranges, and updates the mean share of strange readings.
     """
-    last, before, heard = state[at + _LAST], state[at + _BEFORE], state[at + _HEARD]
-    low, high = numbers.ranges
+    last, heard, (low, high) = state.last[k], state.heard[k], numbers.ranges
     if heard > 0.5 and range_ == last and low < range_ < high:
-        state[at + _EQUAL] += 1.0
+        state.equal[k] += 1.0
     else:
-        state[at + _EQUAL], state[at + _HEADING] = 0.0, heading
+        state.equal[k], state.heading[k] = 0.0, heading
     if heard > 1.5 and slow:
-        strange = 1.0 if abs(range_ - 2.0 * last + before) > numbers.step_m else 0.0
-        state[at + _STRANGE] += _PART * (strange - state[at + _STRANGE])
-    state[at + _LAST], state[at + _BEFORE] = range_, last
-    state[at + _HEARD] = heard + 1.0
-    turned = abs(heading - state[at + _HEADING])
-    if state[at + _EQUAL] >= numbers.equal or turned > numbers.turn_rad:
+        change = range_ - 2.0 * last + state.before[k]
+        strange = 1.0 if abs(change) > numbers.step_m else 0.0
+        state.strange[k] += _PART * (strange - state.strange[k])
+    state.last[k], state.before[k], state.heard[k] = range_, last, heard + 1.0
+    turned = abs(heading - state.heading[k])
+    if state.equal[k] >= numbers.equal or turned > numbers.turn_rad:
         return _FROZEN
-    return _NOISY if state[at + _STRANGE] > _MOST_STRANGE else _NONE
+    return _NOISY if state.strange[k] > _MOST_STRANGE else _NONE
 
 
+@register_jitable
 def monitor_step(
-    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+    tick: int, state: MonitorState, inputs: Any, outputs: Any, numbers: MonitorNumbers
 ) -> None:
-    """Finds the fault of one tick.
-
-    State: pose, m and rad; whether odometry was lost; eight numbers per sensor.
-    """
+    """Finds the fault of one tick; see ``systems.framework.block.Step``."""
     pose, ranges, echo, ages = inputs
-    turned = pose[2] - state[_POSE + 2]
+    turned = pose[2] - state.pose[2]
     if tick > 0:
-        moved = math.hypot(pose[0] - state[_POSE], pose[1] - state[_POSE + 1])
+        moved = math.hypot(pose[0] - state.pose[0], pose[1] - state.pose[1])
         if moved > numbers.limits[0] or abs(turned) > numbers.limits[1]:
-            state[_IS_LOST] = 1.0
+            state.is_lost[0] = 1.0
     for i in range(3):
-        state[_POSE + i] = pose[i]
-    kind, sensor = _NONE, 0
+        state.pose[i] = pose[i]
+    kind, sensor = float(_NONE), 0
     # Judge each sensor; the first one with a fault is reported.
     slow = abs(turned) <= _SLOW_RAD_S * numbers.tick_s
     for k in range(len(ranges)):
-        at = _SENSORS + _EACH * k
         found = _NONE
         if ages[k] > numbers.silent_s:
             found = _SILENT
         elif ages[k] < 0.5 * numbers.tick_s:
             if echo[k] > 0.5:
-                found = _judged(state, at, ranges[k], pose[2], slow, numbers)
+                found = _judged(state, k, ranges[k], pose[2], slow, numbers)
             else:
-                state[at + _HEARD], state[at + _EQUAL] = 0.0, 0.0
+                state.heard[k], state.equal[k] = 0.0, 0.0
         if found != _NONE:
-            state[at + _FOUND] = found
-            state[at + _UNTIL] = tick + _KEPT_S / numbers.tick_s
-        if tick < state[at + _UNTIL] and kind == _NONE:
-            kind, sensor = state[at + _FOUND], k + 1
-    if state[_IS_LOST] > 0.5:
-        kind, sensor = _LOST, 0
+            state.found[k], state.until[k] = found, tick + _KEPT_S / numbers.tick_s
+        if tick < state.until[k] and kind == _NONE:
+            kind, sensor = state.found[k], k + 1
+    if state.is_lost[0] > 0.5:
+        kind, sensor = float(_LOST), 0
     outputs[0][0], outputs[0][1] = kind, sensor
 
 
@@ -151,9 +166,8 @@ class SensingMonitor(Block):
     The monitor cannot distinguish a sensor that never reports an echo from one that
     points at empty space.
 
-    Discrete state, every tick: pose; whether odometry was lost; and for each sensor its
-    last two ranges, the counts, the last fault, and the tick until which this fault
-    counts. The output is a function of state and inputs: no latency.
+    The abstract state is ``MonitorState``. The output is a function of state and inputs
+    at every tick: no latency.
 
     Args:
         sensors: The range sensors.
@@ -199,7 +213,8 @@ class SensingMonitor(Block):
             _STEP_M + _STEP_M_S2 * round_s**2 + _SIGMAS * sensors.noise_m,
             tick_s,
         )
-        state = [0.0] * (_SENSORS + _EACH * sensors.count)
+        sizes = [3, 1] + [sensors.count] * (len(MonitorState._fields) - 2)
+        state = MonitorState(*map(np.zeros, sizes))
         self.declare(
             Step(monitor_step, numbers, state),
             tick_s=tick_s,

@@ -217,7 +217,7 @@ def test_a4_encoders_in_whole_pulses_stay_within_the_margin():
 def test_a4_broken_by_wheels_that_are_not_as_large_as_is_believed():
     slip = {"plant": {"slip": (0.03, -0.03)}}
     assert collides(37, slip)
-    known = {"free_space": {"wheel_error": 0.03, "place_error_m": 0.09}}
+    known = {"guard": {"wheel_error": 0.03, "place_error_m": 0.09}}
     assert not collides(37, slip | known)
 
 

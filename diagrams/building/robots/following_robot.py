@@ -167,7 +167,7 @@ def _obstacle_sensing(
     ]
     if mapped:
         known = FreeSpaceMap(
-            parameters=robot.free_space,
+            parameters=robot.own_map,
             sensors=robot.ultrasonic,
             robot=robot.robot,
             odometry=robot.odometry,

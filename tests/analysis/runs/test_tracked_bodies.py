@@ -7,7 +7,6 @@ import pytest
 
 from analysis.runs.tracked_bodies import TrackedBodies, tracked_bodies
 from diagrams import build_sound_follower, load_scenario, make_simulator, simulate
-from systems.planning.hazards import EXISTS, WEIGHT
 
 SETTINGS = ["hearing=ideal", "law=guarded", "duration_s=9"]
 
@@ -36,12 +35,12 @@ def test_they_are_those_of_the_block(run):
     hazards = state.hazards
     found = tracked(run, [2.0, 8.0])
     assert found.times == pytest.approx([2.0, 8.0])
-    exists = hazards.tracks[:, EXISTS]
+    exists = hazards.exists
     assert exists.max() > 0.5
     np.testing.assert_allclose(found.exists[1], exists, atol=1e-9)
     best = int(np.argmax(exists))
-    particles = hazards.particles[best]
-    mean = np.average(particles[:, :4], axis=0, weights=particles[:, WEIGHT])
+    x, y, vx, vy, weight = (values[best] for values in hazards.particles)
+    mean = np.average([x, y, vx, vy], axis=1, weights=weight)
     np.testing.assert_allclose(found.places[1, best], mean[:2], atol=1e-6)
     np.testing.assert_allclose(found.velocities[1, best], mean[2:], atol=1e-6)
 

@@ -34,8 +34,8 @@ DISTURBING = re.compile(
 )
 #: Such by their names alone, and why they are not set.
 OTHERS = {
-    "repulsion.guarded.weave_period_s": "of a wave that the law weighs",
-    "repulsion.guarded.search_period_s": "of a wave that the law weighs",
+    "repulsion.trajectory_adaptive.safety_filter.approach_rate": "a gain",
+    "repulsion.trajectory_filtered.safety_filter.approach_rate": "a gain",
     "sound_search.noise_s": "for how long a search listens",
     "odor.mean_intensity": "of the steady plume, which has no noise",
     "gas_sensors.slope_mismatch": "0.03 by default",
@@ -119,11 +119,11 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "duration_s": 8.0,
             "hearing": "ideal",
             "law": "active",
-            "guard": {"obstacle_speed_m_s": 0.3},
+            "guard.obstacle_speed_m_s": 0.3,
             "plant.friction": 0.1,
             "odometry.lost_at_s": 6.0,
-            "free_space.wheel_error": 0.03,
-            "free_space.place_error_m": 0.05,
+            "guard.wheel_error": 0.03,
+            "guard.place_error_m": 0.05,
             "ideal_hearing.bearing_noise_deg": 2.0,
             "ideal_hearing.range_noise_fraction": 0.05,
             "ultrasonic.noise_m": 0.01,

@@ -52,12 +52,10 @@ ultrasonic: {noise_m: 0, firing: sequential}
 collision_vector: {aggregation: sum}
 attraction: {follow_distance_m: 0.6, damping_n_s_m: 4}
 repulsion: {velocity_term: closing}
-following: {cruise_speed_m_s: 0.5}
 robot: {mass_kg: 5}
 plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
 odometry: {rounding: false}
-guard: {margin_m: 0.02}
-free_space: {cell_m: 0.04}
+guard: {margin_m: 0.02, cell_m: 0.04}
 integration_step_s: 0.005
 """
 

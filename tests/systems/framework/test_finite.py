@@ -27,7 +27,7 @@ from systems.framework.signals import (
 )
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import make_free_space
-from systems.safety.parameters import FreeSpaceParameters
+from systems.safety.parameters import GuardParameters
 from systems.sound.adc import convert
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import make_emission
@@ -49,7 +49,7 @@ BLOCKS: dict[str, tuple[dict[str, Any], ...]] = {
     # With wheel errors it keeps what lies under the body.
     "FreeSpaceMap": (
         {},
-        {"parameters": FreeSpaceParameters(wheel_error=0.01, place_error_m=0.03)},
+        {"parameters": GuardParameters(wheel_error=0.01, place_error_m=0.03)},
     ),
     "IdealObstacleSensor": ({"obstacle_count": 2},),
     "MicArray": ({}, {"others": ["radio"]}),

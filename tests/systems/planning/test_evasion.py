@@ -8,25 +8,24 @@ import numpy as np
 import pytest
 
 from systems.planning.evasion import (
-    EvasionNumbers,
     choose_motion,
     find_threats,
     risk_of,
     watch_of,
 )
+from systems.planning.hazards import Sample
 
 HALF_SIZE = 0.175, 0.41
-NUMBERS = EvasionNumbers(3.0, 2.0, HALF_SIZE, 0.62, 8.0, 0.7)
 HERE = 0.0, 0.0, 0.0
 
 
 def body(x, y, vx, vy, *, age=0.0, spread=0.0):
     """One body, whose place and velocity are known."""
-    return np.array([[x, y, vx, vy, 1.0, age, spread]])
+    return Sample(*np.array([[x], [y], [vx], [vy], [1.0], [age], [spread]]))
 
 
 def choice(bodies, wanted=(0.45, 0.0, 0.0), held=0.0):
-    return choose_motion(bodies, len(bodies), HERE, wanted, held, NUMBERS)
+    return choose_motion(bodies, HERE, wanted, held, HALF_SIZE)
 
 
 def clearance(bodies, speed, heading, seconds=3.0):
@@ -37,7 +36,7 @@ def clearance(bodies, speed, heading, seconds=3.0):
         theta += step * min(max(3.0 * error, -2.0), 2.0)
         x += step * speed * math.cos(theta)
         y += step * speed * math.sin(theta)
-        for px, py, vx, vy, *_ in bodies:
+        for px, py, vx, vy in zip(*bodies[:4], strict=True):
             dx = px + (k + 1) * step * vx - x
             dy = py + (k + 1) * step * vy - y
             u = abs(math.cos(theta) * dx + math.sin(theta) * dy) - HALF_SIZE[0]
@@ -66,21 +65,21 @@ def test_what_would_be_hit_is_evaded(x, y, vx, vy):
 def test_beside_a_body_only_getting_away_counts():
     """A guard stops a robot that turns beside a body, which then comes up to it."""
     behind = body(-0.65, 0.1, 0.35, 0.0)
-    assert risk_of(behind, 1, HERE, 0.6, 0.0, NUMBERS) < 0.2
-    turning = risk_of(behind, 1, HERE, 0.6, 2.0, NUMBERS)
+    assert risk_of(behind, HERE, 0.6, 0.0, HALF_SIZE) < 0.2
+    turning = risk_of(behind, HERE, 0.6, 2.0, HALF_SIZE)
     assert turning > 0.5
     # Far from it the same turn leads away.
     far = body(-1.6, 0.1, 0.35, 0.0)
-    assert risk_of(far, 1, HERE, 0.6, 2.0, NUMBERS) < 0.2
+    assert risk_of(far, HERE, 0.6, 2.0, HALF_SIZE) < 0.2
 
 
 def test_risk_counts_bodies_that_are_hit():
     ahead = body(0.9, 0.0, 0.0, 0.0)
-    assert risk_of(ahead, 1, HERE, 0.45, 0.0, NUMBERS) == pytest.approx(0.9, abs=0.1)
+    assert risk_of(ahead, HERE, 0.45, 0.0, HALF_SIZE) == pytest.approx(0.9, abs=0.1)
     beside = body(0.9, 0.41 + 0.5, 0.0, 0.0)
-    assert risk_of(beside, 1, HERE, 0.45, 0.0, NUMBERS) == 0.0
+    assert risk_of(beside, HERE, 0.45, 0.0, HALF_SIZE) == 0.0
     between = body(0.9, 0.41 + 0.29, 0.0, 0.0)  # half of the way from 15 to 43 cm
-    assert risk_of(between, 1, HERE, 0.45, 0.0, NUMBERS) == pytest.approx(0.45, abs=0.1)
+    assert risk_of(between, HERE, 0.45, 0.0, HALF_SIZE) == pytest.approx(0.45, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -97,10 +96,9 @@ def test_what_was_lost_from_view_is_looked_at():
     _, heading, _ = choice(lost)
     bearing = math.atan2(1.3, 0.2)
     assert 0.3 < heading < bearing
-    threats = np.zeros((1, 2))
-    find_threats(lost, 1, HERE, (0.45, 0.0), threats)
-    assert threats[0, 0] == pytest.approx(bearing)
-    assert watch_of(threats, 1, heading) < 0.5 * watch_of(threats, 1, 0.0)
+    threats = find_threats(lost, HERE, (0.45, 0.0))
+    assert threats.bearing_rad == pytest.approx([bearing])
+    assert watch_of(threats, heading) < 0.5 * watch_of(threats, 0.0)
 
 
 def test_where_the_guard_holds_it_does_not_try_again():

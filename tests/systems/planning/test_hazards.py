@@ -7,14 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from systems.planning.hazards import (
-    EXISTS,
-    HazardSensors,
-    make_hazards,
-    pick_hazards,
-    track_hazards,
-)
-from systems.safety.free_space import ROLLED, make_free_space
+from systems.planning.hazards import make_hazards, pick_hazards, track_hazards
+from systems.planning.looks import HazardSensors
+from systems.safety.free_space import make_free_space
 from systems.world.geometry import fan_ranges
 
 TICK_S, CELLS, CELL_M, AHEAD_M, FARTHEST_M = 0.025, 240, 0.05, 0.175, 3.0
@@ -30,7 +25,6 @@ def sensors(noise_m=0.001):
         FARTHEST_M,
         0.002 + 5.0 * noise_m,
         noise_m,
-        0.6,
         TICK_S,
     )
 
@@ -82,9 +76,9 @@ def crossing(time):
 
 def estimate(hazards):
     """Mean place and velocity of the likeliest track."""
-    best = int(np.argmax(hazards.tracks[:, EXISTS]))
-    p = hazards.particles[best]
-    return p[:, 4] @ p[:, :4]
+    best = int(np.argmax(hazards.exists))
+    p = hazards.particles
+    return np.array([p.x[best], p.y[best], p.vx[best], p.vy[best]]) @ p.weight[best]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -96,7 +90,7 @@ def test_place_and_velocity_of_a_post_that_crosses(seed, noise_m):
     x, y, vx, vy = estimate(hazards)
     true = crossing(3.0)[0]
     # One body may be tracked twice where noise is as large as its movement.
-    assert hazards.tracks[:, EXISTS].max() > (0.9 if noise_m < 0.005 else 0.8)
+    assert hazards.exists.max() > (0.9 if noise_m < 0.005 else 0.8)
     assert math.hypot(x - true[0], y - true[1]) < 0.15
     assert math.hypot(vx + 0.1, vy + 0.35) < (0.12 if noise_m < 0.005 else 0.2)
 
@@ -104,19 +98,19 @@ def test_place_and_velocity_of_a_post_that_crosses(seed, noise_m):
 def test_echoes_from_where_nobody_has_looked_may_be_of_what_rests():
     hazards = make_hazards(3)
     look(hazards, range(121), weaving, crossing, floor(free=False))
-    assert (hazards.tracks[:, EXISTS] == 0.0).all()
+    assert (hazards.exists == 0.0).all()
 
 
 def test_nor_those_from_floor_that_is_forgotten():
     """What was seen free counts up to a rolled way: beyond it, it may be of a wall."""
     hazards, space = make_hazards(3), floor()
     space.free_until[space.free_until > 0.0] = 2.0
-    space.facts[0, ROLLED] = 2.5
+    space.rolled_m[0] = 2.5
     look(hazards, range(121), weaving, crossing, space)
-    assert (hazards.tracks[:, EXISTS] == 0.0).all()
-    space.facts[0, ROLLED] = 1.5
+    assert (hazards.exists == 0.0).all()
+    space.rolled_m[0] = 1.5
     look(hazards, range(121), weaving, crossing, space)
-    assert hazards.tracks[:, EXISTS].max() > 0.9
+    assert hazards.exists.max() > 0.9
 
 
 @pytest.mark.parametrize("noise_m", [0.001, 0.01])
@@ -137,7 +131,7 @@ def test_what_rests_is_never_tracked(turn, noise_m):
         look(
             hazards, ticks, pose_at, lambda _: bodies, space, noise_m=noise_m, seed=seed
         )
-        assert (hazards.tracks[:, EXISTS] == 0.0).all()
+        assert (hazards.exists == 0.0).all()
 
 
 def test_what_is_followed_is_not_tracked():
@@ -153,26 +147,26 @@ def test_what_is_followed_is_not_tracked():
             floor(),
             target=(x, y, 0.35),
         )
-        assert (hazards.tracks[:, EXISTS] == 0.0).all()
+        assert (hazards.exists == 0.0).all()
 
 
 def test_a_body_that_is_no_longer_there_is_forgotten_once_looked_for():
     hazards, space = make_hazards(3), floor()
     look(hazards, range(80), weaving, crossing, space)
-    assert hazards.tracks[:, EXISTS].max() > 0.9
+    assert hazards.exists.max() > 0.9
     look(hazards, range(80, 280), weaving, lambda _: [], space)
-    assert hazards.tracks[:, EXISTS].max() < 0.1
+    assert hazards.exists.max() < 0.1
 
 
 def test_picked_particles_stand_for_all():
     hazards, space = make_hazards(3), floor()
     look(hazards, range(80), weaving, crossing, space)
-    count = pick_hazards(hazards, 80 * TICK_S, (0.0, 0.0, 0.0), 5.0)
-    picked = hazards.picked[:count]
-    assert picked[:, 4].sum() == pytest.approx(hazards.tracks[:, EXISTS].sum())
-    mean = picked[:, 4] @ picked[:, :2] / picked[:, 4].sum()
+    picked = pick_hazards(hazards, 80 * TICK_S, (0.0, 0.0, 0.0), 5.0)
+    weight = picked.weight
+    assert weight.sum() == pytest.approx(hazards.exists.sum())
+    mean = np.array([picked.x, picked.y]) @ weight / weight.sum()
     np.testing.assert_allclose(mean, estimate(hazards)[:2], atol=0.05)
-    assert pick_hazards(hazards, 80 * TICK_S, (9.0, 9.0, 0.0), 5.0) == 0
+    assert len(pick_hazards(hazards, 80 * TICK_S, (9.0, 9.0, 0.0), 5.0).x) == 0
 
 
 def test_same_readings_same_tracks():
@@ -181,5 +175,7 @@ def test_same_readings_same_tracks():
         hazards = make_hazards(3)
         look(hazards, range(100), weaving, crossing, floor())
         pairs.append(hazards)
-    for one, other in zip(*pairs, strict=True):
-        assert one.tobytes() == other.tobytes()
+    one, other = pairs
+    assert one.exists.max() > 0.9
+    for a, b in zip(one.particles, other.particles, strict=True):
+        assert a.tobytes() == b.tobytes()

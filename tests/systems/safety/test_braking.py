@@ -44,7 +44,6 @@ NUMBERS = BrakingNumbers(
     keep_m=RADIUS + 0.012,
     least_m=RADIUS + 0.009,
     obstacle_speed_m_s=0.0,
-    slow_turn_rad_s=0.3,
 )
 ARC = np.full((1, 2, 2), 100.0)
 PLANT = PlantNumbers.of(RobotParameters(), PlantParameters())

@@ -16,9 +16,9 @@ from systems.base.robot import body_radius
 from systems.framework.block import RunFacts
 from systems.framework.input_error import InputError
 from systems.safety.braking import HALTED
-from systems.safety.free_space import ROLLED, cell_is_free, clear_disc, make_free_space
+from systems.safety.free_space import cell_is_free, clear_disc, make_free_space
 from systems.safety.free_space_map import map_step
-from systems.safety.parameters import FreeSpaceParameters, GuardParameters
+from systems.safety.parameters import GuardParameters
 from systems.safety.views import PlaceError, lasting
 
 pytestmark = pytest.mark.drake
@@ -125,39 +125,32 @@ def test_what_it_changes_the_virtual_mass_moves_by(bench):
     np.testing.assert_allclose(state[:2], expected, atol=1e-12)
 
 
-def test_a_least_margin_above_the_margin_is_refused():
-    with pytest.raises(ValueError, match="least_margin_m"):
-        GuardParameters(margin_m=0.01, least_margin_m=0.02)
+@pytest.mark.parametrize("fields", [{"margin_m": 0.002}, {"start_bubble_m": 3.3}])
+def test_a_margin_below_the_least_and_a_bubble_beyond_the_map_are_refused(fields):
+    with pytest.raises(ValueError, match=next(iter(fields))):
+        GuardParameters(**fields)
 
 
-@pytest.mark.parametrize(
-    ("fields", "field"),
-    [
-        ({"cell_m": 0.005, "window_m": 30.0}, "window_m"),
-        ({"start_bubble_m": 0.5}, "start_bubble_m"),
-        ({"window_m": 3.9}, "window_m"),
-    ],
-)
-def test_a_memory_that_cannot_serve_is_refused(fields, field):
+def test_a_bubble_that_is_too_small_for_the_body_is_refused():
     with pytest.raises(InputError) as error:
-        FreeSpaceMap(parameters=FreeSpaceParameters(**fields))
-    assert error.value.field == field
+        FreeSpaceMap(parameters=GuardParameters(start_bubble_m=0.5))
+    assert error.value.field == "start_bubble_m"
 
 
 @pytest.mark.parametrize(
     ("overrides", "field"),
     [
         (["obstacle_sensing=ideal"], "obstacle_sensing"),
-        (["free_space.start_bubble_m=0.5"], "free_space.start_bubble_m"),
+        (["guard.start_bubble_m=0.5"], "guard.start_bubble_m"),
         (["ultrasonic.axes_deg=[60, -60]"], "ultrasonic.axes_deg"),
         (["obstacles=[{name: box, waypoints_m: [[0.9, 0]]}]"], "start.position_m"),
         (["source.waypoints_m=[[1.1, 0]]"], "start.position_m"),
         (
-            ["free_space.wheel_error=0.02", "free_space.place_error_m=0.02"],
-            "free_space.place_error_m",
+            ["guard.wheel_error=0.02", "guard.place_error_m=0.02"],
+            "guard.place_error_m",
         ),
-        (["free_space.place_error_m=0"], "free_space.place_error_m"),
-        (["odometry.pulses_per_revolution=30"], "free_space.place_error_m"),
+        (["guard.place_error_m=0"], "guard.place_error_m"),
+        (["odometry.pulses_per_revolution=30"], "guard.place_error_m"),
     ],
 )
 def test_a_guard_that_could_not_serve_is_refused(overrides, field):
@@ -180,14 +173,14 @@ def space_map(**given: Any) -> Any:
 
 def test_a_cell_is_known_for_the_way_that_wheel_errors_allow():
     """Of the bubble, 1 m: 0.02 s + 0.04 s (1 + s)/0.41 = 0.03, solved by hand."""
-    known = FreeSpaceParameters(wheel_error=0.02, place_error_m=0.03)
+    known = GuardParameters(wheel_error=0.02, place_error_m=0.03)
     state, numbers = space_map(parameters=known, odometry=EXACT)
     b = 0.02 + 0.04 / 0.41
     lasts = (math.sqrt(b * b + 4.0 * 0.03 * 0.04 / 0.41) - b) / (2.0 * 0.04 / 0.41)
     for tick in range(100):
         way = 0.004 * tick
         map_step(tick, state, (*BLIND, (way, 0.0, 0.0), STILL), (), numbers)
-        assert state.free_space.facts[0, ROLLED] == pytest.approx(way)
+        assert state.free_space.rolled_m[0] == pytest.approx(way)
         behind = cell_is_free(state.free_space, -14, 0, way)
         assert behind == (way <= lasts)
         # Under the body space stays known: the body is there.
@@ -211,7 +204,7 @@ def test_the_rolled_way_is_the_mean_of_both_rims(motion, rolled):
     for tick in range(4):
         pose = tuple(tick * each for each in motion)
         map_step(tick, state, (*BLIND, pose, STILL), (), numbers)
-    found = state.free_space.facts[0, ROLLED]
+    found = state.free_space.rolled_m[0]
     assert 3.0 * rolled * longer - 1e-12 <= found <= 3.0 * rolled * longer * 1.05
 
 
@@ -224,26 +217,24 @@ def test_pulses_make_a_tick_count_half_a_pulse_more_and_a_reversal_its_command()
     x, tick = 0.0, 0
     map_step(tick, state, (*BLIND, (x, 0.0, 0.0), STILL), (), numbers)
     for moved, counted, command in ways:
-        before, x, tick = state.free_space.facts[0, ROLLED], x + moved, tick + 1
+        before, x, tick = state.free_space.rolled_m[0], x + moved, tick + 1
         commanded = (command, -0.5 * command)
         map_step(tick, state, (*BLIND, (x, 0.0, 0.0), commanded), (), numbers)
-        found = state.free_space.facts[0, ROLLED] - before
+        found = state.free_space.rolled_m[0] - before
         assert found == pytest.approx(counted + 0.5 * pulse, abs=1e-12)
 
 
 def test_by_the_encoders_of_the_papers_robot_a_cell_is_known_for_14_m():
     """(q/L) (s + d) + q = 6 mm at d = 2 m, with pulses of q = 0.145 mm at the rim."""
     pulse = 0.06 * math.tau / 2600
-    error = PlaceError.of(
-        FreeSpaceParameters(), Scenario().only.robot, OdometryParameters()
-    )
+    error = PlaceError.of(GuardParameters(), Scenario().robot, OdometryParameters())
     expected = (0.006 - pulse) * 0.41 / pulse - 2.0
     assert lasting(2.0, error) == pytest.approx(expected)
     assert 14.0 < expected < 15.0
 
 
 GUARD = "guard={}"
-ERRORS = "free_space.wheel_error=0.005", "free_space.place_error_m=0.03"
+ERRORS = "guard.wheel_error=0.005", "guard.place_error_m=0.03"
 MOVING = "guard.obstacle_speed_m_s=0.3"
 
 
@@ -258,7 +249,7 @@ MOVING = "guard.obstacle_speed_m_s=0.3"
         ("two_static_obstacles", (MOVING, "ultrasonic.firing=sequential")),
         ("default", (GUARD, "ultrasonic.period_s=0.05")),
         ("corridor", (GUARD, "tick_s=0.0125")),
-        ("corridor", (*ERRORS, GUARD, "plant.slip=[0.005, -0.005]")),
+        ("corridor", (*ERRORS, "plant.slip=[0.005, -0.005]")),
         ("convoy", (GUARD, "law=conventional")),
     ],
 )

@@ -8,6 +8,7 @@ from itertools import count
 import numpy as np
 import pytest
 
+from systems.framework.block import copied
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.sensing_monitor import SENSING_FAULTS, SensingMonitor
 
@@ -21,7 +22,8 @@ class Watched:
 
     def __init__(self, **sensors):
         block = SensingMonitor(sensors=UltrasonicParameters(**sensors))
-        self.step, self.state, self.ticks = block.step, [*block.step.state], count()
+        self.step, self.ticks = block.step, count()
+        self.state = copied(block.step.state)
 
     def tells(self, ranges, pose=(0.0, 0.0, 0.0), echo=(1, 1, 1), ages=(0.0, 0.0, 0.0)):
         """Name of what is wrong, and the sensor."""

@@ -61,7 +61,7 @@ def test_the_audits_cart_names_speed_limit_and_field():
             "ultrasonic.faults",
             "A2",
         ),
-        ("plant.slip=[0.01, -0.01]", "free_space.wheel_error", "A4"),
+        ("plant.slip=[0.01, -0.01]", "guard.wheel_error", "A4"),
         ("plant.friction=0.6", "plant.friction", "A5"),
     ],
 )
@@ -73,7 +73,7 @@ def test_every_broken_assumption_is_told(setting, field, told):
 
 
 def test_what_is_true_or_reckoned_with_is_not_told():
-    known = "free_space={wheel_error: 0.01, place_error_m: 0.1}"
+    known = "guard={wheel_error: 0.01, place_error_m: 0.1}"
     faults = "ultrasonic.faults=[{sensor: 1, kind: silent}]"
     assert warned("guard={}") == ()
     assert warned("guard={}", "plant.slip=[0.01, -0.01]", known) == ()
