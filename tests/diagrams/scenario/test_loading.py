@@ -46,6 +46,7 @@ robots:
   robot: {obstacle_sensing: ultrasonic}
   second: {hearing: audio, obstacle_sensing: ultrasonic, start: {position_m: [-2, -1]}}
 sound_speed_m_s: 346.5
+assumed_sound_speed_m_s: 340
 ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
 ultrasonic: {noise_m: 0, firing: sequential}
@@ -320,7 +321,7 @@ def test_the_walk_finds_the_fields():
     assert {
         "duration_s",
         "robot.wheel_radius_m",
-        "assumed_sound_speed_m_s",
+        "sound_speed_m_s",
         "sound.level_pa",
         "attraction.follow_distance_m",
     } <= set(FLOAT_FIELDS)
