@@ -107,7 +107,7 @@ class RecordingSearch:
         """(p, 2 m + 1) of the pairs' cross-spectra (p, f), which add up to 1."""
         m = self.grid.max_lag + slack
         values = correlations_at_lags(cross, self.recording.bins, self._length, m)
-        return values * (0.5 * self._length)
+        return values * np.float32(0.5 * self._length)
 
     def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
         """(g,) of the pairs' cross-spectra (p, f), which add up to 1."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ pytestmark = pytest.mark.drake
 
 PLAIN = TrackerParameters(hold="world")
 #: As for ideal hearing: every source is where it is heard.
-EXACT = {"resolve_front_back": False, "floor_m": 0.0}
+EXACT: Any = {"resolve_front_back": False, "floor_m": 0.0}
 SILENT = {
     "p_PS_B": [0.0, 0.0],
     "covariance": [0.0] * 4,
