@@ -16,10 +16,10 @@ from systems.laws.trajectory.trajectory_impedance import (
     contact_force,
     contact_numbers,
     contacts_of_objects,
-    state_matrices,
     step_is_blocked,
 )
 from systems.routes.grid_search import search_cells
+from tests.systems.laws.trajectory.state_space import state_matrices
 
 #: K = K_e = 3 N/m, D = D_e = 4 N s/m, M = 1 kg, as in the paper's tables.
 K, D = 3.0, 4.0

@@ -17,7 +17,6 @@ from systems import (
     TrajectoryImpedanceController,
     UltrasonicArray,
 )
-from systems.laws.trajectory.reference_model import nominal_poles
 from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 from systems.laws.trajectory.trajectory_filtered import FilteredTrajectoryParameters
 
@@ -139,11 +138,9 @@ def _adaptation(scenario: Scenario) -> list[Any]:
     own = _adapting(scenario.router.gains)
     if own is None:
         return []
-    robot, tick_s = scenario.router.robot, scenario.tick_s
-    frequency, ratio = nominal_poles(
-        robot.mass_kg, own.stiffness_n_m, own.damping_n_s_m
-    )
-    return [
-        ReferenceModel(frequency=frequency, ratio=ratio, tick_s=tick_s),
-        ImpedanceAdaptation(parameters=own, robot=robot, tick_s=tick_s),
-    ]
+    given: dict[str, Any] = {
+        "parameters": own,
+        "robot": scenario.router.robot,
+        "tick_s": scenario.tick_s,
+    }
+    return [ReferenceModel(**given), ImpedanceAdaptation(**given)]

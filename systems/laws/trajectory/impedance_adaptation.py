@@ -10,8 +10,6 @@ from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.laws.trajectory.impedance_sensitivity import (
-    Impedance,
-    SensitivityNumbers,
     advance_sensitivity,
     penalty_gradient,
     sensitivity_sources,
@@ -82,13 +80,7 @@ def adaptation_step(
     p_WP = control_point(pose, numbers.control_point_m)
     found = contacts_of_objects(objects, v_WP, numbers.contacts)
     sources = sensitivity_sources(p_WP, v_WP, target, found, numbers.mass)
-    loop = SensitivityNumbers(
-        Impedance(state[0], state[1], state[2]),
-        numbers.contact_damping,
-        numbers.contacts,
-        numbers.mass,
-        numbers.tick_s,
-    )
+    gains = state[0], state[1], state[2]
     # Errors against the reference, and gradient of the safety term. Its distance
     # d_sec is S.
     ex, ey = p_WP[0] - reference[0], p_WP[1] - reference[1]
@@ -104,7 +96,7 @@ def adaptation_step(
             gradient += _VELOCITY_WEIGHT_S2 * (
                 evx * state[at + 2] + evy * state[at + 3]
             )
-            advance_sensitivity(state, at, source, found, loop)
+            advance_sensitivity(state, at, source, found, gains, numbers)
         if numbers.rates[k] == 0.0:
             gradient = 0.0
         value = state[_GAINS + k] - numbers.tick_s * (numbers.rates[k] * gradient)

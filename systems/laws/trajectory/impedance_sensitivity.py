@@ -6,19 +6,6 @@ from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 
-from systems.laws.trajectory.trajectory_impedance import ContactNumbers
-
-
-class Impedance(NamedTuple):
-    """The gains that may adapt."""
-
-    stiffness: Any
-    """Stiffness K to the target, N/m."""
-    damping: Any
-    """Damping D to the target, N s/m."""
-    contact_stiffness: Any
-    """Stiffness K_e to contacts, N/m."""
-
 
 class Sensitivities(NamedTuple):
     """Partial derivatives (x, y) of the acceleration with respect to K, D, and K_e."""
@@ -57,29 +44,17 @@ def sensitivity_sources(
     )
 
 
-class SensitivityNumbers(NamedTuple):
-    """Gains and constants of the loop at one tick."""
-
-    impedance: Impedance
-    contact_damping: float
-    """Contact damping D_e, N s/m."""
-    contacts: ContactNumbers
-    mass: float
-    """Virtual mass M, kg."""
-    tick_s: float
-
-
 @register_jitable
 def advance_sensitivity(
-    state: Any, begin: Any, source: Any, contacts: Any, loop: Any
+    state: Any, begin: Any, source: Any, contacts: Any, gains: Any, numbers: Any
 ) -> None:
     """Advances the sensitivities by one tick of d/dt X_q = A X_q + source.
 
     This is eq. 34 with two corrections: the left side is a time derivative, and the
     right side contains the term A X_q. X_q has dp/dq and dv/dq of one gain q. A is the
     exact linearization of the loop. A contact with a point has the stiffness K_e along
-    n and the stiffness -K_e (S - d)/d across n. If the damping fades with the distance
-    d, the function adds the matrix -(D_e/S) (v - v_j) n^T to this stiffness.
+    n and the stiffness -K_e (S - d)/d across n. Its damping fades with the distance d,
+    so the function adds the matrix -(D_e/S) (v - v_j) n^T to this stiffness.
 
     The function updates the velocity first, and then the position with the new
     velocity. The virtual mass moves in the same order.
@@ -89,31 +64,32 @@ def advance_sensitivity(
             dp/dq (x and y) and dv/dq (x and y).
         begin: Index in the state of the first of these four numbers.
         source: (x, y) of ``sensitivity_sources``.
-        contacts: Result of ``contacts_of_objects``.
-        loop: ``SensitivityNumbers``.
+        contacts: Result of ``contacts_of_objects`` for damping that fades.
+        gains: K, N/m, D, N s/m, and K_e, N/m.
+        numbers: ``AdaptationNumbers``.
     """
-    impedance, tick_s = loop.impedance, loop.tick_s
+    tick_s = numbers.tick_s
+    stiffness, damping, contact_stiffness = gains
     px, py = state[begin], state[begin + 1]
     vx, vy = state[begin + 2], state[begin + 3]
     # Spring and damper to the target.
-    fx = -impedance.stiffness * px - impedance.damping * vx
-    fy = -impedance.stiffness * py - impedance.damping * vy
+    fx = -stiffness * px - damping * vx
+    fy = -stiffness * py - damping * vy
     # Spring and damper of each contact.
     for contact in contacts:
         nx, ny = contact.n
         along = nx * px + ny * py
         across = contact.overlap_m / contact.distance_m
-        k = impedance.contact_stiffness
-        damper = loop.contact_damping * contact.share
+        k = contact_stiffness
+        damper = numbers.contact_damping * contact.share
         fx = fx + k * (across * (px - along * nx) - along * nx) - damper * vx
         fy = fy + k * (across * (py - along * ny) - along * ny) - damper * vy
-        if loop.contacts.fades:
-            slope = loop.contact_damping / loop.contacts.begins_m * along
-            fx = fx + slope * contact.v_relative[0]
-            fy = fy + slope * contact.v_relative[1]
+        slope = numbers.contact_damping / numbers.contacts.begins_m * along
+        fx = fx + slope * contact.v_relative[0]
+        fy = fy + slope * contact.v_relative[1]
     # Velocity, then position.
-    vx = vx + tick_s * (fx / loop.mass + source[0])
-    vy = vy + tick_s * (fy / loop.mass + source[1])
+    vx = vx + tick_s * (fx / numbers.mass + source[0])
+    vy = vy + tick_s * (fy / numbers.mass + source[1])
     state[begin], state[begin + 1] = px + tick_s * vx, py + tick_s * vy
     state[begin + 2], state[begin + 3] = vx, vy
 

@@ -10,8 +10,12 @@ import numpy as np
 from numba.extending import register_jitable
 from scipy.linalg import expm
 
+from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 
 
 class ReferenceNumbers(NamedTuple):
@@ -85,8 +89,8 @@ class ReferenceModel(Block):
     output from the next tick on.
 
     Args:
-        frequency: Natural frequency w_n, rad/s.
-        ratio: Damping ratio xi.
+        parameters: K and D, ``TrajectoryImpedanceParameters``.
+        robot: Virtual mass M. M, K, and D determine the poles of the model.
         tick_s: Period, s.
 
     Reference: Engelbrecht, Steyn and Djouani (2021), eq. 19 to 26, with the dots of eq.
@@ -101,11 +105,14 @@ class ReferenceModel(Block):
     def __init__(
         self,
         *,
-        frequency: float = math.sqrt(3.0),
-        ratio: float = 2.0 / math.sqrt(3.0),
+        parameters: TrajectoryImpedanceParameters = TrajectoryImpedanceParameters(),
+        robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("reference_model")
+        frequency, ratio = nominal_poles(
+            robot.mass_kg, parameters.stiffness_n_m, parameters.damping_n_s_m
+        )
         numbers = held_matrices(frequency, ratio, tick_s)
         self.declare(Step(reference_step, numbers, [0.0] * 4), tick_s=tick_s)

@@ -53,7 +53,7 @@ def trajectory_law(
     gains: type[TrajectoryImpedanceParameters],
     *more: Equation,
 ) -> Law:
-    """Returns the record of a law whose block is ``TrajectoryImpedanceController``.
+    """Makes the record of a law whose block is ``TrajectoryImpedanceController``.
 
     Args:
         name: See ``Law``.
@@ -61,6 +61,9 @@ def trajectory_law(
         label: See ``Law``.
         gains: Model of the gains.
         *more: Equations that follow the equation of motion.
+
+    Returns:
+        The record.
     """
     motion = Equation(
         "Impedance to the target and to contacts",

@@ -45,7 +45,7 @@ def test_the_document_has_the_numbers(analyses):
     assert bounds["stable_today_n_m"][1] == pytest.approx(60.9, abs=0.05)
     assert bounds["mass"]["motor_lag_s"] == 0.05
     assert document["adaptation"]["lyapunov"]["falls"]
-    assert document["adaptation"]["cures"]["projected"] is False
+    assert document["adaptation"]["bounded"] is False
     chains = document["robot_chain"]["chains"]
     assert [chain["grows"] for chain in chains] == [True, False, True, False]
     assert chains[0]["tail"]["8"] == pytest.approx(chains[0]["peak"] ** 7)

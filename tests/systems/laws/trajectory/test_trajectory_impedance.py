@@ -17,7 +17,6 @@ from systems.laws.trajectory.trajectory_impedance import (
     contact_force,
     contact_numbers,
     contacts_of_objects,
-    state_matrices,
     step_is_blocked,
     target_force,
 )
@@ -25,6 +24,7 @@ from systems.laws.trajectory.trajectory_impedance_controller import (
     TrajectoryImpedanceController,
 )
 from tests.systems.laws.trajectory.point_robot import ROBOT, TICK_S, along, run
+from tests.systems.laws.trajectory.state_space import state_matrices
 
 #: As the paper has it, but for signs: K_e = K, S of table 1; and gains that rest.
 CONVENTIONAL = AdaptiveTrajectoryParameters(rate=0.0)
