@@ -46,7 +46,6 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
         return None
     guard = MotionGuard(
         parameters=scenario.own_guard,
-        known=scenario.free_space,
         robot=scenario.robot,
         plant=scenario.plant,
         tick_s=scenario.tick_s,

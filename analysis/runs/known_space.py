@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from diagrams import RunResult, Scenario
 from diagrams.scenario.own_code import import_own
 from systems.framework.block import RunFacts
-from systems.safety.free_space import FIRST_I, FIRST_J, ROLLED, FreeSpace
+from systems.safety.free_space import FreeSpace
 from systems.safety.free_space_map import FreeSpaceMap
 
 #: Columns of a run without which the map cannot be worked out.
@@ -94,7 +94,7 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
     scenario, tick_s = result.scenario, result.scenario.tick_s
     sensors = scenario.ultrasonic
     block = FreeSpaceMap(
-        parameters=scenario.free_space,
+        parameters=scenario.own_map,
         sensors=sensors,
         robot=scenario.robot,
         odometry=scenario.odometry,
@@ -185,9 +185,9 @@ _View = tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.float64]]
 def _view(space: FreeSpace) -> _View:
     """The known cells of a map in the order of their places."""
     cells = len(space.free_until)
-    first = space.facts[0, [FIRST_I, FIRST_J]].astype(np.int64)
+    first = space.first.copy()
     at = np.ix_(*((first[:, None] + np.arange(cells)) % cells))
-    free = space.free_until[at] >= space.facts[0, ROLLED]
+    free = space.free_until[at] >= space.rolled_m[0]
     hits = np.where(free, 0.0, space.hits[at])
     known = np.argwhere(free | (hits > 0.0))
     if len(known) == 0:

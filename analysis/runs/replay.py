@@ -452,7 +452,7 @@ def known_times(result: RunResult) -> list[float]:
     Each half second, or so seldom that fine cells do not fill the memory.
     """
     end, scenario = result.simulated_s, result.scenario
-    most = max(2, MOST_CELLS // scenario.free_space.cells**2)
+    most = max(2, MOST_CELLS // scenario.own_map.cells**2)
     period = max(KNOWN_PERIOD_S, end / most)
     first = min(FIRST_TICKS * scenario.tick_s, end)
     return [first, *np.arange(period, end, period).tolist(), end]

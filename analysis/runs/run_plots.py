@@ -381,7 +381,7 @@ def _guard_distances(axes: Axes, result: RunResult) -> None:
     spare, view = columns["guard_distance"], columns["guard_view_distance"]
     axes.plot(time, spare, color=COLOURS["robot"], label="to spare")
     guard = result.scenario.own_guard
-    if guard is not None and guard.obstacle_speed_m_s > 0.0:
+    if guard is not None and guard.obstacle_speed_m_s:
         axes.plot(
             time,
             view,

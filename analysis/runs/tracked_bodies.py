@@ -10,13 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.runs.known_space import has_known_space, logged_readings, remembered_space
 from diagrams import RunResult
 from systems.laws.guarded_controller import hazard_sensors
-from systems.planning.hazards import (
-    EXISTS,
-    WEIGHT,
-    Hazards,
-    make_hazards,
-    track_hazards,
-)
+from systems.planning.guarded_drive import SOURCE_RADIUS_M
+from systems.planning.hazards import Hazards, make_hazards, track_hazards
 
 
 @dataclass(frozen=True)
@@ -52,13 +47,10 @@ def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
     scenario, columns = result.scenario, result.columns
     if scenario.law != "guarded" or not has_known_space(result):
         return None
-    own, tick_s = scenario.repulsion.guarded, scenario.tick_s
     wanted = np.ravel(np.asarray(times, dtype=float))
     rows = np.unique(np.abs(result.time[:, None] - wanted).argmin(axis=0))
     hazards = make_hazards(scenario.ultrasonic.count)
-    sensors = hazard_sensors(
-        scenario.ultrasonic, scenario.robot, scenario.free_space, own, tick_s
-    )
+    sensors = hazard_sensors(scenario.ultrasonic, scenario.robot, scenario.tick_s)
     targets = result.vector("p_WS_estimated").T
     targets[columns["target_valid"] < 0.5] = np.inf
     found = []
@@ -67,7 +59,7 @@ def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
         zip(readings, remembered_space(result), strict=True)
     ):
         ranges, echo, ages, pose, _ = read
-        followed = (*targets[row].tolist(), own.source_radius_m)
+        followed = (*targets[row].tolist(), SOURCE_RADIUS_M)
         time = float(result.time[row])
         track_hazards(
             hazards, time, pose, (ranges, echo, ages), space, followed, sensors
@@ -82,10 +74,11 @@ def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
 
 def _view(hazards: Hazards) -> tuple[NDArray[np.float64], ...]:
     """Existence, place, velocity and spread of each track."""
-    exists = hazards.tracks[:, EXISTS].copy()
-    weights = hazards.particles[:, :, WEIGHT, None]
-    means = np.sum(weights * hazards.particles[:, :, :4], axis=1)
-    off = hazards.particles[:, :, :2] - means[:, None, :2]
+    exists, particles = hazards.exists.copy(), hazards.particles
+    weights = particles.weight[:, :, None]
+    motions = np.stack([particles.x, particles.y, particles.vx, particles.vy], axis=2)
+    means = np.sum(weights * motions, axis=1)
+    off = motions[:, :, :2] - means[:, None, :2]
     spreads = np.sqrt(np.sum(weights * off**2, axis=(1, 2)))
     empty = exists <= 0.0
     means[empty], spreads[empty] = np.nan, np.nan

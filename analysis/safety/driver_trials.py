@@ -174,13 +174,13 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "braking of 0.6": {"guard": {"braking_m_s2": 0.6}},
     "slip apart": {
         "plant": {"slip": (0.005, -0.005)},
-        "free_space": {"wheel_error": 0.005, "place_error_m": 0.03},
+        "guard": {"wheel_error": 0.005, "place_error_m": 0.03},
     },
     "slip alike": {
         "plant": {"slip": (-0.005, -0.005)},
-        "free_space": {"wheel_error": 0.005, "place_error_m": 0.03},
+        "guard": {"wheel_error": 0.005, "place_error_m": 0.03},
     },
-    "cells of 2 cm": {"free_space": {"cell_m": 0.02}},
+    "cells of 2 cm": {"guard": {"cell_m": 0.02}},
 }
 #: All settings. ``draw_trial`` chooses the added ones only when it is asked to.
 SETTINGS = {
@@ -188,7 +188,7 @@ SETTINGS = {
     "encoders not rounded": {"odometry": {"rounding": False}},
     "slip apart, known to 10 cm": {
         "plant": {"slip": (0.005, -0.005)},
-        "free_space": {"wheel_error": 0.005, "place_error_m": 0.1},
+        "guard": {"wheel_error": 0.005, "place_error_m": 0.1},
     },
     "encoders of 650 pulses": {"odometry": {"pulses_per_revolution": 650}},
 }
@@ -396,8 +396,7 @@ def make_trial(
             "rest_time_s": 1e4,
             "diverged_range_m": 1e3,
         },
-        "guard": {},
-        "free_space": {"start_bubble_m": BUBBLE_M},
+        "guard": {"obstacle_speed_m_s": 0.0, "start_bubble_m": BUBBLE_M},
     }
     fields = _merged(fields, SETTINGS[variant])
     table = np.array([Row(*row) for row in rows] or [Row(0.0)], dtype=float)

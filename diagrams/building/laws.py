@@ -38,7 +38,7 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
 
     A class derives from LeafSystem. Its arguments may be ``robot``, ``attraction``,
     ``repulsion``, ``gains`` (those of the law of the package from whose block the class
-    derives), ``velocity_term``, ``sensors``, ``tick_s``, ``known``, ``bodies`` and
+    derives), ``velocity_term``, ``sensors``, ``tick_s``, ``guard``, ``bodies`` and
     ``seed``. Each of its inputs has the name of an output port in the diagram. The
     class has exactly one of the outputs that ``make_command`` accepts.
 
@@ -65,7 +65,7 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         "attraction": scenario.attraction,
         "tick_s": scenario.tick_s,
         "sensors": sensors,
-        "known": scenario.free_space,
+        "guard": scenario.own_map,
         "bodies": bodies,
         "seed": seed,
     }
@@ -96,7 +96,7 @@ def _gains_of_base(block: type, repulsion: RepulsionParameters) -> Any:
     """Returns the gains of the law of the package whose block is a base of a class."""
     for name, law in LAWS.items():
         if law.controller is not None and issubclass(block, law.controller):
-            return getattr(repulsion, name)
+            return getattr(repulsion, name, None)
     return None
 
 

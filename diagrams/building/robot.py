@@ -444,7 +444,6 @@ def _driving(scenario: Scenario, controller: Any) -> Any:
         return make_command(controller, scenario.robot, scenario.tick_s)
     return MotionGuard(
         parameters=scenario.own_guard,
-        known=scenario.free_space,
         robot=scenario.robot,
         plant=scenario.plant,
         command=commanded(controller),

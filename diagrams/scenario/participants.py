@@ -35,7 +35,7 @@ from systems.ranging.parameters import (
     UltrasonicParameters,
 )
 from systems.routes.parameters import RouteParameters
-from systems.safety.parameters import FreeSpaceParameters, GuardParameters
+from systems.safety.parameters import GuardParameters
 from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
 from systems.sound.parameters import MicArrayParameters, SoundParameters, channel_skew
 
@@ -92,7 +92,6 @@ class FollowerParameters(Parameters):
     guard: GuardParameters | None = None
     """The guard works with any law and keeps the robot in space that its sensors have
     seen as free; null: no guard, unless the law is ``guarded``."""
-    free_space: FreeSpaceParameters = FreeSpaceParameters()
     search: PlumeSearchParameters = PlumeSearchParameters()
     gas_sensors: GasSensorParameters = GasSensorParameters()
     airflow_sensors: AirflowParameters = AirflowParameters()
@@ -118,9 +117,18 @@ class FollowerParameters(Parameters):
     @property
     def own_guard(self) -> GuardParameters | None:
         """The guard of the robot, or None. A guarded law always has a guard."""
-        if self.guard is None and self.law in LAWS and LAWS[self.law].guarded:
-            return GuardParameters(obstacle_speed_m_s=0.6)
-        return self.guard
+        guarded = self.law in LAWS and LAWS[self.law].guarded
+        if self.guard is None and not guarded:
+            return None
+        guard = self.guard or GuardParameters()
+        if guard.obstacle_speed_m_s is not None:
+            return guard
+        return guard.model_copy(update={"obstacle_speed_m_s": 0.6 if guarded else 0.0})
+
+    @property
+    def own_map(self) -> GuardParameters:
+        """Parameters of the map: those of the guard, or the defaults without one."""
+        return self.own_guard or GuardParameters()
 
     @property
     def listens(self) -> bool:

@@ -9,26 +9,19 @@ import numpy as np
 from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.laws.guarded import GuardedParameters
 from systems.laws.parameters import AttractionParameters
-from systems.planning.evasion import EvasionNumbers
 from systems.planning.guarded_drive import (
-    CARROT_X,
-    CARROT_Y,
+    CLEARANCE_M,
     GIVING_UP,
-    MEMORY,
-    MODE,
-    SPEED,
-    TURN,
-    WAY_LEFT,
     DriveNumbers,
     DriveState,
     drive_guarded,
+    make_drive_state,
 )
-from systems.planning.hazards import HazardSensors, make_hazards
-from systems.planning.way import make_way
+from systems.planning.looks import HazardSensors
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.parameters import FreeSpaceParameters
+from systems.safety.parameters import GuardParameters
+from systems.safety.views import range_error
 
 
 def guarded_step(
@@ -37,16 +30,16 @@ def guarded_step(
     """Computes the twist, the plan, and the port ``gives_up`` of one tick."""
     drive_guarded(tick, state, inputs, numbers)
     memory, (twist, plan, gives_up) = state.memory, outputs
-    twist[0], twist[1] = memory[0, SPEED], memory[0, TURN]
-    plan[0], plan[1] = memory[0, MODE], memory[0, CARROT_X]
-    plan[2], plan[3] = memory[0, CARROT_Y], memory[0, WAY_LEFT]
-    gives_up[0] = 1.0 if memory[0, MODE] == GIVING_UP else 0.0
+    twist[0], twist[1] = memory.speed[0], memory.turn[0]
+    plan[0], plan[1] = memory.mode[0], memory.carrot[0]
+    plan[2], plan[3] = memory.carrot[1], memory.way_left_m[0]
+    gives_up[0] = 1.0 if memory.mode[0] == GIVING_UP else 0.0
 
 
 class GuardedController(Block):
     """Plans a route to the target through free and unknown space, and looks ahead.
 
-    Every ``replan_s`` the block finds the cheapest route for the disc that holds the
+    Every 0.5 s the block finds the cheapest route for the disc that holds the
     body. Unknown cells cost a little more than free cells. Cells with echoes cost much
     more. The robot drives toward the farthest point of the route that it can reach
     straight at little extra cost. Its speed depends on the remaining distance. It
@@ -63,7 +56,7 @@ class GuardedController(Block):
     chooses the pair of least cost. The cost has three terms: the deviation from the
     wanted motion, the distance from the bodies, and whether the sensors see the bodies.
 
-    If every route crosses cells with echoes for ``search_way_s``, the robot stops. It
+    If every route crosses cells with echoes for 20 s, the robot stops. It
     reports at the port ``gives_up`` that it gives up, until there is a route.
 
     The port ``plan`` has the mode, the point for which the robot heads, and the
@@ -77,9 +70,8 @@ class GuardedController(Block):
     Args:
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
-        gains: ``GuardedParameters``.
         sensors: Parameters of the range sensors.
-        known: Parameters of the map.
+        guard: Parameters of the map.
         tick_s: Period of the controller, s.
 
     Reference: ours; docs/guard.md.
@@ -112,30 +104,21 @@ class GuardedController(Block):
         *,
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
-        gains: GuardedParameters = GuardedParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
-        known: FreeSpaceParameters = FreeSpaceParameters(),
+        guard: GuardParameters = GuardParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("guarded_controller")
-        own = gains
         numbers = DriveNumbers(
-            own,
             attraction.follow_distance_m,
             robot.control_point_m,
-            hazard_sensors(sensors, robot, known, own, tick_s),
-            EvasionNumbers(
-                (0.5 * robot.length_m, 0.5 * robot.width_m),
-                own.risk_gain,
-                own.watch_gain,
-            ),
-            body_radius(robot) + known.place_error_m + own.clearance_m,
+            hazard_sensors(sensors, robot, tick_s),
+            (0.5 * robot.length_m, 0.5 * robot.width_m),
+            body_radius(robot) + guard.place_error_m + CLEARANCE_M,
             tick_s,
         )
-        state = DriveState(
-            np.zeros((1, MEMORY)), make_way(known.cells), make_hazards(sensors.count)
-        )
+        state = make_drive_state(guard.cells, sensors.count)
         self.declare(
             Step(guarded_step, numbers, state),
             tick_s=tick_s,
@@ -144,31 +127,24 @@ class GuardedController(Block):
 
 
 def hazard_sensors(
-    sensors: UltrasonicParameters,
-    robot: RobotParameters,
-    known: FreeSpaceParameters,
-    own: GuardedParameters,
-    tick_s: float,
+    sensors: UltrasonicParameters, robot: RobotParameters, tick_s: float
 ) -> HazardSensors:
     """Returns the sensor constants that the tracker of moving bodies uses.
 
     Args:
         sensors: Parameters of the range sensors.
         robot: Robot, for the position of P.
-        known: Parameters of the map, for the error of the ranges.
-        own: Parameters of the law.
         tick_s: Period of the controller, s.
 
     Returns:
-        Positions, directions, and errors of the sensors; top speed of the bodies.
+        Positions, directions, and errors of the sensors.
     """
     axes, places, half_angle = sensors.beams
     return HazardSensors(
         np.add(places, [robot.control_point_m, 0.0]),
         np.column_stack([axes, np.full(len(axes), half_angle)]),
         sensors.maximum_range_m,
-        known.range_error(sensors),
+        range_error(sensors),
         sensors.noise_m,
-        own.hazard_speed_m_s,
         tick_s,
     )

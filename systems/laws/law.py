@@ -98,7 +98,7 @@ class Law:
         """Class of the law's block, or None if the law names none.
 
         The class may take the arguments ``gains``, ``velocity_term``, ``robot``,
-        ``attraction``, ``sensors``, ``tick_s``, ``known`` (parameters of the map),
+        ``attraction``, ``sensors``, ``tick_s``, ``guard`` (parameters of the map),
         ``bodies`` (number of bodies), and ``seed``. This property imports the class
         when it is read. Therefore the check of a scenario needs no Drake and no
         compiled code.

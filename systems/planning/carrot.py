@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from systems.framework.compiling import njit
-from systems.planning.way import STRAIGHT, Way
+from systems.planning.way import STRAIGHT, Way, cell_at
 
 #: A straight line is accepted if it costs at most this multiple of the path to the same
 #: point.
@@ -35,10 +35,10 @@ def find_carrot(
     Returns:
         (x, y) of the point, m. Without a path, this is the position of the robot.
     """
-    found, begin, cell = (x, y), 0, way.facts[0, 5]
-    for k in range(int(way.facts[0, 0])):
+    found, begin, cell = (x, y), 0, way.cell_m[0]
+    for k in range(way.points[0]):
         px, py = way.path[k, 0], way.path[k, 1]
-        i, j = _cell(way, px, py)
+        i, j = cell_at(way, px, py)
         distance = math.hypot(px - x, py - y)
         if k == 0:
             begin = way.cost[i, j]
@@ -48,20 +48,9 @@ def find_carrot(
         steps, price = max(1, math.ceil(2.0 * distance / cell)), 0.0
         for step in range(steps):
             part = (step + 0.5) / steps
-            a, b = _cell(way, x + (px - x) * part, y + (py - y) * part)
+            a, b = cell_at(way, x + (px - x) * part, y + (py - y) * part)
             price += way.price[a, b] / steps
         straight = STRAIGHT * price * distance / cell
         if straight <= _DEARER * (begin - way.cost[i, j]) or distance < _NEAREST_M:
             found = px, py
     return found
-
-
-@njit(cache=True)
-def _cell(
-    way: Way, x: float, y: float
-) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Return the cell of a place, or the nearest cell of the window."""
-    size, cell = way.price.shape[0], way.facts[0, 5]
-    i = math.floor(x / cell) - int(way.facts[0, 3])
-    j = math.floor(y / cell) - int(way.facts[0, 4])
-    return min(max(i, 0), size - 1), min(max(j, 0), size - 1)

@@ -6,11 +6,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.planning.following import CRUISE_SPEED_M_S
-from systems.planning.hazards import AGE_S, SPREAD, VX, VY, WEIGHT, X, Y
-from systems.planning.turning import TURN_GAIN, TURN_RATE_RAD_S, wrapped
+from systems.planning.hazards import Sample
+from systems.planning.turning import turn_rate, wrapped
+from systems.safety.braking import SLOW_TURN_RAD_S
 
 #: Duration of the prediction of motions, s, and its time step, s.
 _AHEAD_S, _STEP_S = 4.0, 0.2
@@ -34,7 +36,7 @@ _STALE_S, _UNSURE_M_S, _LEAST_NEED, _MOST_NEED = 0.8, 0.1, 0.1, 2.0
 #: view that counts, rad.
 _IN_VIEW_RAD, _OUT_OF_VIEW_RAD = 0.55, 1.0
 #: Speeds that are tried in addition to the wanted speed, m/s.
-_SPEEDS = (-0.6, -0.4, -0.2, 0.0, 0.15, 0.3, 0.45, 0.62)
+_SPEEDS = (-0.6, -0.4, -0.2, 0.0, 0.15, 0.3, 0.45, CRUISE_SPEED_M_S)
 #: Angles between the tried headings and the wanted heading, rad. Largest angle between
 #: the wanted heading and a heading towards a threat, rad.
 _ASIDE = (0.0, 0.5, -0.5, 1.0, -1.0)
@@ -45,25 +47,23 @@ _GAZE_RAD = 0.8
 #: distance, m/rad. The guard then permits only motions that lead away from the body, by
 #: at least the share ``_WITHDRAWS`` of their speed.
 _BESIDE_M, _BESIDE_S, _BESIDE_TURN_M, _WITHDRAWS = 0.09, 0.4, 0.2, 0.2
-#: Turn rate that the guard always permits, rad/s. Total weight of particles that counts
-#: as a body.
-_SLOW_RAD_S, _BODY_SHARE = 0.3, 0.3
-#: Price of a deviation from the wanted heading, m/s per rad.
-_TURN_PRICE = 0.1
+#: Total weight of particles that counts as a body.
+_BODY_SHARE = 0.3
+#: Prices, as a loss of wanted speed: a predicted contact with a body, m/s; a threat
+#: that is 1 rad out of view, m/s; and a deviation from the wanted heading, m/s per rad.
+_RISK_PRICE, _WATCH_PRICE, _TURN_PRICE = 8.0, 0.7, 0.1
 #: A speed that the guard has refused is not tried again at headings within this angle,
 #: rad, of the robot's heading.
 _HELD_RAD = 0.6
 
 
-class EvasionNumbers(NamedTuple):
-    """Constants of ``choose_motion``."""
+class Threats(NamedTuple):
+    """Where the robot has to look, one entry per particle."""
 
-    half_size: tuple[float, float]
-    """Half of the body's length and width, m."""
-    risk_gain: float
-    """Price of a predicted contact with a body, m/s."""
-    watch_gain: float
-    """Price of a threat that is 1 rad out of view, m/s."""
+    bearing_rad: NDArray[np.float64]
+    """Bearing of the particle in W, rad."""
+    watched: NDArray[np.float64]
+    """Number of bodies that the robot has to watch there."""
 
 
 @njit(cache=True)
@@ -76,7 +76,7 @@ def _between(
 
 @njit(cache=True)
 def _is_held(
-    bodies: Any, count: int, pose: Any, motion: Any, time: float, numbers: Any
+    bodies: Sample, pose: Any, motion: Any, time: float, half_size: Any
 ) -> bool:  # pragma: no cover  (compiled)
     """Return whether the guard would refuse a motion because of bodies nearby.
 
@@ -86,29 +86,28 @@ def _is_held(
     x, y, theta = pose
     speed, omega = motion
     c, s = math.cos(theta), math.sin(theta)
-    radius = math.hypot(numbers.half_size[0], numbers.half_size[1])
+    radius = math.hypot(half_size[0], half_size[1])
     near, moved = 0.0, _WITHDRAWS * max(abs(speed), radius * abs(omega))
     beside = radius + _BESIDE_M
     beside += _BESIDE_S * (abs(speed) + _BESIDE_TURN_M * abs(omega))
-    for n in range(count):
-        dx = bodies[n, X] + time * bodies[n, VX] - x
-        dy = bodies[n, Y] + time * bodies[n, VY] - y
+    for n in range(len(bodies.x)):
+        dx = bodies.x[n] + time * bodies.vx[n] - x
+        dy = bodies.y[n] + time * bodies.vy[n] - y
         distance = math.hypot(dx, dy)
         # The speed away from the body is a sufficient share of the speed of motion.
         withdraws = -speed * (c * dx + s * dy) >= moved * distance
         if distance < beside and not withdraws:
-            near += bodies[n, WEIGHT]
+            near += bodies.weight[n]
     return near > _BODY_SHARE
 
 
 @njit(cache=True)
 def risk_of(
-    bodies: Any,
-    count: int,
+    bodies: Sample,
     pose: Any,
     speed: float,
     heading: float,
-    numbers: EvasionNumbers,
+    half_size: tuple[float, float],
 ) -> float:  # pragma: no cover  (compiled)
     """Predicts how many bodies come near the robot if it uses a speed and heading.
 
@@ -117,21 +116,20 @@ def risk_of(
     permits, and returns the larger risk.
 
     Args:
-        bodies: (n, 7) from ``pick_hazards``.
-        count: Number of particles in ``bodies``.
+        bodies: From ``pick_hazards``.
         pose: (x, y, theta) now, m and rad.
         speed: Forward speed, m/s.
         heading: Heading to which the robot turns, rad.
-        numbers: Properties of the robot.
+        half_size: Half of the body's length and width, m.
 
     Returns:
         Expected number of bodies. A body counts fully within 15 cm of the robot's
         sides, and less up to 43 cm.
     """
-    let, held = _risk_along(bodies, count, pose, speed, heading, numbers, np.inf)
+    let, held = _risk_along(bodies, pose, speed, heading, half_size, np.inf)
     if held:
         stopped, _ = _risk_along(
-            bodies, count, pose, speed, heading, numbers, _SLOW_RAD_S
+            bodies, pose, speed, heading, half_size, SLOW_TURN_RAD_S
         )
         return max(let, stopped)
     return let
@@ -139,12 +137,11 @@ def risk_of(
 
 @njit(cache=True)
 def _risk_along(
-    bodies: Any,
-    count: int,
+    bodies: Sample,
     pose: Any,
     speed: float,
     heading: float,
-    numbers: EvasionNumbers,
+    half_size: tuple[float, float],
     held_rad_s: float,
 ) -> tuple[float, bool]:  # pragma: no cover  (compiled)
     """Return the risk of a motion, and whether the guard would hold the robot.
@@ -157,14 +154,13 @@ def _risk_along(
     """
     steps, total, held = math.ceil(_AHEAD_S / _STEP_S), 0.0, False
     x, y, theta = pose[0], pose[1], pose[2]
-    worst = np.zeros(count)
+    worst = np.zeros(len(bodies.x))
     for k in range(steps):
-        omega = TURN_GAIN * wrapped(heading - theta)
-        omega = min(max(omega, -TURN_RATE_RAD_S), TURN_RATE_RAD_S)
+        omega = turn_rate(wrapped(heading - theta))
         v, now, time = speed, k * _STEP_S, (k + 1) * _STEP_S
         guarded = held_rad_s < np.inf
         if (guarded or not held) and _is_held(
-            bodies, count, (x, y, theta), (speed, omega), now, numbers
+            bodies, (x, y, theta), (speed, omega), now, half_size
         ):
             held = True
             if guarded:
@@ -174,18 +170,18 @@ def _risk_along(
         c, s = math.cos(theta), math.sin(theta)
         x += v * _STEP_S * c
         y += v * _STEP_S * s
-        for n in range(count):
-            dx = bodies[n, X] + time * bodies[n, VX] - x
-            dy = bodies[n, Y] + time * bodies[n, VY] - y
+        for n in range(len(bodies.x)):
+            dx = bodies.x[n] + time * bodies.vx[n] - x
+            dy = bodies.y[n] + time * bodies.vy[n] - y
             # Gaps between the particle and the robot's rectangle, in B.
-            u = max(abs(c * dx + s * dy) - numbers.half_size[0], 0.0)
-            w = max(abs(-s * dx + c * dy) - numbers.half_size[1], 0.0)
+            u = max(abs(c * dx + s * dy) - half_size[0], 0.0)
+            w = max(abs(-s * dx + c * dy) - half_size[1], 0.0)
             if u + w > 2.0 * _NEAR_M:
                 continue
             near = _between(math.hypot(u, w), _NEAR_M, _HIT_M)
             worst[n] = max(worst[n], near * (1.0 - _LATER * time / _AHEAD_S))
-    for n in range(count):
-        total += bodies[n, WEIGHT] * worst[n]
+    for n in range(len(bodies.x)):
+        total += bodies.weight[n] * worst[n]
     return total, held
 
 
@@ -205,8 +201,8 @@ def _least_distance(
 
 @njit(cache=True)
 def find_threats(
-    bodies: Any, count: int, pose: Any, wanted: Any, threats: Any
-) -> float:  # pragma: no cover  (compiled)
+    bodies: Sample, pose: Any, wanted: Any
+) -> Threats:  # pragma: no cover  (compiled)
     """Finds how much the robot has to watch each particle, and in which direction.
 
     A particle is a threat if it will come near the robot. The function predicts the
@@ -215,45 +211,38 @@ def find_threats(
     while, or whose velocity is uncertain.
 
     Args:
-        bodies: (n, 7) from ``pick_hazards``.
-        count: Number of particles in ``bodies``.
+        bodies: From ``pick_hazards``.
         pose: (x, y, theta) of the robot, m and rad.
         wanted: Wanted speed, m/s, and heading, rad.
-        threats: (n, 2) array that the function fills: bearing in W, rad, and number of
-            bodies to be watched.
 
     Returns:
-        Sum of the numbers of bodies to be watched.
+        One threat per particle.
     """
     speed, heading = max(wanted[0], 0.0), wanted[1]
     vx, vy = speed * math.cos(heading), speed * math.sin(heading)
-    total = 0.0
-    for n in range(count):
-        dx, dy = bodies[n, X] - pose[0], bodies[n, Y] - pose[1]
-        driving, comes = _least_distance(dx, dy, bodies[n, VX] - vx, bodies[n, VY] - vy)
-        standing, later = _least_distance(dx, dy, bodies[n, VX], bodies[n, VY])
+    threats = Threats(np.empty(len(bodies.x)), np.empty(len(bodies.x)))
+    for n in range(len(bodies.x)):
+        dx, dy = bodies.x[n] - pose[0], bodies.y[n] - pose[1]
+        driving, comes = _least_distance(dx, dy, bodies.vx[n] - vx, bodies.vy[n] - vy)
+        standing, later = _least_distance(dx, dy, bodies.vx[n], bodies.vy[n])
         threat = _between(min(driving, standing), _NO_THREAT_M, _THREAT_M)
         # The nearest approach is now: the particle moves away.
         if comes + later < 0.2:
             threat *= _GOING
         # Need to watch: by the uncertain velocity, and by the time without an echo.
-        unsure = min(max(bodies[n, SPREAD] / _UNSURE_M_S - 0.5, _LEAST_NEED), 1.0)
-        need = max(min(bodies[n, AGE_S] / _STALE_S, _MOST_NEED), unsure)
-        threats[n, 0] = math.atan2(dy, dx)
-        threats[n, 1] = bodies[n, WEIGHT] * threat * need
-        total += threats[n, 1]
-    return total
+        unsure = min(max(bodies.spread_m_s[n] / _UNSURE_M_S - 0.5, _LEAST_NEED), 1.0)
+        need = max(min(bodies.age_s[n] / _STALE_S, _MOST_NEED), unsure)
+        threats.bearing_rad[n] = math.atan2(dy, dx)
+        threats.watched[n] = bodies.weight[n] * threat * need
+    return threats
 
 
 @njit(cache=True)
-def watch_of(
-    threats: Any, count: int, heading: float
-) -> float:  # pragma: no cover  (compiled)
+def watch_of(threats: Threats, heading: float) -> float:  # pragma: no cover  (compiled)
     """Computes how much of the threats is out of view at a heading.
 
     Args:
-        threats: (n, 2) from ``find_threats``.
-        count: Number of threats.
+        threats: From ``find_threats``.
         heading: Heading of the robot, rad.
 
     Returns:
@@ -261,20 +250,19 @@ def watch_of(
         Each angle counts at most 1 rad.
     """
     total = 0.0
-    for n in range(count):
-        off = abs(wrapped(threats[n, 0] - heading)) - _IN_VIEW_RAD
-        total += threats[n, 1] * min(max(off, 0.0), _OUT_OF_VIEW_RAD)
+    for n in range(len(threats.watched)):
+        off = abs(wrapped(threats.bearing_rad[n] - heading)) - _IN_VIEW_RAD
+        total += threats.watched[n] * min(max(off, 0.0), _OUT_OF_VIEW_RAD)
     return total
 
 
 @njit(cache=True)
 def choose_motion(
-    bodies: Any,
-    count: int,
+    bodies: Sample,
     pose: Any,
     wanted: Any,
     held: float,
-    numbers: EvasionNumbers,
+    half_size: tuple[float, float],
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Chooses the speed and heading with the lowest price.
 
@@ -282,8 +270,8 @@ def choose_motion(
 
     * the difference between its velocity and the wanted velocity;
     * the angle between its heading and the weaving heading, times a small price;
-    * the threats that are out of view at this heading, times ``watch_gain``;
-    * the bodies that come near within 4 s, times ``risk_gain``.
+    * the threats that are out of view at this heading, times a price;
+    * the bodies that come near within 4 s, times a price.
 
     The function tries all pairs of a heading and a speed. It uses nine headings: five
     around the heading of the path, the current heading, the weaving heading, and two
@@ -291,25 +279,23 @@ def choose_motion(
     the other terms already exceed the lowest price.
 
     Args:
-        bodies: (n, 7) from ``pick_hazards``.
-        count: Number of particles in ``bodies``.
+        bodies: From ``pick_hazards``.
         pose: (x, y, theta) of the robot, m and rad.
         wanted: Wanted speed, m/s; heading of the path, rad; and weaving heading, rad,
             which oscillates around the heading of the path.
         held: Speed that the guard has just refused, m/s, or 0.
-        numbers: Properties of the robot, and prices.
+        half_size: Half of the body's length and width, m.
 
     Returns:
         Speed, m/s; heading, rad; and the number of bodies to be watched. If the last
         number is zero, there is no reason to deviate from the wanted motion.
     """
-    threats = np.zeros((count, 2))
-    way = wanted[0], wanted[1]
-    watched = find_threats(bodies, count, pose, way, threats)
-    cosine, sine = 0.0, 0.0
-    for n in range(count):
-        cosine += threats[n, 1] * math.cos(threats[n, 0])
-        sine += threats[n, 1] * math.sin(threats[n, 0])
+    threats = find_threats(bodies, pose, (wanted[0], wanted[1]))
+    watched, cosine, sine = 0.0, 0.0, 0.0
+    for n in range(len(bodies.x)):
+        watched += threats.watched[n]
+        cosine += threats.watched[n] * math.cos(threats.bearing_rad[n])
+        sine += threats.watched[n] * math.sin(threats.bearing_rad[n])
     # Mean direction of the threats.
     gaze = math.atan2(sine, cosine)
     headings = np.empty(len(_ASIDE) + 4)
@@ -324,20 +310,20 @@ def choose_motion(
         # The angle off the path, or off the weaving heading if this angle is smaller.
         off = min(abs(wrapped(heading - wanted[1])), weaving)
         base = _TURN_PRICE * weaving
-        base += numbers.watch_gain * watch_of(threats, count, heading)
+        base += _WATCH_PRICE * watch_of(threats, heading)
         for k in range(len(_SPEEDS) + 1):
             speed = wanted[0] if k == len(_SPEEDS) else _SPEEDS[k]
             price = base + math.hypot(
                 wanted[0] - speed * math.cos(off), speed * math.sin(off)
             )
-            if speed > CRUISE_SPEED_M_S or price >= best:
+            if price >= best:
                 continue
             ahead = abs(wrapped(heading - pose[2])) < _HELD_RAD
             # The guard has just refused such a motion.
             if ahead and speed * held > 0.0:
                 continue
-            risk = risk_of(bodies, count, pose, speed, heading, numbers)
-            price += numbers.risk_gain * risk
+            risk = risk_of(bodies, pose, speed, heading, half_size)
+            price += _RISK_PRICE * risk
             if price < best:
                 best, chosen = price, (speed, heading)
     return chosen[0], chosen[1], watched

@@ -15,28 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
-from systems.planning.turning import wrapped
-from systems.safety.free_space import FIRST_I, FIRST_J, ROLLED, FreeSpace
+from systems.planning.looks import (
+    HazardSensors,
+    Look,
+    Looks,
+    came_from_free,
+    goes_on,
+    is_target,
+    look_of,
+    make_looks,
+    remember_looks,
+    seen_from,
+)
+from systems.safety.free_space import FreeSpace
 
 #: Number of tracks; particles per track; particles per track that are used to choose a
 #: motion.
 _TRACKS, _PARTICLES, _PICKED = 8, 200, 25
-#: Indices in a particle: position, m; velocity, m/s; and its share of the track.
-X, Y, VX, VY, WEIGHT = range(5)
-#: Additional indices in a picked particle: time since its track was last seen, s, and
-#: standard deviation of the velocity in its track, m/s.
-AGE_S, SPREAD = 5, 6
-#: Indices in a track: probability that the body exists, and when it was last seen, s.
-EXISTS, SEEN_S = range(2)
-#: Indices in the memory: state of the random generator, and when the last track began,
-#: s.
-RANDOM, MOVED_S = range(2)
-#: Indices in a look, which is one reading of one sensor: range, m; whether there was an
-#: echo; time, s; position of the sensor, m; and direction of its axis, rad.
-R, HEARD, TIME, SX, SY, AXIS = range(6)
-#: Number of looks per sensor that are kept.
-_LOOKS = 3
-
+#: Greatest speed of the bodies that are tracked, m/s.
+TOP_SPEED_M_S = 0.6
 #: Distance of a particle behind the surface that echoes, m.
 _BEYOND_M = 0.02
 #: A range does not fit a particle if it differs from the distance of the particle by
@@ -70,53 +67,68 @@ _LEAST_EXISTS, _LEAST_SHARE = 0.03, 0.03
 _CERTAIN, _SEEN_AGAIN = 0.98, 0.2
 #: A track ends if it was not seen for this time, s, or is farther away than this, m.
 _FORGET_S, _FAR_M = 12.0, 5.0
-#: Spacing of the points at which an arc is checked, and how far behind the arc they
-#: reach, both in cells.
-_ARC_STEP, _BEHIND = 0.3, 0.6
 #: ``find_movers`` lists a track if its probability is at least the first number and it
 #: was seen within the second number, s. Echoes within the third number, m, of its
 #: position come from the body.
 _LIKELY, _LATELY_S, _BODY_M = 0.3, 3.0, 0.5
 #: Largest number of draws for a particle that no sensor would have seen before.
 _TRIES = 12
-#: A range that changes faster than the first number, m/s, belongs to another body. A
-#: look that is older than the second number, ticks, is not compared with the next look.
-_FASTEST_M_S, _OLDEST_TICKS = 2.0, 4.5
+#: The oldest look is not compared with a particle if it is older than this multiple of
+#: the time between the last two looks.
+_TOO_OLD = 10.0
 
 
-class HazardSensors(NamedTuple):
-    """Properties of sensors and bodies on which the tracks depend."""
+class Particles(NamedTuple):
+    """Hypotheses about bodies.
 
-    places: NDArray[np.float64]
-    """(sensors, 2) position relative to the axle in B, m."""
-    directions: NDArray[np.float64]
-    """(sensors, 2) direction of the axis in B and half of the aperture, rad."""
-    farthest_m: float
-    """Greatest range, m."""
-    margin_m: float
-    """Largest error of a range, m."""
-    noise_m: float
-    """Standard deviation of a range, m."""
-    top_speed_m_s: float
-    """Largest speed of a body, m/s."""
-    tick_s: float
+    In ``Hazards``, each array has the form (tracks, particles). Functions that work on
+    one track get its rows.
+    """
+
+    x: NDArray[np.float64]
+    """Position, m."""
+    y: NDArray[np.float64]
+    """Position, m."""
+    vx: NDArray[np.float64]
+    """Velocity, m/s."""
+    vy: NDArray[np.float64]
+    """Velocity, m/s."""
+    weight: NDArray[np.float64]
+    """Share of the track. The weights of a track add up to 1."""
 
 
 class Hazards(NamedTuple):
     """The tracks of moving bodies. All arrays change."""
 
-    tracks: NDArray[np.float64]
-    """(tracks, 2) ``EXISTS`` and ``SEEN_S``."""
-    particles: NDArray[np.float64]
-    """(tracks, particles, 5) particles of each track; the weights of a track add up to
-    1."""
-    looks: NDArray[np.float64]
-    """(3, sensors, 6) last looks of each sensor, most recent first."""
-    memory: NDArray[np.float64]
-    """(1, 2) ``RANDOM`` and ``MOVED_S``."""
-    picked: NDArray[np.float64]
-    """(n, 7) particles that ``pick_hazards`` has chosen as a sample of all particles.
-    The weight of a picked particle is an expected number of bodies."""
+    exists: NDArray[np.float64]
+    """(tracks,) probability that the body exists; 0 for an unused track."""
+    seen_s: NDArray[np.float64]
+    """(tracks,) time at which the body was last seen, s."""
+    particles: Particles
+    looks: Looks
+    random: NDArray[np.int64]
+    """(1,) state of the random generator."""
+    moved_s: NDArray[np.float64]
+    """(1,) time at which the last track began, s."""
+
+
+class Sample(NamedTuple):
+    """Particles of several tracks that stand for all particles; arrays of (n,)."""
+
+    x: NDArray[np.float64]
+    """Position, m."""
+    y: NDArray[np.float64]
+    """Position, m."""
+    vx: NDArray[np.float64]
+    """Velocity, m/s."""
+    vy: NDArray[np.float64]
+    """Velocity, m/s."""
+    weight: NDArray[np.float64]
+    """Expected number of bodies for which the particle stands."""
+    age_s: NDArray[np.float64]
+    """Time since the track was last seen, s."""
+    spread_m_s: NDArray[np.float64]
+    """Standard deviation of the velocity in the track, m/s."""
 
 
 def make_hazards(sensors: int) -> Hazards:
@@ -128,15 +140,14 @@ def make_hazards(sensors: int) -> Hazards:
     Returns:
         The empty memory.
     """
-    memory = np.array([[1.0, -np.inf]])
-    looks = np.zeros((_LOOKS, sensors, 6))
-    looks[:, :, TIME] = -np.inf
+    grid = _TRACKS, _PARTICLES
     return Hazards(
-        np.zeros((_TRACKS, 2)),
-        np.zeros((_TRACKS, _PARTICLES, 5)),
-        looks,
-        memory,
-        np.zeros((_TRACKS * _PICKED, 7)),
+        np.zeros(_TRACKS),
+        np.zeros(_TRACKS),
+        Particles(*(np.zeros(grid) for _ in Particles._fields)),
+        make_looks(sensors),
+        np.ones(1, dtype=np.int64),
+        np.full(1, -np.inf),
     )
 
 
@@ -177,74 +188,68 @@ def track_hazards(
     """
     ages, tick_s = readings[2], sensors.tick_s
     _move_on(hazards, tick_s)
-    _remember_looks(hazards, time, pose, readings, sensors)
+    remember_looks(hazards.looks, time, pose, readings, sensors)
     for k in range(len(ages)):
         # The sensor has not fired in this tick.
         if ages[k] > 0.5 * tick_s:
             continue
-        look, half = hazards.looks[0, k], sensors.directions[k, 1]
-        unknown = look[HEARD] > 0.5 and not _is_target(look, half, target)
+        look, half = look_of(hazards.looks, 0, k), sensors.directions[k, 1]
+        unknown = look.heard > 0.5 and not is_target(look, half, target)
         best = _best_track(hazards, look, half) if unknown else -1
-        for t in range(len(hazards.tracks)):
-            if hazards.tracks[t, EXISTS] > 0.0:
-                _weigh(hazards, t, k, best, sensors)
+        for t in range(len(hazards.exists)):
+            if hazards.exists[t] > 0.0:
+                _weigh(hazards, t, best, look, half, sensors)
         if best >= 0:
-            hazards.tracks[best, SEEN_S] = time
-            doubt = _CERTAIN - hazards.tracks[best, EXISTS]
-            hazards.tracks[best, EXISTS] += _SEEN_AGAIN * doubt
+            hazards.seen_s[best] = time
+            doubt = _CERTAIN - hazards.exists[best]
+            hazards.exists[best] += _SEEN_AGAIN * doubt
         elif (
             unknown
-            and _goes_on(hazards, k, time, sensors)
-            and _came_from_free(space, look, half, sensors.margin_m)
+            and goes_on(look, look_of(hazards.looks, 1, k), tick_s)
+            and came_from_free(space, look, half, sensors.margin_m)
         ):
-            _begin(hazards, k, time, sensors)
+            _begin(hazards, k, sensors)
     _forget(hazards, time, pose)
+
+
+@njit(cache=True)
+def _particles_of(
+    hazards: Hazards, t: int
+) -> Particles:  # pragma: no cover  (compiled)
+    """Return the particles of a track; changes affect the track."""
+    p = hazards.particles
+    return Particles(p.x[t], p.y[t], p.vx[t], p.vy[t], p.weight[t])
 
 
 @njit(cache=True)
 def _move_on(hazards: Hazards, tick_s: float) -> None:  # pragma: no cover  (compiled)
     """Move all particles by one tick with their velocities."""
-    for t in range(len(hazards.tracks)):
-        if hazards.tracks[t, EXISTS] > 0.0:
-            p = hazards.particles[t]
-            for n in range(len(p)):
-                p[n, X] += tick_s * p[n, VX]
-                p[n, Y] += tick_s * p[n, VY]
+    for t in range(len(hazards.exists)):
+        if hazards.exists[t] > 0.0:
+            p = _particles_of(hazards, t)
+            for n in range(len(p.x)):
+                p.x[n] += tick_s * p.vx[n]
+                p.y[n] += tick_s * p.vy[n]
             # Bodies stop sometimes. On average, the share ``_STOPS_HZ`` of the
             # particles stops per second.
-            if _chance(hazards.memory) < _STOPS_HZ * tick_s * len(p):
-                n = int(_chance(hazards.memory) * len(p))
-                p[n, VX], p[n, VY] = 0.0, 0.0
+            if _chance(hazards.random) < _STOPS_HZ * tick_s * len(p.x):
+                n = int(_chance(hazards.random) * len(p.x))
+                p.vx[n], p.vy[n] = 0.0, 0.0
 
 
 @njit(cache=True)
 def _best_track(
-    hazards: Hazards, look: Any, half: float
+    hazards: Hazards, look: Look, half: float
 ) -> int:  # pragma: no cover  (compiled)
     """Return the track that explains an echo best; -1 if no track explains it."""
     best, most = -1, _LEAST_SHARE
-    for t in range(len(hazards.tracks)):
-        exists = hazards.tracks[t, EXISTS]
+    for t in range(len(hazards.exists)):
+        exists = hazards.exists[t]
         if exists > 0.0:
-            share = exists * _share_at(hazards.particles[t], look, half)
+            share = exists * _share_at(_particles_of(hazards, t), look, half)
             if share > most:
                 best, most = t, share
     return best
-
-
-@njit(cache=True)
-def _goes_on(
-    hazards: Hazards, k: int, time: float, sensors: HazardSensors
-) -> bool:  # pragma: no cover  (compiled)
-    """Return whether an echo fits the previous look of its sensor.
-
-    If it does not fit, the range rate is unknown.
-    """
-    look, then = hazards.looks[0, k], hazards.looks[1, k]
-    since = time - then[TIME]
-    if then[HEARD] < 0.5 or since > _OLDEST_TICKS * sensors.tick_s:
-        return False
-    return abs(look[R] - then[R]) < _FASTEST_M_S * since
 
 
 @njit(cache=True)
@@ -252,95 +257,64 @@ def _forget(
     hazards: Hazards, time: float, pose: Any
 ) -> None:  # pragma: no cover  (compiled)
     """End improbable, old and distant tracks, and resample the others."""
-    for t in range(len(hazards.tracks)):
-        exists, seen_s = hazards.tracks[t, EXISTS], hazards.tracks[t, SEEN_S]
+    for t in range(len(hazards.exists)):
+        exists = hazards.exists[t]
         if exists <= 0.0:
             continue
-        first = hazards.particles[t, 0]
-        far = math.hypot(first[X] - pose[0], first[Y] - pose[1]) > _FAR_M
-        if exists < _LEAST_EXISTS or far or time - seen_s > _FORGET_S:
-            hazards.tracks[t, EXISTS] = 0.0
+        p = _particles_of(hazards, t)
+        far = math.hypot(p.x[0] - pose[0], p.y[0] - pose[1]) > _FAR_M
+        if exists < _LEAST_EXISTS or far or time - hazards.seen_s[t] > _FORGET_S:
+            hazards.exists[t] = 0.0
         else:
-            _draw_anew(hazards, t)
+            _draw_anew(p, hazards.random)
 
 
 @njit(cache=True)
-def _chance(memory: Any) -> float:  # pragma: no cover  (compiled)
+def _chance(random: Any) -> float:  # pragma: no cover  (compiled)
     """Return the next pseudorandom number from 0 to 1 (Park and Miller, 1988)."""
-    memory[0, RANDOM] = (48271 * int(memory[0, RANDOM])) % 2147483647
-    return memory[0, RANDOM] / 2147483647.0
+    random[0] = (48271 * random[0]) % 2147483647
+    return random[0] / 2147483647.0
 
 
 @njit(cache=True)
-def _normal(memory: Any) -> float:  # pragma: no cover  (compiled)
+def _normal(random: Any) -> float:  # pragma: no cover  (compiled)
     """Return a roughly normal random number from -3 to 3: mean 0, deviation 1."""
-    return 2.0 * (_chance(memory) + _chance(memory) + _chance(memory) - 1.5)
+    return 2.0 * (_chance(random) + _chance(random) + _chance(random) - 1.5)
 
 
 @njit(cache=True)
-def _remember_looks(
-    hazards: Hazards, time: float, pose: Any, readings: Any, sensors: HazardSensors
-) -> None:  # pragma: no cover  (compiled)
-    """Store the new readings as looks, with position and direction of each sensor."""
-    ranges, echo, ages = readings
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    for k in range(len(ranges)):
-        if ages[k] > 0.5 * sensors.tick_s:
-            continue
-        for age in range(_LOOKS - 1, 0, -1):
-            for i in range(6):
-                hazards.looks[age, k, i] = hazards.looks[age - 1, k, i]
-        ahead, aside = sensors.places[k]
-        look = hazards.looks[0, k]
-        look[R], look[HEARD], look[TIME] = ranges[k], echo[k], time
-        look[SX] = pose[0] + c * ahead - s * aside
-        look[SY] = pose[1] + s * ahead + c * aside
-        look[AXIS] = pose[2] + sensors.directions[k, 0]
-
-
-@njit(cache=True)
-def _seen_from(
-    look: Any, x: float, y: float
-) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Return the distance of a place, m, and its angle off the sensor's axis, rad."""
-    dx, dy = x - look[SX], y - look[SY]
-    return math.hypot(dx, dy), abs(wrapped(math.atan2(dy, dx) - look[AXIS]))
-
-
-@njit(cache=True)
-def _is_target(
-    look: Any, half: float, target: Any
-) -> bool:  # pragma: no cover  (compiled)
-    """Return whether an echo may come from the followed target."""
-    distance, off = _seen_from(look, target[0], target[1])
-    beside = off - half < target[2] / max(distance, target[2])
-    return beside and abs(distance - look[R]) < target[2]
-
-
-@njit(cache=True)
-def _share_at(p: Any, look: Any, half: float) -> float:  # pragma: no cover  (compiled)
+def _share_at(
+    p: Particles, look: Look, half: float
+) -> float:  # pragma: no cover  (compiled)
     """Return the share of a track's particles, by weight, that fit an echo."""
     share = 0.0
-    for n in range(len(p)):
-        distance, off = _seen_from(look, p[n, X], p[n, Y])
+    for n in range(len(p.x)):
+        distance, off = seen_from(look, p.x[n], p.y[n])
         if (
             off < half + _EDGE_M / max(distance, 0.1)
-            and abs(distance - look[R] - _BEYOND_M) < _GATE_M
+            and abs(distance - look.range_m - _BEYOND_M) < _GATE_M
         ):
-            share += p[n, WEIGHT]
+            share += p.weight[n]
     return share
 
 
 @njit(cache=True)
 def _weigh(
-    hazards: Hazards, t: int, k: int, best: int, sensors: HazardSensors
+    hazards: Hazards,
+    t: int,
+    best: int,
+    look: Look,
+    half: float,
+    sensors: HazardSensors,
 ) -> None:  # pragma: no cover  (compiled)
-    """Weigh the particles of a track with the newest look of sensor ``k``.
+    """Weigh the particles of a track with a look, by Bayes' rule.
 
-    ``best`` is the track to which the echo is attributed, or -1. If ``best`` is track
-    ``t``, the track has echoed. For each particle, ``gap`` is the measured distance
-    minus the distance of the particle. Without an echo, ``gap`` is infinite for
-    particles within the greatest range, and 0 for the others. There are four cases:
+    ``best`` is the track to which the echo is attributed, or -1. If it is track ``t``,
+    the track has echoed. ``half`` is half of the sensor's aperture, rad. Each weight is
+    multiplied by the likelihood of the look if the body were at this particle. The
+    likelihood depends on ``gap``, the measured distance minus the distance of the
+    particle. Without an echo, ``gap`` is infinite for particles within the greatest
+    range, and 0 for the others. There are four cases:
 
     * The particle is outside the aperture. If its track has echoed, the particle loses
       weight.
@@ -350,164 +324,126 @@ def _weigh(
       particle moves to the measured range.
     * The particle is behind the echo of its track. The particle loses weight.
 
-    Other particles keep their weight, because a nearer object may hide them. If the
-    track has not echoed, the lost weight lowers the probability of the track by Bayes'
-    rule.
+    Other particles keep their weight, because a nearer object may hide them. The sum of
+    the new weights is the likelihood of the look if the body exists anywhere in its
+    track. If the track has not echoed, this sum lowers the probability of the track.
     """
-    p, fit_m = hazards.particles[t], math.hypot(_FIT_M, sensors.noise_m)
-    look, half, echoed = hazards.looks[0, k], sensors.directions[k, 1], t == best
-    total = 0.0
-    for n in range(len(p)):
-        distance, off = _seen_from(look, p[n, X], p[n, Y])
+    p, fit_m = _particles_of(hazards, t), math.hypot(_FIT_M, sensors.noise_m)
+    echoed, total = t == best, 0.0
+    for n in range(len(p.x)):
+        distance, off = seen_from(look, p.x[n], p.y[n])
         edge = _EDGE_M / max(distance, 0.1)
-        gap = look[R] + _BEYOND_M - distance
-        if look[HEARD] < 0.5:
+        gap = look.range_m + _BEYOND_M - distance
+        if look.heard < 0.5:
             gap = np.inf if distance < sensors.farthest_m - 0.05 else 0.0
         # Outside the aperture.
         if off > half + edge:
             if echoed:
-                p[n, WEIGHT] *= _ELSEWHERE
+                p.weight[n] *= _ELSEWHERE
         elif gap > _GATE_M:
             # The sensor has seen past the particle.
             if off < half - 0.5 * edge:
-                p[n, WEIGHT] *= _UNSEEN
+                p.weight[n] *= _UNSEEN
         elif echoed and gap > -_GATE_M:
-            p[n, WEIGHT] *= max(math.exp(-0.5 * (gap / fit_m) ** 2), _LEAST_FIT)
-            _pull(p[n], look, distance, gap, sensors)
+            p.weight[n] *= max(math.exp(-0.5 * (gap / fit_m) ** 2), _LEAST_FIT)
+            _pull(p, n, look, distance, gap, sensors.tick_s)
         elif echoed:
-            p[n, WEIGHT] *= _ELSEWHERE
-        total += p[n, WEIGHT]
-    exists = hazards.tracks[t, EXISTS]
+            p.weight[n] *= _ELSEWHERE
+        total += p.weight[n]
+    exists = hazards.exists[t]
     if total < 1e-9:
-        hazards.tracks[t, EXISTS] = 0.0
+        hazards.exists[t] = 0.0
         return
     if not echoed:
-        # Bayes' rule: ``total`` is the likelihood of the look if the body exists.
         exists = min(exists, _CERTAIN)
         exists *= total / (exists * total + 1.0 - exists)
-    hazards.tracks[t, EXISTS] = exists
-    for n in range(len(p)):
-        p[n, WEIGHT] /= total
+    hazards.exists[t] = exists
+    for n in range(len(p.x)):
+        p.weight[n] /= total
 
 
 @njit(cache=True)
 def _pull(
-    particle: Any, look: Any, distance: float, gap: float, sensors: HazardSensors
+    p: Particles, n: int, look: Look, distance: float, gap: float, tick_s: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Move a particle to the measured range.
+    """Move particle ``n`` to the measured range.
 
     A part of the range error also corrects the velocity of the particle.
     """
-    ux = (particle[X] - look[SX]) / max(distance, 1e-6)
-    uy = (particle[Y] - look[SY]) / max(distance, 1e-6)
-    particle[X] += gap * ux
-    particle[Y] += gap * uy
-    change = min(max(_TO_VELOCITY * gap / sensors.tick_s, -0.1), 0.1)
-    particle[VX] += change * ux
-    particle[VY] += change * uy
-    speed = math.hypot(particle[VX], particle[VY])
-    if speed > sensors.top_speed_m_s:
-        particle[VX] *= sensors.top_speed_m_s / speed
-        particle[VY] *= sensors.top_speed_m_s / speed
-
-
-@njit(cache=True)
-def _came_from_free(
-    space: FreeSpace, look: Any, half: float, margin_m: float
-) -> bool:  # pragma: no cover  (compiled)
-    """Return whether the whole arc of an echo was seen free before.
-
-    The function checks points along the arc, over the width of the aperture. In depth,
-    the points extend from the range minus its largest error to the range plus this
-    error and a part of a cell. The cells of all points must still count as free.
-    """
-    cells, cell = space.hits.shape[0], space.cell_m
-    step_m = _ARC_STEP * cell
-    across = max(8, math.ceil(2.0 * half * look[R] / step_m))
-    along = math.ceil((2.0 * margin_m + _BEHIND * cell) / step_m)
-    for one in range(across + 1):
-        angle = look[AXIS] + half * (2.0 * one / across - 1.0)
-        for other in range(along + 1):
-            at = look[R] - margin_m + other * step_m
-            i = math.floor((look[SX] + at * math.cos(angle)) / cell)
-            j = math.floor((look[SY] + at * math.sin(angle)) / cell)
-            di, dj = i - space.facts[0, FIRST_I], j - space.facts[0, FIRST_J]
-            if not (0 <= di < cells and 0 <= dj < cells):
-                return False
-            # The position of a forgotten cell is no longer known.
-            if space.free_until[i % cells, j % cells] < space.facts[0, ROLLED]:
-                return False
-    return True
+    ux = (p.x[n] - look.x) / max(distance, 1e-6)
+    uy = (p.y[n] - look.y) / max(distance, 1e-6)
+    p.x[n] += gap * ux
+    p.y[n] += gap * uy
+    change = min(max(_TO_VELOCITY * gap / tick_s, -0.1), 0.1)
+    p.vx[n] += change * ux
+    p.vy[n] += change * uy
+    speed = math.hypot(p.vx[n], p.vy[n])
+    if speed > TOP_SPEED_M_S:
+        p.vx[n] *= TOP_SPEED_M_S / speed
+        p.vy[n] *= TOP_SPEED_M_S / speed
 
 
 @njit(cache=True)
 def _begin(
-    hazards: Hazards, k: int, time: float, sensors: HazardSensors
+    hazards: Hazards, k: int, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Begin a track that replaces the least probable one.
+    """Begin a track with the newest echo of sensor ``k``.
 
-    The body may be anywhere on the arc of the newest echo of sensor ``k``. The radial
-    speed of the body follows from the range rate and the motion of the sensor, with an
-    error. The tangential speed is unknown. The function draws this speed uniformly from
-    the values for which the total speed does not exceed the top speed. It repeats a
-    draw if a sensor would have seen the drawn body in its oldest look. It omits this
-    check if the oldest look of sensor ``k`` is too old. Each particle is drawn at most
-    12 times.
+    The track replaces the least probable one. Each of its particles is drawn like this:
+
+    1. The direction is anywhere within the aperture, and the distance is the range.
+    2. The radial speed is the range rate plus the sensor's own speed in this direction,
+       with a random error.
+    3. The tangential speed is unknown. It is drawn uniformly from the values for which
+       the total speed does not exceed ``TOP_SPEED_M_S``.
+    4. A body that begins to echo was out of view shortly before. The draw is repeated,
+       up to 12 times, if a sensor would have seen the body in its oldest look. This
+       check is omitted if the oldest look of sensor ``k`` is too old.
     """
-    tracks, memory, top = hazards.tracks, hazards.memory, sensors.top_speed_m_s
-    look, then, half = (
-        hazards.looks[0, k],
-        hazards.looks[1, k],
-        sensors.directions[k, 1],
-    )
-    # Find the least probable track.
-    t = 0
-    for other in range(len(tracks)):
-        if tracks[other, EXISTS] < tracks[t, EXISTS]:
-            t = other
-    # Range rate, its error, and velocity of the sensor.
-    p, since = hazards.particles[t], time - then[TIME]
-    rate = (look[R] - then[R]) / since
+    random, top = hazards.random, TOP_SPEED_M_S
+    look, then = look_of(hazards.looks, 0, k), look_of(hazards.looks, 1, k)
+    half, since = sensors.directions[k, 1], look.time_s - then.time_s
+    rate = (look.range_m - then.range_m) / since
     rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m / since)
-    own_x, own_y = (look[SX] - then[SX]) / since, (look[SY] - then[SY]) / since
-    ago = time - hazards.looks[2, k, TIME]
-    at = look[R] + _BEYOND_M
-    for n in range(len(p)):
+    own_x, own_y = (look.x - then.x) / since, (look.y - then.y) / since
+    ago = look.time_s - hazards.looks.time_s[2, k]
+    at = look.range_m + _BEYOND_M
+    t = int(np.argmin(hazards.exists))
+    p = _particles_of(hazards, t)
+    for n in range(len(p.x)):
         for _ in range(_TRIES):
-            # Draw a direction within the aperture.
-            angle = look[AXIS] + half * (2.0 * _chance(memory) - 1.0)
+            angle = look.axis_rad + half * (2.0 * _chance(random) - 1.0)
             ux, uy = math.cos(angle), math.sin(angle)
-            # The range rate is the radial speed of the body minus that of the sensor.
-            radial = rate + own_x * ux + own_y * uy + rate_error * _normal(memory)
+            radial = rate + own_x * ux + own_y * uy + rate_error * _normal(random)
             radial = min(max(radial, -top), top)
             across = math.sqrt(max(top * top - radial * radial, 0.0))
-            across *= 2.0 * _chance(memory) - 1.0
-            p[n, X], p[n, Y] = look[SX] + at * ux, look[SY] + at * uy
-            p[n, VX] = radial * ux - across * uy
-            p[n, VY] = radial * uy + across * ux
-            if ago > 10.0 * since or not _was_visible(hazards, p[n], ago, sensors):
+            across *= 2.0 * _chance(random) - 1.0
+            p.x[n], p.y[n] = look.x + at * ux, look.y + at * uy
+            p.vx[n] = radial * ux - across * uy
+            p.vy[n] = radial * uy + across * ux
+            if ago > _TOO_OLD * since or not _was_visible(hazards, p, n, ago, sensors):
                 break
-        p[n, WEIGHT] = 1.0 / len(p)
-    tracks[t, EXISTS], tracks[t, SEEN_S] = _CERTAIN, time
-    memory[0, MOVED_S] = time
+        p.weight[n] = 1.0 / len(p.x)
+    hazards.exists[t], hazards.seen_s[t] = _CERTAIN, look.time_s
+    hazards.moved_s[0] = look.time_s
 
 
 @njit(cache=True)
 def _was_visible(
-    hazards: Hazards, particle: Any, ago: float, sensors: HazardSensors
+    hazards: Hazards, p: Particles, n: int, ago: float, sensors: HazardSensors
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether the oldest looks contradict a particle.
+    """Return whether the oldest looks contradict particle ``n``.
 
     The function moves the particle back in time by ``ago`` seconds. A look contradicts
     the particle if two conditions hold. The particle was inside the aperture, at least
     3 cm from the edge. It was also at least 3 cm nearer than the reading. The sensor
     would have seen such a body, but did not.
     """
-    x, y = particle[X] - ago * particle[VX], particle[Y] - ago * particle[VY]
-    for k in range(hazards.looks.shape[1]):
-        look, half = hazards.looks[_LOOKS - 1, k], sensors.directions[k, 1]
-        distance, off = _seen_from(look, x, y)
-        reach = look[R] if look[HEARD] > 0.5 else sensors.farthest_m
+    x, y = p.x[n] - ago * p.vx[n], p.y[n] - ago * p.vy[n]
+    for k in range(len(sensors.directions)):
+        look, half = look_of(hazards.looks, 2, k), sensors.directions[k, 1]
+        distance, off = seen_from(look, x, y)
+        reach = look.range_m if look.heard > 0.5 else sensors.farthest_m
         inside = off < half - 0.03 / max(distance, 0.1)
         if inside and distance + 0.03 < reach:
             return True
@@ -515,7 +451,7 @@ def _was_visible(
 
 
 @njit(cache=True)
-def _draw_anew(hazards: Hazards, t: int) -> None:  # pragma: no cover  (compiled)
+def _draw_anew(p: Particles, random: Any) -> None:  # pragma: no cover  (compiled)
     """Draw the particles of a track again in proportion to their weights.
 
     The function draws only if the effective number of particles is at most half of
@@ -523,34 +459,45 @@ def _draw_anew(hazards: Hazards, t: int) -> None:  # pragma: no cover  (compiled
     draw is systematic: it takes particles at equal steps of the cumulative weight.
     Small noise then separates copies of the same particle.
     """
-    p, memory = hazards.particles[t], hazards.memory
-    squares = 0.0
-    for n in range(len(p)):
-        squares += p[n, WEIGHT] ** 2
-    if squares * len(p) < 2.0:
+    count, squares = len(p.x), 0.0
+    for n in range(count):
+        squares += p.weight[n] ** 2
+    if squares * count < 2.0:
         return
-    old = np.copy(p)
-    by_x = max(_JITTER * _spread(p, VX), _JITTER_M_S)
-    by_y = max(_JITTER * _spread(p, VY), _JITTER_M_S)
-    passed, m = old[0, WEIGHT], 0
-    for n in range(len(p)):
-        while passed < (n + 0.5) / len(p) and m < len(p) - 1:
-            m += 1
-            passed += old[m, WEIGHT]
-        p[n, X] = old[m, X] + _JITTER_M * _normal(memory)
-        p[n, Y] = old[m, Y] + _JITTER_M * _normal(memory)
-        p[n, VX] = old[m, VX] + by_x * _normal(memory)
-        p[n, VY] = old[m, VY] + by_y * _normal(memory)
-        p[n, WEIGHT] = 1.0 / len(p)
+    by_x = max(_JITTER * _spread(p.vx), _JITTER_M_S)
+    by_y = max(_JITTER * _spread(p.vy), _JITTER_M_S)
+    drawn = _at_equal_steps(p.weight, count)
+    x, y, vx, vy = p.x[drawn], p.y[drawn], p.vx[drawn], p.vy[drawn]
+    for n in range(count):
+        p.x[n] = x[n] + _JITTER_M * _normal(random)
+        p.y[n] = y[n] + _JITTER_M * _normal(random)
+        p.vx[n] = vx[n] + by_x * _normal(random)
+        p.vy[n] = vy[n] + by_y * _normal(random)
+        p.weight[n] = 1.0 / count
 
 
 @njit(cache=True)
-def _spread(p: Any, which: int) -> float:  # pragma: no cover  (compiled)
+def _at_equal_steps(
+    weight: Any, count: int
+) -> NDArray[np.int64]:  # pragma: no cover  (compiled)
+    """Return the indices of ``count`` particles at equal steps of cumulative weight."""
+    found = np.empty(count, dtype=np.int64)
+    passed, m = weight[0], 0
+    for n in range(count):
+        while passed < (n + 0.5) / count and m < len(weight) - 1:
+            m += 1
+            passed += weight[m]
+        found[n] = m
+    return found
+
+
+@njit(cache=True)
+def _spread(values: Any) -> float:  # pragma: no cover  (compiled)
     """Return the unweighted standard deviation of one value over all particles."""
     mean, square = 0.0, 0.0
-    for n in range(len(p)):
-        mean += p[n, which] / len(p)
-        square += p[n, which] ** 2 / len(p)
+    for n in range(len(values)):
+        mean += values[n] / len(values)
+        square += values[n] ** 2 / len(values)
     return math.sqrt(max(square - mean**2, 0.0))
 
 
@@ -570,14 +517,13 @@ def find_movers(
         Number of bodies.
     """
     count = 0
-    for t in range(len(hazards.tracks)):
-        exists, seen_s = hazards.tracks[t, EXISTS], hazards.tracks[t, SEEN_S]
-        if exists < _LIKELY or time - seen_s > _LATELY_S:
+    for t in range(len(hazards.exists)):
+        if hazards.exists[t] < _LIKELY or time - hazards.seen_s[t] > _LATELY_S:
             continue
-        p, x, y = hazards.particles[t], 0.0, 0.0
-        for n in range(len(p)):
-            x += p[n, WEIGHT] * p[n, X]
-            y += p[n, WEIGHT] * p[n, Y]
+        p, x, y = _particles_of(hazards, t), 0.0, 0.0
+        for n in range(len(p.x)):
+            x += p.weight[n] * p.x[n]
+            y += p.weight[n] * p.y[n]
         places[count, 0], places[count, 1], places[count, 2] = x, y, _BODY_M
         count += 1
     return count
@@ -586,38 +532,35 @@ def find_movers(
 @njit(cache=True)
 def pick_hazards(
     hazards: Hazards, time: float, pose: Any, within_m: float
-) -> int:  # pragma: no cover  (compiled)
+) -> Sample:  # pragma: no cover  (compiled)
     """Picks a sample of the particles of all tracks near a robot.
 
     The function takes 25 particles of each track, at equal steps of the cumulative
     weight. Each picked particle gets an equal part of the probability of the track.
 
     Args:
-        hazards: The tracks. The function writes ``picked``.
+        hazards: The tracks.
         time: Current time, s.
         pose: (x, y, theta) of the robot, m and rad.
         within_m: Distance from the robot, m. Tracks beyond it are left out.
 
     Returns:
-        Number of picked particles.
+        The picked particles; empty arrays without tracks nearby.
     """
-    picked, count = hazards.picked, 0
-    for t in range(len(hazards.tracks)):
-        exists, p = hazards.tracks[t, EXISTS], hazards.particles[t]
+    picked, count = np.empty((7, len(hazards.exists) * _PICKED)), 0
+    for t in range(len(hazards.exists)):
+        exists, p = hazards.exists[t], _particles_of(hazards, t)
         if exists < _LEAST_EXISTS:
             continue
-        if math.hypot(p[0, X] - pose[0], p[0, Y] - pose[1]) > within_m:
+        if math.hypot(p.x[0] - pose[0], p.y[0] - pose[1]) > within_m:
             continue
-        spread = math.hypot(_spread(p, VX), _spread(p, VY))
-        passed, m = p[0, WEIGHT], 0
-        for n in range(_PICKED):
-            while passed < (n + 0.5) / _PICKED and m < len(p) - 1:
-                m += 1
-                passed += p[m, WEIGHT]
-            for i in range(4):
-                picked[count, i] = p[m, i]
-            picked[count, WEIGHT] = exists / _PICKED
-            picked[count, AGE_S] = time - hazards.tracks[t, SEEN_S]
-            picked[count, SPREAD] = spread
+        spread = math.hypot(_spread(p.vx), _spread(p.vy))
+        for m in _at_equal_steps(p.weight, _PICKED):
+            picked[0, count], picked[1, count] = p.x[m], p.y[m]
+            picked[2, count], picked[3, count] = p.vx[m], p.vy[m]
+            picked[4, count] = exists / _PICKED
+            picked[5, count] = time - hazards.seen_s[t]
+            picked[6, count] = spread
             count += 1
-    return count
+    some = picked[:, :count]
+    return Sample(some[0], some[1], some[2], some[3], some[4], some[5], some[6])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
-from systems.safety.free_space import FIRST_I, FIRST_J, FreeSpace
+from systems.safety.free_space import FreeSpace, cells_within
 
 #: A cell with fewer hits than the first number is not occupied. More hits than the
 #: second number do not make it more certain.
@@ -40,13 +40,8 @@ def list_occupied(
     """
     cell, cells = space.cell_m, space.hits.shape[0]
     found, count = np.empty((64, 3)), 0
-    low_i = max(math.floor((x - reach) / cell), int(space.facts[0, FIRST_I]))
-    low_j = max(math.floor((y - reach) / cell), int(space.facts[0, FIRST_J]))
-    high_i = min(
-        math.floor((x + reach) / cell), int(space.facts[0, FIRST_I]) + cells - 1
-    )
-    high_j = min(
-        math.floor((y + reach) / cell), int(space.facts[0, FIRST_J]) + cells - 1
+    low_i, low_j, high_i, high_j = cells_within(
+        space, x - reach, y - reach, x + reach, y + reach
     )
     for i in range(low_i, high_i + 1):
         row = space.hits[i % cells]

@@ -20,6 +20,35 @@ def wrapped(angle: float) -> float:
 
 
 @register_jitable
+def turn_rate(error: float) -> float:
+    """Computes the yaw rate that corrects an error of the heading.
+
+    Args:
+        error: Wanted heading minus heading, rad.
+
+    Returns:
+        Yaw rate, rad/s, at most ``TURN_RATE_RAD_S``.
+    """
+    return min(max(TURN_GAIN * error, -TURN_RATE_RAD_S), TURN_RATE_RAD_S)
+
+
+@register_jitable
+def slowed_by(error: float, speed: float) -> float:
+    """Reduces a forward speed while the robot turns.
+
+    Args:
+        error: Error of the heading, rad.
+        speed: Wanted speed, m/s. A negative speed is not changed.
+
+    Returns:
+        Speed, m/s; 0 if the robot has to turn before it drives.
+    """
+    if speed > 0.0:
+        speed *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0
+    return speed
+
+
+@register_jitable
 def turn_towards(speed: float, heading: float, theta: float) -> tuple[float, float]:
     """Computes the motion that turns a robot to a heading while it drives.
 
@@ -33,7 +62,4 @@ def turn_towards(speed: float, heading: float, theta: float) -> tuple[float, flo
         Forward speed, m/s, and yaw rate, rad/s.
     """
     error = wrapped(heading - theta)
-    turn = min(max(TURN_GAIN * error, -TURN_RATE_RAD_S), TURN_RATE_RAD_S)
-    if speed > 0.0:
-        speed *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0
-    return speed, turn
+    return slowed_by(error, speed), turn_rate(error)

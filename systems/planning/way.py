@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
-from systems.safety.free_space import FIRST_I, FIRST_J, NEVER, FreeSpace
+from systems.safety.free_space import NEVER, FreeSpace
 
 #: Prices of a cell that was seen free, and of an unknown cell. The other prices apply
 #: if the disc at this cell is near an occupied cell, very near an occupied cell, over a
@@ -49,15 +49,21 @@ class Way(NamedTuple):
     """(buckets, 1) index of the first entry of each bucket."""
     path: NDArray[np.float64]
     """(p, 2) middles of the cells of the path, from the robot to the goal, m."""
-    facts: NDArray[np.float64]
-    """(1, 6): number of points of ``path``; length of the path, m; highest price of the
-    cells after the first; numbers of the window's first cell on the floor, along x and
-    y; side of a cell, m."""
+    points: NDArray[np.int64]
+    """(1,) number of points of ``path``."""
+    length_m: NDArray[np.float64]
+    """(1,) length of the path, m."""
+    dearest: NDArray[np.int64]
+    """(1,) highest price of the cells of the path after the first."""
+    low: NDArray[np.int64]
+    """(2,) numbers of the window's first cell on the floor, along x and y."""
+    cell_m: NDArray[np.float64]
+    """(1,) side of a cell, m."""
     marks: NDArray[np.float64]
     """(q, 3) positions marked as blocked, m, and the time until which a mark counts,
     s."""
-    marked: NDArray[np.float64]
-    """(1, 1) number of marks so far; a new mark replaces the oldest."""
+    marked: NDArray[np.int64]
+    """(1,) number of marks so far; a new mark replaces the oldest."""
 
 
 def make_way(cells: int) -> Way:
@@ -78,9 +84,13 @@ def make_way(cells: int) -> Way:
         np.zeros((8 * size * size + 1, 2), dtype=np.int32),
         np.full((_BUCKETS, 1), -1, dtype=np.int32),
         np.zeros((4 * size, 2)),
-        np.zeros((1, 6)),
+        np.zeros(1, dtype=np.int64),
+        np.zeros(1),
+        np.zeros(1, dtype=np.int64),
+        np.zeros(2, dtype=np.int64),
+        np.zeros(1),
         np.zeros((16, 3)),
-        np.zeros((1, 1)),
+        np.zeros(1, dtype=np.int64),
     )
 
 
@@ -111,11 +121,13 @@ def find_way(
         clear: (n, 3) positions and radii, m. Hits within these radii do not block the
             path, because they come from the target or a moving body.
     """
-    size, cell = way.price.shape[0], 2.0 * space.cell_m
-    low = _first_cells(space)
-    _set_prices(way, space, low, time, radius, clear)
-    si, sj = _cell_at(start, low, cell, size)
-    gi, gj = _cell_at(goal, low, cell, size)
+    size, cell, low = way.price.shape[0], 2.0 * space.cell_m, way.low
+    way.cell_m[0] = cell
+    for axis in range(2):
+        low[axis] = (space.first[axis] + 1) // 2
+    _set_prices(way, space, time, radius, clear)
+    si, sj = cell_at(way, start[0], start[1])
+    gi, gj = cell_at(way, goal[0], goal[1])
     _search(way, si * size + sj, gi * size + gj)
     points, length, dearest, at = 0, 0.0, 0, si * size + sj
     while points < len(way.path):
@@ -132,8 +144,7 @@ def find_way(
         if at == gi * size + gj or way.towards[i, j] < 0:
             break
         at = way.towards[i, j]
-    way.facts[0, 0], way.facts[0, 1], way.facts[0, 2] = points, length, dearest
-    way.facts[0, 3], way.facts[0, 4], way.facts[0, 5] = low[0], low[1], cell
+    way.points[0], way.length_m[0], way.dearest[0] = points, length, dearest
 
 
 @njit(cache=True)
@@ -147,36 +158,34 @@ def mark_blocked(
         place: (x, y), m.
         until: Time until which the mark counts, s.
     """
-    k = int(way.marked[0, 0]) % len(way.marks)
+    k = way.marked[0] % len(way.marks)
     way.marks[k, 0], way.marks[k, 1], way.marks[k, 2] = place[0], place[1], until
-    way.marked[0, 0] += 1.0
+    way.marked[0] += 1
 
 
 @njit(cache=True)
-def _first_cells(space: FreeSpace) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Return the numbers of the first wide cell of the window, along x and y."""
-    first_i, first_j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
-    return (first_i + 1) // 2, (first_j + 1) // 2
-
-
-@njit(cache=True)
-def _cell_at(
-    place: Any, low: Any, cell: float, size: int
+def cell_at(
+    way: Way, x: float, y: float
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Return the cell of a place, or the nearest cell of the window."""
-    i = math.floor(place[0] / cell) - low[0]
-    j = math.floor(place[1] / cell) - low[1]
+    """Returns the cell of a place, or the nearest cell of the window.
+
+    Args:
+        way: From ``find_way``.
+        x: Position of the place, m.
+        y: Position of the place, m.
+
+    Returns:
+        Numbers of the cell within the window, along x and y.
+    """
+    size, cell = way.price.shape[0], way.cell_m[0]
+    i = math.floor(x / cell) - way.low[0]
+    j = math.floor(y / cell) - way.low[1]
     return min(max(i, 0), size - 1), min(max(j, 0), size - 1)
 
 
 @njit(cache=True)
 def _set_prices(
-    way: Way,
-    space: FreeSpace,
-    low: Any,
-    time: float,
-    radius: float,
-    clear: Any,
+    way: Way, space: FreeSpace, time: float, radius: float, clear: Any
 ) -> None:  # pragma: no cover  (compiled)
     """Set the price of each cell. It depends on what was seen, on hits and on marks.
 
@@ -185,7 +194,8 @@ def _set_prices(
     places in ``clear`` do not count. Marked places count as occupied until their time
     has passed.
     """
-    size, cells, cell = way.price.shape[0], space.free_until.shape[0], 2 * space.cell_m
+    size, cells, cell = way.price.shape[0], space.free_until.shape[0], way.cell_m[0]
+    low = way.low
     for i in range(size):
         for j in range(size):
             way.price[i, j] = FREE
@@ -200,11 +210,11 @@ def _set_prices(
             x, y = (low[0] + 0.5 * i + 0.25) * cell, (low[1] + 0.5 * j + 0.25) * cell
             if not _is_near(clear, x, y):
                 highest = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
-                _keep_off(way, (x, y), low, cell, radius, highest)
+                _keep_off(way, (x, y), radius, highest)
     for k in range(len(way.marks)):
         if way.marks[k, 2] > time:
             place = way.marks[k, 0], way.marks[k, 1]
-            _keep_off(way, place, low, cell, radius, OCCUPIED)
+            _keep_off(way, place, radius, OCCUPIED)
 
 
 @njit(cache=True)
@@ -218,7 +228,7 @@ def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (comp
 
 @njit(cache=True)
 def _keep_off(
-    way: Way, place: Any, low: Any, cell: float, radius: float, highest: int
+    way: Way, place: Any, radius: float, highest: int
 ) -> None:  # pragma: no cover  (compiled)
     """Raise the prices of the cells near a narrow cell, according to their distance.
 
@@ -226,7 +236,8 @@ def _keep_off(
     cell. Within the radius of the disc the price is ``highest``. Farther away it is
     ``TIGHT``, then ``NEAR``.
     """
-    size, x, y = way.price.shape[0], place[0] / cell - low[0], place[1] / cell - low[1]
+    size, cell = way.price.shape[0], way.cell_m[0]
+    x, y = place[0] / cell - way.low[0], place[1] / cell - way.low[1]
     reach = (radius + _NEAR_M) / cell
     half = 0.25
     for i in range(max(math.floor(x - reach), 0), min(math.ceil(x + reach), size)):

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from systems.base.lagged_motion import LaggedMotion, advance_pose
 from systems.framework.compiling import njit
 from systems.safety.free_space import (
-    ROLLED,
     FreeSpace,
     cell_is_free,
     edge_cells,
@@ -25,6 +24,8 @@ PASSED, SLOWED, TURNED, BRAKED, HALTED = range(5)
 #: Shares of the wanted wheel speeds that are tried, the largest first.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 
+#: A robot that turns on the spot no faster than this counts as at rest, rad/s.
+SLOW_TURN_RAD_S = 0.3
 #: A robot turns on the spot if two conditions hold. The commanded speed of the axle is
 #: below this number, m/s. The way that the axle still moves due to the lag of the
 #: motors is below ``IN_PLACE_M``.
@@ -62,8 +63,6 @@ class BrakingNumbers(NamedTuple):
     """Smaller distance for a robot that has come nearer than ``keep_m``, m."""
     obstacle_speed_m_s: float
     """Largest speed of obstacles in view, m/s. With 0, all obstacles are at rest."""
-    slow_turn_rad_s: float
-    """A robot that turns on the spot no faster than this counts as at rest, rad/s."""
 
 
 class Danger(NamedTuple):
@@ -226,7 +225,7 @@ def can_be_braked(
     if now <= 0.0 and not in_place:  # the way out is unknown
         return False
     turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
-    slow = in_place and turn <= numbers.slow_turn_rad_s
+    slow = in_place and turn <= SLOW_TURN_RAD_S
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
     begin = pose
     # Predict until the wheels are at rest, and brake after the first tick.
@@ -333,7 +332,7 @@ def danger_of(
     """
     # The square contains at most this number of cells.
     corners = np.empty((int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
-    until = space.facts[0, ROLLED] + reach[1]
+    until = space.rolled_m[0] + reach[1]
     x, y = pose[0], pose[1]
     count = edge_cells(space, x, y, reach[0], until, corners)
     distance = nearest_cell(corners, count, space.cell_m, x, y)
@@ -398,7 +397,7 @@ def chosen(
         return TURNED, part
     # A turn slow enough to count as rest is always permitted on the spot: otherwise the
     # robot could never get away from a nearby obstacle.
-    slow = numbers.slow_turn_rad_s * numbers.wheel_separation_m
+    slow = SLOW_TURN_RAD_S * numbers.wheel_separation_m
     slow *= 0.5 / numbers.wheel_radius_m
     turn = min(max(turn, -slow), slow)
     part = ahead - turn, ahead + turn

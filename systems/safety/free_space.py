@@ -14,8 +14,6 @@ from systems.safety.views import Sectors, lasting
 
 register_jitable(lasting)
 
-#: Indices of ``FreeSpace.facts``.
-FIRST_I, FIRST_J, ROLLED, TICK = range(4)
 #: Value of a cell that was never seen free.
 NEVER = -1.0
 #: The window moves when its middle is farther from the robot than the first number,
@@ -47,9 +45,10 @@ class FreeSpace(NamedTuple):
     hits: NDArray[np.float64]
     """(n, n) weighted number of echoes from the place of a cell since it was last seen
     free."""
-    facts: NDArray[np.float64]
-    """(1, 4): i and j of the first cell of the window; rolled way, m; tick of the last
-    change."""
+    first: NDArray[np.int64]
+    """(2,) i and j of the first cell of the window."""
+    rolled_m: NDArray[np.float64]
+    """(1,) rolled way, m."""
     arcs: NDArray[np.float64]
     """(sensors, points, 2) points of the arc at which the view of each sensor ends, m,
     in order from the right to the left edge of its aperture. The arc follows from the
@@ -58,18 +57,6 @@ class FreeSpace(NamedTuple):
     """(sensors, 1) time of the last reading of each sensor, s, or ``NEVER``."""
     cell_m: float
     """Side of a cell, m."""
-
-    def copy(self) -> FreeSpace:
-        """Returns a copy with its own arrays."""
-        return FreeSpace(
-            np.copy(self.free_until),
-            np.copy(self.seen_s),
-            np.copy(self.hits),
-            np.copy(self.facts),
-            np.copy(self.arcs),
-            np.copy(self.arcs_s),
-            self.cell_m,
-        )
 
 
 def make_free_space(
@@ -86,12 +73,12 @@ def make_free_space(
     Returns:
         The window, with the origin of the floor in its middle.
     """
-    facts = np.array([[-(cells // 2), -(cells // 2), 0.0, NEVER]])
     return FreeSpace(
         np.full((cells, cells), NEVER),
         np.full((cells, cells), NEVER),
         np.zeros((cells, cells)),
-        facts,
+        np.full(2, -(cells // 2)),
+        np.zeros(1),
         np.zeros((sensors, arc_points, 2)),
         np.full((sensors, 1), NEVER),
         cell_m,
@@ -114,10 +101,36 @@ def cell_is_free(
         Whether the cell counts as free. Cells outside the window do not.
     """
     cells = space.free_until.shape[0]
-    di, dj = i - space.facts[0, FIRST_I], j - space.facts[0, FIRST_J]
+    di, dj = i - space.first[0], j - space.first[1]
     if di < 0 or dj < 0 or di >= cells or dj >= cells:
         return False
     return space.free_until[i % cells, j % cells] >= until
+
+
+@njit(cache=True)
+def cells_within(
+    space: FreeSpace, low_x: float, low_y: float, high_x: float, high_y: float
+) -> tuple[int, int, int, int]:  # pragma: no cover  (compiled)
+    """Finds the cells of the window that a rectangle meets.
+
+    Args:
+        space: The window.
+        low_x: Least x of the rectangle, m.
+        low_y: Least y, m.
+        high_x: Greatest x, m.
+        high_y: Greatest y, m.
+
+    Returns:
+        Least i and j, and greatest i and j, of these cells. A least number above the
+        greatest means that there are none.
+    """
+    cell, cells, (first_i, first_j) = space.cell_m, len(space.hits), space.first
+    return (
+        max(math.floor(low_x / cell), first_i),
+        max(math.floor(low_y / cell), first_j),
+        min(math.floor(high_x / cell), first_i + cells - 1),
+        min(math.floor(high_y / cell), first_j + cells - 1),
+    )
 
 
 @njit(cache=True)
@@ -135,7 +148,7 @@ def move_window(
     slack = min(_SLACK, cells // _SLACK_SHARE)
     for axis in range(2):
         place = x if axis == 0 else y
-        first = int(space.facts[0, axis])
+        first = space.first[axis]
         wanted = math.floor(place / space.cell_m) - cells // 2
         if abs(wanted - first) <= slack:
             continue
@@ -147,7 +160,7 @@ def move_window(
                 space.free_until[i, j] = NEVER
                 space.seen_s[i, j] = NEVER
                 space.hits[i, j] = 0.0
-        space.facts[0, axis] = wanted
+        space.first[axis] = wanted
 
 
 @njit(cache=True)
@@ -164,12 +177,9 @@ def clear_disc(
         until: Rolled way up to which the cells count as free, m.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
-    low_i, low_j = math.floor((x - radius) / cell), math.floor((y - radius) / cell)
-    high_i, high_j = math.floor((x + radius) / cell), math.floor((y + radius) / cell)
-    low_i = max(low_i, int(space.facts[0, FIRST_I]))
-    low_j = max(low_j, int(space.facts[0, FIRST_J]))
-    high_i = min(high_i, int(space.facts[0, FIRST_I]) + cells - 1)
-    high_j = min(high_j, int(space.facts[0, FIRST_J]) + cells - 1)
+    low_i, low_j, high_i, high_j = cells_within(
+        space, x - radius, y - radius, x + radius, y + radius
+    )
     for i in range(low_i, high_i + 1):
         dx = max(x - i * cell, (i + 1) * cell - x)
         for j in range(low_j, high_j + 1):
@@ -224,7 +234,7 @@ def _free_cells(
 ) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
     """Return ``cell_is_free`` for all cells of a rectangle."""
     cells = space.free_until.shape[0]
-    first_i, first_j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
+    first_i, first_j = space.first
     free = np.zeros((high_i - low_i + 1, high_j - low_j + 1), dtype=np.bool_)
     for i in range(max(low_i, first_i), min(high_i, first_i + cells - 1) + 1):
         row = space.free_until[i % cells]
@@ -305,16 +315,10 @@ def see(
         right, left = sectors.right[begin, 0], sectors.left[end - 1, 0]
         from_axle = math.hypot(ahead, aside)
         farthest = np.max(seen[begin:end, 2])
-        box = _sector_box(sx, sy, pose[2] + right, pose[2] + left, farthest + cell)
-        # Rectangle of cells that contains the sector, within the window.
-        low_i = max(math.floor(box[0] / cell), int(space.facts[0, FIRST_I]))
-        low_j = max(math.floor(box[1] / cell), int(space.facts[0, FIRST_J]))
-        high_i = min(
-            math.floor(box[2] / cell), int(space.facts[0, FIRST_I]) + cells - 1
+        low_x, low_y, high_x, high_y = _sector_box(
+            sx, sy, pose[2] + right, pose[2] + left, farthest + cell
         )
-        high_j = min(
-            math.floor(box[3] / cell), int(space.facts[0, FIRST_J]) + cells - 1
-        )
+        low_i, low_j, high_i, high_j = cells_within(space, low_x, low_y, high_x, high_y)
         for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
             dx = (i + 0.5) * cell - sx
             for j in range(low_j, high_j + 1):
@@ -330,9 +334,7 @@ def see(
                 )
                 at = i % cells, j % cells
                 if free >= distance + half:
-                    until = space.facts[0, ROLLED] + lasting(
-                        distance + from_axle, error
-                    )
+                    until = space.rolled_m[0] + lasting(distance + from_axle, error)
                     space.free_until[at] = max(space.free_until[at], until)
                     space.seen_s[at] = time
                     space.hits[at] = 0.0

@@ -16,9 +16,6 @@ from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
-    NEVER,
-    ROLLED,
-    TICK,
     FreeSpace,
     clear_disc,
     end_view,
@@ -26,8 +23,14 @@ from systems.safety.free_space import (
     move_window,
     see,
 )
-from systems.safety.parameters import FreeSpaceParameters
-from systems.safety.views import PlaceError, Sectors, lasting, sensor_sectors
+from systems.safety.parameters import GuardParameters
+from systems.safety.views import (
+    PlaceError,
+    Sectors,
+    lasting,
+    range_error,
+    sensor_sectors,
+)
 
 #: Largest angle between two points of a sensor's arc, seen from the sensor, rad.
 _ARC_STEP = 0.035
@@ -62,7 +65,7 @@ class MapState(NamedTuple):
 
     free_space: FreeSpace
     was_at: NDArray[np.float64]
-    """(1, 3) pose in the last tick, m and rad."""
+    """(3,) pose in the last tick, m and rad; NaN before the first tick."""
 
 
 def map_step(
@@ -84,7 +87,7 @@ def map_step(
     move_window(space, pose[0], pose[1])
     # The first tick clears the bubble. Each later tick adds the way rolled since the
     # tick before.
-    if space.facts[0, TICK] == NEVER:
+    if math.isnan(was_at[0]):
         clear_disc(
             space,
             pose[0],
@@ -94,15 +97,14 @@ def map_step(
         )
     else:
         fastest = max(abs(commanded[0]), abs(commanded[1]))
-        space.facts[0, ROLLED] += rolled_way(
-            was_at[0], pose, numbers.least_way * fastest, error
+        space.rolled_m[0] += rolled_way(
+            was_at, pose, numbers.least_way * fastest, error
         )
     for k in range(3):
-        was_at[0, k] = pose[k]
-    space.facts[0, TICK] = tick
+        was_at[k] = pose[k]
     # If cells can be forgotten, the disc of the body is cleared again.
     if error.wheel_error > 0.0 or error.pulse_m > 0.0:
-        until = space.facts[0, ROLLED] + lasting(numbers.radius, error)
+        until = space.rolled_m[0] + lasting(numbers.radius, error)
         clear_disc(space, pose[0], pose[1], numbers.radius, until)
     # Readings of the sensors that have fired in this tick.
     readings = np.empty((len(ranges), 2))
@@ -170,7 +172,7 @@ class FreeSpaceMap(Block):
     Rate and latency: a function of state and present inputs, in every tick; no latency.
 
     Args:
-        parameters: ``FreeSpaceParameters``.
+        parameters: Cells, start bubble, and errors of positions.
         sensors: Places, apertures, ranges and noise of the sensors.
         robot: Body, and position of P.
         odometry: Pulses of the encoders.
@@ -178,7 +180,7 @@ class FreeSpaceMap(Block):
         tick_s: Period of the robot, s.
 
     Raises:
-        InputError: The grid does not fit the robot.
+        InputError: The start bubble is too small for the robot.
 
     Reference: ours; docs/guard.md has the theorem that depends on this block.
     """
@@ -196,7 +198,7 @@ class FreeSpaceMap(Block):
     def __init__(
         self,
         *,
-        parameters: FreeSpaceParameters = FreeSpaceParameters(),
+        parameters: GuardParameters = GuardParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
         robot: RobotParameters = RobotParameters(),
         odometry: OdometryParameters = OdometryParameters(),
@@ -221,7 +223,7 @@ class FreeSpaceMap(Block):
             (
                 sensors.minimum_range_m,
                 sensors.maximum_range_m,
-                parameters.range_error(sensors),
+                range_error(sensors),
             ),
             place_error,
             least_way,
@@ -234,7 +236,7 @@ class FreeSpaceMap(Block):
             parameters.cells, parameters.cell_m, sensors.count, points
         )
         self.declare(
-            Step(map_step, numbers, MapState(space, np.zeros((1, 3)))),
+            Step(map_step, numbers, MapState(space, np.full(3, np.nan))),
             tick_s=tick_s,
             sizes={"sensors": sensors.count},
         )

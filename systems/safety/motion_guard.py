@@ -26,7 +26,7 @@ from systems.safety.braking import (
     danger_of,
     rolled_speeds,
 )
-from systems.safety.parameters import FreeSpaceParameters, GuardParameters
+from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
 from systems.safety.views import stopping_way, tick_parts
 
 #: Sizes of the parts of the state: velocity of P, wheel speeds, report, and modeled
@@ -136,7 +136,6 @@ class MotionGuard(Block):
 
     Args:
         parameters: ``GuardParameters``.
-        known: Grid of the map, and largest position error of a cell.
         robot: Dimensions and top speed.
         plant: Lag of the motors.
         command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or
@@ -175,7 +174,6 @@ class MotionGuard(Block):
         self,
         *,
         parameters: GuardParameters = GuardParameters(),
-        known: FreeSpaceParameters = FreeSpaceParameters(),
         robot: RobotParameters = RobotParameters(),
         plant: PlantParameters = PlantParameters(),
         command: str = "acceleration_W",
@@ -184,7 +182,7 @@ class MotionGuard(Block):
         super().__init__()
         self.set_name("motion_guard")
         self.inputs = (self.inputs[0]._replace(name=command), *self.inputs[1:])
-        numbers = _numbers(parameters, known, robot, plant, COMMANDS[command], tick_s)
+        numbers = _numbers(parameters, robot, plant, COMMANDS[command], tick_s)
         self.declare(
             Step(guard_step, numbers, [0.0] * sum(_SIZES), _publish_guard),
             tick_s=tick_s,
@@ -193,13 +191,12 @@ class MotionGuard(Block):
 
 def _numbers(
     own: GuardParameters,
-    known: FreeSpaceParameters,
     robot: RobotParameters,
     plant: PlantParameters,
     velocity: Callable[..., Any],
     tick_s: float,
 ) -> GuardNumbers:
-    radius = body_radius(robot) + known.place_error_m
+    radius = body_radius(robot) + own.place_error_m
     keep = radius + own.margin_m
     parts = tick_parts(tick_s)
     braking = BrakingNumbers(
@@ -212,11 +209,10 @@ def _numbers(
         lagged_motion(tick_s / parts, plant.motor_lag_s),
         robot.top_wheel_speed,
         keep,
-        radius + own.least_margin_m,
-        own.obstacle_speed_m_s,
-        own.slow_turn_rad_s,
+        radius + LEAST_MARGIN_M,
+        own.obstacle_speed_m_s or 0.0,
     )
     stopping = stopping_way(own, robot, plant, tick_s)
-    reach = keep + stopping + 2.0 * known.cell_m, stopping
+    reach = keep + stopping + 2.0 * own.cell_m, stopping
     kept = math.exp(-tick_s / plant.motor_lag_s)
     return GuardNumbers(velocity, robot, braking, kept, reach)

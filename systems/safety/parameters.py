@@ -1,42 +1,44 @@
-"""Parameters of the memory of space and of the guard."""
+"""Parameters of the guard and of its map."""
 
 from __future__ import annotations
 
 import math
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from systems.base.robot import RobotParameters, body_radius
 from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Acceleration,
     Fraction,
-    Length,
     NonNegativeLength,
     NonNegativeSpeed,
     Parameters,
 )
-from systems.ranging.parameters import UltrasonicParameters
 
-#: Largest number of cells along a side of a window: 16 million cells take 0.4 GB.
-_MOST_CELLS = 4_000
+#: Smaller margin, m, for a robot that has come nearer than ``margin_m`` because a model
+#: was wrong.
+LEAST_MARGIN_M = 0.003
+#: Side of the square that the map remembers, m. The square moves along with the robot.
+WINDOW_M = 12.8
 
-#: The error of a range is below this many standard deviations.
-_SIGMAS = 5.0
 
+class GuardParameters(Parameters):
+    """How the guard keeps a robot in free space, and how it remembers this space."""
 
-class FreeSpaceParameters(Parameters):
-    """How the robot remembers free space."""
-
+    obstacle_speed_m_s: NonNegativeSpeed | None = None
+    """Largest speed, m/s, that the guard assumes for obstacles in view. With 0, it
+    assumes that all obstacles are at rest. null: 0.6 m/s with the law ``guarded``, and
+    0 with other laws."""
+    braking_m_s2: Acceleration = 1.5
+    """Deceleration of the faster wheel's rim when the guard brakes, m/s^2."""
+    margin_m: float = Field(default=0.006, ge=LEAST_MARGIN_M, le=100.0)
+    """Distance, m, that the guard keeps between the disc around the body and space that
+    is not free, in addition to ``place_error_m``."""
     cell_m: float = Field(default=0.05, ge=0.005, le=0.25)
-    """Side of a cell, m."""
-    window_m: Length = 12.8
-    """Side of the remembered square, m. The square moves along with the robot."""
-    start_bubble_m: Length = 1.0
+    """Side of a cell of the map, m."""
+    start_bubble_m: float = Field(default=1.0, gt=0.0, le=WINDOW_M / 4.0)
     """Radius about the axle that is assumed to be free at the start, m."""
-    range_margin_m: NonNegativeLength = 0.002
-    """Largest amount, m, by which a range is too long, in addition to five standard
-    deviations of its noise."""
     wheel_error: Fraction = 0.0
     """Relative error of each wheel's travel, in addition to the pulses of its
     encoder."""
@@ -47,29 +49,19 @@ class FreeSpaceParameters(Parameters):
 
     @property
     def cells(self) -> int:
-        """Number of cells along a side of the window."""
-        return math.ceil(self.window_m / self.cell_m - 1e-9)
-
-    def range_error(self, sensors: UltrasonicParameters) -> float:
-        """Returns the largest amount by which a range is too long, m."""
-        return self.range_margin_m + _SIGMAS * sensors.noise_m
+        """Number of cells along a side of the map."""
+        return math.ceil(WINDOW_M / self.cell_m - 1e-9)
 
     def check(self, robot: RobotParameters) -> None:
-        """Checks that the grid fits a robot.
+        """Checks that the start bubble holds a robot.
 
         Args:
             robot: Dimensions of its body.
 
         Raises:
-            InputError: The grid is too coarse, too large or too small.
+            InputError: The bubble is too small.
         """
         radius = body_radius(robot)
-        if self.cells > _MOST_CELLS:
-            raise InputError(
-                "window_m",
-                f"{self.window_m:g} m in cells of {self.cell_m:g} m are {self.cells}^2 "
-                f"cells, more than {_MOST_CELLS}^2; lower it, or raise cell_m",
-            )
         if self.start_bubble_m < radius + 2.0 * self.cell_m:
             raise InputError(
                 "start_bubble_m",
@@ -78,37 +70,3 @@ class FreeSpaceParameters(Parameters):
                 f"m; raise it to {radius + 2.0 * self.cell_m:.3g}, or lower "
                 "cell_m",
             )
-        if self.window_m < 4.0 * self.start_bubble_m:
-            raise InputError(
-                "window_m",
-                f"{self.window_m:g} m is less than four times the bubble of "
-                f"{self.start_bubble_m:g} m; raise it",
-            )
-
-
-class GuardParameters(Parameters):
-    """How the guard keeps a robot in free space."""
-
-    obstacle_speed_m_s: NonNegativeSpeed = 0.0
-    """Largest speed, m/s, that the guard assumes for obstacles in view. With 0, it
-    assumes that all obstacles are at rest."""
-    braking_m_s2: Acceleration = 1.5
-    """Deceleration of the faster wheel's rim when the guard brakes, m/s^2."""
-    margin_m: NonNegativeLength = 0.006
-    """Distance, m, that the guard keeps between the disc around the body and space that
-    is not free, in addition to ``free_space.place_error_m``."""
-    least_margin_m: NonNegativeLength = 0.003
-    """Smaller margin, m, for a robot that has come nearer than ``margin_m`` because a
-    model was wrong."""
-    slow_turn_rad_s: float = Field(default=0.3, ge=0.0, le=10.0)
-    """A robot that turns on the spot no faster than this counts as at rest, rad/s."""
-
-    @model_validator(mode="after")
-    def _check(self) -> GuardParameters:
-        if self.least_margin_m > self.margin_m:
-            raise InputError(
-                "least_margin_m",
-                f"{self.least_margin_m:g} is above margin_m {self.margin_m:g}; "
-                "lower it",
-            )
-        return self

@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.parameters import FreeSpaceParameters, GuardParameters
+from systems.safety.parameters import GuardParameters
 
 #: The rims of the wheels count as at rest if they will move by less than this, m, due
 #: to the lag.
 REST_M = 2e-4
 #: A robot turns on the spot if its axle will move by less than this, m, due to the lag.
 IN_PLACE_M = 5e-5
+#: Largest amount, m, by which a range without noise is too long, and number of standard
+#: deviations that bounds the noise of a range.
+RANGE_MARGIN_M, _SIGMAS = 0.002, 5.0
 #: Longest time between two positions that the guard compares with cells, s.
 _PART_S = 0.025
 
@@ -61,14 +64,14 @@ class PlaceError(NamedTuple):
     @classmethod
     def of(
         cls,
-        known: FreeSpaceParameters,
+        guard: GuardParameters,
         robot: RobotParameters,
         odometry: OdometryParameters,
     ) -> PlaceError:
         """Collects the values from the parameters.
 
         Args:
-            known: Wheel error, and allowed position error.
+            guard: Wheel error, and allowed position error.
             robot: Dimensions of the wheels.
             odometry: Pulses of the encoders.
 
@@ -80,7 +83,7 @@ class PlaceError(NamedTuple):
             pulse = math.tau / odometry.pulses_per_revolution
             pulse_m = robot.wheel_radius_m * pulse
         return cls(
-            known.wheel_error, pulse_m, robot.wheel_separation_m, known.place_error_m
+            guard.wheel_error, pulse_m, robot.wheel_separation_m, guard.place_error_m
         )
 
 
@@ -126,6 +129,11 @@ def lasting(distance: float, error: PlaceError) -> float:
     if a == 0.0:
         return left / b
     return (math.sqrt(b * b + 4.0 * a * left) - b) / (2.0 * a)
+
+
+def range_error(sensors: UltrasonicParameters) -> float:
+    """Returns the largest amount by which a range is too long, m."""
+    return RANGE_MARGIN_M + _SIGMAS * sensors.noise_m
 
 
 def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sectors:
@@ -230,7 +238,7 @@ def unseen_approach(
         tick_s: Period of the command, s.
 
     Returns:
-        Sum of the four effects, m. It is 1.6 mm with all defaults. ``least_margin_m``
+        Sum of the four effects, m. It is 1.6 mm with all defaults. ``LEAST_MARGIN_M``
         has to be at least as large as this sum.
     """
     top, lag, part_s = (

@@ -161,7 +161,7 @@ def _obstacle_sensing(
     ]
     if mapped:
         known = FreeSpaceMap(
-            parameters=scenario.free_space,
+            parameters=scenario.own_map,
             sensors=scenario.ultrasonic,
             robot=scenario.robot,
             odometry=scenario.odometry,

@@ -36,7 +36,8 @@ def check_guard(
         InputError: The sensors or the grid are unsuitable, or a body is within the
             start bubble.
     """
-    if robot.own_guard is None:
+    guard = robot.own_guard
+    if guard is None:
         return
     if robot.obstacle_sensing != "ultrasonic":
         raise InputError(
@@ -45,20 +46,20 @@ def check_guard(
             "ultrasonic, or leave guard out",
         )
     try:
-        robot.free_space.check(robot.robot)
+        guard.check(robot.robot)
     except InputError as error:
-        field = f"{prefix}free_space.{error.field}"
+        field = f"{prefix}guard.{error.field}"
         raise InputError(field, error.message) from None
     _check_view(prefix, robot)
-    _check_memory(prefix, robot, robot.own_guard, tick_s)
-    bubble, (x, y) = robot.free_space.start_bubble_m, robot.start.position_m
+    _check_memory(prefix, robot, guard, tick_s)
+    bubble, (x, y) = guard.start_bubble_m, robot.start.position_m
     for name, body in bodies.items():
         distance = math.hypot(*beyond_rectangle((x, y), body.rectangle(0.0)))
         if distance < bubble:
             raise InputError(
                 f"{prefix}start.position_m",
                 f"{name!r} is {distance:.3g} m from the axle, within "
-                f"{prefix}free_space.start_bubble_m, {bubble:g} m, which the "
+                f"{prefix}guard.start_bubble_m, {bubble:g} m, which the "
                 "guard assumes to be free; move one of them, or lower "
                 "start_bubble_m",
             )
@@ -85,17 +86,17 @@ def _check_memory(
     stopped. Meanwhile odometry adds an error to the position of the body on the map.
     ``place_error_m`` must cover this error.
     """
-    known, body = robot.free_space, robot.robot
+    body = robot.robot
     stopping = stopping_way(guard, body, robot.plant, tick_s)
-    error = PlaceError.of(known, body, robot.odometry)
+    error = PlaceError.of(guard, body, robot.odometry)
     distance = body_radius(body) + stopping
     needed = place_error(distance, stopping, error)
-    if needed > known.place_error_m:
+    if needed > guard.place_error_m:
         raise InputError(
-            f"{prefix}free_space.place_error_m",
-            f"is {known.place_error_m:g} m, but by the time the robot stops, "
+            f"{prefix}guard.place_error_m",
+            f"is {guard.place_error_m:g} m, but by the time the robot stops, "
             f"{stopping:.2g} m on, what was {distance:.3g} m away may be off by "
             f"{needed:.2g} m, by encoder pulses of {error.pulse_m * 1e3:.2g} mm "
-            f"and a wheel_error of {known.wheel_error:g}; raise it, or use an "
+            f"and a wheel_error of {guard.wheel_error:g}; raise it, or use an "
             "encoder with more pulses or a smaller wheel_error",
         )

@@ -19,9 +19,12 @@ from systems.base.tyre_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError, shortened
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.sensor_faults import BLIND
+from systems.safety.parameters import LEAST_MARGIN_M
 from systems.safety.views import (
+    RANGE_MARGIN_M,
     PlaceError,
     place_error,
+    range_error,
     sensor_sectors,
     stopping_way,
     unseen_approach,
@@ -139,15 +142,15 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
         raise InputError(
             "guard", "is unset, so that there is no guard to promise anything; set it"
         )
-    known, tick_s = scenario.free_space, scenario.tick_s
-    keep = body_radius(scenario.robot) + known.place_error_m + guard.margin_m
-    error, lag = known.range_error(scenario.ultrasonic), scenario.plant.motor_lag_s
+    tick_s = scenario.tick_s
+    keep = body_radius(scenario.robot) + guard.place_error_m + guard.margin_m
+    error, lag = range_error(scenario.ultrasonic), scenario.plant.motor_lag_s
     # A reading of a sensor is at most one round of readings old.
     age = scenario.ultrasonic.round_ticks(tick_s) * tick_s
     way = speed**2 / (2.0 * guard.braking_m_s2) + speed * (lag + 2.0 * tick_s)
     if body_speed == 0.0:
         # A cell is free only as a whole. One reading updates only every fourth row.
-        cells = math.sqrt(2.0) * known.cell_m + 4.0 * age * speed
+        cells = math.sqrt(2.0) * guard.cell_m + 4.0 * age * speed
         return keep + way + error + cells
     time = speed / guard.braking_m_s2 + 2.0 * tick_s + _LAGS * lag
     return keep + way + error + body_speed * (age + time)
@@ -190,7 +193,7 @@ def guarantees(scenario: Scenario) -> Guarantees:
     assert guard is not None
     (view,) = (each for each in found if each.name == "view")
     return Guarantees(
-        guard.obstacle_speed_m_s,
+        guard.obstacle_speed_m_s or 0.0,
         seen_angle_deg(scenario.ultrasonic, scenario.robot.control_point_m),
         view.limit,
         view.value,
@@ -213,7 +216,7 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
     """
     alone = scenario.of_robot(robot)
     guard, sensors = alone.own_guard, alone.ultrasonic
-    speed = 0.0 if guard is None else guard.obstacle_speed_m_s
+    speed = (guard and guard.obstacle_speed_m_s) or 0.0
     needed = clear_way(alone, alone.robot.top_speed_m_s, speed)
     axes, places, half_angle = sensors.beams
     forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angle
@@ -253,8 +256,8 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
         (math.hypot(*beyond_rectangle(place, body.rectangle(0.0))) for body in bodies),
         default=math.inf,
     )
-    field = "free_space.start_bubble_m"
-    bubble = scenario.free_space.start_bubble_m
+    field = "guard.start_bubble_m"
+    bubble = scenario.own_map.start_bubble_m
     text = "nearest body at the start"
     return Assumption("A3", text, nearest, bubble, "m", at_least=True, field=field)
 
@@ -264,7 +267,6 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
     sensors, c = scenario.ultrasonic, scenario.acoustics.c
     stretch = (sensors.assumed_sound_speed_m_s or c) / c
     excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m
-    margin = scenario.free_space.range_margin_m
     blind = sum(fault.number == BLIND for fault in sensors.faults)
     return (
         Assumption(
@@ -282,7 +284,7 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
             "A2",
             "excess of the farthest range due to the assumed speed of sound",
             excess,
-            margin,
+            RANGE_MARGIN_M,
             "m",
             field="ultrasonic.assumed_sound_speed_m_s",
         ),
@@ -293,9 +295,9 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
     """A4 and A5: errors of position and wheels are bounded, and the tires grip."""
     guard, plant = scenario.own_guard, scenario.plant
     assert guard is not None
-    robot, known, tick_s = scenario.robot, scenario.free_space, scenario.tick_s
+    robot, tick_s = scenario.robot, scenario.tick_s
     stopping = stopping_way(guard, robot, plant, tick_s)
-    error = PlaceError.of(known, robot, scenario.odometry)
+    error = PlaceError.of(guard, robot, scenario.odometry)
     lost = place_error(body_radius(robot) + stopping, stopping, error)
     slip = max(map(abs, plant.slip))
     grip = math.inf if plant.friction is None else plant.friction
@@ -305,26 +307,26 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
             "A4",
             "unknown share of a wheel's travel",
             slip,
-            known.wheel_error,
+            guard.wheel_error,
             "of 1",
-            field="free_space.wheel_error",
+            field="guard.wheel_error",
         ),
         Assumption(
             "A4",
             "error of a position due to encoder pulses and wheels, until the "
             "robot stops",
             lost,
-            known.place_error_m,
+            guard.place_error_m,
             "m",
-            field="free_space.place_error_m",
+            field="guard.place_error_m",
         ),
         Assumption(
             "A5",
             "approach to a cell between two looks and while coasting",
             unseen_approach(robot, plant, tick_s),
-            guard.least_margin_m,
+            LEAST_MARGIN_M,
             "m",
-            field="guard.least_margin_m",
+            field="robot.top_speed_m_s",
         ),
         Assumption(
             "A5",

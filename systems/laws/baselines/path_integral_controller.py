@@ -31,7 +31,7 @@ from systems.planning.following import (
 )
 from systems.planning.turning import wrapped
 from systems.planning.way import Way, find_way, make_way
-from systems.safety.parameters import FreeSpaceParameters
+from systems.safety.parameters import GuardParameters
 
 #: Half side of the window of the distance field, m. A sequence stays within it.
 _WINDOW_M = 2.5
@@ -294,8 +294,8 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
     straight = math.hypot(target[0] - px, target[1] - py)
     left = straight
     carrot = target
-    if way.facts[0, 1] > _DETOUR * math.hypot(target[0] - at[0], target[1] - at[1]):
-        left = max(straight, way.facts[0, 1] - ahead)
+    if way.length_m[0] > _DETOUR * math.hypot(target[0] - at[0], target[1] - at[1]):
+        left = max(straight, way.length_m[0] - ahead)
         carrot = find_carrot(way, at[0], at[1], _LOOK_AHEAD_M)
     dx, dy = carrot[0] - px, carrot[1] - py
     far = max(math.hypot(dx, dy), 1e-9)
@@ -325,7 +325,7 @@ class PathIntegralController(MapController):
         robot: Size of the body, and position of P.
         attraction: ``AttractionParameters``; uses the follow distance.
         gains: ``PathIntegralParameters``.
-        known: Parameters of the map.
+        guard: Parameters of the map.
         seed: Seed of the random sequences.
         tick_s: Period of the controller, s.
 
@@ -340,7 +340,7 @@ class PathIntegralController(MapController):
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
         gains: PathIntegralParameters = PathIntegralParameters(),
-        known: FreeSpaceParameters = FreeSpaceParameters(),
+        guard: GuardParameters = GuardParameters(),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
@@ -353,7 +353,7 @@ class PathIntegralController(MapController):
             max(round(_STEP_S / tick_s), 1),
             _noise(seed),
         )
-        state = PathIntegralState(np.zeros((_STEPS, 2)), make_way(known.cells))
+        state = PathIntegralState(np.zeros((_STEPS, 2)), make_way(guard.cells))
         self.declare(Step(path_integral_step, numbers, state), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:

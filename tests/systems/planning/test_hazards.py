@@ -14,7 +14,7 @@ from systems.planning.hazards import (
     pick_hazards,
     track_hazards,
 )
-from systems.safety.free_space import ROLLED, make_free_space
+from systems.safety.free_space import make_free_space
 from systems.world.geometry import fan_ranges
 
 TICK_S, CELLS, CELL_M, AHEAD_M, FARTHEST_M = 0.025, 240, 0.05, 0.175, 3.0
@@ -111,10 +111,10 @@ def test_nor_those_from_floor_that_is_forgotten():
     """What was seen free counts up to a rolled way: beyond it, it may be of a wall."""
     hazards, space = make_hazards(3), floor()
     space.free_until[space.free_until > 0.0] = 2.0
-    space.facts[0, ROLLED] = 2.5
+    space.rolled_m[0] = 2.5
     look(hazards, range(121), weaving, crossing, space)
     assert (hazards.tracks[:, EXISTS] == 0.0).all()
-    space.facts[0, ROLLED] = 1.5
+    space.rolled_m[0] = 1.5
     look(hazards, range(121), weaving, crossing, space)
     assert hazards.tracks[:, EXISTS].max() > 0.9
 

@@ -81,12 +81,12 @@ def test_a_way_costs_what_dijkstra_finds(seed):
     size = CELLS // 2
     (si, sj), (gi, gj) = (np.floor(p / 0.1).astype(int) + 20 for p in (start, goal))
     assert way.cost[si, sj] == cost_by_scipy(way.price, si * size + sj, gi * size + gj)
-    points = way.path[: int(way.facts[0, 0])]
+    points = way.path[: way.points[0]]
     np.testing.assert_allclose(points[0], (np.array([si, sj]) - 19.5) * 0.1)
     np.testing.assert_allclose(points[-1], (np.array([gi, gj]) - 19.5) * 0.1)
     steps = np.abs(np.diff(points, axis=0))
     assert steps.max() < 0.1 + 1e-9
-    assert way.facts[0, 1] == pytest.approx(np.hypot(*steps.T).sum())
+    assert way.length_m[0] == pytest.approx(np.hypot(*steps.T).sum())
 
 
 def test_prices_go_by_distance_from_the_cell_that_echoed():
@@ -154,4 +154,4 @@ def test_the_carrot_is_straight_ahead_where_nothing_is():
 def test_a_goal_beyond_the_window_is_headed_for_at_its_edge():
     space, way = known_space(), make_way(CELLS)
     seek(way, space, (0.05, 0.05), (30.0, 0.05), 0.0)
-    assert way.path[int(way.facts[0, 0]) - 1] == pytest.approx((1.95, 0.05))
+    assert way.path[way.points[0] - 1] == pytest.approx((1.95, 0.05))

@@ -12,10 +12,7 @@ from scipy.optimize import brentq
 
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
-    FIRST_I,
-    FIRST_J,
     NEVER,
-    ROLLED,
     FreeSpace,
     cell_is_free,
     clear_disc,
@@ -76,7 +73,7 @@ def seen_space(
 
 def free_cells(space: FreeSpace) -> set[tuple[int, int]]:
     n = space.free_until.shape[0]
-    first = space.facts[0, FIRST_I], space.facts[0, FIRST_J]
+    first = tuple(space.first)
     i, j = (range(int(f), int(f) + n) for f in first)
     return {(a, b) for a in i for b in j if cell_is_free(space, a, b, 0.0)}
 
@@ -246,7 +243,7 @@ def test_the_window_forgets_what_leaves_it_and_keeps_what_stays(x, y):
     space.seen_s[:] = space.free_until
     before = free_cells(space)
     move_window(space, x, y)
-    i, j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
+    i, j = space.first
     # A window of 64 may lag behind by an eighth of itself.
     assert abs(i + 32 - x / CELL_M) <= 9
     assert abs(j + 32 - y / CELL_M) <= 9
@@ -261,7 +258,7 @@ def test_the_window_stays_where_the_robot_is_near_its_middle():
     space = make_free_space(256, CELL_M, 1, 2)
     for x in (0.0, 0.95, -0.95):
         move_window(space, x, 0.0)
-        assert space.facts[0, FIRST_I] == -128
+        assert space.first[0] == -128
 
 
 def test_a_disc_clears_the_cells_that_lie_wholly_in_it():
@@ -357,7 +354,7 @@ def test_cells_count_as_long_as_their_distance_from_the_axle_allows():
     sectors = sensor_sectors(sensors, CONTROL_POINT_M)
     space = make_free_space(160, CELL_M, 3, 17)
     error = PlaceError(0.01, 0.0, 0.41, allowed_m=0.03)
-    space.facts[0, ROLLED] = 5.0
+    space.rolled_m[0] = 5.0
     readings = np.array([[2.0, np.inf]] * 3)
     for tick in range(4):
         see(space, 0.0, tick, np.zeros(3), sectors, readings, error)

@@ -16,7 +16,7 @@ from systems.base.robot import body_radius
 from systems.framework.block import RunFacts
 from systems.framework.input_error import InputError
 from systems.safety.braking import HALTED
-from systems.safety.free_space import ROLLED, cell_is_free, clear_disc, make_free_space
+from systems.safety.free_space import cell_is_free, clear_disc, make_free_space
 from systems.safety.free_space_map import map_step
 from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 from systems.safety.views import PlaceError, lasting
@@ -187,7 +187,7 @@ def test_a_cell_is_known_for_the_way_that_wheel_errors_allow():
     for tick in range(100):
         way = 0.004 * tick
         map_step(tick, state, (*BLIND, (way, 0.0, 0.0), STILL), (), numbers)
-        assert state.free_space.facts[0, ROLLED] == pytest.approx(way)
+        assert state.free_space.rolled_m[0] == pytest.approx(way)
         behind = cell_is_free(state.free_space, -14, 0, way)
         assert behind == (way <= lasts)
         # Under the body space stays known: the body is there.
@@ -211,7 +211,7 @@ def test_the_rolled_way_is_the_mean_of_both_rims(motion, rolled):
     for tick in range(4):
         pose = tuple(tick * each for each in motion)
         map_step(tick, state, (*BLIND, pose, STILL), (), numbers)
-    found = state.free_space.facts[0, ROLLED]
+    found = state.free_space.rolled_m[0]
     assert 3.0 * rolled * longer - 1e-12 <= found <= 3.0 * rolled * longer * 1.05
 
 
@@ -224,10 +224,10 @@ def test_pulses_make_a_tick_count_half_a_pulse_more_and_a_reversal_its_command()
     x, tick = 0.0, 0
     map_step(tick, state, (*BLIND, (x, 0.0, 0.0), STILL), (), numbers)
     for moved, counted, command in ways:
-        before, x, tick = state.free_space.facts[0, ROLLED], x + moved, tick + 1
+        before, x, tick = state.free_space.rolled_m[0], x + moved, tick + 1
         commanded = (command, -0.5 * command)
         map_step(tick, state, (*BLIND, (x, 0.0, 0.0), commanded), (), numbers)
-        found = state.free_space.facts[0, ROLLED] - before
+        found = state.free_space.rolled_m[0] - before
         assert found == pytest.approx(counted + 0.5 * pulse, abs=1e-12)
 
 

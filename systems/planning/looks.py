@@ -1,0 +1,201 @@
+"""Looks: readings of range sensors, with the place and direction of each sensor."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.framework.compiling import njit
+from systems.planning.turning import wrapped
+from systems.safety.free_space import FreeSpace, cell_is_free
+
+#: Number of looks per sensor that are kept.
+_LOOKS = 3
+#: Spacing of the points at which an arc is checked, and how far behind the arc they
+#: reach, both in cells.
+_ARC_STEP, _BEHIND = 0.3, 0.6
+#: A range that changes faster than the first number, m/s, belongs to another body. A
+#: look that is older than the second number, ticks, is not compared with the next look.
+_FASTEST_M_S, _OLDEST_TICKS = 2.0, 4.5
+
+
+class HazardSensors(NamedTuple):
+    """Properties of the sensors on which looks and tracks depend."""
+
+    places: NDArray[np.float64]
+    """(sensors, 2) position relative to the axle in B, m."""
+    directions: NDArray[np.float64]
+    """(sensors, 2) direction of the axis in B and half of the aperture, rad."""
+    farthest_m: float
+    """Greatest range, m."""
+    margin_m: float
+    """Largest error of a range, m."""
+    noise_m: float
+    """Standard deviation of a range, m."""
+    tick_s: float
+
+
+class Look(NamedTuple):
+    """One reading of one sensor."""
+
+    range_m: float
+    heard: float
+    """1 if there was an echo, else 0."""
+    time_s: float
+    x: float
+    """Position of the sensor, m."""
+    y: float
+    """Position of the sensor, m."""
+    axis_rad: float
+    """Direction of the sensor's axis, rad."""
+
+
+class Looks(NamedTuple):
+    """The last looks of each sensor, most recent first.
+
+    All arrays have the form (3, sensors), and change.
+    """
+
+    range_m: NDArray[np.float64]
+    heard: NDArray[np.float64]
+    time_s: NDArray[np.float64]
+    """Minus infinity if there was no such look yet."""
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    axis_rad: NDArray[np.float64]
+
+
+def make_looks(sensors: int) -> Looks:
+    """Returns a memory without looks.
+
+    Args:
+        sensors: Number of range sensors.
+    """
+    looks = Looks(*(np.zeros((_LOOKS, sensors)) for _ in Looks._fields))
+    looks.time_s[:] = -np.inf
+    return looks
+
+
+@njit(cache=True)
+def look_of(looks: Looks, age: int, k: int) -> Look:  # pragma: no cover  (compiled)
+    """Returns one look.
+
+    Args:
+        looks: The looks of all sensors.
+        age: 0 for the newest look, 1 for the one before, 2 for the oldest.
+        k: Number of the sensor.
+    """
+    return Look(
+        looks.range_m[age, k],
+        looks.heard[age, k],
+        looks.time_s[age, k],
+        looks.x[age, k],
+        looks.y[age, k],
+        looks.axis_rad[age, k],
+    )
+
+
+@njit(cache=True)
+def remember_looks(
+    looks: Looks, time: float, pose: Any, readings: Any, sensors: HazardSensors
+) -> None:  # pragma: no cover  (compiled)
+    """Stores the readings of the sensors that have fired in this tick.
+
+    Args:
+        looks: Modified in place.
+        time: Current time, s.
+        pose: (x, y, theta) of the robot, m and rad.
+        readings: Ranges, m; echoes, 0 or 1; and ages of the readings, s.
+        sensors: Properties of the sensors.
+    """
+    ranges, echo, ages = readings
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(len(ranges)):
+        if ages[k] > 0.5 * sensors.tick_s:
+            continue
+        for values in looks:
+            for age in range(_LOOKS - 1, 0, -1):
+                values[age, k] = values[age - 1, k]
+        ahead, aside = sensors.places[k]
+        looks.range_m[0, k], looks.heard[0, k] = ranges[k], echo[k]
+        looks.time_s[0, k] = time
+        looks.x[0, k] = pose[0] + c * ahead - s * aside
+        looks.y[0, k] = pose[1] + s * ahead + c * aside
+        looks.axis_rad[0, k] = pose[2] + sensors.directions[k, 0]
+
+
+@njit(cache=True)
+def seen_from(
+    look: Look, x: float, y: float
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Returns the distance of a place, m, and its angle off the sensor's axis, rad."""
+    dx, dy = x - look.x, y - look.y
+    return math.hypot(dx, dy), abs(wrapped(math.atan2(dy, dx) - look.axis_rad))
+
+
+@njit(cache=True)
+def is_target(
+    look: Look, half: float, target: Any
+) -> bool:  # pragma: no cover  (compiled)
+    """Returns whether an echo may come from the followed target.
+
+    Args:
+        look: The look with the echo.
+        half: Half of the sensor's aperture, rad.
+        target: (x, y, radius) of the target, m.
+    """
+    distance, off = seen_from(look, target[0], target[1])
+    beside = off - half < target[2] / max(distance, target[2])
+    return beside and abs(distance - look.range_m) < target[2]
+
+
+@njit(cache=True)
+def goes_on(
+    look: Look, then: Look, tick_s: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Returns whether an echo fits the look before it, so that its rate is known.
+
+    Args:
+        look: The newest look of a sensor.
+        then: The look before.
+        tick_s: Period of the controller, s.
+    """
+    since = look.time_s - then.time_s
+    if then.heard < 0.5 or since > _OLDEST_TICKS * tick_s:
+        return False
+    return abs(look.range_m - then.range_m) < _FASTEST_M_S * since
+
+
+@njit(cache=True)
+def came_from_free(
+    space: FreeSpace, look: Look, half: float, margin_m: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Returns whether the whole arc of an echo was seen free before.
+
+    The function checks points along the arc, over the width of the aperture. In depth,
+    the points extend from the range minus its largest error to the range plus this
+    error and a part of a cell. The cells of all points must still count as free.
+
+    Args:
+        space: Cells that were seen free.
+        look: The look with the echo.
+        half: Half of the sensor's aperture, rad.
+        margin_m: Largest error of a range, m.
+    """
+    cell = space.cell_m
+    step_m = _ARC_STEP * cell
+    across = max(8, math.ceil(2.0 * half * look.range_m / step_m))
+    along = math.ceil((2.0 * margin_m + _BEHIND * cell) / step_m)
+    for one in range(across + 1):
+        angle = look.axis_rad + half * (2.0 * one / across - 1.0)
+        for other in range(along + 1):
+            at = look.range_m - margin_m + other * step_m
+            i = math.floor((look.x + at * math.cos(angle)) / cell)
+            j = math.floor((look.y + at * math.sin(angle)) / cell)
+            # The position of a forgotten cell is no longer known.
+            if not cell_is_free(space, i, j, space.rolled_m[0]):
+                return False
+    return True
