@@ -161,8 +161,8 @@ class Anything(ActiveImpedanceController):
 class Asking(StopWhenNearController):
     asked = {}
 
-    def __init__(self, gains, known, bodies, seed, tick_s):
-        Asking.asked = {"bodies": bodies, "seed": seed, "cell": known.cell_m}
+    def __init__(self, gains, guard, bodies, seed, tick_s):
+        Asking.asked = {"bodies": bodies, "seed": seed, "cell": guard.cell_m}
         super().__init__(gains=gains, tick_s=tick_s)
 """
 
