@@ -56,7 +56,6 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
         "temperature": (0.003, 0.5),
         "turn_spread_rad_s": (0.3, 1.2),
         "angle_gain": (0.3, 5.0),
-        "forward_gain": (0.1, 5.0),
         "obstacle_gain": (0.5, 15.0),
         "inflation_m": (0.05, 0.5),
         "clearance_m": (0.01, 0.15),
@@ -64,11 +63,8 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "orca": {
         "horizon_s": (0.7, 6.0),
         "offset_m": (0.03, 0.2),
-        "clearance_m": (0.005, 0.1),
     },
 }
-#: Kept in a ratio: VFH+ has two thresholds.
-_HIGH = 2.0
 
 
 class Tried(NamedTuple):
@@ -94,14 +90,13 @@ def tried_settings(law: str, points: int, seed: int) -> list[dict[str, float]]:
     ranges = RANGES[law]
     sequence = qmc.Sobol(len(ranges), rng=seed)
     found: list[dict[str, float]] = [{}]
-    for point in sequence.random(points):
-        values = {
+    found += [
+        {
             name: float(f"{low * (high / low) ** share:.2g}")
             for (name, (low, high)), share in zip(ranges.items(), point, strict=True)
         }
-        if "low_threshold" in values:
-            values["high_threshold"] = _HIGH * values["low_threshold"]
-        found.append(values)
+        for point in sequence.random(points)
+    ]
     return found
 
 

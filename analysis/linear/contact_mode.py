@@ -23,6 +23,7 @@ from pydrake.systems.analysis import DiscreteTimeApproximation
 from pydrake.systems.primitives import Linearize
 from scipy.optimize import brentq
 
+from analysis.laws.push_and_pull import stiffest
 from analysis.models.block_models import block_model
 from analysis.models.ideal_scenarios import require_rolling
 from analysis.models.linear_models import LinearModel
@@ -251,14 +252,15 @@ class ContactLimits:
     """(rows, columns) largest K_0 of the conventional law, N/m; negative where
     the attraction alone is too stiff."""
     reference_stiffness_n_m: NDArray[np.float64]
-    """(rows, columns) largest k_ref of the active law, N/m: as a spring that
-    law is stiffest at 2 alpha, with k_ref / e^2."""
+    """(rows, columns) largest k_ref of the active law, N/m, by its largest slope."""
     today: tuple[float, int]
     """Motor lag, s, and latency, ticks, of the scenario."""
     stiffness_today_n_m: float
     """K_0 of the scenario, N/m."""
     reference_stiffness_today_n_m: float
     """k_ref of the scenario, N/m."""
+    active_slope_today_n_m: float
+    """Largest slope -df/dc of the active law of the scenario, N/m."""
     tick_s: float
     """Of the scenario, s."""
 
@@ -292,13 +294,16 @@ def contact_limits(
         ]
     )
     left = total - scenario.follower.attraction.stiffness_n_m
+    k_ref = scenario.follower.laws.active.reference_stiffness_n_m
+    slope = stiffest("active", scenario)
     return ContactLimits(
         motor_lags_s=tuple(lags),
         latency_ticks=tuple(latency_ticks),
         stiffness_n_m=left,
-        reference_stiffness_n_m=left * math.e**2,
+        reference_stiffness_n_m=left * (k_ref / slope),
         today=(scenario.only.plant.motor_lag_s, 0),
         stiffness_today_n_m=scenario.follower.laws.conventional.stiffness_n_m,
-        reference_stiffness_today_n_m=scenario.follower.laws.active.reference_stiffness_n_m,
+        reference_stiffness_today_n_m=k_ref,
+        active_slope_today_n_m=slope,
         tick_s=scenario.tick_s,
     )

@@ -50,7 +50,9 @@ def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
     wanted = np.ravel(np.asarray(times, dtype=float))
     rows = np.unique(np.abs(result.time[:, None] - wanted).argmin(axis=0))
     hazards = make_hazards(scenario.follower.ultrasonic.count)
-    sensors = hazard_sensors(scenario.follower.ultrasonic, scenario.only.robot, scenario.tick_s)
+    sensors = hazard_sensors(
+        scenario.follower.ultrasonic, scenario.only.robot, scenario.tick_s
+    )
     targets = result.vector("p_WS_estimated").T
     targets[columns["target_valid"] < 0.5] = np.inf
     found = []

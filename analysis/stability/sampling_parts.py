@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -364,9 +363,9 @@ def _render_contact(data: ContactLimits, name: str) -> list[str]:
         for lag, row in zip(data.motor_lags_s, data.stiffness_n_m, strict=True)
     ]
     caption = (
-        "Largest slope -df/dc of a law, N/m: K_0 of the conventional law (now "
-        f"{number(data.stiffness_today_n_m)}), k_ref/e\u00b2 of the active law of 2019 "
-        f"(now {number(data.reference_stiffness_today_n_m / math.e**2)})"
+        "Largest slope -df/dc of a law, N/m: now "
+        f"{number(data.stiffness_today_n_m)} with the conventional law, "
+        f"{number(data.active_slope_today_n_m)} with the active law of 2019"
     )
     lag, ticks = data.today
     return [

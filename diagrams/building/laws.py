@@ -106,7 +106,7 @@ def _gains_of_base(block: type, laws: LawGains) -> Any:
     """Returns the gains of the law of the package whose block is a base of a class."""
     for name, law in LAWS.items():
         if law.controller is not None and issubclass(block, law.controller):
-            return getattr(laws, name)
+            return getattr(laws, name, None)
     return None
 
 

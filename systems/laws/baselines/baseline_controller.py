@@ -1,11 +1,17 @@
-"""The ports and helper functions that the blocks of all baselines share."""
+"""The ports of all baselines, and the echoes that those with a map avoid."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
-from systems.framework.block import Block, Port
+from systems.framework.block import OBJECT, Block, Port
+from systems.planning.occupied import list_occupied
 
 #: Distance from the target within which echoes count as echoes of the target, m.
 SOURCE_CLEARANCE_M = 0.5
@@ -21,6 +27,28 @@ class BaselineController(Block):
         Port("pose_WB_estimated", 3, "m, m, rad"),
     )
     outputs = (Port("twist_B", 2, "m/s, rad/s", ("wanted_speed", "wanted_turn")),)
+
+
+class MapController(BaselineController):
+    """A baseline that avoids cells of the map from which echoes came."""
+
+    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
+
+
+@register_jitable
+def occupied_around(inputs: Any, reach_m: float) -> NDArray[np.float64]:
+    """Lists the occupied cells around the robot, without those of the target.
+
+    Args:
+        inputs: Values of the input ports of a ``MapController``.
+        reach_m: Half of the side of the square in which cells are listed, m.
+
+    Returns:
+        (n, 3) cells, see ``list_occupied``.
+    """
+    target, pose = inputs[0], inputs[3]
+    clear = target[0], target[1], SOURCE_CLEARANCE_M
+    return list_occupied(inputs[4], pose[0], pose[1], reach_m, clear)
 
 
 def half_size(robot: RobotParameters) -> tuple[float, float]:

@@ -10,18 +10,17 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
-from systems.framework.block import OBJECT, Port, Step
+from systems.framework.block import Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
-    SOURCE_CLEARANCE_M,
-    BaselineController,
+    MapController,
     half_size,
+    occupied_around,
 )
 from systems.laws.dynamic_window import DynamicWindowParameters
 from systems.laws.parameters import AttractionParameters
 from systems.planning.following import SPEED_LIMITS, FollowNumbers, approach
-from systems.planning.occupied import list_occupied
 from systems.planning.turning import wrapped
 
 #: Numbers of speeds and of yaw rates in the grid over a window.
@@ -219,11 +218,10 @@ def dynamic_window_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DynamicWindowNumbers
 ) -> None:
     """Computes the twist. The state is the last choice of speed and yaw rate."""
-    target, pose = inputs[0], inputs[3]
+    pose = inputs[3]
     if tick % numbers.period_ticks == 0:
         wanted, bearing = approach(inputs, numbers.follow)
-        clear = target[0], target[1], SOURCE_CLEARANCE_M
-        places = list_occupied(inputs[4], pose[0], pose[1], _REACH_M, clear)
+        places = occupied_around(inputs, _REACH_M)
         now, at = (state[0], state[1]), (pose[0], pose[1], pose[2])
         state[0], state[1] = choose_in_window(
             places, at, now, wanted, bearing, numbers.window
@@ -231,7 +229,7 @@ def dynamic_window_step(
     outputs[0][0], outputs[0][1] = state[0], state[1]
 
 
-class DynamicWindowController(BaselineController):
+class DynamicWindowController(MapController):
     """Chooses a motion that the robot can reach, and from which it can stop in time.
 
     Ten times per second, the block considers the speeds and yaw rates that the robot
@@ -254,8 +252,6 @@ class DynamicWindowController(BaselineController):
     Reference: Fox, Burgard and Thrun, The dynamic window approach to collision
     avoidance, IEEE Robotics and Automation Magazine 4 (1), 1997.
     """
-
-    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
 
     def __init__(
         self,

@@ -10,13 +10,14 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters, body_radius
-from systems.framework.block import OBJECT, Port, RunFacts, Step
+from systems.framework.block import RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     SOURCE_CLEARANCE_M,
-    BaselineController,
+    MapController,
     half_size,
+    occupied_around,
 )
 from systems.laws.parameters import AttractionParameters
 from systems.laws.path_integral import PathIntegralParameters
@@ -28,7 +29,6 @@ from systems.planning.following import (
     FollowNumbers,
     wanted_speed,
 )
-from systems.planning.occupied import list_occupied
 from systems.planning.turning import wrapped
 from systems.planning.way import Way, find_way, make_way
 from systems.safety.parameters import GuardParameters
@@ -265,8 +265,7 @@ def path_integral_step(
         at, valid = (pose[0], pose[1], pose[2]), inputs[2][0] > 0.5
         place, speed = (target[0], target[1]), (velocity[0], velocity[1])
         goal = _goal(at, place, speed, valid, space, state.way, numbers)
-        beside = (place[0], place[1], SOURCE_CLEARANCE_M)
-        places = list_occupied(space, at[0], at[1], _WINDOW_M, beside)
+        places = occupied_around(inputs, _WINDOW_M)
         cell = space.cell_m
         field = distance_field(places, at[0], at[1], _WINDOW_M, cell)
         noise = numbers.noise[tick // numbers.period_ticks % _ROUNDS]
@@ -308,7 +307,7 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
     return px + rest * ux, py + rest * uy, moves * ux, moves * uy
 
 
-class PathIntegralController(BaselineController):
+class PathIntegralController(MapController):
     """Tries many motion sequences and drives their mean, weighted by cost.
 
     Ten times per second, the block makes a new plan:
@@ -334,8 +333,6 @@ class PathIntegralController(BaselineController):
     Trans. on Robotics 34 (6), 2018. The cost terms are those of Nav2's MPPI controller
     (its critics).
     """
-
-    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
 
     def __init__(
         self,

@@ -10,17 +10,13 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters, body_radius
-from systems.framework.block import OBJECT, Port, Step
+from systems.framework.block import Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.laws.baselines.baseline_controller import (
-    SOURCE_CLEARANCE_M,
-    BaselineController,
-)
+from systems.laws.baselines.baseline_controller import MapController, occupied_around
 from systems.laws.parameters import AttractionParameters
 from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.following import FollowNumbers, approach
-from systems.planning.occupied import list_occupied
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
 #: Number of sectors (5 deg each, as in the paper), and largest number of sectors of a
@@ -243,10 +239,9 @@ def vector_field_histogram_step(
     The state has one number for each sector (1 if it is blocked, else 0), the last
     direction in sectors, and the last speed in m/s.
     """
-    target, pose, own, twist = inputs[0], inputs[3], numbers.own, outputs[0]
+    pose, own, twist = inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
-    clear = target[0], target[1], SOURCE_CLEARANCE_M
-    places = list_occupied(inputs[4], pose[0], pose[1], own.window_m, clear)
+    places = occupied_around(inputs, own.window_m)
     memory = np.empty(len(state))
     for k in range(len(memory)):
         memory[k] = state[k]
@@ -265,7 +260,7 @@ def vector_field_histogram_step(
         state[k] = memory[k]
 
 
-class VectorFieldHistogramController(BaselineController):
+class VectorFieldHistogramController(MapController):
     """Steers into the best valley of a polar histogram of obstacles.
 
     The obstacles are cells that gave echoes and that no sensor has seen free since. At
@@ -294,8 +289,6 @@ class VectorFieldHistogramController(BaselineController):
     Reference: Ulrich and Borenstein, VFH+: reliable obstacle avoidance for fast mobile
     robots, IEEE Int. Conf. on Robotics and Automation, 1998.
     """
-
-    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
 
     def __init__(
         self,

@@ -161,9 +161,9 @@ class Anything(ActiveImpedanceController):
 class Asking(StopWhenNearController):
     asked = {}
 
-    def __init__(self, guard, bodies, seed, tick_s):
+    def __init__(self, gains, guard, bodies, seed, tick_s):
         Asking.asked = {"bodies": bodies, "seed": seed, "cell": guard.cell_m}
-        super().__init__(tick_s=tick_s)
+        super().__init__(gains=gains, tick_s=tick_s)
 """
 
 
