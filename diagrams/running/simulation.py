@@ -18,8 +18,8 @@ from diagrams.running.audio.diagram_audio import DiagramAudio
 from diagrams.running.audio.run_audio import RunAudio
 from diagrams.running.compiled.loop import CompiledLoop, compile_loop
 from diagrams.running.compiled.loop_blocks import shared_blocks, shared_world
+from diagrams.running.referee import Referee, RefereeMonitor
 from diagrams.running.run_result import RunResult, gather_result, logged_columns
-from diagrams.running.stop_rules import RunRules, StopRules
 from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import WORLD, Scenario
 from systems.framework.input_error import InputError
@@ -90,8 +90,8 @@ def simulate(
         )
     load_compiled_code(follower)
     simulator = make_simulator(follower)
-    rules = StopRules(follower)
-    simulator.set_monitor(_monitor(follower, rules, audio))
+    judge = RefereeMonitor(follower)
+    simulator.set_monitor(_monitor(follower, judge, audio))
     start = perf_counter()
     simulator.Initialize()
     views = _python_views(follower, simulator.get_context())
@@ -99,13 +99,13 @@ def simulate(
         simulator.AdvanceTo(min(second, scenario.duration_s))
         if progress is not None:
             progress(simulator.get_context().get_time())
-        if rules.over:
+        if judge.referee.over:
             break
     wall_s = perf_counter() - start
     views.clear()
     columns = _logged(follower, simulator)
     world = columns.pop(WORLD, {})
-    return gather_result(scenario, rules.robots, columns, wall_s, world=world)
+    return gather_result(judge.referee, columns, wall_s, world=world)
 
 
 def _logged(
@@ -142,19 +142,19 @@ def _logged(
 
 
 def _monitor(
-    follower: SoundFollower, rules: StopRules, audio: RunAudio | None
+    follower: SoundFollower, judge: RefereeMonitor, audio: RunAudio | None
 ) -> Callable[[Any], Any]:
     """Returns the function that the simulator calls after every step.
 
     It saves the sound, if any, and applies the stop rules.
     """
     if audio is None:
-        return rules
+        return judge
     save = DiagramAudio(follower, audio)
 
     def monitor(context: Any) -> Any:
         save(context)
-        return rules(context)
+        return judge(context)
 
     return monitor
 
@@ -188,7 +188,7 @@ def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> Compiled
 
 def _new_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
     blocks, world = shared_blocks(scenario), shared_world(scenario)
-    return compile_loop(scenario, blocks, RunRules(scenario), world, audio)
+    return compile_loop(scenario, blocks, Referee(scenario), world, audio)
 
 
 def _run_compiled(
@@ -205,10 +205,9 @@ def _run_compiled(
         if progress is not None:
             progress(loop.time_s)
     wall_s = perf_counter() - start
-    robots = loop.rules.robots
-    columns = {name: loop.logged(name) for name in robots}
+    columns = {name: loop.logged(name) for name in scenario.all_robots}
     world = loop.logged(WORLD) if WORLD in loop.columns else {}
-    return gather_result(scenario, robots, columns, wall_s, "compiled", world)
+    return gather_result(loop.referee, columns, wall_s, "compiled", world)
 
 
 def _python_views(follower: SoundFollower, context: Any) -> list[Any]:

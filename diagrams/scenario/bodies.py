@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -70,11 +69,6 @@ class LivePath:
         """
         x, y, theta = pose
         self._then, self._now = self._now, (time, (x, y, theta))
-
-    @property
-    def step_m(self) -> float:
-        """Distance between the positions at the last two ticks, m."""
-        return math.dist(self._then[1][:2], self._now[1][:2])
 
     def pose(self, time: float) -> tuple[float, float, float]:
         """(x, y, theta) at a time in s, interpolated between the last two ticks."""

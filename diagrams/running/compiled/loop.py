@@ -31,7 +31,7 @@ from diagrams.running.compiled.loop_blocks import LoopBlocks
 from diagrams.running.compiled.parts import run_parts
 from diagrams.running.compiled.plan import LoopPlan, LoopRobot, LoopWorld
 from diagrams.running.compiled.sounds import sounds_of_a_run
-from diagrams.running.stop_rules import JudgedTick, RunRules
+from diagrams.running.referee import Referee
 from diagrams.scenario.scenario import WORLD, Scenario
 from systems.framework.host_step import HostError
 from systems.framework.input_error import InputError, shortened
@@ -45,8 +45,8 @@ class CompiledLoop:
     """(ticks + 1, columns) logged values of all robots; rows from ``done`` on are not
     yet filled."""
     tick_s: float
-    rules: RunRules
-    """Stop rules; they know why the run ended."""
+    referee: Referee
+    """It knows why the run ended."""
     columns: Mapping[str, Mapping[str, int]]
     """Indices of the columns in the log, by robot or world, and by column name."""
     plan: LoopPlan
@@ -86,8 +86,8 @@ class CompiledLoop:
         except (NumbaError, NotImplementedError, ValueError) as error:
             own = [
                 text
-                for rules in self.rules.robots.values()
-                for text in (rules.scenario.law, *rules.scenario.blocks)
+                for robot in self.referee.scenario.all_robots.values()
+                for text in (robot.law, *robot.blocks)
                 if ":" in text
             ]
             if not own:
@@ -122,32 +122,6 @@ class CompiledLoop:
                 "which names the block",
             )
         self.over = over or self.done == len(self.log)
-        if self.over:
-            names = enumerate(self.rules.robots)
-            self.rules.take_over({name: self._last_tick(k, name) for k, name in names})
-
-    def _last_tick(self, number: int, robot: str) -> JudgedTick:
-        last, columns = self.done - 1, self.columns[robot]
-        pose = [columns[name] for name in ("p_WB_x", "p_WB_y", "theta_WB")]
-        before = max(last - 1, 0)
-        found, touched = self.plan.ended[number].tolist()
-        return JudgedTick(
-            last * self.tick_s,
-            before * self.tick_s,
-            self.log[last, pose].tolist(),
-            self.log[before, pose].tolist(),
-            self._value(columns, "target_valid", last) > 0.5,
-            self.plan.judged[number].tolist(),
-            found,
-            (touched - 1, float(self.plan.touched_at[number])) if touched else None,
-            # The stop rules see the report that the search published one tick before.
-            self._value(columns, "search_ended", last - 1),
-        )
-
-    def _value(self, columns: Mapping[str, int], name: str, row: int) -> float:
-        """Value of a column in a row; 0 if there is no such column or row."""
-        known = name in columns and row >= 0
-        return float(self.log[row, columns[name]]) if known else 0.0
 
 
 def _complaint(error: Exception) -> str:
@@ -161,7 +135,7 @@ def _complaint(error: Exception) -> str:
 def compile_loop(
     scenario: Scenario,
     blocks: Mapping[str, LoopBlocks],
-    rules: RunRules,
+    referee: Referee,
     shared: LoopBlocks | None = None,
     audio: RunAudio | None = None,
 ) -> CompiledLoop:
@@ -170,7 +144,7 @@ def compile_loop(
     Args:
         scenario: The scenario to run.
         blocks: Blocks of each robot; they may have been made for another start or seed.
-        rules: Stop rules of the run.
+        referee: Referee of the run.
         shared: Blocks that all robots share, if any.
         audio: Open files for the sound, if it is saved.
 
@@ -185,19 +159,19 @@ def compile_loop(
     sounds = sounds_of_a_run(scenario, times)
     world = LoopWorld(scenario, shared, ticks) if shared is not None else None
     robots = {
-        name: LoopRobot(scenario, name, own, ticks, sounds.heard[name], world)
-        for name, own in blocks.items()
+        name: LoopRobot(scenario, name, own, ticks, sounds.heard[name], pose_WB, world)
+        for (name, own), pose_WB in zip(blocks.items(), referee.poses, strict=True)
     }
     plan = LoopPlan(robots, times)
     for name in robots:
-        plan.surround(name, rules.robots[name].surroundings)
+        plan.surround(name, scenario.surroundings(name))
     for name, function in sounds.carried.items():
         plan.remember(name, function)
     for each in (*((world,) if world else ()), *robots.values()):
         plan.add(each)
     if audio is not None:
         save_sounds(plan, robots, sounds, audio)
-    plan.judge(rules, scenario.tick_s)
+    plan.judge(referee)
     width, columns = 0, {}
     logged: dict[str, LoopRobot | LoopWorld] = {**robots}
     if world is not None:
@@ -211,7 +185,7 @@ def compile_loop(
     return CompiledLoop(
         np.empty((ticks + 1, width)),
         scenario.tick_s,
-        rules,
+        referee,
         columns,
         plan,
     )

@@ -10,18 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.building.robot import block_seed, seed_of
-from diagrams.running.compiled.judge import contacts_of, judge_all
 from diagrams.running.compiled.loop_blocks import LoopBlocks
 from diagrams.running.compiled.parts import PUBLISH
 from diagrams.running.compiled.source import LoopPart, address_of, compiled_part
-from diagrams.running.stop_rules import (
-    CONTACT,
-    GIVES_UP,
-    SEARCH_REPORT,
-    TOUCHED,
-    UNJUDGED,
-    RunRules,
-)
+from diagrams.running.referee import Referee
+from diagrams.running.stop_rules import READ_PORTS, run_is_over
 from diagrams.scenario.bodies import Surroundings
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step, has_arrays
@@ -30,19 +23,7 @@ from systems.framework.host_step import HostCall, HostFunction, host_step
 
 #: Ports that the stop rules and the loudspeakers read, with sizes; a robot may lack
 #: some of them.
-_WATCHED = {
-    "pose_WB": 3,
-    "velocity_WB": 3,
-    "pose_WS": 3,
-    "target_valid": 1,
-    GIVES_UP: 1,
-    SEARCH_REPORT: 4,
-    CONTACT: 2,
-    TOUCHED: 1,
-    "calling": 1,
-}
-#: The ports that the stop rules read.
-_JUDGED = [name for name in _WATCHED if name != "calling"]
+_WATCHED = {**READ_PORTS, "calling": 1}
 
 
 class LoopWorld:
@@ -76,6 +57,7 @@ class LoopRobot:
         made: LoopBlocks,
         ticks: int,
         heard: Mapping[str, Callable[[int], Any]],
+        pose_WB: NDArray[np.float64],
         world: LoopWorld | None = None,
     ) -> None:
         own = scenario.all_robots[name]
@@ -93,6 +75,7 @@ class LoopRobot:
         self.made, (self.steps, self.carried) = made, made.steps(self.facts)
         sizes = {**_WATCHED, **made.sizes}
         self._views = {port: np.zeros(size) for port, size in sizes.items()}
+        self._views["pose_WB"] = pose_WB
         if world is not None:
             given = made.outside.intersection(world.made.sizes)
             self._views |= {port: world.view(port) for port in given}
@@ -120,13 +103,6 @@ class LoopPlan:
         """Values that a row of the log contains."""
         self.hosts: list[HostCall] = []
         """Functions that the loop calls in Python."""
-        self.ended = np.zeros((len(robots), 2), dtype=np.int64)
-        """(robots, 2) index of the cause, and 1 plus the number of the touched body (0
-        for none)."""
-        self.touched_at = np.zeros(len(robots))
-        """(robots,) elapsed part of the tick at the contact (0 to 1)."""
-        self.judged = np.tile(np.array(UNJUDGED), (len(robots), 1))
-        """(robots, 8) states of ``judge_tick``."""
         self._parts: list[tuple[LoopPart, str]] = []
         self._judge = 0
         self._filled: list[int] = []
@@ -221,7 +197,7 @@ class LoopPlan:
         everything = {**around.bodies, around.target: around.followed}
         wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
         for port, bodies in wanted.items():
-            if port == "pose_WS" or port in robot.made.outside:
+            if port in robot.made.outside:
                 into = robot.view(port)
                 # Bodies on known paths, by the index of their pose in the port.
                 known = {3 * k: b for k, b in enumerate(bodies) if b not in robots}
@@ -244,26 +220,18 @@ class LoopPlan:
         line = f"{part.name(function)}({arguments}, tick)"
         self._filled.append(self._add(part, [line]))
 
-    def judge(self, rules: RunRules, tick_s: float) -> None:
-        """Adds the part that judges all robots in a tick.
+    def judge(self, referee: Referee) -> None:
+        """Adds the steps of the referee, and the part that ends the run.
 
         Args:
-            rules: Stop rules of the run.
-            tick_s: Control period, s.
+            referee: Referee of the run.
         """
-        robots = self._robots
-        watched = tuple(
-            (*map(robot.view, _JUDGED), np.array(robot.facts.initial_pose))
-            for robot in robots.values()
-        )
-        contacts = tuple(
-            contacts_of(rules.robots[name], [*robots], self._times) for name in robots
-        )
-        values = tick_s, watched, contacts, self.judged, self.ended, self.touched_at
+        for name, step in referee.steps.items():
+            read = map(self._robots[name].view, READ_PORTS)
+            self._early.append(self._step(step, (referee.poses, *read), ()))
         part = LoopPart()
-        arguments = ", ".join(map(part.expression, values))
-        lines = [f"if {part.name(judge_all)}(tick, {arguments}):", "    return 1"]
-        self._judge = self._add(part, lines)
+        over = f"{part.name(run_is_over)}({part.expression(referee.found)})"
+        self._judge = self._add(part, [f"if {over}:", "    return 1"])
 
     def _add(self, part: LoopPart, lines: Sequence[str]) -> int:
         self._parts.append((part, part.source(lines)))
