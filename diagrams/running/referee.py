@@ -106,12 +106,13 @@ class Referee:
         Args:
             name: Name of the robot.
         """
+        found = self.steps[name].state.found[0]
+        if found:
+            return FOUND[found]
+        return INTERRUPTED if self.over else self._cause_at_time_limit(name)
+
+    def _cause_at_time_limit(self, name: str) -> str:
         state, rules = self.steps[name].state, self.steps[name].numbers.rules
-        if state.found[0]:
-            return FOUND[state.found[0]]
-        if self.over:
-            return INTERRUPTED
-        # The run has reached its time limit.
         if rules.searches:
             return "timeout"
         *_, been_in_goal, ticks, following_ticks = state.rules.tolist()
@@ -202,9 +203,8 @@ def _table_of(
     ticks = int(own.duration_s / own.tick_s + 1e-9)
     times: NDArray[np.float64] = own.tick_s * np.arange(ticks + 1.0)
     moving = {n: b for n, b in bodies.items() if b.path.moves and n not in robots}
-    poses = {
-        n: b.path.poses(_instants(times, BETWEEN_TICKS)) for n, b in moving.items()
-    }
+    instants = _instants(times, BETWEEN_TICKS)
+    poses = {name: body.path.poses(instants) for name, body in moving.items()}
     farthest = {
         name: float(np.hypot(*np.diff(rows[:, :2], axis=0).T).max(initial=0.0))
         for name, rows in poses.items()

@@ -470,10 +470,9 @@ def test_a_find_is_judged_by_where_the_source_is(searches, ended, place, cause):
     """The robot is at (2, 1), turned by 30 deg; places are ahead and left of it."""
     scenario = load_scenario(searches)
     (step,) = Referee(scenario).steps.values()
+    rules = step.numbers.rules
     c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
     ahead, left = place
     source = 2.0 + c * ahead - s * left, 1.0 + s * ahead + c * left
-    found = judge_search(
-        float(ended), (2.0, 1.0, math.pi / 6), source, step.numbers.rules
-    )
+    found = judge_search(float(ended), (2.0, 1.0, math.pi / 6), source, rules)
     assert FOUND[found] == cause
