@@ -26,7 +26,7 @@ from diagrams import (
     build_sound_follower,
     make_simulator,
 )
-from diagrams.running.referee import RefereeMonitor
+from diagrams.running.monitor import Monitor
 from diagrams.running.stop_rules import Collision
 from diagrams.scenario.bodies import robot_rectangle
 from systems.base.wheel_speed_command import hand_position_twist, limited_wheel_speeds
@@ -149,8 +149,8 @@ def _run(
     """Cause, and the mechanism of a collision."""
     scenario, robot = follower.scenario, follower.scenario.robot
     simulator = make_simulator(follower)
-    judge = RefereeMonitor(follower)
-    simulator.set_monitor(judge)
+    monitor = Monitor(follower)
+    simulator.set_monitor(monitor)
     contexts = {
         role: follower.blocks[role].GetMyMutableContextFromRoot(
             simulator.get_mutable_context()
@@ -166,9 +166,9 @@ def _run(
     simulator.Initialize()
     simulator.AdvanceTo(scenario.duration_s)
     (name,) = follower.robots
-    collision = judge.referee.collision(name)
+    collision = monitor.referee.collision(name)
     if collision is None:
-        return judge.referee.cause_of(name), ""
+        return monitor.referee.cause_of(name), ""
     end = contexts["plant"].get_continuous_state_vector().CopyToVector()[:3]
     return "collision", _mechanism(scenario, end, collision)
 

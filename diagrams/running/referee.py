@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import EventStatus
 
-from diagrams.building.builder import SoundFollower
-from diagrams.building.robot import Parts
 from diagrams.running.stop_rules import (
     ENDING,
     FOUND,
     INTERRUPTED,
-    READ_PORTS,
-    ROUNDING_S,
     SUCCESSFUL,
     UNJUDGED,
     BodyTable,
@@ -37,8 +31,6 @@ from systems.world.geometry import rectangle_clearance
 #: least number of parts, and the greatest distance that a body on its own path may move
 #: in one part, m. If a body is faster, ticks have more parts.
 BETWEEN_TICKS, _PART_M = 5, 0.02
-
-_GO_ON = EventStatus.DidNothing()
 
 
 class Referee:
@@ -253,63 +245,3 @@ def _instants(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
     shares = np.arange(1, parts + 1) / parts
     between = times[:-1, None] + shares * np.diff(times)[:, None]
     return np.concatenate([times[:1], between.ravel()])
-
-
-class RefereeMonitor:
-    """A monitor for Drake's simulator that calls the steps of a referee.
-
-    Args:
-        follower: The diagram.
-    """
-
-    def __init__(self, follower: SoundFollower) -> None:
-        self.referee = Referee(follower.scenario)
-        self._diagram, self._tick_s = follower.diagram, follower.scenario.tick_s
-        self._views = {name: _View(parts) for name, parts in follower.robots.items()}
-        self._tick = -1
-
-    def __call__(self, context: Any) -> EventStatus:
-        """Judges the run; the simulator calls this method after every step.
-
-        Steps may be shorter than ticks; this method ignores the instants between ticks.
-        """
-        time, referee = context.get_time(), self.referee
-        tick = round(time / self._tick_s)
-        if tick == self._tick or abs(time - tick * self._tick_s) > ROUNDING_S:
-            return _GO_ON
-        self._tick = tick
-        inputs = {}
-        for number, (name, view) in enumerate(self._views.items()):
-            referee.poses[number], *inputs[name] = view.at(context)
-        for name, step in referee.steps.items():
-            values = referee.poses, *inputs[name]
-            step.step(tick, step.state, values, (), step.numbers)
-        if referee.over:
-            cause = referee.cause_of(referee.decisive)
-            return EventStatus.ReachedTermination(self._diagram, cause)
-        return _GO_ON
-
-
-class _View:
-    """Reads the ports of a robot from the context of the diagram."""
-
-    def __init__(self, parts: Parts) -> None:
-        self._ports: list[tuple[int, Any, Any]] = []
-        self._zeros = [[0.0] * size for size in (3, *READ_PORTS.values())]
-        for index, name in enumerate(("pose_WB", *READ_PORTS)):
-            having = [b for b in parts.blocks.values() if b.HasOutputPort(name)]
-            self._ports += [(index, b, b.GetOutputPort(name)) for b in having[:1]]
-        self._root: Any = None
-        self._contexts: list[Any] = []
-
-    def at(self, context: Any) -> list[Any]:
-        """The pose of the robot, and the values of ``READ_PORTS``."""
-        if context is not self._root:
-            self._root = context
-            self._contexts = [
-                b.GetMyContextFromRoot(context) for _, b, _ in self._ports
-            ]
-        values = [*self._zeros]
-        for (index, _, port), own in zip(self._ports, self._contexts, strict=True):
-            values[index] = port.Eval(own).tolist()
-        return values

@@ -1,8 +1,9 @@
 """The blocks of a scenario in one compiled loop over ticks.
 
 Drake's diagram remains the model. The loop calls the same functions, which are the
-``Step`` of each block. The names of the ports determine the order of the calls. The
-integrator and the random numbers are the same, and the loop logs the same columns.
+``Step`` of each block. The connections in the diagrams of the robots determine the
+order of the calls. The integrator and the random numbers are the same, and the loop
+logs the same columns.
 
 Each tick has the following order, which is the same as in Drake:
 
@@ -18,23 +19,32 @@ Each tick has the following order, which is the same as in Drake:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
+from diagrams.building.builder import audible_sounds
+from diagrams.building.robot import seed_of
 from diagrams.running.audio.run_audio import RunAudio
-from diagrams.running.compiled.loop_audio import save_sounds
-from diagrams.running.compiled.loop_blocks import LoopBlocks
+from diagrams.running.compiled.loop_blocks import (
+    LoopDiagram,
+    shared_blocks,
+    shared_sources,
+    shared_world,
+)
 from diagrams.running.compiled.parts import run_parts
-from diagrams.running.compiled.plan import LoopPlan, LoopRobot, LoopWorld
-from diagrams.running.compiled.sounds import sounds_of_a_run
+from diagrams.running.compiled.plan import LoopPlan
 from diagrams.running.referee import Referee
-from diagrams.scenario.scenario import WORLD, Scenario
+from diagrams.scenario.scenario import ROBOT, WORLD, Scenario
+from systems.framework.block import RunFacts
 from systems.framework.host_step import HostError
 from systems.framework.input_error import InputError, shortened
+from systems.framework.signals import Emission
 
 
 @dataclass
@@ -132,20 +142,11 @@ def _complaint(error: Exception) -> str:
     return shortened(next(known, type(error).__name__), 120)
 
 
-def compile_loop(
-    scenario: Scenario,
-    blocks: Mapping[str, LoopBlocks],
-    referee: Referee,
-    shared: LoopBlocks | None = None,
-    audio: RunAudio | None = None,
-) -> CompiledLoop:
+def compile_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
     """Assembles the compiled loop of a scenario.
 
     Args:
         scenario: The scenario to run.
-        blocks: Blocks of each robot; they may have been made for another start or seed.
-        referee: Referee of the run.
-        shared: Blocks that all robots share, if any.
         audio: Open files for the sound, if it is saved.
 
     Returns:
@@ -156,36 +157,91 @@ def compile_loop(
     """
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
-    sounds = sounds_of_a_run(scenario, times)
-    world = LoopWorld(scenario, shared, ticks) if shared is not None else None
-    robots = {
-        name: LoopRobot(scenario, name, own, ticks, sounds.heard[name], pose_WB, world)
-        for (name, own), pose_WB in zip(blocks.items(), referee.poses, strict=True)
+    referee, made_world = Referee(scenario), shared_world(scenario)
+    world = made_world and LoopDiagram(made_world, _facts(scenario, ticks), {})
+    robots: dict[str, LoopDiagram] = {}
+    # The emission of each loudspeaker at a tick. Robots may hear one another.
+    emitters = {
+        name: made.blocks["emitter"].step_for(_facts(scenario, ticks, name))
+        for name, made in shared_sources(scenario).items()
     }
+    emissions: dict[str, Callable[[int], Emission]] = {
+        name: emitters[name].carries["emission"]
+        if name in emitters
+        else lambda tick, name=name: robots[name].carried["emitter", "emission"](tick)
+        for name in audible_sounds(scenario)
+    }
+    blocks = shared_blocks(scenario)
+    for (name, own), pose_WB in zip(blocks.items(), referee.poses, strict=True):
+        target = scenario.target(name)
+        heard = {f"emission_{source}": emissions[source] for source in emissions}
+        heard["emission"] = heard.pop(f"emission_{target}", lambda tick: None)
+        shared = {("plant", "pose_WB"): pose_WB}
+        if world is not None:
+            given = world.published.items()
+            shared |= {("", port): world.values[key] for port, key in given}
+            if ("", f"frames_{name}") in world.values:
+                frames = world.values["", f"frames_{name}"]
+                shared["controller", "frames"] = frames
+        facts = _facts(scenario, ticks, name, heard)
+        robots[name] = LoopDiagram(own, facts, shared)
     plan = LoopPlan(robots, times)
     for name in robots:
         plan.surround(name, scenario.surroundings(name))
-    for name, function in sounds.carried.items():
-        plan.remember(name, function)
-    for each in (*((world,) if world else ()), *robots.values()):
+    for name, emitter in emitters.items():
+        path = scenario.all_sources[name].path()
+        velocities = np.array([path.velocity(time) for time in times.tolist()])
+        plan.add_source(path, velocities, emitter)
+    logged = {**robots} if world is None else {WORLD: world, **robots}
+    for each in logged.values():
         plan.add(each)
     if audio is not None:
-        save_sounds(plan, robots, sounds, audio)
+        read = partial(_value_of, robots, emissions)
+        plan.call(lambda tick, _, __: audio.save(tick, partial(read, tick)))
     plan.judge(referee)
     width, columns = 0, {}
-    logged: dict[str, LoopRobot | LoopWorld] = {**robots}
-    if world is not None:
-        logged[WORLD] = world
     for name, each in logged.items():
-        own = each.made
-        plan.logged += [each.view(port) for _, port in own.columns]
-        wanted = [text for texts in own.columns.values() for text in texts]
+        wanted = [text for texts in each.made.columns.values() for text in texts]
         columns[name] = {text: width + k for k, text in enumerate(wanted)}
         width += len(wanted)
-    return CompiledLoop(
-        np.empty((ticks + 1, width)),
+    log = np.empty((ticks + 1, width))
+    return CompiledLoop(log, scenario.tick_s, referee, columns, plan)
+
+
+def _facts(
+    scenario: Scenario,
+    ticks: int,
+    owner: str = ROBOT,
+    carried: Mapping[str, Callable[[int], Any]] | None = None,
+) -> RunFacts:
+    """Facts about a run for the blocks of a robot, of a source, or of the world."""
+    own = scenario.all_robots.get(owner)
+    goal = own.route.goal_m if own is not None and own.route is not None else None
+    return RunFacts(
+        ticks,
         scenario.tick_s,
-        referee,
-        columns,
-        plan,
+        own.start.pose if own is not None else (0.0, 0.0, 0.0),
+        scenario.integrator.scheme,
+        scenario.integrator.step_s,
+        partial(seed_of, scenario, owner=owner),
+        carried or {},
+        scenario.mapped(),
+        goal,
     )
+
+
+def _value_of(
+    robots: Mapping[str, LoopDiagram],
+    emissions: Mapping[str, Callable[[int], Emission]],
+    tick: int,
+    owner: str,
+    port: str,
+) -> Any:
+    """Value of an output port of a robot or source; None if there is no such port."""
+    if port == "emission":
+        return emissions[owner](tick)
+    robot = robots[owner]
+    key = robot.published.get(port)
+    if key in robot.made.objects:
+        return robot.carried[key](tick) if key in robot.carried else None
+    return None if key is None else robot.values[key]

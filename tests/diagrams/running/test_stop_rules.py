@@ -18,7 +18,8 @@ from diagrams import (
     make_simulator,
     simulate,
 )
-from diagrams.running.referee import Referee, RefereeMonitor
+from diagrams.running.monitor import Monitor
+from diagrams.running.referee import Referee
 from diagrams.running.stop_rules import FOUND, judge_search
 from diagrams.scenario.bodies import robot_rectangle
 from diagrams.scenario.scenario import Scenario
@@ -46,7 +47,7 @@ def test_a_run_leaves_no_simulator_behind():
     follower = build_sound_follower(Scenario.model_validate(BASE))
     simulator = make_simulator(follower)
     context = simulator.get_context()
-    simulator.set_monitor(RefereeMonitor(follower))
+    simulator.set_monitor(Monitor(follower))
     simulator.Initialize()
     simulator.AdvanceTo(0.1)
     alive = weakref.ref(simulator)
