@@ -33,6 +33,7 @@ from diagrams.building.robot import seed_of
 from diagrams.running.audio.run_audio import RunAudio
 from diagrams.running.compiled.loop_blocks import (
     LoopDiagram,
+    PortKey,
     shared_blocks,
     shared_sources,
     shared_world,
@@ -157,64 +158,80 @@ def compile_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledL
     """
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
-    referee, made_world = Referee(scenario), shared_world(scenario)
-    world = made_world and LoopDiagram(made_world, _facts(scenario, ticks), {})
-    robots: dict[str, LoopDiagram] = {}
-    # The emission of each loudspeaker at a tick. Robots may hear one another.
+    referee, facts_of = Referee(scenario), partial(_facts, scenario, ticks)
     emitters = {
-        name: made.blocks["emitter"].step_for(_facts(scenario, ticks, name))
+        name: made.blocks["emitter"].step_for(facts_of(name))
         for name, made in shared_sources(scenario).items()
     }
-    emissions: dict[str, Callable[[int], Emission]] = {
-        name: emitters[name].carries["emission"]
-        if name in emitters
-        else lambda tick, name=name: robots[name].carried["emitter", "emission"](tick)
-        for name in audible_sounds(scenario)
-    }
+    robots: dict[str, LoopDiagram] = {}
+
+    def emission(name: str, tick: int) -> Emission:
+        """Emission of a source or robot; robots may hear one another."""
+        if name in emitters:
+            carried = emitters[name].carries["emission"]
+        else:
+            carried = robots[name].carried["emitter", "emission"]
+        found: Emission = carried(tick)
+        return found
+
+    every: dict[str, LoopDiagram] = {}
+    made_world = shared_world(scenario)
+    if made_world is not None:
+        every[WORLD] = LoopDiagram(made_world, facts_of(ROBOT), {})
     blocks = shared_blocks(scenario)
-    for (name, own), pose_WB in zip(blocks.items(), referee.poses, strict=True):
+    for (name, made), pose_WB in zip(blocks.items(), referee.poses, strict=True):
         target = scenario.target(name)
-        heard = {f"emission_{source}": emissions[source] for source in emissions}
-        heard["emission"] = heard.pop(f"emission_{target}", lambda tick: None)
+        heard = {
+            "emission" if source == target else f"emission_{source}": partial(
+                emission, source
+            )
+            for source in audible_sounds(scenario)
+        }
         shared = {("plant", "pose_WB"): pose_WB}
-        if world is not None:
-            given = world.published.items()
-            shared |= {("", port): world.values[key] for port, key in given}
-            if ("", f"frames_{name}") in world.values:
-                frames = world.values["", f"frames_{name}"]
-                shared["controller", "frames"] = frames
-        facts = _facts(scenario, ticks, name, heard)
-        robots[name] = LoopDiagram(own, facts, shared)
+        if WORLD in every:
+            shared |= _shared_with_world(every[WORLD], name)
+        every[name] = robots[name] = LoopDiagram(made, facts_of(name, heard), shared)
     plan = LoopPlan(robots, times)
     for name in robots:
         plan.surround(name, scenario.surroundings(name))
     for name, emitter in emitters.items():
-        path = scenario.all_sources[name].path()
-        velocities = np.array([path.velocity(time) for time in times.tolist()])
-        plan.add_source(path, velocities, emitter)
-    logged = {**robots} if world is None else {WORLD: world, **robots}
-    for each in logged.values():
-        plan.add(each)
-    if audio is not None:
-        read = partial(_value_of, robots, emissions)
-        plan.call(lambda tick, _, __: audio.save(tick, partial(read, tick)))
-    plan.judge(referee)
+        plan.add_source(scenario.all_sources[name], emitter)
     width, columns = 0, {}
-    for name, each in logged.items():
+    for name, each in every.items():
+        plan.add(each)
         wanted = [text for texts in each.made.columns.values() for text in texts]
         columns[name] = {text: width + k for k, text in enumerate(wanted)}
         width += len(wanted)
+    if audio is not None:
+
+        def read(tick: int, owner: str, port: str) -> Any:
+            if port == "emission":
+                return emission(owner, tick)
+            return robots[owner].output(port, tick)
+
+        plan.call(lambda tick, _, __: audio.save(tick, partial(read, tick)))
+    plan.judge(referee)
     log = np.empty((ticks + 1, width))
     return CompiledLoop(log, scenario.tick_s, referee, columns, plan)
+
+
+def _shared_with_world(
+    world: LoopDiagram, robot: str
+) -> dict[PortKey, NDArray[np.float64]]:
+    """Values of ports by which a robot and the world are connected."""
+    values = {("", port): world.values[key] for port, key in world.published.items()}
+    if ("", f"frames_{robot}") in world.values:
+        values["controller", "frames"] = world.values["", f"frames_{robot}"]
+    return values
 
 
 def _facts(
     scenario: Scenario,
     ticks: int,
-    owner: str = ROBOT,
+    owner: str,
     carried: Mapping[str, Callable[[int], Any]] | None = None,
 ) -> RunFacts:
-    """Facts about a run for the blocks of a robot, of a source, or of the world."""
+    """Facts about a run for the blocks of a robot or source; ``ROBOT``: the world."""
     own = scenario.all_robots.get(owner)
     goal = own.route.goal_m if own is not None and own.route is not None else None
     return RunFacts(
@@ -228,20 +245,3 @@ def _facts(
         scenario.mapped(),
         goal,
     )
-
-
-def _value_of(
-    robots: Mapping[str, LoopDiagram],
-    emissions: Mapping[str, Callable[[int], Emission]],
-    tick: int,
-    owner: str,
-    port: str,
-) -> Any:
-    """Value of an output port of a robot or source; None if there is no such port."""
-    if port == "emission":
-        return emissions[owner](tick)
-    robot = robots[owner]
-    key = robot.published.get(port)
-    if key in robot.made.objects:
-        return robot.carried[key](tick) if key in robot.carried else None
-    return None if key is None else robot.values[key]

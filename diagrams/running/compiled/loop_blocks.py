@@ -167,6 +167,21 @@ class LoopDiagram:
         }
         """Keys of the output ports, by name."""
 
+    def output(self, port: str, tick: int = 0) -> Any:
+        """Returns the values or the object of an output port.
+
+        Args:
+            port: Name of the port.
+            tick: The present tick, for an object.
+
+        Returns:
+            None if there is no such port.
+        """
+        key = self.published.get(port)
+        if key in self.made.objects:
+            return self.carried[key](tick) if key in self.carried else None
+        return None if key is None else self.values[key]
+
 
 def _step_for(block: Any, run: RunFacts) -> Step:
     if not hasattr(block, "step_for"):

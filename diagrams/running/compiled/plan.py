@@ -14,7 +14,8 @@ from diagrams.running.compiled.parts import PUBLISH
 from diagrams.running.compiled.source import LoopPart, address_of, compiled_part
 from diagrams.running.referee import Referee
 from diagrams.running.stop_rules import READ_PORTS, run_is_over
-from diagrams.scenario.bodies import Path, Surroundings
+from diagrams.scenario.bodies import Surroundings
+from diagrams.scenario.participants import SourceParameters
 from systems.framework.block import Step, has_arrays
 from systems.framework.compiling import njit
 from systems.framework.host_step import HostCall, HostFunction, host_step
@@ -70,16 +71,17 @@ class LoopPlan:
                 (self._plants if part == "plant" else self._late).append(number)
         self.logged += [values[key] for key in made.columns]
 
-    def add_source(self, path: Path, velocities: Any, emitter: Step) -> None:
-        """Adds a source that moves along a path and has a loudspeaker.
+    def add_source(self, source: SourceParameters, emitter: Step) -> None:
+        """Adds a source with a loudspeaker.
 
         Args:
-            path: Its pose over time.
-            velocities: (n, 3) velocities in W at the ticks, m/s and rad/s.
+            source: Its path; poses and velocities are tabulated for all ticks.
             emitter: Step of its loudspeaker.
         """
+        path, times = source.path(), self._times
+        velocities = np.array([path.velocity(time) for time in times.tolist()])
         pose_WS, v_WS = np.zeros((2, 3))
-        for into, table in ((pose_WS, path.poses(self._times)), (v_WS, velocities)):
+        for into, table in ((pose_WS, path.poses(times)), (v_WS, velocities)):
             self._fill_by(_fill, into, np.zeros(1, dtype=np.int64), table[None])
         self._filled.append(self._step(emitter, (pose_WS, v_WS), ()))
 
@@ -163,13 +165,12 @@ class LoopPlan:
         """
         for name, step in referee.steps.items():
             robot = self._robots[name]
-            read = [
-                robot.values[robot.published[port]]
-                if port in robot.published
-                else np.zeros(size)
-                for port, size in READ_PORTS.items()
-            ]
-            self._early.append(self._step(step, (referee.poses, *read), ()))
+            read = (robot.output(port) for port in READ_PORTS)
+            zeros = map(np.zeros, READ_PORTS.values())
+            inputs = (
+                z if it is None else it for it, z in zip(read, zeros, strict=True)
+            )
+            self._early.append(self._step(step, (referee.poses, *inputs), ()))
         part = LoopPart()
         over = f"{part.name(run_is_over)}({part.expression(referee.found)})"
         self._judge = self._add(part, [f"if {over}:", "    return 1"])
