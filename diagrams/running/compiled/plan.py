@@ -165,12 +165,11 @@ class LoopPlan:
         """
         for name, step in referee.steps.items():
             robot = self._robots[name]
-            read = (robot.output(port) for port in READ_PORTS)
-            zeros = map(np.zeros, READ_PORTS.values())
-            inputs = (
-                z if it is None else it for it, z in zip(read, zeros, strict=True)
-            )
-            self._early.append(self._step(step, (referee.poses, *inputs), ()))
+            inputs = [referee.poses]
+            for port, size in READ_PORTS.items():
+                values = robot.output(port)
+                inputs.append(np.zeros(size) if values is None else values)
+            self._early.append(self._step(step, tuple(inputs), ()))
         part = LoopPart()
         over = f"{part.name(run_is_over)}({part.expression(referee.found)})"
         self._judge = self._add(part, [f"if {over}:", "    return 1"])
