@@ -22,7 +22,7 @@ from diagrams.running.stop_rules import (
     judge_robot,
     run_is_over,
 )
-from diagrams.scenario.bodies import Body, LivePath, robot_rectangle
+from diagrams.scenario.bodies import Body, RecordedPath, robot_rectangle
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import Step
 from systems.world.geometry import rectangle_clearance
@@ -140,13 +140,11 @@ class Referee:
             return None
         begin, end = max(tick - 1.0, 0.0) * tick_s, tick * tick_s
         instant = begin + part * (end - begin)
-        paths = {}
-        for robot, before, now in zip(
-            self.steps, state.before.tolist(), state.now.tolist(), strict=True
-        ):
-            paths[robot] = LivePath(tuple(before))
-            paths[robot].move(begin, before)
-            paths[robot].move(end, now)
+        moved = np.stack([state.before, state.now], axis=1)
+        paths = {
+            robot: RecordedPath(np.array([begin, end]), poses)
+            for robot, poses in zip(self.steps, moved, strict=True)
+        }
         bodies = self.scenario.surroundings(name, paths).bodies
         touched, hit = [*bodies.items()][int(body)]
         own = self.scenario.all_robots[name].robot

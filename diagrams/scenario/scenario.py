@@ -22,8 +22,8 @@ from pydantic import (
 
 from diagrams.scenario.bodies import (
     Body,
-    LivePath,
     Path,
+    RecordedPath,
     Surroundings,
     microphones_W,
     robot_rectangle,
@@ -220,7 +220,8 @@ class Scenario(FollowerParameters, RunParameters):
         bodies = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
         for name, other in self.all_robots.items():
             if name != robot:
-                path = paths.get(name) or LivePath(other.start.pose)
+                start = RecordedPath(np.zeros(1), np.array([other.start.pose]))
+                path = paths.get(name) or start
                 bodies[name] = Body(path, other.size)
         for name, source in self.all_sources.items():
             if source.body:

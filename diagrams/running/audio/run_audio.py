@@ -184,6 +184,7 @@ class RunAudio:
         """Appends the frames that end at a tick, and the sounds since the last tick.
 
         Both engines call this method before any block changes its state at the tick.
+        The sound at tick 0 precedes the run and is not saved.
 
         Args:
             tick: The present tick.
@@ -196,8 +197,10 @@ class RunAudio:
                 or a frame does not fit the robot's microphones.
             OSError: The disk is full, or fails.
         """
+        if tick == 0:
+            return
         for name, heard in self._heard.items():
-            if tick % round(heard.microphones.frame_s / self._tick_s) == 0 and tick:
+            if tick % round(heard.microphones.frame_s / self._tick_s) == 0:
                 listening = read(name, LISTENING)
                 asked = listening is None or listening[0] > 0.5
                 frame = read(name, "audio") if asked else None
@@ -216,8 +219,7 @@ class RunAudio:
 
         Args:
             robot: Name of the robot.
-            tick: Last tick of the frame; the frame at tick 0 precedes the run and is
-                ignored.
+            tick: Last tick of the frame, above 0.
             frame: Frame of the robot's microphones; None while the robot does not
                 listen.
 
@@ -225,8 +227,6 @@ class RunAudio:
             InputError: The frame does not fit the robot's microphones.
             OSError: The disk is full, or fails.
         """
-        if tick == 0:
-            return
         writer, _, microphones, channels = self._heard[robot]
         shape = channels, microphones.frame_samples
         if frame is None:
@@ -246,14 +246,12 @@ class RunAudio:
 
         Args:
             name: Name of the source, or of the robot that carries the loudspeaker.
-            tick: The present tick.
+            tick: The present tick, above 0.
             emission: The emission at this tick.
 
         Raises:
             OSError: The disk is full, or fails.
         """
-        if tick == 0:
-            return
         writer, full_scale_pa = self._played[name]
         pressure = played_in_a_tick(emission, self._tick_s)
         writer.write(pcm_of_pressure(pressure, full_scale_pa)[None])

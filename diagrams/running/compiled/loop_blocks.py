@@ -238,13 +238,14 @@ def shared_sources(scenario: Scenario) -> dict[str, LoopBlocks]:
     Raises:
         InputError: A sound file cannot be played.
     """
-    air = scenario.model_dump_json(include={"acoustics", "room", "tick_s"})
+    air = f"{scenario.acoustics.c} {scenario.room}"
     blocks = {}
     for name, sound in audible_sounds(scenario).items():
         source = scenario.all_sources.get(name)
         if source is not None:
             made = partial(make_source, scenario, name, source, audible=True)
-            key = f"{name} {sound.model_dump_json()} {scenario.longest_frame_s} {air}"
+            times = f"{scenario.longest_frame_s} {scenario.tick_s}"
+            key = f"{name} {sound.model_dump_json()} {air} {times}"
             blocks[name] = _shared(key, made)
     return blocks
 
