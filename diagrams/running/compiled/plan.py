@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.running.compiled.loop_blocks import LoopDiagram
-from diagrams.running.compiled.parts import PUBLISH
+from diagrams.running.compiled.parts import PUBLISH, clear, copy, fill
 from diagrams.running.compiled.source import LoopPart, address_of, compiled_part
 from diagrams.running.referee import Referee
 from diagrams.running.stop_rules import READ_PORTS, run_is_over
 from diagrams.scenario.bodies import Surroundings
 from diagrams.scenario.participants import SourceParameters
 from systems.framework.block import Step, has_arrays
-from systems.framework.compiling import njit
 from systems.framework.host_step import HostCall, HostFunction, host_step
 
 
@@ -82,7 +81,7 @@ class LoopPlan:
         velocities = np.array([path.velocity(time) for time in times.tolist()])
         pose_WS, v_WS = np.zeros((2, 3))
         for into, table in ((pose_WS, path.poses(times)), (v_WS, velocities)):
-            self._fill_by(_fill, into, np.zeros(1, dtype=np.int64), table[None])
+            self._fill_by(fill, into, np.zeros(1, dtype=np.int64), table[None])
         self._filled.append(self._step(emitter, (pose_WS, v_WS), ()))
 
     def call(self, function: HostFunction) -> None:
@@ -115,7 +114,7 @@ class LoopPlan:
             publish = f"{part.name(step.publish)}(state, outputs, numbers)"
             lines += [f"if tick == {PUBLISH}:", f"    {publish}", "    return 0"]
         elif outputs:
-            lines.append(f"{part.name(_clear)}(outputs)")
+            lines.append(f"{part.name(clear)}(outputs)")
         lines.append(f"{part.name(step.step)}(tick, state, inputs, outputs, numbers)")
         return self._add(part, lines)
 
@@ -141,11 +140,11 @@ class LoopPlan:
                 at = times if any(path.moves for path in paths) else times[:1]
                 places = np.array([*known], dtype=np.int64)
                 poses = np.reshape([path.poses(at) for path in paths], (-1, len(at), 3))
-                self._fill_by(_fill, into, places, poses)
+                self._fill_by(fill, into, places, poses)
                 for k, body in enumerate(bodies):
                     if body in robots:
                         pose = robots[body].values["plant", "pose_WB"]
-                        self._fill_by(_copy, into, 3 * k, pose)
+                        self._fill_by(copy, into, 3 * k, pose)
         if ("", "sizes") in values:
             sizes = [body.size for body in around.obstacles.values()]
             values["", "sizes"][:] = np.ravel(sizes)
@@ -207,29 +206,3 @@ class LoopPlan:
 
 def _table(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
-
-
-@njit(cache=True)
-def _fill(
-    out: Any, places: Any, poses: Any, tick: int
-) -> None:  # pragma: no cover  (compiled)
-    """Copies poses from the row of a tick; bodies at rest have only one row."""
-    row = min(tick, poses.shape[1] - 1)
-    for body in range(len(places)):
-        for k in range(3):
-            out[places[body] + k] = poses[body, row, k]
-
-
-@njit(cache=True)
-def _copy(
-    out: Any, first: int, values: Any, _tick: int
-) -> None:  # pragma: no cover  (compiled)
-    for k in range(len(values)):
-        out[first + k] = values[k]
-
-
-@njit(cache=True)
-def _clear(outputs: Any) -> None:  # pragma: no cover  (compiled)
-    for k in range(len(outputs)):
-        for j in range(len(outputs[k])):
-            outputs[k][j] = 0.0
