@@ -164,7 +164,7 @@ class LoopPlan:
         """
         for name, step in referee.steps.items():
             robot = self._robots[name]
-            inputs = [referee.poses]
+            inputs: list[Any] = [referee.poses]
             for port, size in READ_PORTS.items():
                 values = robot.output(port)
                 inputs.append(np.zeros(size) if values is None else values)
