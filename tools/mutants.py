@@ -37,6 +37,7 @@ ROOT = Path(__file__).parents[1]
 #: recordings, verdicts, metrics, statistics and claims.
 MODULES = (
     "systems/*/*.py",
+    "diagrams/running/referee.py",
     "diagrams/running/stop_rules.py",
     "analysis/arrays/*.py",
     "analysis/reporting/intervals.py",

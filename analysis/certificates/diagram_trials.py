@@ -26,7 +26,8 @@ from diagrams import (
     build_sound_follower,
     make_simulator,
 )
-from diagrams.running.stop_rules import Collision, StopRules
+from diagrams.running.monitor import Monitor
+from diagrams.running.stop_rules import Collision
 from diagrams.scenario.bodies import robot_rectangle
 from systems.base.wheel_speed_command import hand_position_twist, limited_wheel_speeds
 from systems.framework.input_error import InputError
@@ -148,8 +149,8 @@ def _run(
     """Cause, and the mechanism of a collision."""
     scenario, robot = follower.scenario, follower.scenario.only.robot
     simulator = make_simulator(follower)
-    rules = StopRules(follower)
-    simulator.set_monitor(rules)
+    monitor = Monitor(follower)
+    simulator.set_monitor(monitor)
     contexts = {
         role: follower.blocks[role].GetMyMutableContextFromRoot(
             simulator.get_mutable_context()
@@ -164,11 +165,12 @@ def _run(
     set_discrete_state(contexts["command"], [*velocity, *wheels])
     simulator.Initialize()
     simulator.AdvanceTo(scenario.duration_s)
-    (robot_rules,) = rules.robots.values()
-    if robot_rules.collision is None:
-        return robot_rules.final_cause(), ""
+    (name,) = follower.robots
+    collision = monitor.referee.collision(name)
+    if collision is None:
+        return monitor.referee.cause_of(name), ""
     end = contexts["plant"].get_continuous_state_vector().CopyToVector()[:3]
-    return "collision", _mechanism(scenario, end, robot_rules.collision)
+    return "collision", _mechanism(scenario, end, collision)
 
 
 def _mechanism(

@@ -22,6 +22,7 @@ from diagrams.building.robot import (
 from diagrams.scenario.scenario import ODOR, WORLD, Scenario
 from systems import Obstacles
 from systems.framework.input_error import InputError
+from systems.sound.parameters import SoundParameters
 
 
 @dataclass(frozen=True)
@@ -111,26 +112,13 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
         InputError: A sound file cannot be played.
     """
     builder = DiagramBuilder()
-    robots, audible = scenario.robots, set()
-    if any(robot.listens for robot in robots.values()):
-        audible = set(scenario.sounds())
+    audible = audible_sounds(scenario)
     sources = {
         name: make_source(scenario, name, source, audible=name in audible)
         for name, source in scenario.sources.items()
     }
     obstacles = Obstacles(obstacles=scenario.obstacles)
-    followers = {}
-    for name in robots:
-        target = scenario.target(name)
-        followers[name] = make_robot(
-            _own(scenario, name, audible=name in audible),
-            name,
-            bodies=len(scenario.surroundings(name).obstacles),
-            robots=scenario.robots_seen(name),
-            others=[each for each in scenario.sounds() if each != target],
-            listeners_frame_s=scenario.longest_frame_s,
-            log=log,
-        )
+    followers = {name: robot_of(scenario, name, log=log) for name in scenario.robots}
     systems = [*sources.items(), ("obstacles", obstacles), *followers.items()]
     shared = make_world(scenario, log=log)
     if shared is not None:
@@ -138,7 +126,7 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     for name, system in systems:
         builder.AddNamedSystem(name, system)
     world = _World(builder, scenario, obstacles, sources, followers, shared)
-    for name in robots:
+    for name in followers:
         world.surround(name)
     diagram = builder.Build()
     diagram.set_name("sound_follower")
@@ -152,13 +140,41 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     )
 
 
-def _own(scenario: Scenario, name: str, *, audible: bool) -> Scenario:
-    """A robot's own scenario, without a loudspeaker that no robot hears."""
-    own = scenario.of_robot(name)
-    if audible or own.only.loudspeaker is None:
-        return own
-    robot = own.only.model_copy(update={"loudspeaker": None})
-    return own.model_copy(update={"robots": {name: robot}})
+def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
+    """Returns the sounds that a robot hears as waves.
+
+    Args:
+        scenario: The scenario that is run.
+
+    Returns:
+        The sound of each source and loudspeaker, by name; empty if no robot listens.
+    """
+    listens = any(robot.listens for robot in scenario.robots.values())
+    return scenario.sounds() if listens else {}
+
+
+def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
+    """Builds the diagram of a robot of a scenario, see ``make_robot``.
+
+    A loudspeaker that no robot hears is left out.
+
+    Args:
+        scenario: The scenario that is run.
+        name: Name of the robot.
+        log: Whether to log the columns of its blocks at every tick.
+    """
+    own, target = scenario.of_robot(name), scenario.target(name)
+    if name not in audible_sounds(scenario):
+        own = own.with_robot(loudspeaker=None)
+    return make_robot(
+        own,
+        name,
+        bodies=len(scenario.surroundings(name).obstacles),
+        robots=scenario.robots_seen(name),
+        others=[each for each in scenario.sounds() if each != target],
+        listeners_frame_s=scenario.longest_frame_s,
+        log=log,
+    )
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -427,43 +427,17 @@ def connect_by_name(
         InputError: Several blocks publish a quantity that a block needs; or no block
             publishes it, and it does not come from outside.
     """
-    outputs = require_published(blocks, outside)
-    entries: dict[str, Any] = {}
-    for block in blocks:
-        for index in range(block.num_input_ports()):
-            port = block.get_input_port(index)
-            name = port.get_name()
-            if name in outputs:
-                builder.Connect(outputs[name], port)
-            elif name not in entries:
-                entries[name] = builder.ExportInput(port, name)
-            else:
-                builder.ConnectInput(entries[name], port)
-
-
-def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str, Any]:
-    """Refuses blocks whose inputs are not published exactly once.
-
-    Args:
-        blocks: Blocks of a robot or a source.
-        outside: Quantities from outside, see ``connect_by_name``.
-
-    Returns:
-        All output ports of the blocks, by name.
-
-    Raises:
-        InputError: An input is not published exactly once. The error names the input
-            and its block.
-    """
-    blocks, outputs, counts = list(blocks), {}, Counter[str]()
+    outputs, counts = dict[str, Any](), Counter[str]()
     for block in blocks:
         for index in range(block.num_output_ports()):
             port = block.get_output_port(index)
             outputs[port.get_name()] = port
             counts[port.get_name()] += 1
+    entries: dict[str, Any] = {}
     for block in blocks:
         for index in range(block.num_input_ports()):
-            name = block.get_input_port(index).get_name()
+            port = block.get_input_port(index)
+            name = port.get_name()
             given = any(f"{name}_".startswith(f"{each}_") for each in outside)
             if counts[name] != 1 and (counts[name] or not given):
                 raise InputError(
@@ -471,7 +445,12 @@ def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str
                     f"{counts[name]} blocks publish {name!r}, which it needs; "
                     "give exactly one block an output port of that name",
                 )
-    return outputs
+            if name in outputs:
+                builder.Connect(outputs[name], port)
+            elif name not in entries:
+                entries[name] = builder.ExportInput(port, name)
+            else:
+                builder.ConnectInput(entries[name], port)
 
 
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:

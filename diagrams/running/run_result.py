@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.building.robot import Parts
-from diagrams.running.stop_rules import Collision, RobotRules, decisive_robot
+from diagrams.running.referee import Referee
+from diagrams.running.stop_rules import Collision
 from diagrams.scenario.bodies import RecordedPath, Surroundings
 from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import Scenario
@@ -30,7 +31,7 @@ class RunResult:
 
     For a run of several robots, ``robots`` has one result per robot. Column names then
     begin with the name of the robot and a dot. ``cause`` is then the cause of one
-    robot, see ``decisive_robot``.
+    robot, see ``Referee.decisive``.
     """
 
     scenario: Scenario
@@ -134,8 +135,7 @@ class RunResult:
 
 
 def gather_result(
-    scenario: Scenario,
-    rules: Mapping[str, RobotRules],
+    referee: Referee,
     logs: Mapping[str, dict[str, NDArray[np.float64]]],
     wall_s: float,
     engine: Engine = "drake",
@@ -144,8 +144,7 @@ def gather_result(
     """Collects the result of a run that has ended.
 
     Args:
-        scenario: The scenario that was run.
-        rules: The stop rules of each robot, with their causes.
+        referee: The referee of the run.
         logs: The columns of each robot, with the time t.
         wall_s: Duration of the simulation, s.
         engine: The engine that simulated the run.
@@ -155,6 +154,7 @@ def gather_result(
         The result of the only robot. If there are several robots, one result for all
         robots together; its field ``several`` contains the result of each robot.
     """
+    scenario = referee.scenario
     paths = {
         name: RecordedPath(log["t"], np.column_stack([log[key] for key in _POSE]))
         for name, log in logs.items()
@@ -166,15 +166,15 @@ def gather_result(
         own = scenario.of_robot(name)
         results[name] = RunResult(
             own,
-            rules[name].final_cause(),
-            rules[name].collision,
+            referee.cause_of(name),
+            referee.collision(name),
             _completed(log, own, around) | _heard_by_sink(world or {}, name),
             wall_s,
             name,
             engine,
             others=around,
             whole=None if own is scenario else scenario,
-            ended=rules[name].ended,
+            ended=referee.ended(name),
             world=world or {},
         )
     if not several:
@@ -184,7 +184,7 @@ def gather_result(
         for key, values in result.columns.items():
             if key != "t":
                 columns[f"{name}.{key}"] = values
-    decisive = results[decisive_robot(rules)]
+    decisive = results[referee.decisive]
     return RunResult(
         scenario,
         decisive.cause,

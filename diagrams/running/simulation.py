@@ -14,12 +14,10 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from diagrams.building.builder import SoundFollower, build_sound_follower
 from diagrams.building.robot import publishes_state
-from diagrams.running.audio.diagram_audio import DiagramAudio
 from diagrams.running.audio.run_audio import RunAudio
 from diagrams.running.compiled.loop import CompiledLoop, compile_loop
-from diagrams.running.compiled.loop_blocks import shared_blocks, shared_world
+from diagrams.running.monitor import Monitor
 from diagrams.running.run_result import RunResult, gather_result, logged_columns
-from diagrams.running.stop_rules import RunRules, StopRules
 from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import WORLD, Scenario
 from systems.framework.input_error import InputError
@@ -90,8 +88,8 @@ def simulate(
         )
     load_compiled_code(follower)
     simulator = make_simulator(follower)
-    rules = StopRules(follower)
-    simulator.set_monitor(_monitor(follower, rules, audio))
+    monitor = Monitor(follower, audio)
+    simulator.set_monitor(monitor)
     start = perf_counter()
     simulator.Initialize()
     views = _python_views(follower, simulator.get_context())
@@ -99,13 +97,13 @@ def simulate(
         simulator.AdvanceTo(min(second, scenario.duration_s))
         if progress is not None:
             progress(simulator.get_context().get_time())
-        if rules.over:
+        if monitor.referee.over:
             break
     wall_s = perf_counter() - start
     views.clear()
     columns = _logged(follower, simulator)
     world = columns.pop(WORLD, {})
-    return gather_result(scenario, rules.robots, columns, wall_s, world=world)
+    return gather_result(monitor.referee, columns, wall_s, world=world)
 
 
 def _logged(
@@ -141,24 +139,6 @@ def _logged(
     return {name: logged_columns(every[name], *logs[name]) for name in every}
 
 
-def _monitor(
-    follower: SoundFollower, rules: StopRules, audio: RunAudio | None
-) -> Callable[[Any], Any]:
-    """Returns the function that the simulator calls after every step.
-
-    It saves the sound, if any, and applies the stop rules.
-    """
-    if audio is None:
-        return rules
-    save = DiagramAudio(follower, audio)
-
-    def monitor(context: Any) -> Any:
-        save(context)
-        return rules(context)
-
-    return monitor
-
-
 def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
     """Compiles or loads the compiled loop of a scenario, without running a tick.
 
@@ -172,23 +152,18 @@ def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> Compiled
     Raises:
         InputError: See ``simulate``.
     """
-    loop = _new_loop(scenario, audio)
+    loop = compile_loop(scenario, audio)
     loop.prepare()
     listens = any(robot.listens for robot in scenario.robots.values())
     kind = "compiled", *_kind(scenario)
     if listens and kind not in _LOADED:
         # A short separate run compiles the functions that the loop calls in Python.
         # It ignores errors, which the run itself raises again.
-        aside = _new_loop(scenario)
+        aside = compile_loop(scenario)
         with suppress(ValueError):
             aside.advance(math.ceil(_FIRST_TICKS_S / scenario.tick_s))
         _LOADED.add(kind)
     return loop
-
-
-def _new_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
-    blocks, world = shared_blocks(scenario), shared_world(scenario)
-    return compile_loop(scenario, blocks, RunRules(scenario), world, audio)
 
 
 def _run_compiled(
@@ -205,10 +180,9 @@ def _run_compiled(
         if progress is not None:
             progress(loop.time_s)
     wall_s = perf_counter() - start
-    robots = loop.rules.robots
-    columns = {name: loop.logged(name) for name in robots}
+    columns = {name: loop.logged(name) for name in scenario.robots}
     world = loop.logged(WORLD) if WORLD in loop.columns else {}
-    return gather_result(scenario, robots, columns, wall_s, "compiled", world)
+    return gather_result(loop.referee, columns, wall_s, "compiled", world)
 
 
 def _python_views(follower: SoundFollower, context: Any) -> list[Any]:

@@ -1,26 +1,24 @@
-"""The stop rules: they decide at every tick whether a run ends, and for which cause."""
+"""The stop rules: they decide at every tick whether a run ends, and for which cause.
+
+``judge_robot`` is the step of a referee (``diagrams.running.referee``), which both
+engines call.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydrake.systems.framework import EventStatus
 
-from diagrams.building.builder import SoundFollower
-from diagrams.building.robot import Parts
-from diagrams.scenario.bodies import Body, LivePath, Surroundings, robot_rectangle
 from diagrams.scenario.run_parameters import StopParameters
-from diagrams.scenario.scenario import Scenario
 from systems.world.geometry import (
     control_point,
     control_point_velocity,
     first_overlap,
-    rectangle_clearance,
 )
 
 #: Causes of successful runs.
@@ -32,10 +30,6 @@ INTERRUPTED = "interrupted"
 
 #: Tolerance for rounded tick times, s: a rest of exactly ``stop.rest_time_s`` counts.
 ROUNDING_S = 1e-9
-#: The rules check for contacts at the ends of equal parts of a tick. These are the
-#: least number of parts, and the greatest distance that a body on its own path may move
-#: in one part, m. If a body is faster, ticks have more parts.
-BETWEEN_TICKS, _PART_M = 5, 0.02
 
 #: Speed below which P is at rest, m/s.
 REST_SPEED_M_S = 0.05
@@ -49,15 +43,18 @@ _STUCK_RADIUS_M = 0.1
 #: direction to the source, deg.
 ODOR_WITHIN_M, _ODOR_AHEAD_DEG = 0.22, 75.0
 
-#: Port by which a law reports that no route leads to the target, 0 or 1.
-GIVES_UP = "gives_up"
-#: Port by which a search reports how it ended.
-SEARCH_REPORT = "search_report"
-#: Ports of the contact switches of a searching robot, and of the body that they touch.
-CONTACT, TOUCHED = "contact", "touched"
-
-_Places = Mapping[str, tuple[float, float, float]]
-_GO_ON = EventStatus.DidNothing()
+#: Ports of a robot that the stop rules read, with their sizes. A port that a robot
+#: lacks reads 0. ``gives_up``: a law reports that no route leads to the target;
+#: ``search_report``: a search reports how it ended; ``contact`` and ``touched``: the
+#: contact switches of a searching robot, and the body that they touch.
+READ_PORTS = {
+    "velocity_WB": 3,
+    "target_valid": 1,
+    "gives_up": 1,
+    "search_report": 4,
+    "contact": 2,
+    "touched": 1,
+}
 
 
 @dataclass(frozen=True)
@@ -76,194 +73,6 @@ class Collision:
     better."""
 
 
-class NearBody(NamedTuple):
-    """A body that a robot can touch."""
-
-    name: str
-    body: Body
-    reach_m: float
-    """Distance of the centers, m, beyond which the robot and the body cannot touch."""
-    step_m: float
-    """Upper bound of the distance that the body moves in a tick on its own path, m; 0
-    for another robot."""
-
-
-def decisive_robot(robots: Mapping[str, RobotRules]) -> str:
-    """Returns the name of the robot whose cause is the cause of the whole run.
-
-    It is the first robot that collided or diverged. If there is none, it is the first
-    robot that was neither successful nor interrupted. If there is no such robot either,
-    it is the first robot.
-
-    Args:
-        robots: Stop rules of the robots, by name.
-    """
-    causes = {name: rules.final_cause() for name, rules in robots.items()}
-
-    def rank(name: str) -> int:
-        cause = causes[name]
-        if cause in ENDING:
-            return 0
-        return 2 if cause in (*SUCCESSFUL, INTERRUPTED) else 1
-
-    return min(robots, key=rank)
-
-
-class Seen(NamedTuple):
-    """What the stop rules need to know about a robot at a tick."""
-
-    pose: list[float]
-    """x, y, theta in W, m and rad."""
-    velocity: list[float]
-    """vx, vy, omega of the robot in W, m/s and rad/s."""
-    valid: bool
-    """Whether the robot has a target."""
-    gives_up: bool = False
-    """Whether the law reports that no route leads to the target."""
-    ended: float = 0.0
-    """Number of the ending of a search; 0 while the search continues."""
-    feels: bool = False
-    """Whether a contact switch is closed because it touches a body."""
-
-
-class RunRules:
-    """When a run of one or several robots ends.
-
-    The run ends when every robot has a cause, or when a robot collides or diverges. A
-    robot with any other cause keeps moving until the run ends.
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        starts = {n: robot.start.pose for n, robot in scenario.robots.items()}
-        self._paths = {name: LivePath(pose) for name, pose in starts.items()}
-        self.robots = {
-            name: RobotRules(
-                scenario.of_robot(name), scenario.surroundings(name, self._paths)
-            )
-            for name in starts
-        }
-
-    @property
-    def cause(self) -> str:
-        """Cause of the whole run; empty while the run continues."""
-        if not self.over:
-            return ""
-        return self.robots[decisive_robot(self.robots)].final_cause()
-
-    @property
-    def over(self) -> bool:
-        """Whether the run has ended."""
-        causes = [rules.cause for rules in self.robots.values()]
-        return all(causes) or any(cause in ENDING for cause in causes)
-
-    def judge(self, time: float, seen: Mapping[str, Seen]) -> None:
-        """Applies the stop rules at a tick.
-
-        Args:
-            time: Time of the tick, s.
-            seen: State of each robot, by name.
-        """
-        self._move(time, {name: each.pose for name, each in seen.items()})
-        for name, rules in self.robots.items():
-            rules.judge(time, seen[name])
-        self._interrupt()
-
-    def take_over(self, ticks: Mapping[str, JudgedTick]) -> None:
-        """Takes over the end of a compiled loop, which uses the same stop rules.
-
-        Args:
-            ticks: The last tick of each robot, by name.
-        """
-        last = next(iter(ticks.values()))
-        before = {name: tick.pose_before for name, tick in ticks.items()}
-        self._move(last.time_before, before)
-        self._move(last.time, {name: tick.pose for name, tick in ticks.items()})
-        for name, rules in self.robots.items():
-            rules.take_over(ticks[name])
-        self._interrupt()
-
-    def _move(self, time: float, poses: Mapping[str, Sequence[float]]) -> None:
-        for name, path in self._paths.items():
-            path.move(time, poses[name])
-
-    def _interrupt(self) -> None:
-        if self.over:
-            for rules in self.robots.values():
-                rules.cause = rules.cause or INTERRUPTED
-
-
-class StopRules(RunRules):
-    """A monitor for Drake's simulator that remembers why it stopped the run."""
-
-    def __init__(self, follower: SoundFollower) -> None:
-        super().__init__(follower.scenario)
-        self._diagram, self._tick_s = follower.diagram, follower.scenario.tick_s
-        self._views = {name: _View(parts) for name, parts in follower.robots.items()}
-        self._tick = -1
-
-    def __call__(self, context: Any) -> EventStatus:
-        """Judges the run; the simulator calls this method after every step.
-
-        Steps may be shorter than ticks; this method ignores the instants between ticks.
-        """
-        time = context.get_time()
-        tick = round(time / self._tick_s)
-        if tick == self._tick or abs(time - tick * self._tick_s) > ROUNDING_S:
-            return _GO_ON
-        self._tick = tick
-        self.judge(time, {name: view.at(context) for name, view in self._views.items()})
-        if self.over:
-            return EventStatus.ReachedTermination(self._diagram, self.cause)
-        return _GO_ON
-
-
-class _View:
-    """Reads the state of a robot from the context of the diagram."""
-
-    def __init__(self, parts: Parts) -> None:
-        plant = parts.blocks["plant"]
-        self._ports = [
-            (plant, plant.GetOutputPort(name)) for name in ("pose_WB", "velocity_WB")
-        ]
-        for name in ("target_valid", GIVES_UP, SEARCH_REPORT, CONTACT, TOUCHED):
-            having = [b for b in parts.blocks.values() if b.HasOutputPort(name)]
-            self._ports += [(block, block.GetOutputPort(name)) for block in having[:1]]
-        self._root: Any = None
-        self._contexts: list[Any] = []
-
-    def at(self, context: Any) -> Seen:
-        if context is not self._root:
-            self._root = context
-            self._contexts = [b.GetMyContextFromRoot(context) for b, _ in self._ports]
-        seen = {
-            port.get_name(): port.Eval(own).tolist()
-            for (_, port), own in zip(self._ports, self._contexts, strict=True)
-        }
-        return Seen(
-            seen["pose_WB"],
-            seen["velocity_WB"],
-            seen.get("target_valid", [0.0])[0] > 0.5,
-            seen.get(GIVES_UP, [0.0])[0] > 0.5,
-            seen.get(SEARCH_REPORT, [0.0])[0],
-            max(seen.get(CONTACT, [0.0])) > 0.5 and seen[TOUCHED][0] >= 0.0,
-        )
-
-
-def instants_of(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
-    """Returns the instants at which contacts are checked.
-
-    Args:
-        times: (n + 1,) times of the ticks, s.
-        parts: Number of parts per tick.
-
-    Returns:
-        (n * parts + 1,) instants, s, including the ticks.
-    """
-    shares = np.arange(1, parts + 1) / parts
-    between = times[:-1, None] + shares * np.diff(times)[:, None]
-    return np.concatenate([times[:1], between.ravel()])
-
-
 class RuleNumbers(NamedTuple):
     """Numbers that the stop rules use, except those for contacts."""
 
@@ -277,7 +86,7 @@ class RuleNumbers(NamedTuple):
     """1: the robot searches for an odor; 2: for a sound; 0: it does not search."""
 
 
-#: Causes that ``judge_tick`` and ``judge_search`` return, by index.
+#: Causes that the stop rules find at a tick, by index.
 FOUND = (
     "",
     "diverged",
@@ -287,8 +96,9 @@ FOUND = (
     "no way found",
     "found",
     "false find",
+    "collision",
 )
-DIVERGED = FOUND.index("diverged")
+_DIVERGED, _COLLISION = map(FOUND.index, ("diverged", "collision"))
 
 
 class _StatePlaces(NamedTuple):
@@ -316,6 +126,7 @@ _AT = _StatePlaces(*range(8))
 UNJUDGED = (0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
 
 
+@register_jitable
 def judge_tick(
     time: float,
     state: Any,
@@ -331,7 +142,7 @@ def judge_tick(
     The rules apply in this order: diverged, reached, lost, stuck or no way found.
     ``state`` holds the start time of each condition that must last for some time. It
     also counts the ticks since the first detection, and among them the ticks in which P
-    follows the target. If the run reaches its time limit, ``RobotRules.final_cause``
+    follows the target. If the run reaches its time limit, ``Referee.cause_of``
     evaluates these counts.
 
     Args:
@@ -385,6 +196,7 @@ def judge_tick(
     return 5 if gives_up else 4
 
 
+@register_jitable
 def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> int:
     """Decides whether the run of a search ends at a tick, and why, apart from contacts.
 
@@ -418,209 +230,177 @@ def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> in
     return 6 if ahead and distance <= ODOR_WITHIN_M else 7
 
 
-class JudgedTick(NamedTuple):
-    """The last tick of a robot in a compiled loop."""
+class BodyTable(NamedTuple):
+    """The bodies that a robot can touch, and its target."""
 
-    time: float
-    time_before: float
-    """Time of the previous tick, s; 0 at the first tick."""
-    pose: list[float]
-    pose_before: list[float]
-    """Pose at the previous tick; at the first tick the same as ``pose``."""
-    valid: bool
-    """Whether the robot has a target."""
-    state: list[float]
-    """State of ``judge_tick``."""
-    found: int
-    """Index of the cause in ``FOUND`` that was found at this tick or before."""
-    touched: tuple[int, float] | None
-    """Number of the first body that was touched since the previous tick, and the
-    elapsed part of the tick at the contact (0 to 1); None: no contact."""
-    ended: float = 0.0
-    """Number of the ending of a search."""
+    sizes: NDArray[np.float64]
+    """(n, 2) lengths and widths, m."""
+    reach: NDArray[np.float64]
+    """(n,) distances of the centers, m, beyond which the robot and the body cannot
+    touch; -inf for a goal, which has no body."""
+    steps: NDArray[np.float64]
+    """(n,) upper bounds of the distances that the bodies move in a tick on their own
+    paths, m; 0 for robots."""
+    robots: NDArray[np.int64]
+    """(n,) number of the robot if the body is a robot; otherwise -1."""
+    parts: int
+    """Number of equal parts of a tick. Contacts are checked at the end of each part."""
+    rows: NDArray[np.int64]
+    """(n, 2) row in ``poses`` of the first tick, and number of rows per tick; 0 rows
+    per tick for a body at rest."""
+    poses: NDArray[np.float64]
+    """(m, 3) x, y, theta in W of the bodies that are not robots, m and rad, at the ends
+    of all parts of the ticks."""
 
 
-@dataclass
-class RobotRules:
-    """Stop rules of one robot."""
+class RefereeNumbers(NamedTuple):
+    """Constants of ``judge_robot``."""
 
-    scenario: Scenario
-    """The scenario of this robot alone."""
-    surroundings: Surroundings
-    """The bodies that the robot can hit, and its target."""
-    cause: str = ""
-    collision: Collision | None = None
-    ended: float = 0.0
-    """Number of the ending of a search."""
-    _pose: Sequence[float] | None = None
-    """Pose at the last tick."""
-    _valid: bool = False
-    _state: list[float] = field(default_factory=lambda: [*UNJUDGED])
-    _time: float = 0.0
+    robot: int
+    """Number of the robot that is judged."""
+    size: tuple[float, float]
+    """Length and width of the robot, m."""
+    target: int
+    """Number of the target among the bodies."""
+    bodies: BodyTable
+    rules: RuleNumbers
+    tick_s: float
 
-    def __post_init__(self) -> None:
-        scenario = self.scenario
-        self._source_rests = not self.surroundings.followed.path.moves
-        self.numbers = RuleNumbers(
-            scenario.stop,
-            scenario.only.robot.control_point_m,
-            scenario.only.follow_distance_m,
-            scenario.goal_radius(moves=not self._source_rests),
-            self._source_rests,
-            {None: 0, "odor": 1, "sound": 2}[scenario.only.searches],
+
+class RefereeState(NamedTuple):
+    """State of ``judge_robot``."""
+
+    rules: NDArray[np.float64]
+    """(8,) state of ``judge_tick``."""
+    before: NDArray[np.float64]
+    """(robots, 3) poses of all robots at the previous tick, m and rad; at the first
+    tick the present poses."""
+    now: NDArray[np.float64]
+    """(robots, 3) poses of all robots at the last tick."""
+    valid: NDArray[np.float64]
+    """(1,) whether the robot had a target at the last tick, 0 or 1."""
+    ended: NDArray[np.float64]
+    """(1,) number of the ending of a search; 0 while the search continues."""
+    contact: NDArray[np.float64]
+    """(3,) number of the touched body (-1: none), elapsed part of the tick at the
+    contact (0 to 1), and number of the tick."""
+    found: NDArray[np.int64]
+    """(1,) index of the cause in ``FOUND``; 0 while the run continues."""
+
+
+def judge_robot(
+    tick: int, state: RefereeState, inputs: Any, _: Any, numbers: RefereeNumbers
+) -> None:
+    """Applies the stop rules to one robot at a tick.
+
+    The function first looks for a contact, unless a contact switch of the robot is
+    closed because it touches a body: such a contact is intended. If there is no
+    contact and the robot has no cause yet, ``judge_search`` or ``judge_tick`` judges
+    the robot. A robot keeps its cause while other robots continue. However, it can
+    still collide; its cause is then collision.
+
+    Args:
+        tick: Number of the tick.
+        state: Changed in place.
+        inputs: (robots, 3) poses of all robots in W, and the values of ``READ_PORTS``.
+        _: There are no outputs; ``state.found`` is the result.
+        numbers: The constants.
+    """
+    poses, velocity, valid, gives_up, report, switches, body = inputs
+    for k in range(len(poses)):
+        for j in range(3):
+            state.before[k, j] = poses[k, j] if tick == 0 else state.now[k, j]
+            state.now[k, j] = poses[k, j]
+    state.valid[0] = 1.0 if valid[0] > 0.5 else 0.0
+    touched, part = -1, 0.0
+    if not ((switches[0] > 0.5 or switches[1] > 0.5) and body[0] >= 0.0):
+        touched, part = _first_touched(tick, state, numbers)
+    pose = state.now[numbers.robot]
+    target = _pose_of_body(numbers.target, tick, state, numbers.bodies)
+    if touched >= 0:
+        state.contact[0], state.contact[1], state.contact[2] = touched, part, tick
+        state.found[0] = _COLLISION
+    elif state.found[0] == 0 and numbers.rules.searches > 0:
+        state.ended[0] = report[0]
+        state.found[0] = judge_search(report[0], pose, target, numbers.rules)
+    elif state.found[0] == 0:
+        state.found[0] = judge_tick(
+            tick * numbers.tick_s,
+            state.rules,
+            pose,
+            velocity,
+            target,
+            valid[0] > 0.5,
+            gives_up[0] > 0.5,
+            numbers.rules,
         )
-        self.parts, self.near = self._near_bodies()
 
-    def _near_bodies(self) -> tuple[int, list[NearBody]]:
-        """Returns the number of parts per tick, and the bodies that can be touched.
 
-        If a body is fast, ticks have more parts, so that the body moves at most
-        ``_PART_M`` per part.
-        """
-        size, tick_s = self.scenario.only.size, self.scenario.tick_s
-        times = tick_s * np.arange(int(self.scenario.duration_s / tick_s + 1e-9) + 1.0)
-        instants, farthest, near = instants_of(times, BETWEEN_TICKS), 0.0, []
-        for name, body in self.surroundings.bodies.items():
-            step = 0.0
-            if body.path.moves and not isinstance(body.path, LivePath):
-                ways = np.diff(body.path.poses(instants)[:, :2], axis=0)
-                farthest_part = float(np.hypot(*ways.T).max(initial=0.0))
-                step = BETWEEN_TICKS * farthest_part
-                farthest = max(farthest, farthest_part)
-            reach = 0.5 * (math.hypot(*size) + math.hypot(*body.size))
-            near.append(NearBody(name, body, reach, step))
-        return BETWEEN_TICKS * max(1, math.ceil(farthest / _PART_M)), near
+@register_jitable
+def _pose_of_body(
+    body: int, tick: int, state: RefereeState, bodies: BodyTable
+) -> NDArray[np.float64]:
+    if bodies.robots[body] >= 0:
+        return state.now[bodies.robots[body]]
+    return bodies.poses[bodies.rows[body, 0] + bodies.rows[body, 1] * tick]
 
-    def judge(self, time: float, seen: Seen) -> None:
-        """Applies the stop rules at a tick.
 
-        A robot keeps the cause that it has already. However, it can still collide
-        while other robots continue; its cause is then collision.
+@register_jitable
+def _first_touched(
+    tick: int, state: RefereeState, numbers: RefereeNumbers
+) -> tuple[int, float]:
+    """Returns the first body that a robot has touched since the last tick.
 
-        Args:
-            time: Time of the tick, s.
-            seen: State of the robot.
-        """
-        places = {name: body.path.pose(time) for name, body, *_ in self.near}
-        ended, self._valid = self.cause, seen.valid
-        self.collision = None
-        if not seen.feels:  # a contact that the bumper feels is intended
-            self.collision = self._find_collision(time, seen.pose, places)
-        if self.collision is not None:
-            self.cause = "collision"
-        elif self.numbers.searches and not ended:
-            self.ended = seen.ended
-            target = self.surroundings.followed.path.pose(time)
-            found = judge_search(seen.ended, seen.pose, target, self.numbers)
-            self.cause = FOUND[found]
-        elif not ended:
-            found = judge_tick(
-                time,
-                self._state,
-                seen.pose,
-                seen.velocity,
-                self.surroundings.followed.path.pose(time),
-                self._valid,
-                seen.gives_up,
-                self.numbers,
-            )
-            self.cause = FOUND[found]
-        self._pose, self._time = seen.pose, time
+    The function skips a body if its center is too far away for a contact. This is so if
+    the distance of the centers exceeds the reach plus the motions of the robot and the
+    body since the last tick. ``first_overlap`` checks all other bodies at the ends of
+    the parts of the tick. The poses of other robots are interpolated; those of other
+    bodies are known in advance.
 
-    def take_over(self, tick: JudgedTick) -> None:
-        """Takes over the end of a compiled loop, which uses the same stop rules.
+    Returns:
+        Number of the body (-1 for none), and the elapsed part of the tick (0 to 1).
+    """
+    bodies, parts = numbers.bodies, numbers.bodies.parts
+    pose, before = state.now[numbers.robot], state.before[numbers.robot]
+    gone = math.hypot(pose[0] - before[0], pose[1] - before[1])
+    touched, first = -1, np.inf
+    for body in range(len(bodies.reach)):
+        robot, step = bodies.robots[body], bodies.steps[body]
+        now = _pose_of_body(body, tick, state, bodies)
+        then = state.before[max(robot, 0)]
+        if robot >= 0:
+            step = math.hypot(now[0] - then[0], now[1] - then[1])
+        near = bodies.reach[body] + gone + step
+        if math.hypot(now[0] - pose[0], now[1] - pose[1]) > near:
+            continue
+        if robot >= 0:
+            poses = np.empty((parts + 1, 3))
+            for k in range(parts + 1):
+                for j in range(3):
+                    poses[k, j] = then[j] + k / parts * (now[j] - then[j])
+        else:
+            begin = bodies.rows[body, 0] + bodies.rows[body, 1] * max(tick - 1, 0)
+            poses = bodies.poses[begin : begin + (parts + 1 if tick > 0 else 1)]
+        size = bodies.sizes[body]
+        part = first_overlap(before, pose, numbers.size, poses, size)
+        if part < first:
+            touched, first = body, part
+    return touched, first
 
-        Args:
-            tick: The last tick.
-        """
-        self._state, self._valid = tick.state, tick.valid
-        self._pose, self._time = tick.pose_before, tick.time_before
-        self.cause, self.ended = FOUND[tick.found], tick.ended
-        if tick.touched is not None:
-            number, part = tick.touched
-            self.collision = self._collide(
-                self.near[number], part, tick.time, tick.pose
-            )
-            self.cause = "collision"
 
-    def final_cause(self) -> str:
-        """Cause of the run after the simulator has returned."""
-        if self.cause:
-            return self.cause
-        if self.numbers.searches:
-            return "timeout"
-        if not self._source_rests and self._has_followed():
-            return "completed"
-        if not self._valid:
-            return "lost"
-        if not self._source_rests:
-            return "astray"
-        return "unsettled" if self._state[_AT.in_goal] > 0.0 else "timeout"
+@register_jitable
+def run_is_over(found: Any) -> bool:
+    """Returns whether the run of all robots is over.
 
-    def _has_followed(self) -> bool:
-        ticks, following = self._state[_AT.ticks], self._state[_AT.following]
-        return ticks > 0.0 and following >= FOLLOWING_SHARE * ticks
+    The run ends when every robot has a cause, or when a robot collides or diverges. A
+    robot with any other cause keeps moving until the run ends.
 
-    def _find_collision(
-        self, time: float, pose: Sequence[float], places: _Places
-    ) -> Collision | None:
-        """Returns the first contact since the last tick, if there is one.
-
-        The function skips a body if its center is too far away for a contact. This is
-        so if the distance of the centers exceeds ``reach_m`` plus the motions of the
-        robot and the body since the last tick. ``first_overlap`` checks all other
-        bodies at the ends of the parts of the tick.
-        """
-        first = math.inf
-        touched: NearBody | None = None
-        before = pose if self._pose is None else self._pose
-        gone = math.dist(pose[:2], before[:2])
-        for near in self.near:
-            body, step = near.body, near.step_m
-            if isinstance(body.path, LivePath):
-                step = body.path.step_m
-            x, y, _ = places[near.name]
-            if math.hypot(x - pose[0], y - pose[1]) > near.reach_m + gone + step:
-                continue
-            instants = instants_of(np.array([self._time, time]), self.parts)
-            poses = body.path.poses(instants if time > self._time else instants[:1])
-            size = self.scenario.only.size
-            part = first_overlap(tuple(before), tuple(pose), size, poses, body.size)
-            if part < first:
-                first, touched = part, near
-        if touched is None:
-            return None
-        return self._collide(touched, first, time, pose)
-
-    def _collide(
-        self, near: NearBody, part: float, time: float, pose: Sequence[float]
-    ) -> Collision:
-        """Returns a collision after the elapsed part ``part`` (0 to 1) of the tick."""
-        instant = self._time + part * (time - self._time)
-        fault = self._fault(instant, time, pose, near.body)
-        return Collision(near.name, fault, instant)
-
-    def _fault(
-        self, instant: float, time: float, pose: Sequence[float], body: Body
-    ) -> str:
-        """Returns who is at fault for a contact, ``robot`` or ``obstacle``.
-
-        The function compares two clearances. The first is the clearance if only the
-        robot had moved since the last tick. The second is the clearance if only the
-        body had moved. The smaller clearance decides.
-        """
-        robot_then = self._footprint(self._time, time, pose)
-        robot_now = self._footprint(instant, time, pose)
-        body_then, body_now = body.rectangle(self._time), body.rectangle(instant)
-        robot_alone = rectangle_clearance(robot_now, body_then)
-        body_alone = rectangle_clearance(robot_then, body_now)
-        return "robot" if robot_alone <= body_alone else "obstacle"
-
-    def _footprint(
-        self, instant: float, time: float, pose: Sequence[float]
-    ) -> NDArray[np.float64]:
-        """The robot's rectangle at an instant between the last tick and this one."""
-        now = np.array(pose)
-        before = now if self._pose is None else np.array(self._pose)
-        part = (instant - self._time) / max(time - self._time, self.scenario.tick_s)
-        return robot_rectangle(before + part * (now - before), self.scenario.only.robot)
+    Args:
+        found: (robots,) index of the cause of each robot in ``FOUND``.
+    """
+    everyone = True
+    for k in range(len(found)):
+        if found[k] == _COLLISION or found[k] == _DIVERGED:
+            return True
+        everyone = everyone and found[k] > 0
+    return everyone

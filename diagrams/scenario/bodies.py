@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -31,7 +30,7 @@ class Path(Protocol):
 
 @dataclass(frozen=True)
 class RecordedPath:
-    """Poses of a robot at the ticks of a run, with linear interpolation."""
+    """Poses of a robot at ticks of a run, with linear interpolation."""
 
     times: NDArray[np.float64]
     """(n,) ascending times, s."""
@@ -51,43 +50,6 @@ class RecordedPath:
         return np.column_stack(
             [np.interp(at, self.times, column) for column in self.recorded.T]
         )
-
-
-class LivePath:
-    """Poses of a robot at the last two ticks, during a run."""
-
-    moves = True
-
-    def __init__(self, pose: tuple[float, float, float]) -> None:
-        self._then = self._now = 0.0, pose
-
-    def move(self, time: float, pose: Sequence[float]) -> None:
-        """Adds the pose at a new tick; only the last two ticks are kept.
-
-        Args:
-            time: Time of the tick, s.
-            pose: x, y, theta in W, m and rad.
-        """
-        x, y, theta = pose
-        self._then, self._now = self._now, (time, (x, y, theta))
-
-    @property
-    def step_m(self) -> float:
-        """Distance between the positions at the last two ticks, m."""
-        return math.dist(self._then[1][:2], self._now[1][:2])
-
-    def pose(self, time: float) -> tuple[float, float, float]:
-        """(x, y, theta) at a time in s, interpolated between the last two ticks."""
-        (begin, then), (end, now) = self._then, self._now
-        if time >= end or end <= begin:
-            return now
-        part = (time - begin) / (end - begin)
-        x, y, theta = (a + part * (b - a) for a, b in zip(then, now, strict=True))
-        return x, y, theta
-
-    def poses(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) poses at several times."""
-        return np.array([self.pose(time) for time in np.asarray(times).tolist()])
 
 
 class Body(NamedTuple):

@@ -22,8 +22,8 @@ from pydantic import (
 
 from diagrams.scenario.bodies import (
     Body,
-    LivePath,
     Path,
+    RecordedPath,
     Surroundings,
     microphones_W,
     robot_rectangle,
@@ -290,7 +290,8 @@ class Scenario(RunParameters):
         bodies = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
         for name, other in self.robots.items():
             if name != robot:
-                path = paths.get(name) or LivePath(other.start.pose)
+                start = RecordedPath(np.zeros(1), np.array([other.start.pose]))
+                path = paths.get(name) or start
                 bodies[name] = Body(path, other.size)
         for name, source in self.sources.items():
             if source.body:

@@ -22,7 +22,7 @@ from systems.sound.parameters import (
     SoundParameters,
 )
 from systems.sound.recorder import Recorder
-from systems.sound.sound_emitter import emissions_along, history_ticks
+from systems.sound.sound_emitter import history_ticks, make_emission
 from systems.sound.waveforms import make_waveform
 
 #: Distance of the fan, m.
@@ -133,16 +133,14 @@ def _frames(
     ticks = history_ticks(reach, SOUND_SPEED_M_S, _FRAME_S)
     played = []
     for number, (sound, place) in enumerate(sounds):
-        p_WS = np.tile(place, (ticks + count + 1, 1))
+        p_WS = np.tile(place, (ticks + 1, 1))
         waveform = make_waveform(sound, trial.seed + number)
-        played.append(
-            emissions_along(p_WS, np.zeros_like(p_WS), waveform, sound, ticks)
-        )
+        played.append((waveform, sound, p_WS, np.zeros_like(p_WS)))
     pose = np.array([*trial.position_m, 0.0])
     memory, frames = recorder.blank, []
     for tick in range(1, count + 1):
         now, time = (pose, np.zeros(3)), tick * _FRAME_S
-        emissions: list[Emission] = [emission(tick) for emission in played]
+        emissions: list[Emission] = [make_emission(time, *each) for each in played]
         frames.append(recorder.record(emissions, time, now, memory, recorder.array))
         memory = recorder.remembered(emissions, time, now, memory)
     return frames

@@ -40,7 +40,7 @@ class HostCall:
     """
 
     def __init__(self, function: HostFunction, inputs: int) -> None:
-        self._function, self._inputs = function, inputs
+        self.function, self._inputs = function, inputs
         self._seen: tuple[int, Any, Any] = (0, None, None)
         self.error: BaseException | None = None
         kind = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 3)
@@ -55,7 +55,7 @@ class HostCall:
                 values = np.frombuffer(memory, dtype=np.float64)
                 inputs, outputs = values[: self._inputs], values[self._inputs :]
                 self._seen = address, inputs, outputs
-            self._function(tick, inputs, outputs)
+            self.function(tick, inputs, outputs)
         except BaseException as error:  # noqa: BLE001  # raised again after the loop
             self.error = error
             return 1

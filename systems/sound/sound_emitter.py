@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.framework.block import OBJECT, Block, Port
+from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
 from systems.framework.finite import check_finite, read_arrays
+from systems.framework.host_step import host_step
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, Emission, read_only
 from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.parameters import SoundParameters
@@ -111,42 +112,6 @@ def make_emission(
         sound.level_pa,
         samples is not None,
     )
-
-
-def emissions_along(
-    p_WS: NDArray[np.float64],
-    v_WS: NDArray[np.float64],
-    waveform: NDArray[np.float32],
-    sound: SoundParameters,
-    ticks: int,
-    tick_s: float = TICK_S,
-    on_since_s: Callable[[], float | None] | None = None,
-) -> Callable[[int], Emission]:
-    """Emissions of a ``SoundEmitter`` at each tick of a motion.
-
-    Args:
-        p_WS: (ticks + n, 2) positions of the source, m. The first ``ticks`` rows are
-            before the first tick, and the source is at rest there. The caller may fill
-            the row of a tick as late as at this tick.
-        v_WS: (ticks + n, 2) velocities of the source, m/s.
-        waveform: Bursts end to end, from ``make_waveform``.
-        sound: Schedule of the bursts.
-        ticks: Number of earlier ticks, from ``history_ticks``.
-        tick_s: Time from one tick to the next, s.
-        on_since_s: Function that returns the time of the call, s, or None before the
-            call. If this argument is None, the loudspeaker plays without a call.
-
-    Returns:
-        A function that returns the emission at a given tick below n.
-    """
-
-    def emission(tick: int) -> Emission:
-        known = slice(tick, tick + ticks + 1)
-        path = p_WS[known], v_WS[known]
-        played = called_sound(sound, on_since_s()) if on_since_s else sound
-        return make_emission(tick * tick_s, waveform, played, *path, tick_s)
-
-    return emission
 
 
 @cache
@@ -296,3 +261,36 @@ class SoundEmitter(Block):
         output.set_value(
             make_emission(time, self._waveform, sound, p_WS, v_WS, self._tick_s)
         )
+
+    def step_for(self, run: RunFacts) -> Step:
+        """Step that remembers the motion at each tick of a compiled loop.
+
+        Args:
+            run: Seed and period of the run.
+
+        Returns:
+            The step. It carries the emission, which is made when a block reads it.
+
+        Raises:
+            InputError: The sound file cannot be played.
+        """
+        waveform = make_waveform(self._sound, run.seed_of(self.get_name()))
+        p_WS, v_WS = np.zeros((2, self._ticks + run.ticks + 1, 2))
+        since: float | None = None
+
+        def remember(tick: int, inputs: Any, _: Any) -> None:
+            nonlocal since
+            if tick == 0:
+                p_WS[:] = inputs[:2]
+            p_WS[self._ticks + tick], v_WS[self._ticks + tick] = inputs[:2], inputs[3:5]
+            if self._calling and since is None and inputs[6] > 0.5:
+                since = tick * run.tick_s
+
+        def emission(tick: int) -> Emission:
+            known = slice(tick, tick + self._ticks + 1)
+            sound = called_sound(self._sound, since) if self._calling else self._sound
+            path = p_WS[known], v_WS[known]
+            return make_emission(tick * run.tick_s, waveform, sound, *path, run.tick_s)
+
+        step = host_step(remember, 6 + len(self._calling), 0, 1)
+        return step._replace(carries={"emission": emission})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -177,30 +177,50 @@ class RunAudio:
             )
 
     @property
-    def frame_ticks(self) -> dict[str, int]:
-        """Number of ticks per audio frame, by name of each robot that listens."""
-        return {
-            name: round(heard.microphones.frame_s / self._tick_s)
-            for name, heard in self._heard.items()
-        }
-
-    @property
-    def loudspeakers(self) -> list[str]:
-        """Names of the sources and robots that play a sound."""
-        return [*self._played]
-
-    @property
     def first_heard(self) -> Path:
         """The recording of the first robot that listens."""
         return next(iter(self._heard.values())).writer.path
+
+    def save(self, tick: int, read: Callable[[str, str], Any]) -> None:
+        """Appends the frames that end at a tick, and the sounds since the last tick.
+
+        Both engines call this method before any block changes its state at the tick.
+        The sound at tick 0 precedes the run and is not saved.
+
+        Args:
+            tick: The present tick.
+            read: Takes the name of a robot or source, and the name of an output port of
+                one of its blocks. Returns the present value of this port, or None if
+                there is no such port.
+
+        Raises:
+            InputError: A robot that listens has no block with an output port ``audio``,
+                or a frame does not fit the robot's microphones.
+            OSError: The disk is full, or fails.
+        """
+        if tick == 0:
+            return
+        for name, heard in self._heard.items():
+            if tick % round(heard.microphones.frame_s / self._tick_s) == 0:
+                listening = read(name, LISTENING)
+                asked = listening is None or listening[0] > 0.5
+                frame = read(name, "audio") if asked else None
+                if asked and not isinstance(frame, AudioFrame):
+                    raise InputError(
+                        "save_audio",
+                        f"no block of {name} publishes frames on a port 'audio'; leave "
+                        "--save-audio out",
+                    )
+                self.hear(name, tick, frame)
+        for name in self._played:
+            self.play(name, tick, read(name, "emission"))
 
     def hear(self, robot: str, tick: int, frame: AudioFrame | None) -> None:
         """Appends the frame that ends at a tick.
 
         Args:
             robot: Name of the robot.
-            tick: Last tick of the frame; the frame at tick 0 precedes the run and is
-                ignored.
+            tick: Last tick of the frame, above 0.
             frame: Frame of the robot's microphones; None while the robot does not
                 listen.
 
@@ -208,8 +228,6 @@ class RunAudio:
             InputError: The frame does not fit the robot's microphones.
             OSError: The disk is full, or fails.
         """
-        if tick == 0:
-            return
         writer, _, microphones, channels = self._heard[robot]
         shape = channels, microphones.frame_samples
         if frame is None:
@@ -229,14 +247,12 @@ class RunAudio:
 
         Args:
             name: Name of the source, or of the robot that carries the loudspeaker.
-            tick: The present tick.
+            tick: The present tick, above 0.
             emission: The emission at this tick.
 
         Raises:
             OSError: The disk is full, or fails.
         """
-        if tick == 0:
-            return
         writer, full_scale_pa = self._played[name]
         pressure = played_in_a_tick(emission, self._tick_s)
         writer.write(pcm_of_pressure(pressure, full_scale_pa)[None])

@@ -1,8 +1,9 @@
 """The blocks of a scenario in one compiled loop over ticks.
 
 Drake's diagram remains the model. The loop calls the same functions, which are the
-``Step`` of each block. The names of the ports determine the order of the calls. The
-integrator and the random numbers are the same, and the loop logs the same columns.
+``Step`` of each block. The connections in the diagrams of the robots determine the
+order of the calls. The integrator and the random numbers are the same, and the loop
+logs the same columns.
 
 Each tick has the following order, which is the same as in Drake:
 
@@ -18,23 +19,33 @@ Each tick has the following order, which is the same as in Drake:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
+from diagrams.building.builder import audible_sounds
+from diagrams.building.robot import seed_of
 from diagrams.running.audio.run_audio import RunAudio
-from diagrams.running.compiled.loop_audio import save_sounds
-from diagrams.running.compiled.loop_blocks import LoopBlocks
+from diagrams.running.compiled.loop_blocks import (
+    LoopDiagram,
+    PortKey,
+    shared_blocks,
+    shared_sources,
+    shared_world,
+)
 from diagrams.running.compiled.parts import run_parts
-from diagrams.running.compiled.plan import LoopPlan, LoopRobot, LoopWorld
-from diagrams.running.compiled.sounds import sounds_of_a_run
-from diagrams.running.stop_rules import JudgedTick, RunRules
-from diagrams.scenario.scenario import WORLD, Scenario
+from diagrams.running.compiled.plan import LoopPlan
+from diagrams.running.referee import Referee
+from diagrams.scenario.scenario import ROBOT, WORLD, Scenario
+from systems.framework.block import RunFacts
 from systems.framework.host_step import HostError
 from systems.framework.input_error import InputError, shortened
+from systems.framework.signals import Emission
 
 
 @dataclass
@@ -45,8 +56,8 @@ class CompiledLoop:
     """(ticks + 1, columns) logged values of all robots; rows from ``done`` on are not
     yet filled."""
     tick_s: float
-    rules: RunRules
-    """Stop rules; they know why the run ended."""
+    referee: Referee
+    """It knows why the run ended."""
     columns: Mapping[str, Mapping[str, int]]
     """Indices of the columns in the log, by robot or world, and by column name."""
     plan: LoopPlan
@@ -86,8 +97,8 @@ class CompiledLoop:
         except (NumbaError, NotImplementedError, ValueError) as error:
             own = [
                 text
-                for rules in self.rules.robots.values()
-                for text in (rules.scenario.only.law, *rules.scenario.only.blocks)
+                for robot in self.referee.scenario.robots.values()
+                for text in (robot.law, *robot.blocks)
                 if ":" in text
             ]
             if not own:
@@ -122,32 +133,6 @@ class CompiledLoop:
                 "which names the block",
             )
         self.over = over or self.done == len(self.log)
-        if self.over:
-            names = enumerate(self.rules.robots)
-            self.rules.take_over({name: self._last_tick(k, name) for k, name in names})
-
-    def _last_tick(self, number: int, robot: str) -> JudgedTick:
-        last, columns = self.done - 1, self.columns[robot]
-        pose = [columns[name] for name in ("p_WB_x", "p_WB_y", "theta_WB")]
-        before = max(last - 1, 0)
-        found, touched = self.plan.ended[number].tolist()
-        return JudgedTick(
-            last * self.tick_s,
-            before * self.tick_s,
-            self.log[last, pose].tolist(),
-            self.log[before, pose].tolist(),
-            self._value(columns, "target_valid", last) > 0.5,
-            self.plan.judged[number].tolist(),
-            found,
-            (touched - 1, float(self.plan.touched_at[number])) if touched else None,
-            # The stop rules see the report that the search published one tick before.
-            self._value(columns, "search_ended", last - 1),
-        )
-
-    def _value(self, columns: Mapping[str, int], name: str, row: int) -> float:
-        """Value of a column in a row; 0 if there is no such column or row."""
-        known = name in columns and row >= 0
-        return float(self.log[row, columns[name]]) if known else 0.0
 
 
 def _complaint(error: Exception) -> str:
@@ -158,20 +143,11 @@ def _complaint(error: Exception) -> str:
     return shortened(next(known, type(error).__name__), 120)
 
 
-def compile_loop(
-    scenario: Scenario,
-    blocks: Mapping[str, LoopBlocks],
-    rules: RunRules,
-    shared: LoopBlocks | None = None,
-    audio: RunAudio | None = None,
-) -> CompiledLoop:
+def compile_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
     """Assembles the compiled loop of a scenario.
 
     Args:
         scenario: The scenario to run.
-        blocks: Blocks of each robot; they may have been made for another start or seed.
-        rules: Stop rules of the run.
-        shared: Blocks that all robots share, if any.
         audio: Open files for the sound, if it is saved.
 
     Returns:
@@ -182,36 +158,89 @@ def compile_loop(
     """
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
-    sounds = sounds_of_a_run(scenario, times)
-    world = LoopWorld(scenario, shared, ticks) if shared is not None else None
-    robots = {
-        name: LoopRobot(scenario, name, own, ticks, sounds.heard[name], world)
-        for name, own in blocks.items()
+    referee, facts_of = Referee(scenario), partial(_facts, scenario, ticks)
+    emitters = {
+        name: made.blocks["emitter"].step_for(facts_of(name))
+        for name, made in shared_sources(scenario).items()
     }
+    robots: dict[str, LoopDiagram] = {}
+
+    def emission(name: str, tick: int) -> Emission:
+        """Emission of a source or robot; robots may hear one another."""
+        if name in emitters:
+            carried = emitters[name].carries["emission"]
+        else:
+            carried = robots[name].carried["emitter", "emission"]
+        found: Emission = carried(tick)
+        return found
+
+    every: dict[str, LoopDiagram] = {}
+    made_world = shared_world(scenario)
+    if made_world is not None:
+        every[WORLD] = LoopDiagram(made_world, facts_of(ROBOT), {})
+    blocks = shared_blocks(scenario)
+    for (name, made), pose_WB in zip(blocks.items(), referee.poses, strict=True):
+        target = scenario.target(name)
+        heard = {
+            "emission" if source == target else f"emission_{source}": partial(
+                emission, source
+            )
+            for source in audible_sounds(scenario)
+        }
+        shared = {("plant", "pose_WB"): pose_WB}
+        if WORLD in every:
+            shared |= _shared_with_world(every[WORLD], name)
+        every[name] = robots[name] = LoopDiagram(made, facts_of(name, heard), shared)
     plan = LoopPlan(robots, times)
     for name in robots:
-        plan.surround(name, rules.robots[name].surroundings)
-    for name, function in sounds.carried.items():
-        plan.remember(name, function)
-    for each in (*((world,) if world else ()), *robots.values()):
-        plan.add(each)
-    if audio is not None:
-        save_sounds(plan, robots, sounds, audio)
-    plan.judge(rules, scenario.tick_s)
+        plan.surround(name, scenario.surroundings(name))
+    for name, emitter in emitters.items():
+        plan.add_source(scenario.sources[name], emitter)
     width, columns = 0, {}
-    logged: dict[str, LoopRobot | LoopWorld] = {**robots}
-    if world is not None:
-        logged[WORLD] = world
-    for name, each in logged.items():
-        own = each.made
-        plan.logged += [each.view(port) for _, port in own.columns]
-        wanted = [text for texts in own.columns.values() for text in texts]
+    for name, each in every.items():
+        plan.add(each)
+        wanted = [text for texts in each.made.columns.values() for text in texts]
         columns[name] = {text: width + k for k, text in enumerate(wanted)}
         width += len(wanted)
-    return CompiledLoop(
-        np.empty((ticks + 1, width)),
+    if audio is not None:
+
+        def read(tick: int, owner: str, port: str) -> Any:
+            if port == "emission":
+                return emission(owner, tick)
+            return robots[owner].output(port, tick)
+
+        plan.call(lambda tick, _, __: audio.save(tick, partial(read, tick)))
+    plan.judge(referee)
+    log = np.empty((ticks + 1, width))
+    return CompiledLoop(log, scenario.tick_s, referee, columns, plan)
+
+
+def _shared_with_world(
+    world: LoopDiagram, robot: str
+) -> dict[PortKey, NDArray[np.float64]]:
+    """Values of ports by which a robot and the world are connected."""
+    values = {("", port): world.values[key] for port, key in world.published.items()}
+    if ("", f"frames_{robot}") in world.values:
+        values["controller", "frames"] = world.values["", f"frames_{robot}"]
+    return values
+
+
+def _facts(
+    scenario: Scenario,
+    ticks: int,
+    owner: str,
+    carried: Mapping[str, Callable[[int], Any]] | None = None,
+) -> RunFacts:
+    """Facts about a run for the blocks of a robot or source; ``ROBOT``: the world."""
+    own = scenario.robots.get(owner)
+    goal = own.route.goal_m if isinstance(own, Router) else None
+    return RunFacts(
+        ticks,
         scenario.tick_s,
-        rules,
-        columns,
-        plan,
+        own.start.pose if own is not None else (0.0, 0.0, 0.0),
+        scenario.integration_step_s,
+        partial(seed_of, scenario, owner=owner),
+        carried or {},
+        scenario.mapped(),
+        goal,
     )

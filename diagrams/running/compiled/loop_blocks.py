@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cached_property, partial
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any
 
-from pydrake.systems.framework import PortDataType
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.framework import Diagram, PortDataType
 
-from diagrams.building.robot import (
-    OUTSIDE,
-    columns_of,
-    require_published,
-    robot_blocks,
-    world_seeds,
-)
-from diagrams.building.world_blocks import radio_nodes, world_blocks
+from diagrams.building.builder import audible_sounds, robot_of
+from diagrams.building.robot import columns_of, make_source, make_world, parts_of
+from diagrams.building.world_blocks import radio_nodes
 from diagrams.scenario.own_code import loaded_digests
 from diagrams.scenario.participants import Router
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step
 from systems.framework.input_error import InputError
 
-#: Inputs from outside: inputs of a robot that come from the world, and inputs of the
-#: world that come from robots.
-_WORLD = *OUTSIDE, "frames"
-#: Fields of a run that do not affect how blocks are made. ``RunFacts`` provides
+#: Fields of a scenario that do not affect how blocks are made. ``RunFacts`` provides
 #: the values of a run that blocks need.
 _NO_BLOCKS = {
     "name",
@@ -45,48 +39,60 @@ _NO_BLOCKS = {
 _SHARED: dict[str, LoopBlocks] = {}
 _MOST_SHARED = 64
 
+#: A port: the part of its block, and its name. The part of an input of the whole
+#: diagram is empty.
+PortKey = tuple[str, str]
+
 
 class LoopBlocks:
-    """The blocks of a robot by part, and the connections of their ports."""
+    """The blocks of a diagram by part, and the connections of their ports.
 
-    def __init__(self, blocks: Mapping[str, Any]) -> None:
-        """Reads the ports of blocks, which need not be in a diagram.
+    Args:
+        diagram: Diagram of a robot, a source or the world.
+    """
 
-        Raises:
-            InputError: An input is not published by exactly one block or by the world.
-        """
-        require_published(blocks.values(), _WORLD)
-        self.blocks = blocks
-        self.sizes: dict[str, int] = {}
-        """Number of elements of each port, by name."""
-        self.objects: set[str] = set()
-        """Names of the ports that carry objects instead of numbers."""
-        self.inputs = {part: self._names(b, "input") for part, b in blocks.items()}
-        """Names of the input ports of each part."""
-        self.outputs = {part: self._names(b, "output") for part, b in blocks.items()}
-        """Names of the output ports of each part."""
-        self.columns = columns_of(blocks)
-        """Columns of the log, in order, by (part, port)."""
-
-    def _names(self, block: Any, kind: str) -> list[str]:
-        port: Callable[[int], Any] = getattr(block, f"get_{kind}_port")
-        ports = list(map(port, range(getattr(block, f"num_{kind}_ports")())))
-        self.sizes |= {port.get_name(): port.size() for port in ports}
-        self.objects |= {
-            port.get_name()
-            for port in ports
-            if port.get_data_type() == PortDataType.kAbstractValued
+    def __init__(self, diagram: Diagram) -> None:
+        parts = parts_of(diagram)
+        self.blocks = parts.blocks
+        names = {block.get_name(): part for part, block in self.blocks.items()}
+        connected = {
+            (names[block.get_name()], int(index)): (names[source.get_name()], int(port))
+            for (block, index), (source, port) in diagram.connection_map().items()
         }
-        return [port.get_name() for port in ports]
+        self.sizes: dict[PortKey, int] = {}
+        """Number of elements of each output port, and of each input from outside."""
+        self.objects: set[PortKey] = set()
+        """The ports that carry objects instead of numbers."""
+        self.inputs: dict[str, dict[str, PortKey]] = {}
+        """For each part: the port that each input is connected to, by name."""
+        self.outputs: dict[str, list[PortKey]] = {}
+        """Output ports of each part."""
+        self.columns = columns_of(self.blocks)
+        """Columns of the log, in order, by (part, port)."""
+        for part, block in self.blocks.items():
+            ports = map(block.get_output_port, range(block.num_output_ports()))
+            self.outputs[part] = [self._add(part, port) for port in ports]
+        for part, block in self.blocks.items():
+            self.inputs[part] = {}
+            for index in range(block.num_input_ports()):
+                port = block.get_input_port(index)
+                if (part, index) in connected:
+                    source, number = connected[part, index]
+                    key = self.outputs[source][number]
+                else:
+                    key = self._add("", port)
+                self.inputs[part][port.get_name()] = key
 
-    @cached_property
-    def outside(self) -> set[str]:
-        """Names of the inputs that come from the world."""
-        return {*self.sizes}.difference(*self.outputs.values())
+    def _add(self, part: str, port: Any) -> PortKey:
+        key = part, port.get_name()
+        self.sizes[key] = port.size()
+        if port.get_data_type() == PortDataType.kAbstractValued:
+            self.objects.add(key)
+        return key
 
     def steps(
         self, run: RunFacts
-    ) -> tuple[dict[str, Step], Mapping[str, Callable[[int], Any]]]:
+    ) -> tuple[dict[str, Step], dict[PortKey, Callable[[int], Any]]]:
         """Returns the step of each part in a run.
 
         Args:
@@ -99,21 +105,16 @@ class LoopBlocks:
         Raises:
             InputError: A user's own block has no step.
         """
+        carried = {("", port): function for port, function in run.carried.items()}
+        found: dict[str, Step] = {}
         # A block that publishes an object precedes the blocks that read it.
-        carried, found = {**run.carried}, dict[str, Step]()
-        run = run._replace(carried=carried)
-        waiting = [*self.blocks]
-        while waiting:
-            missing = {
-                port
-                for part in waiting
-                for port in self.outputs[part]
-                if port in self.objects
+        for part in self._ordered(self.blocks, self.objects):
+            inputs = self.inputs[part].items()
+            own = {name: carried[key] for name, key in inputs if key in carried}
+            found[part] = _step_for(self.blocks[part], run._replace(carried=own))
+            carried |= {
+                (part, port): function for port, function in found[part].carries.items()
             }
-            part = next(p for p in waiting if not missing.intersection(self.inputs[p]))
-            waiting.remove(part)
-            found[part] = _step_for(self.blocks[part], run)
-            carried |= found[part].carries
         return {part: found[part] for part in self.blocks}, carried
 
     def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
@@ -124,14 +125,61 @@ class LoopBlocks:
         state.
         """
         late = [part for part, step in steps.items() if step.publish is not None]
-        known = self.outside.union(*(self.outputs[part] for part in late))
-        waiting, early = [part for part in self.blocks if part not in late], []
+        early = [part for part in self.blocks if part not in late]
+        return self._ordered(early, self.sizes), late
+
+    def _ordered(self, parts: Iterable[str], ports: Iterable[PortKey]) -> list[str]:
+        """Orders parts: each follows those parts whose ``ports`` it reads."""
+        waiting, ports, done = [*parts], {*ports}, list[str]()
         while waiting:
-            part = next(p for p in waiting if known.issuperset(self.inputs[p]))
+            missing = {key for part in waiting for key in self.outputs[part]} & ports
+            part = next(
+                p for p in waiting if missing.isdisjoint(self.inputs[p].values())
+            )
             waiting.remove(part)
-            early.append(part)
-            known.update(self.outputs[part])
-        return early, late
+            done.append(part)
+        return done
+
+
+class LoopDiagram:
+    """The blocks of a diagram in one run: their steps, and the values of their ports.
+
+    Args:
+        made: The blocks.
+        run: Facts about the run.
+        shared: Values of ports that another diagram or the world also uses.
+    """
+
+    def __init__(
+        self,
+        made: LoopBlocks,
+        run: RunFacts,
+        shared: Mapping[PortKey, NDArray[np.float64]],
+    ) -> None:
+        self.made, (self.steps, self.carried) = made, made.steps(run)
+        self.values = {key: np.zeros(size) for key, size in made.sizes.items()} | {
+            key: values for key, values in shared.items() if key in made.sizes
+        }
+        """Values of the ports."""
+        self.published = {
+            port: (part, port) for part, port in reversed(made.sizes) if part
+        }
+        """Keys of the output ports, by name."""
+
+    def output(self, port: str, tick: int = 0) -> Any:
+        """Returns the values or the object of an output port.
+
+        Args:
+            port: Name of the port.
+            tick: The present tick, for an object.
+
+        Returns:
+            None if there is no such port.
+        """
+        key = self.published.get(port)
+        if key in self.made.objects:
+            return self.carried[key](tick) if key in self.carried else None
+        return None if key is None else self.values[key]
 
 
 def _step_for(block: Any, run: RunFacts) -> Step:
@@ -159,25 +207,43 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
         Blocks of each robot.
 
     Raises:
-        InputError: See ``robot_blocks``.
+        InputError: See ``make_robot``.
     """
     blocks = {}
     for name in scenario.robots:
-        own = scenario.of_robot(name)
+        own, made = scenario.of_robot(name), partial(robot_of, scenario, name)
+        if own.only.blocks:  # a user's block may depend on the whole scenario
+            blocks[name] = LoopBlocks(made())
+            continue
         bodies = len(scenario.surroundings(name).obstacles)
         target = scenario.target(name)
         others = [sound for sound in scenario.sounds() if sound != target]
         robots = scenario.robots_seen(name)
-        made = partial(
-            robot_blocks, own, name, bodies=bodies, robots=robots, others=others
-        )
-        if own.only.blocks:  # a user's block may depend on the whole scenario
-            blocks[name] = LoopBlocks(made())
-            continue
-        made_from = _made_from(own)
-        code = loaded_digests(own)
-        key = f"{name} {bodies} {robots} {others} {code} {made_from}"
+        made_from, code = _made_from(own), loaded_digests(own)
+        heard = name in audible_sounds(scenario), scenario.longest_frame_s
+        key = f"{name} {bodies} {robots} {others} {heard} {code} {made_from}"
         blocks[name] = _shared(key, made)
+    return blocks
+
+
+def shared_sources(scenario: Scenario) -> dict[str, LoopBlocks]:
+    """Returns the blocks of all sources that a robot hears as waves.
+
+    Args:
+        scenario: The scenario to run.
+
+    Raises:
+        InputError: A sound file cannot be played.
+    """
+    air = f"{scenario.sound_speed_m_s} {scenario.room}"
+    blocks = {}
+    for name, sound in audible_sounds(scenario).items():
+        source = scenario.sources.get(name)
+        if source is not None:
+            made = partial(make_source, scenario, name, source, audible=True)
+            times = f"{scenario.longest_frame_s} {scenario.tick_s}"
+            key = f"{name} {sound.model_dump_json()} {air} {times}"
+            blocks[name] = _shared(key, made)
     return blocks
 
 
@@ -194,11 +260,10 @@ def shared_world(scenario: Scenario) -> LoopBlocks | None:
     if not nodes:
         return None
     made_from = scenario.model_dump_json(include={"wind", "odor", "radio", "tick_s"})
-    made = partial(world_blocks, scenario, world_seeds(scenario))
-    return _shared(f"{nodes} {made_from}", made)
+    return _shared(f"{nodes} {made_from}", partial(make_world, scenario))
 
 
-def _shared(key: str, made: Callable[[], Mapping[str, Any]]) -> LoopBlocks:
+def _shared(key: str, made: Callable[[], Any]) -> LoopBlocks:
     found = _SHARED.pop(key, None)
     if found is None:
         found = LoopBlocks(made())

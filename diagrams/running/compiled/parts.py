@@ -4,6 +4,9 @@ Compiling a loop together with all functions that it calls takes numba long, and
 be repeated for every set of blocks. With calls by address, numba compiles each block
 separately, and the loop ``run_parts`` only once.
 
+This file imports little, so that changes elsewhere leave the compiled code of the parts
+valid.
+
 A part is a function of the tick and of the address of its words. The words are whole
 numbers and addresses of arrays. These arrays must not move in memory.
 """
@@ -110,6 +113,34 @@ def _define_called(_, address, tick, words):  # type: ignore[no-untyped-def]
 
 
 _called: Any = intrinsic(_define_called)
+
+
+@njit(cache=True)
+def fill(
+    out: Any, places: Any, poses: Any, tick: int
+) -> None:  # pragma: no cover  (compiled)
+    """Copies poses from the row of a tick; bodies at rest have only one row."""
+    row = min(tick, poses.shape[1] - 1)
+    for body in range(len(places)):
+        for k in range(3):
+            out[places[body] + k] = poses[body, row, k]
+
+
+@njit(cache=True)
+def copy(
+    out: Any, first: int, values: Any, _tick: int
+) -> None:  # pragma: no cover  (compiled)
+    """Copies values to the elements of ``out`` from ``first`` on."""
+    for k in range(len(values)):
+        out[first + k] = values[k]
+
+
+@njit(cache=True)
+def clear(outputs: Any) -> None:  # pragma: no cover  (compiled)
+    """Sets all outputs to 0."""
+    for k in range(len(outputs)):
+        for j in range(len(outputs[k])):
+            outputs[k][j] = 0.0
 
 
 @njit(cache=True)

@@ -2,105 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.building.robot import block_seed, seed_of
-from diagrams.running.compiled.judge import contacts_of, judge_all
-from diagrams.running.compiled.loop_blocks import LoopBlocks
-from diagrams.running.compiled.parts import PUBLISH
+from diagrams.running.compiled.loop_blocks import LoopDiagram
+from diagrams.running.compiled.parts import PUBLISH, clear, copy, fill
 from diagrams.running.compiled.source import LoopPart, address_of, compiled_part
-from diagrams.running.stop_rules import (
-    CONTACT,
-    GIVES_UP,
-    SEARCH_REPORT,
-    TOUCHED,
-    UNJUDGED,
-    RunRules,
-)
+from diagrams.running.referee import Referee
+from diagrams.running.stop_rules import READ_PORTS, run_is_over
 from diagrams.scenario.bodies import Surroundings
-from diagrams.scenario.participants import Router
-from diagrams.scenario.scenario import Scenario
-from systems.framework.block import RunFacts, Step, has_arrays
-from systems.framework.compiling import njit
+from diagrams.scenario.participants import SourceParameters
+from systems.framework.block import Step, has_arrays
 from systems.framework.host_step import HostCall, HostFunction, host_step
-
-#: Ports that the stop rules and the loudspeakers read, with sizes; a robot may lack
-#: some of them.
-_WATCHED = {
-    "pose_WB": 3,
-    "velocity_WB": 3,
-    "pose_WS": 3,
-    "target_valid": 1,
-    GIVES_UP: 1,
-    SEARCH_REPORT: 4,
-    CONTACT: 2,
-    TOUCHED: 1,
-    "calling": 1,
-}
-#: The ports that the stop rules read.
-_JUDGED = [name for name in _WATCHED if name != "calling"]
-
-
-class LoopWorld:
-    """Steps of the blocks that all robots share, and the values of their ports."""
-
-    def __init__(self, scenario: Scenario, made: LoopBlocks, ticks: int) -> None:
-        run = RunFacts(
-            ticks,
-            scenario.tick_s,
-            (0.0, 0.0, 0.0),
-            scenario.integration_step_s,
-            partial(block_seed, scenario.seed),
-            {},
-        )
-        self.made, (self.steps, self.carried) = made, made.steps(run)
-        self._views = {port: np.zeros(size) for port, size in made.sizes.items()}
-
-    def view(self, port: str) -> NDArray[np.float64]:
-        """The values of a port."""
-        return self._views[port]
-
-
-class LoopRobot:
-    """Steps of the blocks of one robot in a run, and the values of their ports."""
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        name: str,
-        made: LoopBlocks,
-        ticks: int,
-        heard: Mapping[str, Callable[[int], Any]],
-        world: LoopWorld | None = None,
-    ) -> None:
-        own = scenario.robots[name]
-        self.facts = RunFacts(
-            ticks,
-            scenario.tick_s,
-            own.start.pose,
-            scenario.integration_step_s,
-            partial(seed_of, scenario, owner=name),
-            {**heard},
-            scenario.mapped(),
-            own.route.goal_m if isinstance(own, Router) else None,
-        )
-        self.made, (self.steps, self.carried) = made, made.steps(self.facts)
-        sizes = {**_WATCHED, **made.sizes}
-        self._views = {port: np.zeros(size) for port, size in sizes.items()}
-        if world is not None:
-            given = made.outside.intersection(world.made.sizes)
-            self._views |= {port: world.view(port) for port in given}
-            if f"frames_{name}" in world.made.sizes:
-                self._views["frames"] = world.view(f"frames_{name}")
-
-    def view(self, port: str) -> NDArray[np.float64]:
-        """The values of a port."""
-        return self._views[port]
 
 
 class LoopPlan:
@@ -112,20 +29,13 @@ class LoopPlan:
     """
 
     def __init__(
-        self, robots: Mapping[str, LoopRobot], times: NDArray[np.float64]
+        self, robots: Mapping[str, LoopDiagram], times: NDArray[np.float64]
     ) -> None:
         self._robots, self._times = robots, times
         self.logged: list[NDArray[np.float64]] = []
         """Values that a row of the log contains."""
         self.hosts: list[HostCall] = []
         """Functions that the loop calls in Python."""
-        self.ended = np.zeros((len(robots), 2), dtype=np.int64)
-        """(robots, 2) index of the cause, and 1 plus the number of the touched body (0
-        for none)."""
-        self.touched_at = np.zeros(len(robots))
-        """(robots,) elapsed part of the tick at the contact (0 to 1)."""
-        self.judged = np.tile(np.array(UNJUDGED), (len(robots), 1))
-        """(robots, 8) states of ``judge_tick``."""
         self._parts: list[tuple[LoopPart, str]] = []
         self._judge = 0
         self._filled: list[int] = []
@@ -133,53 +43,55 @@ class LoopPlan:
         self._late: list[int] = []
         self._plants: list[int] = []
 
-    def add(self, robot: LoopRobot | LoopWorld) -> None:
-        """Adds the blocks of a robot or of the world."""
-        early, late = robot.made.order(robot.steps)
+    def add(self, diagram: LoopDiagram) -> None:
+        """Adds the blocks of a robot or of the world.
+
+        Loudspeakers come first in a tick, because several robots hear them.
+        """
+        made, values = diagram.made, diagram.values
+        early, late = made.order(diagram.steps)
         for part in (*early, *late):
-            step, made = robot.steps[part], robot.made
+            step = diagram.steps[part]
             inputs = tuple(
-                robot.carried[port](0)
-                if port in made.objects and step.host is None
-                else robot.view(port)
-                for port in made.inputs[part]
+                diagram.carried[key](0)
+                if key in made.objects and step.host is None
+                else values[key]
+                for key in made.inputs[part].values()
             )
             outputs = tuple(
-                robot.view(port)
-                for port in made.outputs[part]
-                if port not in made.objects
+                values[key] for key in made.outputs[part] if key not in made.objects
             )
             number = self._step(step, inputs, outputs)
-            if step.publish is None:
+            if part == "emitter":
+                self._filled.append(number)
+            elif step.publish is None:
                 self._early.append(number)
             else:
                 (self._plants if part == "plant" else self._late).append(number)
+        self.logged += [values[key] for key in made.columns]
 
-    def remember(self, name: str, function: HostFunction) -> None:
-        """Passes a robot's motion to a Python function at the start of every tick.
-
-        Args:
-            name: Name of the robot.
-            function: Takes the tick, and the pose and velocity of the robot, followed
-                by whether the robot calls (0 or 1).
-        """
-        ports = "pose_WB", "velocity_WB", "calling"
-        motion = tuple(map(self._robots[name].view, ports))
-        step = host_step(function, sum(map(len, motion)), 0, 1)
-        self._filled.append(self._step(step, motion, ()))
-
-    def show(
-        self, view: NDArray[np.float64], function: HostFunction, period_ticks: int
-    ) -> None:
-        """Passes values to a Python function, directly before the stop rules judge.
+    def add_source(self, source: SourceParameters, emitter: Step) -> None:
+        """Adds a source with a loudspeaker.
 
         Args:
-            view: (n,) values of a port.
-            function: Takes the tick and the values.
-            period_ticks: Period of the calls, ticks.
+            source: Its path; poses and velocities are tabulated for all ticks.
+            emitter: Step of its loudspeaker.
         """
-        step = host_step(function, len(view), 0, period_ticks)
-        self._early.append(self._step(step, (view,), ()))
+        path, times = source.path(), self._times
+        velocities = np.array([path.velocity(time) for time in times.tolist()])
+        pose_WS, v_WS = np.zeros((2, 3))
+        for into, table in ((pose_WS, path.poses(times)), (v_WS, velocities)):
+            self._fill_by(fill, into, np.zeros(1, dtype=np.int64), table[None])
+        self._filled.append(self._step(emitter, (pose_WS, v_WS), ()))
+
+    def call(self, function: HostFunction) -> None:
+        """Calls a Python function at every tick, directly before the stop rules judge.
+
+        Args:
+            function: Takes the tick, and two arrays that it ignores.
+        """
+        nothing = (np.zeros(1),)  # compiled code has no empty state
+        self._early.append(self._step(host_step(function, 1, 0, 1), nothing, ()))
 
     def _step(
         self, step: Step, inputs: tuple[Any, ...], outputs: tuple[Any, ...]
@@ -202,7 +114,7 @@ class LoopPlan:
             publish = f"{part.name(step.publish)}(state, outputs, numbers)"
             lines += [f"if tick == {PUBLISH}:", f"    {publish}", "    return 0"]
         elif outputs:
-            lines.append(f"{part.name(_clear)}(outputs)")
+            lines.append(f"{part.name(clear)}(outputs)")
         lines.append(f"{part.name(step.step)}(tick, state, inputs, outputs, numbers)")
         return self._add(part, lines)
 
@@ -216,25 +128,26 @@ class LoopPlan:
             name: Name of the robot.
             around: The bodies that the robot can see and hit.
         """
-        robot, robots, times = self._robots[name], self._robots, self._times
+        values, robots, times = self._robots[name].values, self._robots, self._times
         everything = {**around.bodies, around.target: around.followed}
         wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
         for port, bodies in wanted.items():
-            if port == "pose_WS" or port in robot.made.outside:
-                into = robot.view(port)
+            if ("", port) in values:
+                into = values["", port]
                 # Bodies on known paths, by the index of their pose in the port.
                 known = {3 * k: b for k, b in enumerate(bodies) if b not in robots}
                 paths = [everything[body].path for body in known.values()]
                 at = times if any(path.moves for path in paths) else times[:1]
                 places = np.array([*known], dtype=np.int64)
                 poses = np.reshape([path.poses(at) for path in paths], (-1, len(at), 3))
-                self._fill_by(_fill, into, places, poses)
+                self._fill_by(fill, into, places, poses)
                 for k, body in enumerate(bodies):
                     if body in robots:
-                        self._fill_by(_copy, into, 3 * k, robots[body].view("pose_WB"))
-        if "sizes" in robot.made.outside:
+                        pose = robots[body].values["plant", "pose_WB"]
+                        self._fill_by(copy, into, 3 * k, pose)
+        if ("", "sizes") in values:
             sizes = [body.size for body in around.obstacles.values()]
-            robot.view("sizes")[:] = np.ravel(sizes)
+            values["", "sizes"][:] = np.ravel(sizes)
 
     def _fill_by(self, function: Any, *values: Any) -> None:
         """Adds a part that fills a port by a function of values and the tick."""
@@ -243,26 +156,22 @@ class LoopPlan:
         line = f"{part.name(function)}({arguments}, tick)"
         self._filled.append(self._add(part, [line]))
 
-    def judge(self, rules: RunRules, tick_s: float) -> None:
-        """Adds the part that judges all robots in a tick.
+    def judge(self, referee: Referee) -> None:
+        """Adds the steps of the referee, and the part that ends the run.
 
         Args:
-            rules: Stop rules of the run.
-            tick_s: Control period, s.
+            referee: Referee of the run.
         """
-        robots = self._robots
-        watched = tuple(
-            (*map(robot.view, _JUDGED), np.array(robot.facts.initial_pose))
-            for robot in robots.values()
-        )
-        contacts = tuple(
-            contacts_of(rules.robots[name], [*robots], self._times) for name in robots
-        )
-        values = tick_s, watched, contacts, self.judged, self.ended, self.touched_at
+        for name, step in referee.steps.items():
+            robot = self._robots[name]
+            inputs: list[Any] = [referee.poses]
+            for port, size in READ_PORTS.items():
+                values = robot.output(port)
+                inputs.append(np.zeros(size) if values is None else values)
+            self._early.append(self._step(step, tuple(inputs), ()))
         part = LoopPart()
-        arguments = ", ".join(map(part.expression, values))
-        lines = [f"if {part.name(judge_all)}(tick, {arguments}):", "    return 1"]
-        self._judge = self._add(part, lines)
+        over = f"{part.name(run_is_over)}({part.expression(referee.found)})"
+        self._judge = self._add(part, [f"if {over}:", "    return 1"])
 
     def _add(self, part: LoopPart, lines: Sequence[str]) -> int:
         self._parts.append((part, part.source(lines)))
@@ -297,29 +206,3 @@ class LoopPlan:
 
 def _table(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
-
-
-@njit(cache=True)
-def _fill(
-    out: Any, places: Any, poses: Any, tick: int
-) -> None:  # pragma: no cover  (compiled)
-    """Copies poses from the row of a tick; bodies at rest have only one row."""
-    row = min(tick, poses.shape[1] - 1)
-    for body in range(len(places)):
-        for k in range(3):
-            out[places[body] + k] = poses[body, row, k]
-
-
-@njit(cache=True)
-def _copy(
-    out: Any, first: int, values: Any, _tick: int
-) -> None:  # pragma: no cover  (compiled)
-    for k in range(len(values)):
-        out[first + k] = values[k]
-
-
-@njit(cache=True)
-def _clear(outputs: Any) -> None:  # pragma: no cover  (compiled)
-    for k in range(len(outputs)):
-        for j in range(len(outputs[k])):
-            outputs[k][j] = 0.0

@@ -284,6 +284,13 @@ def test_files_are_of_one_run(tmp_path):
             simulate(scenario, audio=audio)
 
 
+def test_a_robot_whose_frames_no_block_publishes_is_named(tmp_path):
+    with RunAudio(load_scenario("default", []), tmp_path) as audio:
+        audio.save(0, lambda owner, port: None)
+        with pytest.raises(InputError, match="save_audio: no block of robot publishes"):
+            audio.save(1, lambda owner, port: None)
+
+
 def test_frames_of_another_array_are_refused(tmp_path):
     with RunAudio(load_scenario("default", []), tmp_path) as audio:
         counts = np.zeros((2, 2500), dtype=np.int16)

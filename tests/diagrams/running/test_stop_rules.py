@@ -18,8 +18,9 @@ from diagrams import (
     make_simulator,
     simulate,
 )
-from diagrams.running import stop_rules
-from diagrams.running.stop_rules import FOUND, RobotRules, StopRules, judge_search
+from diagrams.running.monitor import Monitor
+from diagrams.running.referee import Referee
+from diagrams.running.stop_rules import FOUND, judge_search
 from diagrams.scenario.bodies import robot_rectangle
 from diagrams.scenario.scenario import Scenario
 from systems.world.geometry import rectangle_clearance
@@ -48,7 +49,7 @@ def test_a_run_leaves_no_simulator_behind():
     follower = build_sound_follower(Scenario.model_validate(BASE))
     simulator = make_simulator(follower)
     context = simulator.get_context()
-    simulator.set_monitor(StopRules(follower))
+    simulator.set_monitor(Monitor(follower))
     simulator.Initialize()
     simulator.AdvanceTo(0.1)
     alive = weakref.ref(simulator)
@@ -470,9 +471,10 @@ def test_corners_are_not_cut_however_fast():
 def test_a_find_is_judged_by_where_the_source_is(searches, ended, place, cause):
     """The robot is at (2, 1), turned by 30 deg; places are ahead and left of it."""
     scenario = load_scenario(searches)
-    numbers = RobotRules(scenario, scenario.surroundings()).numbers
+    (step,) = Referee(scenario).steps.values()
+    rules = step.numbers.rules
     c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
     ahead, left = place
     source = 2.0 + c * ahead - s * left, 1.0 + s * ahead + c * left
-    found = judge_search(float(ended), (2.0, 1.0, math.pi / 6), source, numbers)
+    found = judge_search(float(ended), (2.0, 1.0, math.pi / 6), source, rules)
     assert FOUND[found] == cause

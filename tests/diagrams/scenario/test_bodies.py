@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagrams.scenario.bodies import Body, LivePath, RecordedPath, Surroundings
+from diagrams.scenario.bodies import Body, RecordedPath, Surroundings
 
 
 def test_a_recorded_path_is_straight_between_ticks():
@@ -18,21 +18,10 @@ def test_a_recorded_path_is_straight_between_ticks():
     np.testing.assert_allclose(path.poses([-1.0, 9.0]), [[0, 0, 0], [1, 0, 0]])
 
 
-def test_a_live_path_knows_the_last_tick_and_this_one():
-    path = LivePath((1.0, 2.0, 3.0))
-    assert path.pose(0.0) == (1.0, 2.0, 3.0)
-    path.move(0.0, [1.0, 2.0, 3.0])
-    path.move(0.1, [2.0, 0.0, 3.0])
-    assert path.pose(0.1) == (2.0, 0.0, 3.0)
-    assert path.pose(0.025) == pytest.approx((1.25, 1.5, 3.0))
-    np.testing.assert_allclose(
-        path.poses([0.0, 0.05]), np.array([[1, 2, 3], [1.5, 1, 3]])
-    )
-
-
 def test_what_is_followed_is_no_obstacle():
     bodies = {
-        name: Body(LivePath((k, 0, 0)), (1.0, 1.0)) for k, name in enumerate("abc")
+        name: Body(RecordedPath(np.zeros(1), np.array([[k, 0, 0]])), (1.0, 1.0))
+        for k, name in enumerate("abc")
     }
     around = Surroundings(bodies, "b")
     assert list(around.obstacles) == ["a", "c"]

@@ -11,13 +11,13 @@ from pydrake.systems.framework import DiagramBuilder
 
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.source_robot import SourceRobot
+from systems.framework.block import RunFacts
+from systems.sound.acoustics import AcousticParameters
 from systems.sound.mic_array import MicArray
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import (
     SoundEmitter,
-    emissions_along,
     emitted_samples,
-    history_ticks,
 )
 from systems.sound.waveforms import make_waveform
 
@@ -198,19 +198,24 @@ def test_a_called_sound_of_a_loop_is_that_of_the_block():
     context = block.CreateDefaultContext()
     for port in ("pose_WS", "v_WS"):
         block.GetInputPort(port).FixValue(context, [0.0] * 3)
-    ticks = history_ticks(30.0, 340.0)
-    since: list[float | None] = [None]
-    path = np.zeros((ticks + 12, 2))
-    emission = emissions_along(
-        path, path, make_waveform(sound), sound, ticks, on_since_s=lambda: since[0]
+    facts = RunFacts(
+        ticks=12,
+        tick_s=0.025,
+        initial_pose=(0.0, 0.0, 0.0),
+        scheme="runge_kutta3",
+        step_s=0.025,
+        seed_of=lambda _: 0,
+        carried={},
     )
+    step = block.step_for(facts)
+    emission = step.carries["emission"]
     simulator = Simulator(block, context)
     for tick in range(12):
         block.GetInputPort("calling").FixValue(context, [float(tick >= 5)])
         simulator.AdvanceTo(0.025 * tick)
         simulator.AdvancePendingEvents()
-        if tick == 5:
-            since[0] = 0.125
+        called = np.array([0.0] * 6 + [float(tick >= 5)])
+        step.host.function(tick, called, np.zeros(0))
         own: Any = block.GetOutputPort("emission").Eval(context)
         loop = emission(tick)
         np.testing.assert_array_equal(own.samples, loop.samples)

@@ -1,0 +1,81 @@
+"""The monitor of Drake's simulator: it saves sound, and ends the run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydrake.systems.framework import EventStatus
+
+from diagrams.building.builder import SoundFollower
+from diagrams.running.audio.run_audio import RunAudio
+from diagrams.running.referee import Referee
+from diagrams.running.stop_rules import READ_PORTS, ROUNDING_S
+
+_GO_ON = EventStatus.DidNothing()
+
+
+class Monitor:
+    """Reads the ports of a diagram at every tick, for the referee and the sound files.
+
+    The simulator calls the monitor before the updates of a tick. The monitor therefore
+    reads the same values as the updates, and Drake computes these values only once.
+
+    Args:
+        follower: The diagram.
+        audio: Open files for the sound of the run; None: no sound is saved.
+    """
+
+    def __init__(self, follower: SoundFollower, audio: RunAudio | None = None) -> None:
+        self.referee = Referee(follower.scenario)
+        self._diagram, self._tick_s = follower.diagram, follower.scenario.tick_s
+        self._audio, self._tick = audio, -1
+        self._ports: dict[tuple[str, str], tuple[Any, Any]] = {}
+        for owner, parts in (*follower.sources.items(), *follower.robots.items()):
+            for block in parts.blocks.values():
+                for index in range(block.num_output_ports()):
+                    port = block.get_output_port(index)
+                    self._ports.setdefault((owner, port.get_name()), (block, port))
+        self._root: Any = None
+        self._contexts: dict[tuple[str, str], Any] = {}
+
+    def __call__(self, context: Any) -> EventStatus:
+        """Saves the sound and judges the run; the simulator calls it after every step.
+
+        Steps may be shorter than ticks; this method ignores the instants between ticks.
+
+        Raises:
+            InputError: A robot that listens has no frames to save.
+            OSError: The disk is full, or fails.
+        """
+        time, referee = context.get_time(), self.referee
+        tick = round(time / self._tick_s)
+        if tick == self._tick or abs(time - tick * self._tick_s) > ROUNDING_S:
+            return _GO_ON
+        self._tick = tick
+        if context is not self._root:
+            self._root, self._contexts = context, {}
+        if self._audio is not None:
+            self._audio.save(tick, self._read)
+        for number, name in enumerate(referee.steps):
+            referee.poses[number] = self._read(name, "pose_WB")
+        for name, step in referee.steps.items():
+            read = [self._numbers(name, *port) for port in READ_PORTS.items()]
+            step.step(tick, step.state, (referee.poses, *read), (), step.numbers)
+        if referee.over:
+            cause = referee.cause_of(referee.decisive)
+            return EventStatus.ReachedTermination(self._diagram, cause)
+        return _GO_ON
+
+    def _read(self, owner: str, name: str) -> Any:
+        """Value of an output port; None if the robot or source has no such port."""
+        key = owner, name
+        if key not in self._ports:
+            return None
+        block, port = self._ports[key]
+        if key not in self._contexts:
+            self._contexts[key] = block.GetMyContextFromRoot(self._root)
+        return port.Eval(self._contexts[key])
+
+    def _numbers(self, owner: str, name: str, size: int) -> list[float]:
+        values = self._read(owner, name)
+        return [0.0] * size if values is None else values.tolist()

@@ -1,0 +1,246 @@
+"""The referee of a run: it ends the run, and knows the causes and the collisions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams.running.stop_rules import (
+    ENDING,
+    FOLLOWING_SHARE,
+    FOUND,
+    INTERRUPTED,
+    SUCCESSFUL,
+    UNJUDGED,
+    BodyTable,
+    Collision,
+    RefereeNumbers,
+    RefereeState,
+    RuleNumbers,
+    judge_robot,
+    run_is_over,
+)
+from diagrams.scenario.bodies import Body, RecordedPath, robot_rectangle
+from diagrams.scenario.scenario import Scenario
+from systems.framework.block import Step
+from systems.world.geometry import rectangle_clearance
+
+#: The rules check for contacts at the ends of equal parts of a tick. These are the
+#: least number of parts, and the greatest distance that a body on its own path may move
+#: in one part, m. If a body is faster, ticks have more parts.
+BETWEEN_TICKS, _PART_M = 5, 0.02
+
+
+class Referee:
+    """Judges all robots of a run at every tick.
+
+    There is one step per robot. Both engines call these steps at every tick, before any
+    block changes its state.
+
+    Args:
+        scenario: The scenario to run.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        robots = [*scenario.robots]
+        self.scenario = scenario
+        self.poses = np.zeros((len(robots), 3))
+        """(robots, 3) poses of all robots in W at the present tick, m and rad; the
+        engine fills them, and passes them to each step."""
+        self.found = np.zeros(len(robots), dtype=np.int64)
+        """(robots,) index of the cause of each robot in ``FOUND``."""
+        self.steps = {
+            name: Step(
+                judge_robot,
+                _numbers_of(scenario, name),
+                RefereeState(
+                    np.array(UNJUDGED),
+                    np.zeros_like(self.poses),
+                    np.zeros_like(self.poses),
+                    np.zeros(1),
+                    np.zeros(1),
+                    np.array([-1.0, 0.0, 0.0]),
+                    self.found[number : number + 1],
+                ),
+            )
+            for number, name in enumerate(robots)
+        }
+        """Step of each robot, by name. The inputs are ``poses`` and the values of
+        ``READ_PORTS``."""
+
+    @property
+    def over(self) -> bool:
+        """Whether the run has ended."""
+        return run_is_over(self.found)
+
+    @property
+    def decisive(self) -> str:
+        """Name of the robot whose cause is the cause of the whole run.
+
+        It is the first robot that collided or diverged. If there is none, it is the
+        first robot that was neither successful nor interrupted. If there is no such
+        robot either, it is the first robot.
+        """
+
+        def rank(name: str) -> int:
+            cause = self.cause_of(name)
+            if cause in ENDING:
+                return 0
+            return 2 if cause in (*SUCCESSFUL, INTERRUPTED) else 1
+
+        return min(self.steps, key=rank)
+
+    def cause_of(self, name: str) -> str:
+        """Returns the cause of a robot after the run.
+
+        Args:
+            name: Name of the robot.
+        """
+        found = self.steps[name].state.found[0]
+        if found:
+            return FOUND[found]
+        return INTERRUPTED if self.over else self._cause_at_time_limit(name)
+
+    def _cause_at_time_limit(self, name: str) -> str:
+        state, rules = self.steps[name].state, self.steps[name].numbers.rules
+        if rules.searches:
+            return "timeout"
+        *_, been_in_goal, ticks, following_ticks = state.rules.tolist()
+        followed = following_ticks >= FOLLOWING_SHARE * ticks
+        if not rules.source_rests and ticks > 0.0 and followed:
+            return "completed"
+        if not state.valid[0]:
+            return "lost"
+        if not rules.source_rests:
+            return "astray"
+        return "unsettled" if been_in_goal else "timeout"
+
+    def ended(self, name: str) -> float:
+        """Returns the number of the ending of a robot's search; 0 if there is none.
+
+        Args:
+            name: Name of the robot.
+        """
+        return float(self.steps[name].state.ended[0])
+
+    def collision(self, name: str) -> Collision | None:
+        """Returns the collision of a robot after the run; None if there is none.
+
+        The robot is at fault if its own motion since the last tick brings it nearer to
+        the body than the motion of the body alone would.
+
+        Args:
+            name: Name of the robot.
+        """
+        state, tick_s = self.steps[name].state, self.scenario.tick_s
+        body, part, tick = state.contact.tolist()
+        if body < 0.0:
+            return None
+        begin, end = max(tick - 1.0, 0.0) * tick_s, tick * tick_s
+        instant = begin + part * (end - begin)
+        moved = np.stack([state.before, state.now], axis=1)
+        paths = {
+            robot: RecordedPath(np.array([begin, end]), poses)
+            for robot, poses in zip(self.steps, moved, strict=True)
+        }
+        bodies = self.scenario.surroundings(name, paths).bodies
+        touched, hit = [*bodies.items()][int(body)]
+        own = self.scenario.robots[name].robot
+        robot_then, robot_now = (
+            robot_rectangle(paths[name].pose(time), own) for time in (begin, instant)
+        )
+        robot_alone = rectangle_clearance(robot_now, hit.rectangle(begin))
+        body_alone = rectangle_clearance(robot_then, hit.rectangle(instant))
+        fault = "robot" if robot_alone <= body_alone else "obstacle"
+        return Collision(touched, fault, instant)
+
+
+def _numbers_of(scenario: Scenario, name: str) -> RefereeNumbers:
+    own, around = scenario.of_robot(name), scenario.surroundings(name)
+    robots, bodies = [*scenario.robots], {**around.bodies}
+    rests = not around.followed.path.moves
+    # A goal has no body. It comes after the bodies, and cannot be touched.
+    target = [*bodies, around.target].index(around.target)
+    if around.goal is not None:
+        bodies[around.target] = around.followed
+    return RefereeNumbers(
+        robots.index(name),
+        own.only.size,
+        target,
+        _table_of(bodies, own, robots, touchable=len(around.bodies)),
+        RuleNumbers(
+            own.stop,
+            own.only.robot.control_point_m,
+            own.only.follow_distance_m,
+            own.goal_radius(moves=not rests),
+            rests,
+            {None: 0, "odor": 1, "sound": 2}[own.only.searches],
+        ),
+        scenario.tick_s,
+    )
+
+
+def _table_of(
+    bodies: Mapping[str, Body], own: Scenario, robots: list[str], *, touchable: int
+) -> BodyTable:
+    """Tabulates bodies; those after the first ``touchable`` ones cannot be touched.
+
+    If a body is fast, ticks have more parts, so that the body moves at most ``_PART_M``
+    per part.
+    """
+    ticks = int(own.duration_s / own.tick_s + 1e-9)
+    times: NDArray[np.float64] = own.tick_s * np.arange(ticks + 1.0)
+    moving = {n: b for n, b in bodies.items() if b.path.moves and n not in robots}
+    instants = _instants(times, BETWEEN_TICKS)
+    poses = {name: body.path.poses(instants) for name, body in moving.items()}
+    farthest = {
+        name: float(np.hypot(*np.diff(rows[:, :2], axis=0).T).max(initial=0.0))
+        for name, rows in poses.items()
+    }
+    parts = max(1, math.ceil(max(farthest.values(), default=0.0) / _PART_M))
+    parts *= BETWEEN_TICKS
+    rows, tables, size = np.zeros((len(bodies), 2), dtype=np.int64), [], 0
+    for row, (name, body) in zip(rows, bodies.items(), strict=True):
+        if name in robots:
+            continue
+        if name not in moving:
+            table = np.repeat(body.path.poses(times[:1]), parts + 1, axis=0)
+        elif parts == BETWEEN_TICKS:
+            table = poses[name]
+        else:
+            table = body.path.poses(_instants(times, parts))
+        row[:] = size, parts if name in moving else 0
+        tables.append(table)
+        size += len(table)
+    reach = [
+        0.5 * (math.hypot(*own.only.size) + math.hypot(*body.size))
+        for body in bodies.values()
+    ]
+    reach[touchable:] = [-math.inf] * (len(bodies) - touchable)
+    return BodyTable(
+        np.array([body.size for body in bodies.values()], dtype=float),
+        np.array(reach),
+        np.array([BETWEEN_TICKS * farthest.get(name, 0.0) for name in bodies]),
+        np.array([robots.index(n) if n in robots else -1 for n in bodies]),
+        parts,
+        rows,
+        np.concatenate([np.empty((0, 3)), *tables]),
+    )
+
+
+def _instants(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
+    """Returns the instants at which contacts are checked.
+
+    Args:
+        times: (n + 1,) times of the ticks, s.
+        parts: Number of parts per tick.
+
+    Returns:
+        (n * parts + 1,) instants, s, including the ticks.
+    """
+    shares = np.arange(1, parts + 1) / parts
+    between = times[:-1, None] + shares * np.diff(times)[:, None]
+    return np.concatenate([times[:1], between.ravel()])
