@@ -41,7 +41,9 @@ from diagrams.running.compiled.loop_blocks import (
 from diagrams.running.compiled.parts import run_parts
 from diagrams.running.compiled.plan import LoopPlan
 from diagrams.running.referee import Referee
-from diagrams.scenario.scenario import ROBOT, WORLD, Scenario
+from diagrams.scenario.participants import Router
+from diagrams.scenario.scenario import WORLD, Scenario
+from diagrams.scenario.shorthand import ROBOT
 from systems.framework.block import RunFacts
 from systems.framework.host_step import HostError
 from systems.framework.input_error import InputError, shortened
