@@ -69,10 +69,13 @@ class Looks(NamedTuple):
 
 
 def make_looks(sensors: int) -> Looks:
-    """Returns a memory without looks.
+    """Makes a memory without looks.
 
     Args:
         sensors: Number of range sensors.
+
+    Returns:
+        The empty memory.
     """
     looks = Looks(*(np.zeros((_LOOKS, sensors)) for _ in Looks._fields))
     looks.time_s[:] = -np.inf
@@ -81,12 +84,15 @@ def make_looks(sensors: int) -> Looks:
 
 @njit(cache=True)
 def look_of(looks: Looks, age: int, k: int) -> Look:  # pragma: no cover  (compiled)
-    """Returns one look.
+    """Reads one look.
 
     Args:
         looks: The looks of all sensors.
         age: 0 for the newest look, 1 for the one before, 2 for the oldest.
         k: Number of the sensor.
+
+    Returns:
+        The look, as numbers.
     """
     return Look(
         looks.range_m[age, k],
@@ -140,12 +146,15 @@ def seen_from(
 def is_target(
     look: Look, half: float, target: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether an echo may come from the followed target.
+    """Checks whether an echo may come from the followed target.
 
     Args:
         look: The look with the echo.
         half: Half of the sensor's aperture, rad.
         target: (x, y, radius) of the target, m.
+
+    Returns:
+        Whether it may.
     """
     distance, off = seen_from(look, target[0], target[1])
     beside = off - half < target[2] / max(distance, target[2])
@@ -156,12 +165,15 @@ def is_target(
 def goes_on(
     look: Look, then: Look, tick_s: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether an echo fits the look before it, so that its rate is known.
+    """Checks whether an echo fits the look before it, so that its rate is known.
 
     Args:
         look: The newest look of a sensor.
         then: The look before.
         tick_s: Period of the controller, s.
+
+    Returns:
+        Whether it fits.
     """
     since = look.time_s - then.time_s
     if then.heard < 0.5 or since > _OLDEST_TICKS * tick_s:
@@ -173,7 +185,7 @@ def goes_on(
 def came_from_free(
     space: FreeSpace, look: Look, half: float, margin_m: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether the whole arc of an echo was seen free before.
+    """Checks whether the whole arc of an echo was seen free before.
 
     The function checks points along the arc, over the width of the aperture. In depth,
     the points extend from the range minus its largest error to the range plus this
@@ -184,6 +196,9 @@ def came_from_free(
         look: The look with the echo.
         half: Half of the sensor's aperture, rad.
         margin_m: Largest error of a range, m.
+
+    Returns:
+        Whether all of it was seen free.
     """
     cell = space.cell_m
     step_m = _ARC_STEP * cell
