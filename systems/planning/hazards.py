@@ -18,7 +18,6 @@ from systems.framework.compiling import njit
 from systems.planning.looks import (
     HazardSensors,
     Look,
-    Looks,
     came_from_free,
     goes_on,
     is_target,
@@ -105,7 +104,8 @@ class Hazards(NamedTuple):
     seen_s: NDArray[np.float64]
     """(tracks,) time at which the body was last seen, s."""
     particles: Particles
-    looks: Looks
+    looks: Look
+    """Last looks of all sensors."""
     random: NDArray[np.int64]
     """(1,) state of the random generator."""
     moved_s: NDArray[np.float64]

@@ -39,36 +39,26 @@ class HazardSensors(NamedTuple):
 
 
 class Look(NamedTuple):
-    """One reading of one sensor."""
+    """One reading of one sensor, as numbers.
 
-    range_m: float
-    heard: float
+    The memory of all sensors has arrays of (3, sensors) instead of the numbers, with
+    the most recent look first.
+    """
+
+    range_m: Any
+    heard: Any
     """1 if there was an echo, else 0."""
-    time_s: float
-    x: float
+    time_s: Any
+    """Minus infinity if there was no such look yet."""
+    x: Any
     """Position of the sensor, m."""
-    y: float
+    y: Any
     """Position of the sensor, m."""
-    axis_rad: float
+    axis_rad: Any
     """Direction of the sensor's axis, rad."""
 
 
-class Looks(NamedTuple):
-    """The last looks of each sensor, most recent first.
-
-    All arrays have the form (3, sensors), and change.
-    """
-
-    range_m: NDArray[np.float64]
-    heard: NDArray[np.float64]
-    time_s: NDArray[np.float64]
-    """Minus infinity if there was no such look yet."""
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    axis_rad: NDArray[np.float64]
-
-
-def make_looks(sensors: int) -> Looks:
+def make_looks(sensors: int) -> Look:
     """Makes a memory without looks.
 
     Args:
@@ -77,13 +67,13 @@ def make_looks(sensors: int) -> Looks:
     Returns:
         The empty memory.
     """
-    looks = Looks(*(np.zeros((_LOOKS, sensors)) for _ in Looks._fields))
+    looks = Look(*(np.zeros((_LOOKS, sensors)) for _ in Look._fields))
     looks.time_s[:] = -np.inf
     return looks
 
 
 @njit(cache=True)
-def look_of(looks: Looks, age: int, k: int) -> Look:  # pragma: no cover  (compiled)
+def look_of(looks: Look, age: int, k: int) -> Look:  # pragma: no cover  (compiled)
     """Reads one look.
 
     Args:
@@ -94,19 +84,20 @@ def look_of(looks: Looks, age: int, k: int) -> Look:  # pragma: no cover  (compi
     Returns:
         The look, as numbers.
     """
+    at = age, k
     return Look(
-        looks.range_m[age, k],
-        looks.heard[age, k],
-        looks.time_s[age, k],
-        looks.x[age, k],
-        looks.y[age, k],
-        looks.axis_rad[age, k],
+        looks.range_m[at],
+        looks.heard[at],
+        looks.time_s[at],
+        looks.x[at],
+        looks.y[at],
+        looks.axis_rad[at],
     )
 
 
 @njit(cache=True)
 def remember_looks(
-    looks: Looks, time: float, pose: Any, readings: Any, sensors: HazardSensors
+    looks: Look, time: float, pose: Any, readings: Any, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
     """Stores the readings of the sensors that have fired in this tick.
 
