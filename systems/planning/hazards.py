@@ -18,7 +18,6 @@ from systems.framework.compiling import njit
 from systems.planning.looks import (
     HazardSensors,
     Look,
-    Looks,
     came_from_free,
     goes_on,
     is_target,
@@ -105,7 +104,8 @@ class Hazards(NamedTuple):
     seen_s: NDArray[np.float64]
     """(tracks,) time at which the body was last seen, s."""
     particles: Particles
-    looks: Looks
+    looks: Look
+    """Last looks of all sensors."""
     random: NDArray[np.int64]
     """(1,) state of the random generator."""
     moved_s: NDArray[np.float64]
@@ -198,7 +198,7 @@ def track_hazards(
         best = _best_track(hazards, look, half) if unknown else -1
         for t in range(len(hazards.exists)):
             if hazards.exists[t] > 0.0:
-                _weigh(hazards, t, best, look, half, sensors)
+                _weigh(hazards, t, k, best, sensors)
         if best >= 0:
             hazards.seen_s[best] = time
             doubt = _CERTAIN - hazards.exists[best]
@@ -300,21 +300,16 @@ def _share_at(
 
 @njit(cache=True)
 def _weigh(
-    hazards: Hazards,
-    t: int,
-    best: int,
-    look: Look,
-    half: float,
-    sensors: HazardSensors,
+    hazards: Hazards, t: int, k: int, best: int, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Weigh the particles of a track with a look, by Bayes' rule.
+    """Weigh the particles of a track with the newest look of sensor ``k``.
 
     ``best`` is the track to which the echo is attributed, or -1. If it is track ``t``,
-    the track has echoed. ``half`` is half of the sensor's aperture, rad. Each weight is
-    multiplied by the likelihood of the look if the body were at this particle. The
-    likelihood depends on ``gap``, the measured distance minus the distance of the
-    particle. Without an echo, ``gap`` is infinite for particles within the greatest
-    range, and 0 for the others. There are four cases:
+    the track has echoed. By Bayes' rule, each weight is multiplied by the likelihood of
+    the look if the body were at this particle. The likelihood depends on ``gap``, the
+    measured distance minus the distance of the particle. Without an echo, ``gap`` is
+    infinite for particles within the greatest range, and 0 for the others. There are
+    four cases:
 
     * The particle is outside the aperture. If its track has echoed, the particle loses
       weight.
@@ -329,6 +324,7 @@ def _weigh(
     track. If the track has not echoed, this sum lowers the probability of the track.
     """
     p, fit_m = _particles_of(hazards, t), math.hypot(_FIT_M, sensors.noise_m)
+    look, half = look_of(hazards.looks, 0, k), sensors.directions[k, 1]
     echoed, total = t == best, 0.0
     for n in range(len(p.x)):
         distance, off = seen_from(look, p.x[n], p.y[n])
