@@ -25,6 +25,7 @@ from diagrams.scenario.fields.near_miss import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
+from systems.framework.input_error import InputError
 from systems.framework.parameters import Angle, Parameters, Point, SoundSpeed
 from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
@@ -225,6 +226,16 @@ class Router(Robot):
     laws: LawGains = LawGains()
     """Gains by law. Only the gains of the robot's law have an effect."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_route(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and data.get("route") is None:
+            law = data.get("law")
+            raise InputError(
+                "route", f"is missing, and law {law!r} drives on one; set route.goal_m"
+            )
+        return data
 
     @property
     def gains(self) -> Any:
