@@ -116,7 +116,7 @@ class Robot(Parameters):
     replaces the robot's block with the same part; a block with a new part is added."""
     loudspeaker: SoundParameters | None = None
     """Sound that the robot itself plays at the origin of B, so that other robots can
-    follow it. Fields that are missing are those of ``sound``."""
+    follow it. Its fields are those of ``sound``, which also has the defaults."""
     start: StartParameters = StartParameters()
     assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed of sound that hearing and range sensors assume, m/s; null: the true speed
