@@ -53,23 +53,51 @@ def load_scenario(
             of the wrong type or out of range. The error names each field by its full
             path.
     """
+    data = written_fields(source)
+    apply_settings(data, dict(_settings(overrides)))
+    resolve_sound(data, Path.cwd())
+    return scenario_from_mapping(data)
+
+
+def written_fields(source: str | Path) -> dict[str, Any]:
+    """Reads the fields that the file of a scenario sets.
+
+    Args:
+        source: See ``load_scenario``.
+
+    Returns:
+        Plain values by present names, with a name, and with absolute paths of sounds.
+
+    Raises:
+        InputError: The name is unknown, or the file is unreadable.
+    """
     path = _find(source)
     data = renewed(read_mapping(path))
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
-    settings = [(renamed(key), value) for key, value in _settings(overrides)]
-    set_fields(data, settings)
-    require_effect(data, [key for key, _ in settings])
-    resolve_sound(data, Path.cwd())
-    return scenario_from_mapping(data)
+    return data
+
+
+def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:
+    """Sets fields of a scenario that a user has given by their paths.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+        settings: Plain values by dotted path. Former names are accepted.
+
+    Raises:
+        InputError: See ``set_fields``, or a field has no effect because all robots or
+            all sources have values of their own.
+    """
+    fields = {renamed(key): value for key, value in settings.items()}
+    set_fields(data, fields.items())
+    require_effect(data, fields)
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     """Returns a copy of a scenario with changes, see ``Scenario.with_``."""
     data = scenario.model_dump(mode="json")
-    settings = list(_settings(changes))
-    set_fields(data, settings)
-    require_effect(data, [key for key, _ in settings])
+    apply_settings(data, dict(_settings(changes)))
     return scenario_from_mapping(data)
 
 
