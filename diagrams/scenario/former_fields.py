@@ -126,6 +126,12 @@ def _robots_and_sources(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, A
 
 
 def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
+    for laws in (fields.get("repulsion"), fields.get("laws")):
+        adaptive = laws.get("trajectory_adaptive") if isinstance(laws, dict) else None
+        if isinstance(adaptive, dict) and "safety_filter" in adaptive:
+            given = adaptive["safety_filter"]
+            if not isinstance(given, bool):  # it was a group or null
+                adaptive["safety_filter"] = given is not None
     for former in former_fields():
         path = former.path
         if where.startswith("sources."):
