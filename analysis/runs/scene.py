@@ -142,9 +142,9 @@ def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
     Returns:
         x, y, theta of the sensor's frame U in B, m and rad.
     """
-    x, y = scenario.ultrasonic.places[sensor]
-    axis = math.radians(scenario.ultrasonic.axes_deg[sensor])
-    return scenario.robot.control_point_m + x, y, axis
+    own = scenario.ultrasonic.sensors[sensor]
+    x, y = own.position_m
+    return scenario.robot.control_point_m + x, y, math.radians(own.axis_deg)
 
 
 def compose(

@@ -207,6 +207,7 @@ def robot_blocks(
         WheelOdometry(
             robot=scenario.robot,
             odometry=scenario.odometry,
+            faults=scenario.faults,
             plant=scenario.plant,
             initial_pose=scenario.start.pose,
             tick_s=scenario.tick_s,

@@ -11,6 +11,7 @@ from diagrams.scenario.fields.near_miss import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
+from systems.framework.faults import Faults, FaultySensor, faults_of
 from systems.framework.parameters import Angle, Parameters, Point
 from systems.heading.parameters import (
     CompassParameters,
@@ -26,11 +27,14 @@ from systems.hearing.parameters import (
 from systems.laws.catalogue import LAWS
 from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
-from systems.odor.parameters import AirflowParameters, GasSensorParameters
+from systems.odor.parameters import (
+    GAS_SENSORS,
+    AirflowParameters,
+    GasSensorParameters,
+)
 from systems.planning.parameters import FollowingParameters
 from systems.ranging.parameters import (
     CollisionVectorParameters,
-    ContactParameters,
     ObjectDetectorParameters,
     ObjectSensorParameters,
     UltrasonicParameters,
@@ -98,12 +102,13 @@ class FollowerParameters(Parameters):
     search: PlumeSearchParameters = PlumeSearchParameters()
     gas_sensors: GasSensorParameters = GasSensorParameters()
     airflow_sensors: AirflowParameters = AirflowParameters()
-    contact_switches: ContactParameters = ContactParameters()
     sound_search: SoundSearchParameters = SoundSearchParameters()
     cross_power: CrossPowerParameters = CrossPowerParameters()
     compass: CompassParameters = CompassParameters()
     heading_control: HeadingControlParameters = HeadingControlParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
+    faults: Faults = ()
+    """Sensors that fail during a run."""
 
     @field_validator("law")
     @classmethod
@@ -115,6 +120,19 @@ class FollowerParameters(Parameters):
     @model_validator(mode="after")
     def _check_channels(self) -> FollowerParameters:
         channel_skew(self.microphones, len(self.robot.microphones_m))
+        return self
+
+    @model_validator(mode="after")
+    def _check_faults(self) -> FollowerParameters:
+        counts: dict[FaultySensor, int] = {
+            "microphones": len(self.robot.microphones_m),
+            "ultrasonic": self.ultrasonic.count,
+            "gas_sensors": GAS_SENSORS,
+            "contact_switches": 2,
+            "odometry": 1,
+        }
+        for sensor, count in counts.items():
+            faults_of(self.faults, sensor, count)
         return self
 
     @property

@@ -170,13 +170,13 @@ def hazard_sensors(
     Returns:
         Positions, directions, and errors of the sensors; top speed of the bodies.
     """
-    axes, places, half_angle = sensors.beams
+    axes, places, half_angles = sensors.beams
     return HazardSensors(
         np.add(places, [robot.control_point_m, 0.0]),
-        np.column_stack([axes, np.full(len(axes), half_angle)]),
-        sensors.maximum_range_m,
-        known.range_error(sensors),
-        sensors.noise_m,
+        np.column_stack([axes, half_angles]),
+        sensors.each("maximum_range_m"),
+        known.range_errors(sensors),
+        sensors.each("noise_m"),
         own.hazard_speed_m_s,
         tick_s,
     )

@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Angle,
     Duration,
@@ -91,18 +90,6 @@ _PRESETS = {
 }
 
 
-class GasSensorFaultParameters(Parameters):
-    """A fault of a gas sensor."""
-
-    sensor: int = Field(default=1, ge=1, le=GAS_SENSORS)
-    """Number of the sensor: 1 right front, 2 rear, 3 left front."""
-    kind: Literal["dead", "stuck"] = "dead"
-    """``dead``: the reading is 1 (clean air) without noise. ``stuck``: the sensor
-    repeats its last reading."""
-    start_s: Time = 0.0
-    """Start of the fault, s."""
-
-
 class GasSensorParameters(Parameters):
     """Three TGS2620 sensors on arms of 20 cm, 120 deg apart (Song 2011, 2.1)."""
 
@@ -135,26 +122,11 @@ class GasSensorParameters(Parameters):
     constant value."""
     drift_per_h: float = Field(default=0.0, ge=-0.03, le=0.03)
     """Relative growth of all readings per hour, 1/h."""
-    faults: Annotated[
-        tuple[GasSensorFaultParameters, ...], Strict(False), Field(max_length=8)
-    ] = ()
-    """Faults of the sensors, at most one per sensor."""
 
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
         return with_preset(data, _PRESETS)
-
-    @model_validator(mode="after")
-    def _check(self) -> GasSensorParameters:
-        failing = [fault.sensor for fault in self.faults]
-        if len({*failing}) < len(failing):
-            raise InputError(
-                "faults",
-                f"sensors {failing}: a sensor has two faults; keep one fault "
-                "per sensor",
-            )
-        return self
 
 
 class AirflowParameters(Parameters):

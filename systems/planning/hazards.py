@@ -91,12 +91,12 @@ class HazardSensors(NamedTuple):
     """(sensors, 2) position relative to the axle in B, m."""
     directions: NDArray[np.float64]
     """(sensors, 2) direction of the axis in B and half of the aperture, rad."""
-    farthest_m: float
-    """Greatest range, m."""
-    margin_m: float
-    """Largest error of a range, m."""
-    noise_m: float
-    """Standard deviation of a range, m."""
+    farthest_m: NDArray[np.float64]
+    """(sensors,) greatest range, m."""
+    margin_m: NDArray[np.float64]
+    """(sensors,) largest error of a range, m."""
+    noise_m: NDArray[np.float64]
+    """(sensors,) standard deviation of a range, m."""
     top_speed_m_s: float
     """Largest speed of a body, m/s."""
     tick_s: float
@@ -195,7 +195,7 @@ def track_hazards(
         elif (
             unknown
             and _goes_on(hazards, k, time, sensors)
-            and _came_from_free(space, look, half, sensors.margin_m)
+            and _came_from_free(space, look, half, sensors.margin_m[k])
         ):
             _begin(hazards, k, time, sensors)
     _forget(hazards, time, pose)
@@ -354,7 +354,7 @@ def _weigh(
     track has not echoed, the lost weight lowers the probability of the track by Bayes'
     rule.
     """
-    p, fit_m = hazards.particles[t], math.hypot(_FIT_M, sensors.noise_m)
+    p, fit_m = hazards.particles[t], math.hypot(_FIT_M, sensors.noise_m[k])
     look, half, echoed = hazards.looks[0, k], sensors.directions[k, 1], t == best
     total = 0.0
     for n in range(len(p)):
@@ -362,7 +362,7 @@ def _weigh(
         edge = _EDGE_M / max(distance, 0.1)
         gap = look[R] + _BEYOND_M - distance
         if look[HEARD] < 0.5:
-            gap = np.inf if distance < sensors.farthest_m - 0.05 else 0.0
+            gap = np.inf if distance < sensors.farthest_m[k] - 0.05 else 0.0
         # Outside the aperture.
         if off > half + edge:
             if echoed:
@@ -468,7 +468,7 @@ def _begin(
     # Range rate, its error, and velocity of the sensor.
     p, since = hazards.particles[t], time - then[TIME]
     rate = (look[R] - then[R]) / since
-    rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m / since)
+    rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m[k] / since)
     own_x, own_y = (look[SX] - then[SX]) / since, (look[SY] - then[SY]) / since
     ago = time - hazards.looks[2, k, TIME]
     at = look[R] + _BEYOND_M
@@ -507,7 +507,7 @@ def _was_visible(
     for k in range(hazards.looks.shape[1]):
         look, half = hazards.looks[_LOOKS - 1, k], sensors.directions[k, 1]
         distance, off = _seen_from(look, x, y)
-        reach = look[R] if look[HEARD] > 0.5 else sensors.farthest_m
+        reach = look[R] if look[HEARD] > 0.5 else sensors.farthest_m[k]
         inside = off < half - 0.03 / max(distance, 0.1)
         if inside and distance + 0.03 < reach:
             return True

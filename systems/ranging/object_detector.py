@@ -199,7 +199,7 @@ def _numbers(
         apart[left] = (sensors.axes[left] - sensors.axes[right]) % math.tau
     beams = BeamNumbers(
         apart,
-        sensors.maximum_range_m,
+        sensors.each("maximum_range_m"),
         own.gap_m,
         1.0 / math.cos(math.radians(own.most_oblique_deg)),
         own.dip_m,

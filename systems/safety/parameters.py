@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from systems.base.robot import RobotParameters, body_radius
@@ -50,9 +52,9 @@ class FreeSpaceParameters(Parameters):
         """Number of cells along a side of the window."""
         return math.ceil(self.window_m / self.cell_m - 1e-9)
 
-    def range_error(self, sensors: UltrasonicParameters) -> float:
-        """Returns the largest amount by which a range is too long, m."""
-        return self.range_margin_m + _SIGMAS * sensors.noise_m
+    def range_errors(self, sensors: UltrasonicParameters) -> NDArray[np.float64]:
+        """(n,) largest amounts by which the ranges of each sensor are too long, m."""
+        return self.range_margin_m + _SIGMAS * sensors.each("noise_m")
 
     def check(self, robot: RobotParameters) -> None:
         """Checks that the grid fits a robot.

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port, Step
@@ -53,42 +55,43 @@ class MonitorNumbers(NamedTuple):
 
     limits: tuple[float, float]
     """Largest motion of the axle, m, and of the heading, rad, in one tick."""
-    ranges: tuple[float, float]
-    """Least and greatest range, m. Only ranges between these limits are checked for
-    equal echoes."""
+    ranges: NDArray[np.float64]
+    """(n, 2) least and greatest range of each sensor, m. Only ranges between these
+    limits are checked for equal echoes."""
     silent_s: float
     """A sensor is silent if its range is older than this, s."""
-    equal: float
-    """A sensor is frozen after this number of equal echoes. The number is infinite
+    equal: NDArray[np.float64]
+    """(n,) a sensor is frozen after this number of equal echoes. The number is infinite
     without noise."""
-    turn_rad: float
-    """Largest turn during which echoes may stay equal, rad."""
-    step_m: float
-    """Largest second difference of a range that motion and noise can cause, m."""
+    turn_rad: NDArray[np.float64]
+    """(n,) largest turn during which echoes may stay equal, rad."""
+    step_m: NDArray[np.float64]
+    """(n,) largest second difference of a range that motion and noise can cause, m."""
     tick_s: float
 
 
 @register_jitable
-def _judged(state, at, range_, heading, slow, numbers):  # type: ignore[no-untyped-def]
-    """Judge a new echo of the sensor whose state begins at ``at``; return the fault.
+def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untyped-def]
+    """Judge a new echo of sensor ``k``; return the fault.
 
     The function counts equal echoes, and remembers the heading at which they began.
     While the robot turns slowly, it checks the second difference of the last three
     ranges, and updates the mean share of strange readings.
     """
+    at = _SENSORS + _EACH * k
     last, before, heard = state[at + _LAST], state[at + _BEFORE], state[at + _HEARD]
-    low, high = numbers.ranges
+    low, high = numbers.ranges[k]
     if heard > 0.5 and range_ == last and low < range_ < high:
         state[at + _EQUAL] += 1.0
     else:
         state[at + _EQUAL], state[at + _HEADING] = 0.0, heading
     if heard > 1.5 and slow:
-        strange = 1.0 if abs(range_ - 2.0 * last + before) > numbers.step_m else 0.0
+        strange = 1.0 if abs(range_ - 2.0 * last + before) > numbers.step_m[k] else 0.0
         state[at + _STRANGE] += _PART * (strange - state[at + _STRANGE])
     state[at + _LAST], state[at + _BEFORE] = range_, last
     state[at + _HEARD] = heard + 1.0
     turned = abs(heading - state[at + _HEADING])
-    if state[at + _EQUAL] >= numbers.equal or turned > numbers.turn_rad:
+    if state[at + _EQUAL] >= numbers.equal[k] or turned > numbers.turn_rad[k]:
         return _FROZEN
     return _NOISY if state[at + _STRANGE] > _MOST_STRANGE else _NONE
 
@@ -118,7 +121,7 @@ def monitor_step(
             found = _SILENT
         elif ages[k] < 0.5 * numbers.tick_s:
             if echo[k] > 0.5:
-                found = _judged(state, at, ranges[k], pose[2], slow, numbers)
+                found = _judged(state, k, ranges[k], pose[2], slow, numbers)
             else:
                 state[at + _HEARD], state[at + _EQUAL] = 0.0, 0.0
         if found != _NONE:
@@ -189,14 +192,16 @@ class SensingMonitor(Block):
         super().__init__()
         self.set_name("sensing_monitor")
         way = _FASTER * robot.top_wheel_speed * robot.wheel_radius_m * tick_s
-        round_s = sensors.round_ticks(tick_s) * tick_s
+        round_s, noise_m = sensors.round_ticks(tick_s) * tick_s, sensors.each("noise_m")
         numbers = MonitorNumbers(
             (way, 2.0 * way / robot.wheel_separation_m),
-            (sensors.minimum_range_m, sensors.maximum_range_m),
+            np.column_stack(
+                [sensors.each("minimum_range_m"), sensors.each("maximum_range_m")]
+            ),
             max(_ROUNDS * round_s, _SILENT_S),
-            _MOST_EQUAL if sensors.noise_m > 0.0 else math.inf,
-            2.0 * math.radians(sensors.beam_half_angle_deg) + _BESIDE_RAD,
-            _STEP_M + _STEP_M_S2 * round_s**2 + _SIGMAS * sensors.noise_m,
+            np.where(noise_m > 0.0, float(_MOST_EQUAL), math.inf),
+            2.0 * np.array(sensors.half_angles) + _BESIDE_RAD,
+            _STEP_M + _STEP_M_S2 * round_s**2 + _SIGMAS * noise_m,
             tick_s,
         )
         state = [0.0] * (_SENSORS + _EACH * sensors.count)

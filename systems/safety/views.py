@@ -138,13 +138,13 @@ def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sec
     Returns:
         The sectors.
     """
-    half = math.radians(sensors.beam_half_angle_deg)
+    axes, halves = sensors.axes, sensors.half_angles
     places: dict[tuple[float, float], list[int]] = {}
     for k, place in enumerate(sensors.places):
         places.setdefault(place, []).append(k)
     first, right, left, seen_by = [0], [], [], []
     for members in places.values():
-        spans = [(sensors.axes[k] - half, sensors.axes[k] + half) for k in members]
+        spans = [(axes[k] - halves[k], axes[k] + halves[k]) for k in members]
         for a, b in _between(spans):
             middle = 0.5 * (a + b)
             right.append(a)

@@ -12,6 +12,7 @@ from pydrake.systems.framework import BasicVector
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
 from systems.framework.cache import declare_cache
+from systems.framework.faults import Fault
 from systems.framework.finite import check_finite, check_record, read_arrays
 from systems.framework.host_step import host_step
 from systems.framework.signals import (
@@ -87,6 +88,7 @@ class MicArray(Block):
         robot: Positions of the microphones.
         acoustics: Speed of sound.
         room: Walls, if there are any.
+        faults: Faults of the robot; those of ``microphones`` apply.
         others: Names of further sources that the robot does not follow. Each name adds
             an input port ``emission_<name>`` [Emission].
         seed: Seed of the noise and of the errors of the array.
@@ -112,6 +114,7 @@ class MicArray(Block):
         robot: RobotParameters = RobotParameters(),
         acoustics: AcousticParameters = AcousticParameters(),
         room: RoomParameters | None = None,
+        faults: Sequence[Fault] = (),
         others: Sequence[str] = (),
         seed: int = 0,
     ) -> None:
@@ -126,6 +129,7 @@ class MicArray(Block):
             room=room,
             sources=1 + len(others),
             seed=seed,
+            faults=faults,
         )
         self._declare_errors(acoustics.c)
         followed, *motion = self.inputs

@@ -71,6 +71,7 @@ def _hearing(
             robot=scenario.robot,
             acoustics=scenario.acoustics,
             room=scenario.room,
+            faults=scenario.faults,
             others=others,
             seed=seed_of("mic_array"),
         ),
@@ -146,6 +147,7 @@ def _obstacle_sensing(
     sensing = [
         UltrasonicArray(
             parameters=scenario.ultrasonic,
+            faults=scenario.faults,
             acoustics=scenario.acoustics,
             seed=seed_of("ultrasonic_array"),
             tick_s=scenario.tick_s,

@@ -127,6 +127,7 @@ def _seen_objects(
     return [
         UltrasonicArray(
             parameters=scenario.ultrasonic,
+            faults=scenario.faults,
             acoustics=scenario.acoustics,
             robot=robot,
             source_size=None,

@@ -92,6 +92,7 @@ def _smell(
     return [
         GasSensorArray(
             parameters=scenario.gas_sensors,
+            faults=scenario.faults,
             seed=seed_of("gas_sensor_array"),
             tick_s=tick_s,
         ),
@@ -101,7 +102,7 @@ def _smell(
             tick_s=tick_s,
         ),
         ContactSwitches(
-            parameters=scenario.contact_switches,
+            faults=scenario.faults,
             robot=scenario.robot,
             bodies=bodies,
             source_size=scenario.odor.container_m,
@@ -122,6 +123,7 @@ def _ears(
             robot=scenario.robot,
             acoustics=scenario.acoustics,
             room=scenario.room,
+            faults=scenario.faults,
             others=others,
             seed=seed_of("mic_array"),
         ),

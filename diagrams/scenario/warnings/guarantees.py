@@ -18,7 +18,6 @@ from systems.base.robot import body_radius
 from systems.base.tyre_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError, shortened
 from systems.ranging.parameters import UltrasonicParameters
-from systems.ranging.sensor_faults import BLIND
 from systems.safety.views import (
     PlaceError,
     place_error,
@@ -141,7 +140,9 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
         )
     known, tick_s = scenario.free_space, scenario.tick_s
     keep = body_radius(scenario.robot) + known.place_error_m + guard.margin_m
-    error, lag = known.range_error(scenario.ultrasonic), scenario.plant.motor_lag_s
+    # The range error of the noisiest sensor counts for all sensors.
+    error = float(max(known.range_errors(scenario.ultrasonic)))
+    lag = scenario.plant.motor_lag_s
     # A reading of a sensor is at most one round of readings old.
     age = scenario.ultrasonic.round_ticks(tick_s) * tick_s
     way = speed**2 / (2.0 * guard.braking_m_s2) + speed * (lag + 2.0 * tick_s)
@@ -215,10 +216,11 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
     guard, sensors = alone.own_guard, alone.ultrasonic
     speed = 0.0 if guard is None else guard.obstacle_speed_m_s
     needed = clear_way(alone, alone.robot.top_speed_m_s, speed)
-    axes, places, half_angle = sensors.beams
-    forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angle
-    far = np.max(np.reshape(places, (-1, 2))[forward, 0], initial=-np.inf)
-    seen = alone.robot.control_point_m + float(far) + sensors.maximum_range_m
+    axes, places, half_angles = sensors.beams
+    forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angles
+    # Of the sensors that look ahead, the one that sees farthest counts.
+    reach = alone.robot.control_point_m + places[:, 0] + sensors.each("maximum_range_m")
+    seen = float(np.max(reach[forward], initial=-np.inf))
     return (
         _of_speeds(corner_speeds(scenario, robot), speed),
         *_of_ranges(alone),
@@ -260,12 +262,19 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A2: no body is nearer than a range reading minus the margin."""
+    """A2: no body is nearer than a range reading minus the margin.
+
+    Of the sensors, the one that misses most echoes and the one that sees farthest
+    count.
+    """
     sensors, c = scenario.ultrasonic, scenario.acoustics.c
     stretch = (sensors.assumed_sound_speed_m_s or c) / c
     excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m
     margin = scenario.free_space.range_margin_m
-    blind = sum(fault.number == BLIND for fault in sensors.faults)
+    blind = sum(
+        fault.sensor == "ultrasonic" and fault.kind == "blind"
+        for fault in scenario.faults
+    )
     return (
         Assumption(
             "A2",
@@ -275,9 +284,7 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
             "of 1",
             field="ultrasonic.dropout_probability",
         ),
-        Assumption(
-            "A2", "number of blind sensors", blind, 0.0, "", field="ultrasonic.faults"
-        ),
+        Assumption("A2", "number of blind sensors", blind, 0.0, "", field="faults"),
         Assumption(
             "A2",
             "excess of the farthest range due to the assumed speed of sound",

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from systems.ranging.sensor_faults import SensorFaultParameters
 
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 from systems.ranging.parameters import UltrasonicParameters
-from systems.ranging.sensor_faults import SensorFaultParameters
 
 BEGIN_S, BEGIN = 1.0, 40
 SETTINGS = (
