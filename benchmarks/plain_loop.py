@@ -47,6 +47,7 @@ from systems.ranging.collision_vector import collision_vectors, echo_points
 from systems.ranging.ultrasonic_array import (
     cone_ranges,
     measured_ranges,
+    range_errors,
     world_rectangles,
 )
 from systems.sound.array_tolerances import draw_tolerances, real_array
@@ -147,11 +148,10 @@ class PlainLoop:
         )
         ranges, echo = measured_ranges(
             true,
-            scenario.ultrasonic,
-            scenario.acoustics.c,
             standard_normals(
                 (2, scenario.ultrasonic.count), self.ultrasonic_seed, tick
             ),
+            range_errors(scenario.ultrasonic, scenario.acoustics.c),
         )
         points = echo_points(ranges.tolist(), echo.tolist(), scenario.ultrasonic)
         vectors = collision_vectors(

@@ -39,6 +39,7 @@ from systems.ranging.sensor_shorthand import (
     add_shorthand,
     check_shared,
     expanded,
+    mark_shared,
     shortened_sensors,
 )
 
@@ -52,6 +53,8 @@ NEIGHBOURS_DEG = 90.0
 
 class RangeSensorParameters(Parameters):
     """One range sensor with a cone: an SRF-05 (Han 2019, 4.2), or another one."""
+
+    model_config = ConfigDict(json_schema_extra=mark_shared)
 
     axis_deg: Angle = 0.0
     """Direction of the axis of the cone in B, counterclockwise from the x axis, deg."""
@@ -73,14 +76,10 @@ _THREE = tuple(RangeSensorParameters(axis_deg=axis) for axis in (30.0, 0.0, -30.
 
 
 class UltrasonicParameters(Parameters):
-    """Range finders: three SRF-05 (Han 2019, 4.2), or any others.
+    """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
 
-    After validation, each sensor has a complete record in ``sensors``. The input may be
-    shorter, see ``systems.ranging.sensor_shorthand``. The properties with the names of
-    fields of a sensor give one value for the whole array, usually that of its worst
-    sensor.
-    """
-
+    # After validation, each sensor has a complete record. The input may be shorter, see
+    # ``sensor_shorthand``.
     model_config = ConfigDict(
         json_schema_extra=lambda schema: add_shorthand(schema, RangeSensorParameters)
     )
@@ -89,10 +88,10 @@ class UltrasonicParameters(Parameters):
     """Named set of sensors. It provides the defaults of the other fields; fields that
     are set take precedence."""
     sensors: Annotated[tuple[RangeSensorParameters, ...], Strict(False)] = _THREE
-    """The sensors, from left to right. A number n stands for n sensors with evenly
-    spaced axes all around, of which the first one points backward. A field of the
-    sensors that is given beside this list, for example ``ultrasonic.noise_m``, applies
-    to all sensors whose record does not have it."""
+    """The sensors, from left to right. Each has ``axis_deg``, and may have values of
+    its own of the fields from ``position_m`` to ``dropout_probability``. A number n
+    stands for n sensors with evenly spaced axes all around, of which the first one
+    points backward."""
     period_s: Period = TICK_S
     """Time from one firing to the next, s."""
     firing: Literal["simultaneous", "sequential"] = "simultaneous"

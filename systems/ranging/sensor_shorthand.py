@@ -15,9 +15,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from systems.framework.input_error import InputError, shortened
+from systems.framework.meanings import meanings
+from systems.framework.parameters import Parameters
 from systems.ranging.sensor_presets import SENSOR_PRESETS
 
 #: Fields of a sensor that may be given once for all sensors.
@@ -116,12 +118,12 @@ def _change(records: list[Any], changes: Mapping[Any, Any]) -> None:
 
 
 def _plain(record: Any) -> Any:
-    if isinstance(record, BaseModel):
+    if isinstance(record, Parameters):
         return record.model_dump(exclude_unset=True)
     return record
 
 
-def check_shared(data: Mapping[str, Any], model: type[BaseModel]) -> None:
+def check_shared(data: Mapping[str, Any], model: type[Parameters]) -> None:
     """Checks the fields that are given for all sensors, so that errors name them.
 
     Args:
@@ -170,25 +172,29 @@ def shortened_sensors(dumped: dict[str, Any]) -> dict[str, Any]:
     return {**dumped, "sensors": own, **common}
 
 
-def add_shorthand(schema: dict[str, Any], model: type[BaseModel]) -> None:
+def mark_shared(schema: dict[str, Any]) -> None:
+    """Marks the shared fields in the JSON Schema of a sensor, which is changed."""
+    for key in SHARED_FIELDS:
+        schema["properties"][key]["shared"] = True
+
+
+def add_shorthand(schema: dict[str, Any], model: type[Parameters]) -> None:
     """Adds the short forms to the JSON Schema of ``UltrasonicParameters``.
 
     Args:
-        schema: Changed in place. The keyword ``shorthand`` marks added fields.
+        schema: Changed in place.
         model: Model of a sensor.
     """
-    fields = model.model_json_schema()["properties"]
-    properties = schema["properties"]
-    for key in SHARED_FIELDS:
-        told = f"``{key}`` of all sensors whose record does not have it."
-        properties[key] = {**fields[key], "description": told, "shorthand": True}
-    listed = properties["sensors"]
+    properties, told = schema["properties"], meanings(model)
+    own = model.model_json_schema()["properties"]
     few = {"minItems": 1, "maxItems": _MOST_SENSORS}
     number = {"type": "integer", "minimum": 1, "maximum": _MOST_SENSORS}
-    properties["sensors"] = {
-        "anyOf": [{"type": "array", "items": listed["items"], **few}, number],
-        "default": [
-            {"axis_deg": each["axis_deg"]}
-            for each in SENSOR_PRESETS["three"]["sensors"]
-        ],
-    }
+    listed = {"type": "array", "items": properties["sensors"]["items"], **few}
+    front = [
+        {"axis_deg": own["axis_deg"]} for own in SENSOR_PRESETS["three"]["sensors"]
+    ]
+    properties["sensors"] = {"anyOf": [listed, number], "default": front}
+    for key in SHARED_FIELDS:
+        text = f"{told[key]} It applies to all sensors without a value of their own."
+        properties[key] = {**own[key], "description": " ".join(text.split())}
+        del properties[key]["shared"]

@@ -143,35 +143,24 @@ def range_errors(parameters: UltrasonicParameters, sound_speed: float) -> RangeE
     )
 
 
-def measured_ranges(
-    true_ranges: NDArray[np.float64],
-    parameters: UltrasonicParameters,
-    sound_speed: float,
-    numbers: NDArray[np.floating],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Ranges that the sensors report.
-
-    Args:
-        true_ranges: (n,) true ranges, m; infinite where a cone is empty.
-        parameters: Errors of the sensors.
-        sound_speed: True speed of sound, m/s.
-        numbers: (2, n) standard normal numbers. The first row is the noise. The second
-            row decides about dropouts: an echo is lost if its number is below the
-            quantile of the dropout probability.
-
-    Returns:
-        (n,) ranges in [minimum, maximum], m, and (n,) echoes, 0 or 1. Without an echo,
-        the range is finite but has no meaning.
-    """
-    return _measured_ranges(true_ranges, numbers, range_errors(parameters, sound_speed))
-
-
 @njit(cache=True)
-def _measured_ranges(
+def measured_ranges(
     true_ranges: NDArray[np.float64],
     numbers: NDArray[np.floating],
     errors: RangeErrors,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
+    """Ranges that the sensors report.
+
+    Args:
+        true_ranges: (n,) true ranges, m; infinite where a cone is empty.
+        numbers: (2, n) standard normal numbers. The first row is the noise. The second
+            row decides about dropouts.
+        errors: Errors and limits of the n sensors.
+
+    Returns:
+        (n,) ranges within the limits of each sensor, m, and (n,) echoes, 0 or 1.
+        Without an echo, the range is the largest one and has no meaning.
+    """
     count = len(true_ranges)
     ranges, echo = np.copy(errors.high_m), np.zeros(count)
     for k in range(count):
@@ -261,7 +250,7 @@ def _read_ranges(
     true = fan_ranges(pose_WB, bodies, *beams, numbers.control_point_m)
     count = len(true)
     normals = tick_normals(numbers.noise, tick, 2, count)
-    new_ranges, new_echo = _measured_ranges(true, normals, errors)
+    new_ranges, new_echo = measured_ranges(true, normals, errors)
     for k in range(count):
         age = (tick - numbers.turns[k]) % numbers.round
         kind, begin = numbers.faults[k]

@@ -92,7 +92,7 @@ def _fields(
     schema: Mapping[str, Any], node: Mapping[str, Any], above: str, defaults: Any
 ) -> Iterator[Field]:
     for name, field in node.get("properties", {}).items():
-        if field.get("shorthand"):  # a field of the elements of a list in this group
+        if field.get("shared"):  # the group above also has this field
             continue
         # A group may override the defaults of its model.
         default = field.get("default")

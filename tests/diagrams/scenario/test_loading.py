@@ -258,7 +258,11 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("obstacles.0.waypoints_m=[[0, 0]]", "obstacles.0", "is on.*move"),
         ("source.waypoints_m=[[0, 0]]", "source", "is on.*move"),
         ("obstacles.0.name=source", "obstacles", "'source' is taken; give"),
-        ("ultrasonic.minimum_range_m=4", "ultrasonic.minimum_range_m", "below"),
+        (
+            "ultrasonic.minimum_range_m=4",
+            "ultrasonic.sensors.0.minimum_range_m",
+            "below",
+        ),
         (
             "repulsion.active.reference_stiffness_n_m=1",
             "repulsion.active.reference_stiffness_n_m",

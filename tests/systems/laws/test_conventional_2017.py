@@ -77,7 +77,7 @@ def test_block_adds_attraction_and_repulsion(bench, distance, least, push):
     """The least range is the sensors'."""
     block = ConventionalImpedance2017Controller(
         repulsion=RepulsionParameters(conventional2017=GAINS),
-        sensors=UltrasonicParameters(minimum_range_m=least),
+        sensors=UltrasonicParameters.model_validate({"minimum_range_m": least}),
     )
     at = bench(
         block,
@@ -109,6 +109,6 @@ def test_gradient(controller_bench, check_gradient, velocity_term, least):
         repulsion=RepulsionParameters(
             velocity_term=velocity_term, conventional2017=GAINS
         ),
-        sensors=UltrasonicParameters(minimum_range_m=least),
+        sensors=UltrasonicParameters.model_validate({"minimum_range_m": least}),
     )
     check_gradient(block, respond, [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1])

@@ -149,7 +149,10 @@ def test_a_memory_that_cannot_serve_is_refused(fields, field):
     [
         (["obstacle_sensing=ideal"], "obstacle_sensing"),
         (["free_space.start_bubble_m=0.5"], "free_space.start_bubble_m"),
-        (["ultrasonic.axes_deg=[60, -60]"], "ultrasonic.axes_deg"),
+        (
+            ["ultrasonic.sensors=[{axis_deg: 60}, {axis_deg: -60}]"],
+            "ultrasonic.sensors",
+        ),
         (["obstacles=[{name: box, waypoints_m: [[0.9, 0]]}]"], "start.position_m"),
         (["source.waypoints_m=[[1.1, 0]]"], "start.position_m"),
         (
@@ -252,7 +255,7 @@ MOVING = "guard.obstacle_speed_m_s=0.3"
         ("two_static_obstacles", (GUARD, "seed=3")),
         ("one_moving_obstacle", (MOVING,)),
         ("corridor", (GUARD, "law=conventional", "ultrasonic.noise_m=0.01")),
-        ("u_trap", (GUARD, "ultrasonic.axes_deg=12")),
+        ("u_trap", (GUARD, "ultrasonic.sensors=12")),
         ("two_static_obstacles", (MOVING, "ultrasonic.firing=sequential")),
         ("default", (GUARD, "ultrasonic.period_s=0.05")),
         ("corridor", (GUARD, "tick_s=0.0125")),

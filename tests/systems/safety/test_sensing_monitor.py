@@ -20,7 +20,7 @@ class Watched:
     """A monitor that is told what is read, tick by tick."""
 
     def __init__(self, **sensors):
-        block = SensingMonitor(sensors=UltrasonicParameters(**sensors))
+        block = SensingMonitor(sensors=UltrasonicParameters.model_validate(sensors))
         self.step, self.state, self.ticks = block.step, [*block.step.state], count()
 
     def tells(self, ranges, pose=(0.0, 0.0, 0.0), echo=(1, 1, 1), ages=(0.0, 0.0, 0.0)):
