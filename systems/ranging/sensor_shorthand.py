@@ -147,9 +147,10 @@ def check_shared(data: Mapping[str, Any], model: type[Parameters]) -> None:
 
 
 def shortened_sensors(dumped: dict[str, Any]) -> dict[str, Any]:
-    """Moves the values that all sensors have in common into the group.
+    """Moves the most frequent value of each shared field into the group.
 
-    A later change of such a value in the group thus applies to all sensors.
+    A later change of such a value in the group thus applies to all sensors that have
+    this value.
 
     Args:
         dumped: All fields of ``UltrasonicParameters`` as plain values.
@@ -157,19 +158,15 @@ def shortened_sensors(dumped: dict[str, Any]) -> dict[str, Any]:
     Returns:
         The short form, which ``expanded`` replaces by the same records.
     """
-    records = dumped.get("sensors", ())
-    common = {
-        key: records[0][key]
-        for key in SHARED_FIELDS
-        if records and all(each[key] == records[0][key] for each in records)
-    }
-    if not common:
+    if "sensors" not in dumped:  # only some of the fields are wanted
         return dumped
+    columns = {key: [each[key] for each in dumped["sensors"]] for key in SHARED_FIELDS}
+    usual = {key: max(values, key=values.count) for key, values in columns.items()}
     own = [
-        {name: value for name, value in each.items() if name not in common}
-        for each in records
+        {key: value for key, value in each.items() if value != usual.get(key)}
+        for each in dumped["sensors"]
     ]
-    return {**dumped, "sensors": own, **common}
+    return {**dumped, "sensors": own, **usual}
 
 
 def mark_shared(schema: dict[str, Any]) -> None:

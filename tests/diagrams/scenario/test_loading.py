@@ -59,6 +59,7 @@ odometry: {rounding: false}
 guard: {margin_m: 0.02}
 free_space: {cell_m: 0.04}
 integrator: {scheme: runge_kutta2, step_s: 0.005}
+faults: [{sensor: ultrasonic, number: 2, kind: noisy, start_s: 1}]
 """
 
 
@@ -98,7 +99,6 @@ def test_library_loads_and_says_what_it_is(name):
 SEARCHING = {
     "airflow_sensors",
     "compass",
-    "contact_switches",
     "cross_power",
     "gas_sensors",
     "heading_control",
