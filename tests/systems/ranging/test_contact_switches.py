@@ -92,5 +92,5 @@ def test_a_wall_of_ten_meters_is_felt_at_its_end_too(gap, switches, compiled):
 def test_a_robot_longer_than_two_meters_feels_ahead_of_its_front():
     """A post at its front, which is 1.5 m from the origin of B."""
     long = RobotParameters(length_m=3.0, width_m=0.3)
-    assert felt((0, 0, 0), box=(1.56, 0.0, 0.0), size=(0.1, 0.1), robot=long)[0] == 1
-    assert felt((0, 0, 0), box=(1.57, 0.0, 0.0), size=(0.1, 0.1), robot=long)[0] == 0
+    assert felt((0, 0, 0), box=(1.559, 0.0, 0.0), size=(0.1, 0.1), robot=long)[0] == 1
+    assert felt((0, 0, 0), box=(1.561, 0.0, 0.0), size=(0.1, 0.1), robot=long)[0] == 0
