@@ -198,7 +198,7 @@ def track_hazards(
         best = _best_track(hazards, look, half) if unknown else -1
         for t in range(len(hazards.exists)):
             if hazards.exists[t] > 0.0:
-                _weigh(hazards, t, best, look, half, sensors)
+                _weigh(hazards, t, k, best, sensors)
         if best >= 0:
             hazards.seen_s[best] = time
             doubt = _CERTAIN - hazards.exists[best]
@@ -206,7 +206,7 @@ def track_hazards(
         elif (
             unknown
             and goes_on(look, look_of(hazards.looks, 1, k), tick_s)
-            and came_from_free(space, look, half, sensors.margin_m)
+            and came_from_free(space, look, half, sensors.margin_m[k])
         ):
             _begin(hazards, k, sensors)
     _forget(hazards, time, pose)
@@ -300,21 +300,16 @@ def _share_at(
 
 @njit(cache=True)
 def _weigh(
-    hazards: Hazards,
-    t: int,
-    best: int,
-    look: Look,
-    half: float,
-    sensors: HazardSensors,
+    hazards: Hazards, t: int, k: int, best: int, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Weigh the particles of a track with a look, by Bayes' rule.
+    """Weigh the particles of a track with the newest look of sensor ``k``.
 
-    ``best`` is the track to which the echo is attributed, or -1. If it is track ``t``,
-    the track has echoed. ``half`` is half of the sensor's aperture, rad. Each weight is
-    multiplied by the likelihood of the look if the body were at this particle. The
-    likelihood depends on ``gap``, the measured distance minus the distance of the
-    particle. Without an echo, ``gap`` is infinite for particles within the greatest
-    range, and 0 for the others. There are four cases:
+    The rule is that of Bayes. ``best`` is the track to which the echo is attributed, or
+    -1. If it is track ``t``, the track has echoed. Each weight is multiplied by the
+    likelihood of the look if the body were at this particle. The likelihood depends on
+    ``gap``, the measured distance minus the distance of the particle. Without an echo,
+    ``gap`` is infinite for particles within the greatest range, and 0 for the others.
+    There are four cases:
 
     * The particle is outside the aperture. If its track has echoed, the particle loses
       weight.
@@ -328,14 +323,15 @@ def _weigh(
     the new weights is the likelihood of the look if the body exists anywhere in its
     track. If the track has not echoed, this sum lowers the probability of the track.
     """
-    p, fit_m = _particles_of(hazards, t), math.hypot(_FIT_M, sensors.noise_m)
+    p, fit_m = _particles_of(hazards, t), math.hypot(_FIT_M, sensors.noise_m[k])
+    look, half = look_of(hazards.looks, 0, k), sensors.directions[k, 1]
     echoed, total = t == best, 0.0
     for n in range(len(p.x)):
         distance, off = seen_from(look, p.x[n], p.y[n])
         edge = _EDGE_M / max(distance, 0.1)
         gap = look.range_m + _BEYOND_M - distance
         if look.heard < 0.5:
-            gap = np.inf if distance < sensors.farthest_m - 0.05 else 0.0
+            gap = np.inf if distance < sensors.farthest_m[k] - 0.05 else 0.0
         # Outside the aperture.
         if off > half + edge:
             if echoed:
@@ -404,7 +400,7 @@ def _begin(
     look, then = look_of(hazards.looks, 0, k), look_of(hazards.looks, 1, k)
     half, since = sensors.directions[k, 1], look.time_s - then.time_s
     rate = (look.range_m - then.range_m) / since
-    rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m / since)
+    rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m[k] / since)
     own_x, own_y = (look.x - then.x) / since, (look.y - then.y) / since
     at = look.range_m + _BEYOND_M
     t = int(np.argmin(hazards.exists))
@@ -450,7 +446,7 @@ def _was_visible(
         if ago > oldest_s:
             continue
         distance, off = seen_from(look, p.x[n] - ago * p.vx[n], p.y[n] - ago * p.vy[n])
-        reach = look.range_m if look.heard > 0.5 else sensors.farthest_m
+        reach = look.range_m if look.heard > 0.5 else sensors.farthest_m[k]
         inside = off < half - 0.03 / max(distance, 0.1)
         if inside and distance + 0.03 < reach:
             return True
