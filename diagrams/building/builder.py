@@ -162,6 +162,9 @@ def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
         scenario: The scenario that is run.
         name: Name of the robot.
         log: Whether to log the columns of its blocks at every tick.
+
+    Returns:
+        The diagram, see ``make_robot``.
     """
     own, target = scenario.of_robot(name), scenario.target(name)
     if name not in audible_sounds(scenario):

@@ -43,6 +43,12 @@ class Monitor:
 
         Steps may be shorter than ticks; this method ignores the instants between ticks.
 
+        Args:
+            context: Context of the diagram.
+
+        Returns:
+            Termination if the run is over.
+
         Raises:
             InputError: A robot that listens has no frames to save.
             OSError: The disk is full, or fails.

@@ -98,6 +98,9 @@ class Referee:
 
         Args:
             name: Name of the robot.
+
+        Returns:
+            A cause, see ``RunResult.cause``.
         """
         found = self.steps[name].state.found[0]
         if found:
@@ -119,21 +122,27 @@ class Referee:
         return "unsettled" if been_in_goal else "timeout"
 
     def ended(self, name: str) -> float:
-        """Returns the number of the ending of a robot's search; 0 if there is none.
+        """Returns how a robot's search ended.
 
         Args:
             name: Name of the robot.
+
+        Returns:
+            Number of the ending, see ``systems.search.search_ending``; 0 without one.
         """
         return float(self.steps[name].state.ended[0])
 
     def collision(self, name: str) -> Collision | None:
-        """Returns the collision of a robot after the run; None if there is none.
+        """Returns the collision of a robot after the run.
 
         The robot is at fault if its own motion since the last tick brings it nearer to
         the body than the motion of the body alone would.
 
         Args:
             name: Name of the robot.
+
+        Returns:
+            The collision; None if the robot has not collided.
         """
         state, tick_s = self.steps[name].state, self.scenario.tick_s
         body, part, tick = state.contact.tolist()

@@ -289,7 +289,7 @@ class RefereeState(NamedTuple):
 
 
 def judge_robot(
-    tick: int, state: RefereeState, inputs: Any, _: Any, numbers: RefereeNumbers
+    tick: int, state: RefereeState, inputs: Any, outputs: Any, numbers: RefereeNumbers
 ) -> None:
     """Applies the stop rules to one robot at a tick.
 
@@ -303,7 +303,7 @@ def judge_robot(
         tick: Number of the tick.
         state: Changed in place.
         inputs: (robots, 3) poses of all robots in W, and the values of ``READ_PORTS``.
-        _: There are no outputs; ``state.found`` is the result.
+        outputs: Empty; ``state.found`` is the result.
         numbers: The constants.
     """
     poses, velocity, valid, gives_up, report, switches, body = inputs
@@ -397,6 +397,9 @@ def run_is_over(found: Any) -> bool:
 
     Args:
         found: (robots,) index of the cause of each robot in ``FOUND``.
+
+    Returns:
+        True if the run is over.
     """
     everyone = True
     for k in range(len(found)):

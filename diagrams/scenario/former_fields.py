@@ -23,6 +23,13 @@ from systems.laws.catalogue import LAWS
 _TABLE = Path(__file__).with_suffix(".tsv")
 #: Names of sensor elements in the lists of faults of the previous version.
 _ELEMENTS = {"microphone", "sensor", "switch"}
+#: Kind of a fault that states none, by group of the previous version.
+_FAULTS = {
+    "microphones": "dead",
+    "ultrasonic": "silent",
+    "gas_sensors": "dead",
+    "contact_switches": "stuck_open",
+}
 #: Beginning of a path to a field of one robot.
 _PREFIX = re.compile(r"^(?:robots\.[^.]+\.)?")
 _MISSING = object()
@@ -144,13 +151,18 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
             )
         else:
             yield f"{where}{path} is now a constant"
-    for group in [*fields]:
+    for group, kind in _FAULTS.items():
         faults = _taken(fields, [group, "faults"])
-        if isinstance(faults, list) and faults:
-            fields.setdefault("faults", []).extend(
-                _fault(group, each) for each in faults
-            )
+        if isinstance(faults, list):
+            found = [_fault(group, kind, each) for each in faults]
+            fields.setdefault("faults", []).extend(found)
             yield f"{where}{group}.faults is now faults"
+    lost_at_s = _taken(fields, ["odometry", "lost_at_s"])
+    if lost_at_s is not _MISSING:
+        if lost_at_s is not None:
+            lost = {"sensor": "odometry", "kind": "lost", "start_s": lost_at_s}
+            fields.setdefault("faults", []).append(lost)
+        yield f"{where}odometry.lost_at_s is now one of faults"
 
 
 def _has_guard(fields: Mapping[str, Any]) -> bool:
@@ -158,13 +170,14 @@ def _has_guard(fields: Mapping[str, Any]) -> bool:
     return fields.get("guard") is not None or (law is not None and law.guarded)
 
 
-def _fault(group: str, fault: Any) -> Any:
+def _fault(group: str, kind: str, fault: Any) -> Any:
     if not isinstance(fault, Mapping):
         return fault
-    return {
-        "sensor": group,
-        **{("number" if k in _ELEMENTS else k): v for k, v in fault.items()},
-    }
+    new = {"sensor": group, "number": 1, "kind": kind}
+    new |= {("number" if key in _ELEMENTS else key): v for key, v in fault.items()}
+    if (group, new["kind"]) == ("gas_sensors", "stuck"):
+        new["kind"] = "frozen"
+    return new
 
 
 def _taken(fields: dict[str, Any], path: list[str]) -> Any:

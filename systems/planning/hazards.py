@@ -18,7 +18,6 @@ from systems.framework.compiling import njit
 from systems.planning.looks import (
     HazardSensors,
     Look,
-    Looks,
     came_from_free,
     goes_on,
     is_target,
@@ -105,7 +104,8 @@ class Hazards(NamedTuple):
     seen_s: NDArray[np.float64]
     """(tracks,) time at which the body was last seen, s."""
     particles: Particles
-    looks: Looks
+    looks: Look
+    """Last looks of all sensors."""
     random: NDArray[np.int64]
     """(1,) state of the random generator."""
     moved_s: NDArray[np.float64]
@@ -304,12 +304,12 @@ def _weigh(
 ) -> None:  # pragma: no cover  (compiled)
     """Weigh the particles of a track with the newest look of sensor ``k``.
 
-    The rule is that of Bayes. ``best`` is the track to which the echo is attributed, or
-    -1. If it is track ``t``, the track has echoed. Each weight is multiplied by the
-    likelihood of the look if the body were at this particle. The likelihood depends on
-    ``gap``, the measured distance minus the distance of the particle. Without an echo,
-    ``gap`` is infinite for particles within the greatest range, and 0 for the others.
-    There are four cases:
+    ``best`` is the track to which the echo is attributed, or -1. If it is track ``t``,
+    the track has echoed. By Bayes' rule, each weight is multiplied by the likelihood of
+    the look if the body were at this particle. The likelihood depends on ``gap``, the
+    measured distance minus the distance of the particle. Without an echo, ``gap`` is
+    infinite for particles within the greatest range, and 0 for the others. There are
+    four cases:
 
     * The particle is outside the aperture. If its track has echoed, the particle loses
       weight.

@@ -39,68 +39,65 @@ class HazardSensors(NamedTuple):
 
 
 class Look(NamedTuple):
-    """One reading of one sensor."""
+    """One reading of one sensor, as numbers.
 
-    range_m: float
-    heard: float
+    The memory of all sensors has arrays of (3, sensors) instead of the numbers, with
+    the most recent look first.
+    """
+
+    range_m: Any
+    heard: Any
     """1 if there was an echo, else 0."""
-    time_s: float
-    x: float
+    time_s: Any
+    """Minus infinity if there was no such look yet."""
+    x: Any
     """Position of the sensor, m."""
-    y: float
+    y: Any
     """Position of the sensor, m."""
-    axis_rad: float
+    axis_rad: Any
     """Direction of the sensor's axis, rad."""
 
 
-class Looks(NamedTuple):
-    """The last looks of each sensor, most recent first.
-
-    All arrays have the form (3, sensors), and change.
-    """
-
-    range_m: NDArray[np.float64]
-    heard: NDArray[np.float64]
-    time_s: NDArray[np.float64]
-    """Minus infinity if there was no such look yet."""
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    axis_rad: NDArray[np.float64]
-
-
-def make_looks(sensors: int) -> Looks:
-    """Returns a memory without looks.
+def make_looks(sensors: int) -> Look:
+    """Makes a memory without looks.
 
     Args:
         sensors: Number of range sensors.
+
+    Returns:
+        The empty memory.
     """
-    looks = Looks(*(np.zeros((_LOOKS, sensors)) for _ in Looks._fields))
+    looks = Look(*(np.zeros((_LOOKS, sensors)) for _ in Look._fields))
     looks.time_s[:] = -np.inf
     return looks
 
 
 @njit(cache=True)
-def look_of(looks: Looks, age: int, k: int) -> Look:  # pragma: no cover  (compiled)
-    """Returns one look.
+def look_of(looks: Look, age: int, k: int) -> Look:  # pragma: no cover  (compiled)
+    """Reads one look.
 
     Args:
         looks: The looks of all sensors.
         age: 0 for the newest look, 1 for the one before, 2 for the oldest.
         k: Number of the sensor.
+
+    Returns:
+        The look, as numbers.
     """
+    at = age, k
     return Look(
-        looks.range_m[age, k],
-        looks.heard[age, k],
-        looks.time_s[age, k],
-        looks.x[age, k],
-        looks.y[age, k],
-        looks.axis_rad[age, k],
+        looks.range_m[at],
+        looks.heard[at],
+        looks.time_s[at],
+        looks.x[at],
+        looks.y[at],
+        looks.axis_rad[at],
     )
 
 
 @njit(cache=True)
 def remember_looks(
-    looks: Looks, time: float, pose: Any, readings: Any, sensors: HazardSensors
+    looks: Look, time: float, pose: Any, readings: Any, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
     """Stores the readings of the sensors that have fired in this tick.
 
@@ -140,12 +137,15 @@ def seen_from(
 def is_target(
     look: Look, half: float, target: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether an echo may come from the followed target.
+    """Checks whether an echo may come from the followed target.
 
     Args:
         look: The look with the echo.
         half: Half of the sensor's aperture, rad.
         target: (x, y, radius) of the target, m.
+
+    Returns:
+        Whether it may.
     """
     distance, off = seen_from(look, target[0], target[1])
     beside = off - half < target[2] / max(distance, target[2])
@@ -156,12 +156,15 @@ def is_target(
 def goes_on(
     look: Look, then: Look, tick_s: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether an echo fits the look before it, so that its rate is known.
+    """Checks whether an echo fits the look before it, so that its rate is known.
 
     Args:
         look: The newest look of a sensor.
         then: The look before.
         tick_s: Period of the controller, s.
+
+    Returns:
+        Whether it fits.
     """
     since = look.time_s - then.time_s
     if then.heard < 0.5 or since > _OLDEST_TICKS * tick_s:
@@ -173,7 +176,7 @@ def goes_on(
 def came_from_free(
     space: FreeSpace, look: Look, half: float, margin_m: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether the whole arc of an echo was seen free before.
+    """Checks whether the whole arc of an echo was seen free before.
 
     The function checks points along the arc, over the width of the aperture. In depth,
     the points extend from the range minus its largest error to the range plus this
@@ -184,6 +187,9 @@ def came_from_free(
         look: The look with the echo.
         half: Half of the sensor's aperture, rad.
         margin_m: Largest error of a range, m.
+
+    Returns:
+        Whether all of it was seen free.
     """
     cell = space.cell_m
     step_m = _ARC_STEP * cell

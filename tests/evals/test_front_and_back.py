@@ -13,8 +13,8 @@ import pytest
 
 from analysis.runs.metrics import run_metrics
 from diagrams import RunResult, load_scenario, simulate
-from diagrams.building.robots import following_robot
-from systems.hearing.tracking.source_tracker import SourceTracker
+from systems.hearing.tracking import source_tracker
+from systems.hearing.tracking.tracker_model import tracker_numbers
 
 pytestmark = pytest.mark.slow
 
@@ -79,10 +79,10 @@ def test_without_the_resolver_the_robot_chases_the_mirror_image(resolve, monkeyp
     """
     if not resolve:
 
-        def in_front(*, exact: bool, **arguments: Any) -> Any:
-            return SourceTracker(exact=True, **arguments)
+        def in_front(*parameters: Any, **how: Any) -> Any:
+            return tracker_numbers(*parameters, **how | {"resolve_front_back": False})
 
-        monkeypatch.setattr(following_robot, "SourceTracker", in_front)
+        monkeypatch.setattr(source_tracker, "tracker_numbers", in_front)
     result = run(
         resting_source(180.0),
         "attraction.follow_distance_m=0",

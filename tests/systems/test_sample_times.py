@@ -27,7 +27,6 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "PathTarget": {},
     "ReferenceModel": {},
     "SafetyFilter": {},
-    "SensingMonitor": {},
     "SoundEmitter": {},
     "SourceTracker": {},
     "TDOAEstimator": {},

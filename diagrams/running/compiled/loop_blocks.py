@@ -232,6 +232,9 @@ def shared_sources(scenario: Scenario) -> dict[str, LoopBlocks]:
     Args:
         scenario: The scenario to run.
 
+    Returns:
+        Blocks of each source.
+
     Raises:
         InputError: A sound file cannot be played.
     """

@@ -121,11 +121,11 @@ def test_what_python_raises_passes_through_the_loop(monkeypatch, kind):
     scenario, follower = build("duration_s=1")
     hear, frames = TDOAEstimator.hear, []
 
-    def fail(self, audio, *remembered):
-        frames.append(audio.time)
-        if audio.time > 0.5:
+    def fail(self, inputs, audio, memory):
+        frames.append(audio().time)
+        if audio().time > 0.5:
             raise kind("in a frame")
-        return hear(self, audio, *remembered)
+        return hear(self, inputs, audio, memory)
 
     simulate(scenario, follower=follower, engine="compiled")
     monkeypatch.setattr(TDOAEstimator, "hear", fail)
