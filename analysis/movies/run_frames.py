@@ -193,10 +193,8 @@ class RunFrames:
                 continue
             echo = own.columns[f"echo_{sensor + 1}"][tick] > 0.5
             x, y, theta = compose(pose, sensor_pose(scenario, sensor))
-            half, axis = (
-                scenario.sensing.ultrasonic.beam_half_angle_deg,
-                np.degrees(theta),
-            )
+            half = scenario.sensing.ultrasonic.sensors[sensor].beam_half_angle_deg
+            axis = np.degrees(theta)
             cone = Wedge(
                 (float(x), float(y)),
                 float(own.columns[f"range_{sensor + 1}"][tick]),

@@ -304,16 +304,15 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
     if "range_1" not in result.columns:
         return
     step = max(1, math.ceil(len(times) / CONE_INSTANTS))
-    half = result.scenario.sensing.ultrasonic.beam_half_angle_deg
     labelled: set[bool] = set()
     for time in times[::step]:
         tick = tick_at(result, time)
-        for sensor in range(result.scenario.sensing.ultrasonic.count):
+        for sensor, own in enumerate(result.scenario.sensing.ultrasonic.sensors):
             echo = bool(result.columns[f"echo_{sensor + 1}"][tick] > 0.5)
             colour = to_rgb(COLOURS["echo" if echo else "empty"])
             pose = result.poses("WB")[tick]
             x, y, theta = compose(pose, sensor_pose(result.scenario, sensor))
-            axis = math.degrees(theta)
+            axis, half = math.degrees(theta), own.beam_half_angle_deg
             wedge = Wedge(
                 (x, y),
                 result.columns[f"range_{sensor + 1}"][tick],

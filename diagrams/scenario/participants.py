@@ -25,6 +25,8 @@ from diagrams.scenario.fields.near_miss import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
+from systems.framework.faults import Faults, FaultySensor, faults_of
+from systems.framework.input_error import InputError
 from systems.framework.parameters import Angle, Parameters, Point, SoundSpeed
 from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
@@ -34,10 +36,13 @@ from systems.hearing.parameters import (
 )
 from systems.laws.catalogue import LAWS
 from systems.laws.parameters import AttractionParameters
-from systems.odor.parameters import AirflowParameters, GasSensorParameters
+from systems.odor.parameters import (
+    GAS_SENSORS,
+    AirflowParameters,
+    GasSensorParameters,
+)
 from systems.ranging.parameters import (
     CollisionVectorParameters,
-    ContactParameters,
     ObjectSensorParameters,
     UltrasonicParameters,
 )
@@ -123,6 +128,8 @@ class Robot(Parameters):
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
+    faults: Faults = ()
+    """Sensors that fail during a run."""
 
     @field_validator("law")
     @classmethod
@@ -130,6 +137,25 @@ class Robot(Parameters):
         if ":" not in law and law not in LAWS:
             raise unknown_law(law, LAWS)
         return law
+
+    @model_validator(mode="after")
+    def _check_faults(self) -> Robot:
+        known = self.sensor_counts
+        for index, fault in enumerate(self.faults):
+            if fault.sensor not in known:
+                raise InputError(
+                    f"faults.{index}.sensor",
+                    f"{fault.sensor} is not a sensor of this robot; use "
+                    f"{' or '.join(known)}",
+                )
+        for sensor, count in known.items():
+            faults_of(self.faults, sensor, count)
+        return self
+
+    @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return {"odometry": 1}
 
     @property
     def own_guard(self) -> GuardParameters | None:
@@ -181,6 +207,14 @@ class Follower(Robot):
         return self
 
     @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return super().sensor_counts | {
+            "microphones": len(self.robot.microphones_m),
+            "ultrasonic": self.ultrasonic.count,
+        }
+
+    @property
     def gains(self) -> Any:
         """Gains of the robot's law; None for a law without gains."""
         return getattr(self.laws, self.law, None)
@@ -227,6 +261,11 @@ class Router(Robot):
     objects: ObjectSensorParameters = ObjectSensorParameters()
 
     @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return super().sensor_counts | {"ultrasonic": self.ultrasonic.count}
+
+    @property
     def gains(self) -> Any:
         """Gains of the robot's law; None for a law without gains."""
         return getattr(self.laws, self.law, None)
@@ -242,9 +281,16 @@ class OdorSearcher(Robot):
     search: PlumeSearchParameters = PlumeSearchParameters()
     gas_sensors: GasSensorParameters = GasSensorParameters()
     airflow_sensors: AirflowParameters = AirflowParameters()
-    contact_switches: ContactParameters = ContactParameters()
     compass: CompassParameters = CompassParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
+
+    @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return super().sensor_counts | {
+            "gas_sensors": GAS_SENSORS,
+            "contact_switches": 2,
+        }
 
 
 class SoundSearcher(Robot):
@@ -264,6 +310,11 @@ class SoundSearcher(Robot):
     def _check_channels(self) -> SoundSearcher:
         channel_skew(self.microphones, len(self.robot.microphones_m))
         return self
+
+    @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return super().sensor_counts | {"microphones": len(self.robot.microphones_m)}
 
     @property
     def listens(self) -> bool:

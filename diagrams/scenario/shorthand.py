@@ -55,8 +55,14 @@ def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
     result = {} if begins_anew(changes) else dict(base)
     for key, value in changes.items():
         before = _plain(result.get(key))
+        listed: dict[str, Any] = {}
+        if isinstance(before, list | tuple):
+            listed = {str(k): each for k, each in enumerate(before)}
         if isinstance(value, Mapping) and isinstance(before, Mapping):
             result[key] = joined(before, value)
+        elif isinstance(value, Mapping) and listed and value.keys() <= listed.keys():
+            # Changes to some elements of a list, by index.
+            result[key] = [*joined(listed, value).values()]
         else:
             result[key] = value
     return result

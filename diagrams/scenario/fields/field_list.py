@@ -118,6 +118,8 @@ def _fields(
     robots: tuple[str, ...],
 ) -> Iterator[Field]:
     for name, field in node.get("properties", {}).items():
+        if field.get("shared"):  # the group above also has this field
+            continue
         # A group may override the defaults of its model.
         default = field.get("default")
         if isinstance(defaults, Mapping) and name in defaults:

@@ -58,6 +58,7 @@ plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
 odometry: {rounding: false}
 guard: {margin_m: 0.02, cell_m: 0.04}
 integration_step_s: 0.005
+faults: [{sensor: ultrasonic, number: 2, kind: noisy, start_s: 1}]
 """
 
 
@@ -97,7 +98,6 @@ def test_library_loads_and_says_what_it_is(name):
 SEARCHING = {
     "airflow_sensors",
     "compass",
-    "contact_switches",
     "gas_sensors",
     "motor_driver",
     "odor",
@@ -255,7 +255,11 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("obstacles.0.waypoints_m=[[0, 0]]", "obstacles.0", "is on.*move"),
         ("source.waypoints_m=[[0, 0]]", "source", "is on.*move"),
         ("obstacles.0.name=source", "obstacles", "'source' is taken; give"),
-        ("ultrasonic.minimum_range_m=4", "ultrasonic.minimum_range_m", "below"),
+        (
+            "ultrasonic.minimum_range_m=4",
+            "ultrasonic.sensors.0.minimum_range_m",
+            "below",
+        ),
         (
             "laws.active.reference_stiffness_n_m=1",
             "laws.active.reference_stiffness_n_m",

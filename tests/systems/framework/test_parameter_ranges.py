@@ -48,11 +48,8 @@ WIDER = {
 
 
 def schemas() -> dict[str, dict[str, Any]]:
-    """Schema of every field of the scenario's tree, as `Model.field`.
-
-    It is that of what a field holds, which may be given in a shorter form.
-    """
-    scenario = Scenario.model_json_schema(mode="serialization")
+    """Schema of every field of the scenario's tree, as `Model.field`."""
+    scenario = Scenario.model_json_schema()
     models = {"Scenario": scenario, **scenario["$defs"]}
     return {
         f"{model}.{field}": schema

@@ -142,7 +142,10 @@ def test_a_bubble_that_is_too_small_for_the_body_is_refused():
     [
         (["obstacle_sensing=ideal"], "obstacle_sensing"),
         (["guard.start_bubble_m=0.5"], "guard.start_bubble_m"),
-        (["ultrasonic.axes_deg=[60, -60]"], "ultrasonic.axes_deg"),
+        (
+            ["ultrasonic.sensors=[{axis_deg: 60}, {axis_deg: -60}]"],
+            "ultrasonic.sensors",
+        ),
         (["obstacles=[{name: box, waypoints_m: [[0.9, 0]]}]"], "start.position_m"),
         (["source.waypoints_m=[[1.1, 0]]"], "start.position_m"),
         (
@@ -245,7 +248,7 @@ MOVING = "guard.obstacle_speed_m_s=0.3"
         ("two_static_obstacles", (GUARD, "seed=3")),
         ("one_moving_obstacle", (MOVING,)),
         ("corridor", (GUARD, "law=conventional", "ultrasonic.noise_m=0.01")),
-        ("u_trap", (GUARD, "ultrasonic.axes_deg=12")),
+        ("u_trap", (GUARD, "ultrasonic.sensors=12")),
         ("two_static_obstacles", (MOVING, "ultrasonic.firing=sequential")),
         ("default", (GUARD, "ultrasonic.period_s=0.05")),
         ("corridor", (GUARD, "tick_s=0.0125")),
