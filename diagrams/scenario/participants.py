@@ -120,7 +120,7 @@ class Robot(Parameters):
     replaces the robot's block with the same part; a block with a new part is added."""
     loudspeaker: SoundParameters | None = None
     """Sound that the robot itself plays at the origin of B, so that other robots can
-    follow it. Fields that are missing are those of ``sound``."""
+    follow it. Its fields are those of ``sound``, which also has the defaults."""
     start: StartParameters = StartParameters()
     assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed of sound that hearing and range sensors assume, m/s; null: the true speed
@@ -259,6 +259,16 @@ class Router(Robot):
     laws: LawGains = LawGains()
     """Gains by law. Only the gains of the robot's law have an effect."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_route(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and data.get("route") is None:
+            law = data.get("law")
+            raise InputError(
+                "route", f"is missing, and law {law!r} drives on one; set route.goal_m"
+            )
+        return data
 
     @property
     def sensor_counts(self) -> dict[FaultySensor, int]:

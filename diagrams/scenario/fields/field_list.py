@@ -147,6 +147,8 @@ def _field(
         meaning=node.get("description") or _meaning(schema, node),
         robots=robots,
     )
+    if "same_fields_as" in node:
+        return
     for each in groups:
         yield from _fields(schema, each, f"{path}.", default, robots)
     for each in choices:

@@ -26,7 +26,7 @@ KINDS = UltrasonicParameters.model_validate(MIXED)
 
 
 def of(*settings: str) -> UltrasonicParameters:
-    return load_scenario("default", settings).ultrasonic
+    return load_scenario("default", settings).follower.ultrasonic
 
 
 def test_one_value_for_all_and_one_for_one():
@@ -73,9 +73,11 @@ def test_a_saved_scenario_gives_the_same_sensors(tmp_path: Path, settings):
     path.write_text(dump_scenario(scenario), "utf-8")
     assert load_scenario(path) == scenario
     # What all sensors have in common can still be changed at once.
-    quiet = load_scenario(path, ["ultrasonic.minimum_range_m=0.2"]).ultrasonic
+    quiet = load_scenario(path, ["ultrasonic.minimum_range_m=0.2"]).follower.ultrasonic
     assert set(quiet.each("minimum_range_m")) == {0.2}
-    one = load_scenario(path, ["ultrasonic.sensors.1.minimum_range_m=0.2"]).ultrasonic
+    one = load_scenario(
+        path, ["ultrasonic.sensors.1.minimum_range_m=0.2"]
+    ).follower.ultrasonic
     assert one.each("minimum_range_m").tolist()[:3] == [0.03, 0.2, 0.03]
 
 
@@ -85,7 +87,7 @@ def test_a_robot_changes_some_sensors_of_the_scenario():
         "two": {"start": {"position_m": [-2, -1]}, "ultrasonic": {"noise_m": 0.4}},
     }
     settings = {"robots": robots, "ultrasonic": {**MIXED, "minimum_range_m": 0.1}}
-    one, two = load_scenario("default", settings).all_robots.values()
+    one, two = load_scenario("default", settings).robots.values()
     assert one.ultrasonic.each("noise_m").tolist() == [0.001, 0.3, 0.02]
     assert set(one.ultrasonic.each("minimum_range_m")) == {0.1}
     # The third sensor has a value of its own.
