@@ -22,14 +22,10 @@ from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
 from analysis.sweeps.sweep_file import read_sweep
 from diagrams.scenario.fields.explain import explain
-from diagrams.scenario.loading import (
-    apply_settings,
-    resolve_sound,
-    scenario_from_mapping,
-    written_fields,
-)
+from diagrams.scenario.loading import resolve_sound, written_fields
 from diagrams.scenario.own_code import own_files
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.scenario import Scenario, scenario_from_mapping
+from diagrams.scenario.settings import apply_settings
 from diagrams.scenario.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters

@@ -126,12 +126,7 @@ def _robots_and_sources(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, A
 
 
 def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
-    for laws in (fields.get("repulsion"), fields.get("laws")):
-        adaptive = laws.get("trajectory_adaptive") if isinstance(laws, dict) else None
-        if isinstance(adaptive, dict) and "safety_filter" in adaptive:
-            given = adaptive["safety_filter"]
-            if not isinstance(given, bool):  # it was a group or null
-                adaptive["safety_filter"] = given is not None
+    _renew_safety_filter(fields)
     for former in former_fields():
         path = former.path
         if where.startswith("sources."):
@@ -154,6 +149,20 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
             )
         else:
             yield f"{where}{path} is now a constant"
+    yield from _renewed_faults(where, fields)
+
+
+def _renew_safety_filter(fields: Mapping[str, Any]) -> None:
+    """Makes the filter of the adaptive law true or false; it was a group or null."""
+    for laws in (fields.get("repulsion"), fields.get("laws")):
+        adaptive = laws.get("trajectory_adaptive") if isinstance(laws, dict) else None
+        if isinstance(adaptive, dict) and "safety_filter" in adaptive:
+            given = adaptive["safety_filter"]
+            adaptive["safety_filter"] = given is not None and given is not False
+
+
+def _renewed_faults(where: str, fields: dict[str, Any]) -> Iterator[str]:
+    """Collects the faults of all sensors in one list."""
     for group, kind in _FAULTS.items():
         faults = _taken(fields, [group, "faults"])
         if isinstance(faults, list):

@@ -12,12 +12,8 @@ from hypothesis import given, strategies as st
 from ruamel.yaml import YAML
 
 from diagrams import load_scenario, simulate
-from diagrams.scenario.loading import (
-    dump_scenario,
-    library_scenarios,
-    scenario_from_mapping,
-)
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.loading import dump_scenario, library_scenarios
+from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
 from systems.sound.parameters import RoomParameters

@@ -12,7 +12,6 @@ from pydrake.systems.framework import DiagramBuilder
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.source_robot import SourceRobot
 from systems.framework.block import RunFacts
-from systems.sound.acoustics import AcousticParameters
 from systems.sound.mic_array import MicArray
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import (
