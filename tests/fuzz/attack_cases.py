@@ -78,31 +78,31 @@ _NAMES = (
 LAWS = """
 import functools, math, sys
 from pydrake.systems.framework import LeafSystem
-def good(c, s, repulsion): return 1.0 / c
+def good(c, s, laws): return 1.0 / c
 def two(c, s): return 1.0
-def none(c, s, repulsion): pass
-def nan(c, s, repulsion): return float("nan")
-def infinite(c, s, repulsion): return float("inf")
-def text(c, s, repulsion): return "x" * 100000
-def imaginary(c, s, repulsion): return 1j
-def listed(c, s, repulsion): return [1.0]
-def raises(c, s, repulsion): raise KeyError("k" * 10000)
-def leaves(c, s, repulsion): sys.exit(0)
-def stops(c, s, repulsion): raise KeyboardInterrupt
+def none(c, s, laws): pass
+def nan(c, s, laws): return float("nan")
+def infinite(c, s, laws): return float("inf")
+def text(c, s, laws): return "x" * 100000
+def imaginary(c, s, laws): return 1j
+def listed(c, s, laws): return [1.0]
+def raises(c, s, laws): raise KeyError("k" * 10000)
+def leaves(c, s, laws): sys.exit(0)
+def stops(c, s, laws): raise KeyboardInterrupt
 class Odd(BaseException): pass
-def odd(c, s, repulsion): raise Odd("o" * 10000)
-def late_odd(c, s, repulsion): return odd(c, s, 0) if c < 2.4 else 1.0 / c
-def late(c, s, repulsion): return math.sqrt(0.5 - c) if c < 2.4 else 1.0 / c
-def near(c, s, repulsion): return 1.0 / c if c > 2.0 or c < 0.2 else None
+def odd(c, s, laws): raise Odd("o" * 10000)
+def late_odd(c, s, laws): return odd(c, s, 0) if c < 2.4 else 1.0 / c
+def late(c, s, laws): return math.sqrt(0.5 - c) if c < 2.4 else 1.0 / c
+def near(c, s, laws): return 1.0 / c if c > 2.0 or c < 0.2 else None
 class Plain: pass
 class Block(LeafSystem): pass
 class Portless(LeafSystem):
-    def __init__(self, robot, attraction, repulsion): super().__init__()
+    def __init__(self, robot, attraction, laws): super().__init__()
 class Rude:
     def __repr__(self): raise RuntimeError("no")
-    def __call__(self, c, s, repulsion): return self
+    def __call__(self, c, s, laws): return self
 rude = Rude()
-partial = functools.partial(lambda k, c, s, repulsion: k / c, 2.0)
+partial = functools.partial(lambda k, c, s, laws: k / c, 2.0)
 number = 5
 """
 _LAW_NAMES = [
@@ -136,7 +136,7 @@ _LAW_FILES = {
     "stops.py": "raise KeyboardInterrupt\n",
     "odd.py": "class Odd(BaseException): pass\nraise Odd('x' * 5000)\n",
     "closes.py": "raise GeneratorExit\n",
-    "talks.py": "print('a line')\ndef good(c, s, repulsion): return 1.0 / c\n",
+    "talks.py": "print('a line')\ndef good(c, s, laws): return 1.0 / c\n",
     "raises.py": "raise RuntimeError('x' * 5000)\n",
     "imports.py": "import nothing_of_that_name\n",
     "empty.py": "",

@@ -17,6 +17,8 @@ from diagrams.scenario.loading import (
     library_scenarios,
     scenario_from_mapping,
 )
+from diagrams.scenario.participants import Follower
+from diagrams.scenario.run_parameters import RunParameters
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
@@ -50,9 +52,9 @@ assumed_sound_speed_m_s: 340
 ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
 ultrasonic: {noise_m: 0, firing: sequential}
-collision_vector: {aggregation: sum}
+collision_vector: {aggregation: sum, velocity_term: closing}
 attraction: {follow_distance_m: 0.6, damping_n_s_m: 4}
-repulsion: {velocity_term: closing}
+laws: {conventional: {damping_n_s_m: 0.9}}
 robot: {mass_kg: 5}
 plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
 odometry: {rounding: false}
@@ -242,7 +244,7 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("seed=1.5", "seed", "valid integer"),
         ("hearing=ears", "hearing", "'audio' or 'ideal'"),
         ("odometry.rounding=1", "odometry.rounding", "valid boolean"),
-        ("arena_m=[1]", "arena_m.1", "required"),
+        ("arena_m=[1]", "arena_m.1", "is missing; set it"),
         ("arena_m=[1, -1]", "arena_m.1", "greater than"),
         ("start.position_m=[0, .nan]", "start.position_m.1", "finite"),
         ("obstacles.0.waypoints_m=[[1, x]]", "obstacles.0.waypoints_m.0.1", "'x'"),

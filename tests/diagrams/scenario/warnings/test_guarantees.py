@@ -113,8 +113,8 @@ def test_the_clear_way_by_hand():
     """R 0.446 and 12 mm, v^2/2a, lag and two ticks, margins of ranges, bodies' way."""
     scenario = load_scenario("two_static_obstacles", ["guard={}"])
     lag, error = (
-        scenario.plant.motor_lag_s,
-        range_error(scenario.ultrasonic),
+        scenario.only.plant.motor_lag_s,
+        range_error(scenario.follower.ultrasonic),
     )
     disc = 0.5 * math.hypot(0.35, 0.82) + 0.012
     way = 0.6**2 / 3.0 + 0.6 * (lag + 0.05) + error
