@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from diagrams.scenario.loading import load_scenario
 from diagrams.scenario.scenario import Scenario
 
 #: What a run is made short with, where it should come to that.
@@ -195,14 +196,16 @@ def _value(draw: random.Random) -> str:
     return draw.choice(_VALUES).replace("·", " ")
 
 
-def _fields() -> list[str]:
-    """Dotted paths of all fields of a scenario with one of everything."""
-    one_of_each = {
-        "obstacles": [{"name": "box"}],
-        "robots": {"robot": {}, "other": {"start": {"position_m": [-2.0, 0.0]}}},
-        "sources": {"source": {}, "radio": {"waypoints_m": [[0.0, 3.0]]}},
-        "room": {},
-    }
+_ONE_OF_EACH = {
+    "obstacles": [{"name": "box"}],
+    "robots": {"robot": {}, "other": {"start": {"position_m": [-2.0, 0.0]}}},
+    "sources": {"source": {}, "radio": {"waypoints_m": [[0.0, 3.0]]}},
+    "room": {},
+}
+
+
+def _fields(scenario: Scenario) -> list[str]:
+    """Dotted paths of all fields of a scenario."""
     found: list[str] = []
 
     def walk(value: Any, path: str) -> None:
@@ -211,13 +214,17 @@ def _fields() -> list[str]:
         for key, item in items or enumerate(value if isinstance(value, list) else ()):
             walk(item, f"{path}.{key}")
 
-    plain = Scenario.model_validate(one_of_each).model_dump(mode="json")
-    for key, value in plain.items():
+    for key, value in scenario.model_dump(mode="json").items():
         walk(value, key)
     return found
 
 
-_FIELDS = _fields()
+_FIELDS = _fields(Scenario.model_validate(_ONE_OF_EACH))
+#: Fields of robots that do not follow a sound, by a scenario that has them.
+_OTHER_FIELDS = {
+    name: _fields(load_scenario(name))
+    for name in ("unknown_block", "odor_search", "sound_search")
+}
 
 
 def _words(draw: random.Random) -> Made:
@@ -265,10 +272,16 @@ def _words(draw: random.Random) -> Made:
 
 def _settings(draw: random.Random) -> Made:
     """Any field with any value."""
-    words = ["simulate", *SHORT]
-    words += ["--set", draw.choice(["hearing=ideal", "hearing=ideal", "hearing=audio"])]
+    words, fields = ["simulate", *SHORT], _FIELDS
+    if draw.random() < 0.3:
+        name = draw.choice([*_OTHER_FIELDS])
+        words.insert(1, name)
+        fields = _OTHER_FIELDS[name]
+    else:
+        hearing = draw.choice(["hearing=ideal", "hearing=ideal", "hearing=audio"])
+        words += ["--set", hearing]
     for _ in range(draw.choice([1, 1, 1, 2])):
-        key = draw.choice(_FIELDS)
+        key = draw.choice(fields)
         if draw.random() < 0.1:
             key = draw.choice(
                 [f"{key}.x", f".{key}", f"{key}.", "x" * 5000, "a\nb", ""]

@@ -64,7 +64,8 @@ def _faults(
         # Replace words of Python by words of YAML.
         message = re.sub(r"dictionary( or instance of \w+)?", "mapping", message)
         message = message.replace("valid tuple", "valid list")
-        value = shortened(repr(details["input"]), 80)
+        given = details["input"]
+        value = "null" if given is None else shortened(repr(given), 80)
         yield InputError(field, f"is {value}; {message[0].lower()}{message[1:]}")
 
 
@@ -75,9 +76,10 @@ def _unknown(
     kinds = ROBOT_FIELDS.get(loc[3], ()) if len(loc) == 4 and loc[0] == "robots" else ()
     if kinds:
         laws = [name for name, law in LAWS.items() if law.robot in kinds]
+        kind = loc[2].replace("_", " ")
         return (
-            f"is not a field of a {loc[2].replace('_', ' ')}; remove it, or use one of "
-            f"the laws of robots that have it: {', '.join(laws)}"
+            f"is not a field of {'an' if kind[0] in 'aeiou' else 'a'} {kind}; remove "
+            f"it, or use one of the laws of robots that have it: {', '.join(laws)}"
         )
     if constant := constant_now(".".join(loc[3:] if loc[0] == "robots" else loc)):
         return f"is no longer a field, but {constant}; remove it"
