@@ -31,7 +31,7 @@ from pydrake.systems.framework import LeafSystem
 
 
 class Ahead(LeafSystem):
-    def __init__(self, robot, attraction, repulsion):
+    def __init__(self, robot, attraction, laws):
         super().__init__()
         self.set_name("ahead")
         self.DeclareVectorOutputPort(
@@ -264,8 +264,8 @@ def test_one_robots_settings_do_not_touch_another_and_follow_the_scenarios():
     assert b.attraction.damping_n_s_m == 3.0
     assert a.attraction.follow_distance_m == b.attraction.follow_distance_m == 0.9
     assert a.start.position_m == (0.0, 5.0)
-    other = scenario.with_robot(law="active")
-    assert other.robots["a"].law == "active"
+    other = scenario.with_({"law": "active"})
+    assert (other.robots["a"].law, other.robots["b"].law) == ("active", "none")
 
 
 def test_parts_are_asked_for_by_name_where_there_are_several():
