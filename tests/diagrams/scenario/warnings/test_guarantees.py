@@ -113,7 +113,7 @@ def test_the_clear_way_by_hand():
     """R 0.446 and 12 mm, v^2/2a, lag and two ticks, margins of ranges, bodies' way."""
     scenario = load_scenario("two_static_obstacles", ["guard={}"])
     lag, error = (
-        scenario.plant.motor_lag_s,
+        scenario.only.plant.motor_lag_s,
         range_errors(scenario.follower.ultrasonic).max(),
     )
     disc = 0.5 * math.hypot(0.35, 0.82) + 0.012
