@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from diagrams.scenario.fields.near_miss import unknown_law
+from diagrams.scenario.suggestions import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters

@@ -81,11 +81,16 @@ def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
     Returns:
         Fields of the run, with complete ``robots`` and ``sources``. Values of a wrong
         type stay as they are, for the validator.
+
+    Raises:
+        InputError: ``source`` has a sound.
     """
     run = {key: value for key, value in data.items() if key not in ROBOT_FIELDS}
     shared = {key: value for key, value in data.items() if key in ROBOT_FIELDS}
     source, sound = _plain(run.pop("source", {})), _plain(run.pop("sound", {}))
     robots = run.get("robots") or {ROBOT: {}}
+    if "sound" in _group(data.get("source")):
+        raise InputError("source.sound", "is not a field of a scenario; use sound")
     if isinstance(robots, Mapping):
         robots = _robots(robots, shared, sound)
         run["robots"] = robots

@@ -72,7 +72,8 @@ def _faults(
         # Replace words of Python by words of YAML.
         message = re.sub(r"dictionary( or instance of \w+)?", "mapping", message)
         message = message.replace("valid tuple", "valid list")
-        value = shortened(repr(details["input"]), 80)
+        given = details["input"]
+        value = "null" if given is None else shortened(repr(given), 80)
         yield InputError(field, f"is {value}; {message[0].lower()}{message[1:]}")
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
-from diagrams.scenario.fields.near_miss import did_you_mean
 from diagrams.scenario.fields.schema_walk import options, resolved
+from diagrams.scenario.suggestions import did_you_mean
 from systems.framework.input_error import InputError
 
 _KINDS = {

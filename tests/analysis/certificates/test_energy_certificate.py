@@ -178,7 +178,7 @@ def test_an_uncovered_velocity_term_is_left_out(two_boxes):
 
 def test_a_law_that_pulls_is_refused(two_boxes, tmp_path, monkeypatch):
     (tmp_path / "pulling.py").write_text(
-        "def pull(c, s, repulsion):\n    return -1.0 + 0.0 * c\n"
+        "def pull(c, s, laws):\n    return -1.0 + 0.0 * c\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ValueError, match=r"law: .* pulls toward obstacles"):
@@ -187,7 +187,7 @@ def test_a_law_that_pulls_is_refused(two_boxes, tmp_path, monkeypatch):
 
 def test_a_law_of_ones_own_is_certified(two_boxes, tmp_path, monkeypatch):
     (tmp_path / "soft.py").write_text(
-        "def soft(c, s, repulsion):\n    return 3.0 / (0.1 + c)\n"
+        "def soft(c, s, laws):\n    return 3.0 / (0.1 + c)\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     certificate = certify_energy(two_boxes("active", "law=soft:soft"), cell_m=0.04)

@@ -50,7 +50,7 @@ def test_v_falls_along_the_law_itself(region):
     c = model.contact.equilibrium_m + x
     force = law.at_rest(c) - 2.0 * (model.contact.to_go_m + c)
     rates = np.column_stack(
-        [w, (force - v) / 3.94, (v - w) / scenario.plant.motor_lag_s]
+        [w, (force - v) / 3.94, (v - w) / scenario.only.plant.motor_lag_s]
     )
     dot = 2.0 * np.einsum("ni,ij,nj->n", y, region.P, rates / model.scales)
     assert dot.max() < 0.0

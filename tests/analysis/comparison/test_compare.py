@@ -70,7 +70,7 @@ def test_laws_meet_the_same_layouts_with_the_same_noise():
     for none, active in zip(points[::2], points[1::2], strict=True):
         one, other = plan.scenario_of(none), plan.scenario_of(active)
         assert (one.only.law, other.only.law) == ("none", "active")
-        assert one.model_copy(update={"law": "active"}) == other
+        assert one.with_robot(law="active") == other
 
 
 def test_a_layout_does_not_depend_on_laws_or_runs():

@@ -105,7 +105,7 @@ def test_a_block_without_a_radial_law_is_refused(two_boxes, tmp_path, monkeypatc
     (tmp_path / "own_blocks.py").write_text(
         "from pydrake.systems.framework import LeafSystem\n\n\n"
         "class Block(LeafSystem):\n"
-        "    def __init__(self, robot, attraction, repulsion):\n"
+        "    def __init__(self, robot, attraction, laws):\n"
         "        super().__init__()\n"
         "        for name, size in (\n"
         "            ('acceleration_W', 2), ('forces_W', 4), ('obstacle_speeds', 3)\n"
@@ -120,7 +120,7 @@ def test_a_block_without_a_radial_law_is_refused(two_boxes, tmp_path, monkeypatc
 
 def test_a_force_that_is_not_finite_is_refused(two_boxes, tmp_path, monkeypatch):
     (tmp_path / "own_laws.py").write_text(
-        "def no_number(c, s, repulsion):\n    return float('nan')\n"
+        "def no_number(c, s, laws):\n    return float('nan')\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     scenario = two_boxes("active", "law=own_laws:no_number")

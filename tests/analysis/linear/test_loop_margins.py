@@ -338,7 +338,7 @@ def test_bearings_that_shrink_turn_the_target_along_with_the_robot(cuts, law):
     (1 - k)(y + L y/epsilon), and that must be less than y.
     """
     point, loops = cuts[law]
-    epsilon = point.loop.scenario.robot.control_point_m
+    epsilon = point.loop.scenario.only.robot.control_point_m
     distance = point.source_distance_m
     (across,) = [
         found.margins

@@ -44,7 +44,7 @@ def test_range_slope_is_that_of_the_estimators_closed_form(distance, true_speed)
 
 def test_stiffness_of_the_laws_is_their_closed_form():
     # K_0; k_ref / e^2 at c = 2 alpha; K_0 / rho_1^2 where the force stops growing.
-    gains = scenario().repulsion
+    gains = scenario().follower.laws
     K_0 = gains.conventional.stiffness_n_m
     assert law_stiffness(scenario()) == pytest.approx(K_0, rel=1e-6)
     peak = gains.active.reference_stiffness_n_m * math.exp(-2.0)

@@ -138,7 +138,7 @@ def test_contact_slopes_are_the_laws_own():
         "active": {"reference_stiffness_n_m": 50.0, "matched_stiffness_n_m": 12.0},
     }
     laws = [
-        contact_slopes(Scenario.model_validate({"law": law, "repulsion": gains}))
+        contact_slopes(Scenario.model_validate({"law": law, "laws": gains}))
         for law in ("conventional", "active")
     ]
     assert laws[0].stiffness_n_m == pytest.approx(9.0, rel=1e-6)

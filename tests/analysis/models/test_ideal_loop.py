@@ -138,11 +138,11 @@ from pydrake.math import exp
 from pydrake.systems.framework import LeafSystem
 
 
-def smooth(c, s, repulsion):
+def smooth(c, s, laws):
     return 3.0 * exp(-2.0 * c)
 
 
-def rough(c, s, repulsion):
+def rough(c, s, laws):
     return 3.0 * math.exp(-2.0 * c)
 """
 

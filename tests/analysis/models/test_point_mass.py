@@ -25,7 +25,7 @@ def block_force(scenario, law, state, *, before=None):
     bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
 
     def vectors(p):
-        slots = 3 if scenario.collision_vector.aggregation == "sum" else 1
+        slots = 3 if scenario.follower.collision_vector.aggregation == "sum" else 1
         return nearest_vectors((p[0], p[1], 0.0), bodies, 0.0, 3.0, slots)
 
     C = {} if before is None else {round(v[0]): v[1:] for v in vectors(before)}
@@ -37,7 +37,9 @@ def block_force(scenario, law, state, *, before=None):
         pushes.append(repulsion_force(C_W, s, law))
     F_b = np.sum(pushes, axis=0)
     p_WS = scenario.source.path().pose(0.0)[:2]
-    F_m = attraction_force(state[:2], state[2:], p_WS, 1.0, scenario.attraction, 3.94)
+    F_m = attraction_force(
+        state[:2], state[2:], p_WS, 1.0, scenario.follower.attraction, 3.94
+    )
     return F_m[0] + F_b[0], F_m[1] + F_b[1]
 
 

@@ -317,8 +317,8 @@ def test_fine_cells_are_shown_more_seldom(guarded_run):
     times = known_times(guarded_run)
     assert times[:3] == pytest.approx([0.075, 0.5, 1.0])
     assert times[-1] == end
-    fine = guarded_run.scenario.own_map.model_copy(update={"cell_m": 0.005})
-    scenario = guarded_run.scenario.model_copy(update={"guard": fine})
+    fine = guarded_run.scenario.follower.own_map.model_copy(update={"cell_m": 0.005})
+    scenario = guarded_run.scenario.with_robot(guard=fine)
     seldom = known_times(replace(guarded_run, scenario=scenario))
     assert seldom == pytest.approx([0.075, end / 4, end / 2, 3 * end / 4, end])
 

@@ -224,7 +224,7 @@ def test_bearings_are_in_degrees_and_ranges_in_metres(crossing_run):
         _line(ranges, "estimated").get_ydata(), columns["source_range"], equal_nan=True
     )
     assert _line(ranges, "follow distance").get_ydata()[0] == pytest.approx(
-        crossing_run.scenario.attraction.follow_distance_m
+        crossing_run.scenario.follower.attraction.follow_distance_m
     )
     estimated = np.asarray(_line(bearings, "estimated").get_ydata())
     expected = columns["source_bearing"] * 180.0 / math.pi
@@ -262,7 +262,7 @@ def test_each_burst_is_shaded_in_every_panel(crossing_run):
 
 
 def test_a_burst_ends_with_the_run(collision_run):
-    sound = collision_run.scenario.sound
+    sound = collision_run.scenario.source.sound
     assert sound_bursts(sound, 2.2) == [(0.0, 0.5), (2.0, 2.2)]
 
 

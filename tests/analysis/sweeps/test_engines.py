@@ -12,7 +12,7 @@ from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import run_sweep
 
 LAWS = """
-def wordy(c, s, repulsion):
+def wordy(c, s, laws):
     return 2.0 / float(str(c))
 """
 

@@ -38,15 +38,15 @@ def tried(law):
     CALLS[law] += 1
     return CALLS[law] > 30
 
-def nan(c, s, repulsion):
+def nan(c, s, laws):
     return c * float("nan") if tried("nan") else 0.0
 
-def deadly(c, s, repulsion):
+def deadly(c, s, laws):
     if tried("deadly"):
         os.kill(os.getpid(), signal.SIGKILL)
     return 0.0
 
-def mortal(c, s, repulsion):
+def mortal(c, s, laws):
     mark = Path(__file__).with_name("died")
     if tried("mortal") and not mark.exists():
         mark.touch()

@@ -32,7 +32,7 @@ def law(tmp_path, monkeypatch) -> Path:
         "import sys\n"
         f"sys.path.insert(0, {str(tmp_path)!r})\n"
         "import law_helper\n"
-        "def soft(c, s, repulsion):\n    return law_helper.GAIN / c\n"
+        "def soft(c, s, laws):\n    return law_helper.GAIN / c\n"
     )
     return file
 
@@ -114,7 +114,7 @@ def test_two_comparisons_never_share_a_directory(tmp_path, monkeypatch):
 def test_a_comparison_of_which_nothing_ran_says_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "failing_law.py").write_text(
-        "def late(c, s, repulsion):\n"
+        "def late(c, s, laws):\n"
         "    return None if 0.35 < c < 1.4 or 1.55 < c < 2.9 else 0.0\n"
     )
     settings = {**QUICK, "duration_s": 20.0, "obstacle_sensing": "ideal"}

@@ -19,11 +19,11 @@ OWN_LAW = """
 from pydrake.math import exp
 
 
-def gaussian(c, s, repulsion):
+def gaussian(c, s, laws):
     return 6.0 * exp(-c * c / laws.active.alpha_m) + 0.5 * s
 
 
-def wordy(c, s, repulsion):
+def wordy(c, s, laws):
     return 1.0 / float(str(c))
 """
 

@@ -34,13 +34,8 @@ DISTURBING = re.compile(
 )
 #: Such by their names alone, and why they are not set.
 OTHERS = {
-    "repulsion.trajectory_adaptive.safety_filter.approach_rate": "a gain",
-    "repulsion.trajectory_filtered.safety_filter.approach_rate": "a gain",
     "sound_search.noise_s": "for how long a search listens",
-    "odor.mean_intensity": "of the steady plume, which has no noise",
-    "gas_sensors.slope_mismatch": "0.03 by default",
     "gas_sensors.mismatch": "0.01 by default",
-    "laws.mppi.step_s": "of what the law predicts",
     "tdoa.false_alarm_rate": "a threshold",
 }
 FAST = {"tick_s": 0.0125, "microphones.frame_s": 0.05, "ultrasonic.period_s": 0.0375}
@@ -157,7 +152,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "duration_s": 4.0,
             "hearing": "ideal",
             "law": "dwa",
-            "laws.dwa.period_s": 0.2,
             "ideal_hearing.range_noise_fraction": 0.05,
         },
     ),
@@ -168,8 +162,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "duration_s": 2.0,
             "hearing": "ideal",
             "law": "mppi",
-            "laws.mppi.samples": 50,
-            "laws.mppi.speed_spread_m_s": 0.3,
             "laws.mppi.turn_spread_rad_s": 1.3,
             "ideal_hearing.range_noise_fraction": 0.05,
         },

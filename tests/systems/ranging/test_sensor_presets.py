@@ -149,8 +149,9 @@ def test_each_robot_may_have_another():
     robots += "{position_m: [-2, -1]}}}"
     words = [robots, "ultrasonic.noise_m=0.003"]
     scenario = load_scenario("default", words)
-    assert scenario.robots["second"].ultrasonic == sensors("ring_8")
-    assert scenario.robots["robot"].ultrasonic == sensors("three", noise_m=0.003)
+    assert scenario.of_robot("second").sensing.ultrasonic == sensors("ring_8")
+    first = scenario.of_robot("robot").sensing.ultrasonic
+    assert first == sensors("three", noise_m=0.003)
 
 
 def test_a_robot_may_be_named_preset():

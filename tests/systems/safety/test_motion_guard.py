@@ -12,7 +12,7 @@ import pytest
 from diagrams import Scenario, load_scenario, simulate
 from systems import FreeSpaceMap, MotionGuard, WheelCommand
 from systems.base.parameters import OdometryParameters
-from systems.base.robot import body_radius
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import RunFacts
 from systems.framework.input_error import InputError
 from systems.safety.braking import HALTED
@@ -230,7 +230,7 @@ def test_pulses_make_a_tick_count_half_a_pulse_more_and_a_reversal_its_command()
 def test_by_the_encoders_of_the_papers_robot_a_cell_is_known_for_14_m():
     """(q/L) (s + d) + q = 6 mm at d = 2 m, with pulses of q = 0.145 mm at the rim."""
     pulse = 0.06 * math.tau / 2600
-    error = PlaceError.of(GuardParameters(), Scenario().only.robot, OdometryParameters())
+    error = PlaceError.of(GuardParameters(), RobotParameters(), OdometryParameters())
     expected = (0.006 - pulse) * 0.41 / pulse - 2.0
     assert lasting(2.0, error) == pytest.approx(expected)
     assert 14.0 < expected < 15.0
