@@ -156,13 +156,14 @@ class Scenario(RunParameters):
 
     @property
     def source(self) -> SourceParameters:
-        """The source that the only robot follows.
+        """The source that the first robot follows.
 
         Raises:
-            InputError: The robot does not follow a source, or there are several robots.
+            InputError: This robot does not follow a source.
         """
-        if (target := self.target(next(iter(self.robots)))) not in self.sources:
-            raise InputError("source", "there is none: no robot follows a source")
+        first = next(iter(self.robots))
+        if (target := self.target(first)) not in self.sources:
+            raise InputError("source", f"robot {first!r} does not follow a source")
         return self.sources[target]
 
     def sounds(self) -> dict[str, SoundParameters]:
