@@ -65,7 +65,7 @@ def _outcome(result: RunResult) -> dict[str, Any]:
         "collision": collision,
         "halts": halts,
     }
-    if result.scenario.only.searches is not None:
+    if not result.several and result.scenario.only.searches is not None:
         faults = fault_names(result.columns["search_fault"][-1])
         ended |= {"reason": result.reason or None, "faults": faults}
     return ended
