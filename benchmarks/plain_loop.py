@@ -47,6 +47,7 @@ from systems.ranging.collision_vector import collision_vectors, echo_points
 from systems.ranging.ultrasonic_array import (
     cone_ranges,
     measured_ranges,
+    range_errors,
     world_rectangles,
 )
 from systems.sound.array_tolerances import draw_tolerances, real_array
@@ -152,10 +153,10 @@ class PlainLoop:
         )
         ranges, echo = measured_ranges(
             true,
-            scenario.follower.ultrasonic,
             standard_normals(
                 (2, scenario.follower.ultrasonic.count), self.ultrasonic_seed, tick
             ),
+            range_errors(scenario.follower.ultrasonic),
         )
         points = echo_points(
             ranges.tolist(), echo.tolist(), scenario.follower.ultrasonic

@@ -103,9 +103,10 @@ def _draw_views(axes: Axes) -> None:
     robot = Scenario().only.robot
     for column, name in enumerate(SENSOR_PRESETS):
         sensors = UltrasonicParameters.model_validate({"preset": name})
-        x, half = _APART * column, sensors.beam_half_angle_deg
-        for axis in sensors.axes_deg:
-            wedge = Wedge((x, 0.0), 1.0, 90.0 + axis - half, 90.0 + axis + half)
+        x = _APART * column
+        for each in sensors.sensors:
+            middle, half = 90.0 + each.axis_deg, each.beam_half_angle_deg
+            wedge = Wedge((x, 0.0), 1.0, middle - half, middle + half)
             wedge.set(facecolor=COLOURS["seen"], alpha=0.35, linewidth=0.0)
             axes.add_patch(wedge)
         axes.plot([x], [0.0], "o", color=COLOURS["robot"])

@@ -25,7 +25,7 @@ SENSING: Mapping[str, Mapping[str, Any]] = {
     "7 beams": {**_BEAMS, "ultrasonic": {"preset": "scan_7"}},
     "72 beams": {
         **_BEAMS,
-        "ultrasonic": {"preset": "lidar", "positions_m": [[-0.08, 0.0]]},
+        "ultrasonic": {"preset": "lidar", "position_m": [-0.08, 0.0]},
     },
 }
 _SCENARIOS = (

@@ -247,7 +247,7 @@ def test_directory_that_cannot_be_made_is_refused_before_the_run(capsys):
 
 def test_a_law_that_gives_nan_is_found_before_the_run(capsys, tmp_path, monkeypatch):
     (tmp_path / "nan_laws.py").write_text(
-        "def nowhere(c, s, repulsion):\n    return c * float('nan')\n"
+        "def nowhere(c, s, laws):\n    return c * float('nan')\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     out = tmp_path / "out"

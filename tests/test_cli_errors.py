@@ -21,20 +21,20 @@ SHORT = ("--set", "duration_s=0.05", "--set", "hearing=ideal")
 FIVE_LAWS = """
 import functools, math, sys
 def two(c, s): return 1.0
-def none(c, s, repulsion): pass
-def nan(c, s, repulsion): return float("nan")
-def text(c, s, repulsion): return "1"
-def imaginary(c, s, repulsion): return 1j
-def listed(c, s, repulsion): return [1.0]
-def raises(c, s, repulsion): raise KeyError("k" * 1000)
-def leaves(c, s, repulsion): sys.exit(0)
-def late(c, s, repulsion): return math.sqrt(-1.0) if 1.6 < c < 2.9 else 0.0
-def stops(c, s, repulsion): raise KeyboardInterrupt
+def none(c, s, laws): pass
+def nan(c, s, laws): return float("nan")
+def text(c, s, laws): return "1"
+def imaginary(c, s, laws): return 1j
+def listed(c, s, laws): return [1.0]
+def raises(c, s, laws): raise KeyError("k" * 1000)
+def leaves(c, s, laws): sys.exit(0)
+def late(c, s, laws): return math.sqrt(-1.0) if 1.6 < c < 2.9 else 0.0
+def stops(c, s, laws): raise KeyboardInterrupt
 class Odd(BaseException): pass
-def odd(c, s, repulsion): raise Odd("odd")
-def late_odd(c, s, repulsion): return odd(c, s, 0) if 1.6 < c < 2.9 else 0.0
+def odd(c, s, laws): raise Odd("odd")
+def late_odd(c, s, laws): return odd(c, s, 0) if 1.6 < c < 2.9 else 0.0
 class Plain: pass
-def scaled(k, c, s, repulsion): return k / c
+def scaled(k, c, s, laws): return k / c
 partial = functools.partial(scaled, 2.0)
 """
 
@@ -166,7 +166,7 @@ TALKING = """
 import atexit
 print("imported")
 atexit.register(print, "at exit")
-def soft(c, s, repulsion):
+def soft(c, s, laws):
     print("called")
     return 1.0 / c
 """

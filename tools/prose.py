@@ -42,7 +42,8 @@ PATTERNS = {
     r"\b[Mm]aster(?: robot)?s?\b|\bslave\b": "leader, follower",
     r"\b(?:colour|centre|metre|behaviour|odour|neighbour|licence|linearis|localis"
     r"|normalis|optimis|summaris|recognis|initialis|discretis|artefact|grey|travell"
-    r"|modell|labell|fulfil\b|draught|judgement)\w*|\banalyse[dr]?\b": "American spelling",
+    r"|modell|labell|fulfil\b|draught|judgement)\w*": "American spelling",
+    r"\banalyse[dr]?\b": "analyze",
     r"\bOf (?:the|all|these|several|two|each)\b[^.]{0,60}, ": (
         "put the subject first: 'Ten of the ...'"
     ),

@@ -94,12 +94,14 @@ def make_schema() -> dict[str, Any]:
 
     Returns:
         The schema; see ``tidied``. The keyword ``robots`` of a field of robots has the
-        kinds of robots that have this field.
+        kinds of robots that have this field. The keyword ``same_fields_as`` names a
+        group with the same model.
     """
     schema = _File.model_json_schema()
     for node in (schema, schema["$defs"]["_Robot"]):
         named = [{"const": law.name, "description": law.title} for law in LAWS.values()]
         node["properties"]["law"]["anyOf"] = [*named, {"pattern": ":"}]
+        node["properties"]["loudspeaker"]["same_fields_as"] = "sound"
         for name, kinds in ROBOT_FIELDS.items():
             node["properties"][name]["robots"] = list(kinds)
     return tidied(schema, "A scenario of phonotaxis")

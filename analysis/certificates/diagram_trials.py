@@ -181,8 +181,8 @@ def _mechanism(
     point = touching_point(robot_rectangle(pose, scenario.only.robot), body)
     p_WP = control_point(pose, scenario.only.robot.control_point_m)
     x, y = rotate(-pose[2], point[0] - p_WP[0], point[1] - p_WP[1])
-    fan = max(map(abs, scenario.follower.ultrasonic.axes_deg))
-    fan += scenario.follower.ultrasonic.beam_half_angle_deg
+    sensors = scenario.follower.ultrasonic.sensors
+    fan = max(abs(each.axis_deg) + each.beam_half_angle_deg for each in sensors)
     if abs(math.degrees(math.atan2(y, x))) <= fan:
         return "ahead"
     x_B = x + scenario.only.robot.control_point_m

@@ -82,7 +82,7 @@ class _Parser(argparse.ArgumentParser):
         command = re.match(r"argument COMMAND: invalid choice: '(.*?)'", message)
         hint = ""
         if command:
-            from diagrams.scenario.fields.near_miss import did_you_mean
+            from diagrams.scenario.suggestions import did_you_mean
 
             hint = did_you_mean(command[1], COMMANDS)
         raise _UsageError(f"{message}{hint}; see {self.prog} --help")
@@ -96,7 +96,7 @@ class _Parser(argparse.ArgumentParser):
         """
         hint = ""
         if option := re.search(r"--([\w-]+)", " ".join(words)):
-            from diagrams.scenario.fields.near_miss import did_you_mean
+            from diagrams.scenario.suggestions import did_you_mean
 
             options = {name: _options(parser) for name, parser in self.below.items()}
             # Without the dashes, which would make all options alike.

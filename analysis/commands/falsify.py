@@ -89,7 +89,7 @@ def _prepare(options: Namespace, take: Take) -> Job[Any]:
 
 def _drivers(names: str | None) -> Sequence[str]:
     from analysis.safety.driver_trials import DRIVERS, USUAL
-    from diagrams.scenario.fields.near_miss import did_you_mean
+    from diagrams.scenario.suggestions import did_you_mean
     from systems.framework.input_error import InputError
     from systems.laws.catalogue import LAWS
 

@@ -32,7 +32,7 @@ from analysis.runs.run_table import (
 )
 from analysis.sweeps.estimates import by_cell
 from analysis.sweeps.plan import SweepPlan
-from diagrams.scenario.loading import scenario_from_mapping
+from diagrams.scenario.scenario import scenario_from_mapping
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,9 @@ from pydantic import ValidationError
 import diagrams
 from analysis.sweeps.plan import SweepPlan, load_sweep
 from diagrams.scenario.fields.explain import explain
-from diagrams.scenario.loading import (
-    load_scenario,
-    parse_setting,
-    read_mapping,
-    scenario_from_mapping,
-)
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.loading import load_scenario, read_mapping
+from diagrams.scenario.scenario import Scenario, scenario_from_mapping
+from diagrams.scenario.settings import parse_setting
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, ROUTE_LAWS
 

@@ -163,11 +163,10 @@ def _robot_frames(
     yield transform(time, base, f"{name}/control_point", [ahead, 0.0, 0.0])
     if not isinstance(robot, HasRangeSensors):
         return
-    sensors = robot.ultrasonic
-    for k in range(1, sensors.count + 1):
+    for k, sensor in enumerate(robot.ultrasonic.sensors, start=1):
         if f"range_{k}" in own:
-            (x, y), axis = sensors.places[k - 1], sensors.axes_deg[k - 1]
-            pose_BU = [ahead + x, y, math.radians(axis)]
+            x, y = sensor.position_m
+            pose_BU = [ahead + x, y, math.radians(sensor.axis_deg)]
             yield transform(time, base, f"{name}/sensor_{k}", pose_BU)
 
 
@@ -211,14 +210,14 @@ def _robot_entries(
 def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Message:
     """A reading; infinite where there is no echo, as ROS has it."""
     assert isinstance(robot, HasRangeSensors)
-    sensors = robot.ultrasonic
+    sensor = robot.ultrasonic.sensors[k - 1]
     return stamped(
         time,
         f"{name}/sensor_{k}",
         radiation_type=0,
-        field_of_view=2.0 * math.radians(sensors.beam_half_angle_deg),
-        min_range=sensors.minimum_range_m,
-        max_range=sensors.maximum_range_m,
+        field_of_view=2.0 * math.radians(sensor.beam_half_angle_deg),
+        min_range=sensor.minimum_range_m,
+        max_range=sensor.maximum_range_m,
         range=distance,
-        variance=sensors.noise_m**2,
+        variance=sensor.noise_m**2,
     )

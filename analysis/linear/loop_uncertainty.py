@@ -17,7 +17,7 @@ from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.operating_points import OperatingPoint, resting_equilibrium
 from diagrams import Scenario
-from diagrams.scenario.loading import scenario_from_mapping
+from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 
 #: Temperatures between which the speed of sound is not known, deg C.

@@ -192,10 +192,8 @@ class RunFrames:
         for sensor in logged_sensors(own):
             echo = own.columns[f"echo_{sensor + 1}"][tick] > 0.5
             x, y, theta = compose(pose, sensor_pose(scenario, sensor))
-            half, axis = (
-                scenario.sensing.ultrasonic.beam_half_angle_deg,
-                np.degrees(theta),
-            )
+            half = scenario.sensing.ultrasonic.sensors[sensor].beam_half_angle_deg
+            axis = np.degrees(theta)
             cone = Wedge(
                 (float(x), float(y)),
                 float(own.columns[f"range_{sensor + 1}"][tick]),

@@ -63,13 +63,13 @@ def _cone_ranges(
     bodies: NDArray[np.float64],
     axes: NDArray[np.float64],
     places: NDArray[np.float64],
-    half_angle: float,
+    half_angles: NDArray[np.float64],
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """(n, cones) true ranges of (n, 5) rectangles, m; see ``fan_ranges``."""
     ranges = np.empty((len(poses), axes.size))
     for i in range(len(poses)):
         ranges[i] = fan_ranges(
-            poses[i], bodies[i : i + 1], axes, places, half_angle, control_point_m
+            poses[i], bodies[i : i + 1], axes, places, half_angles, control_point_m
         )
     return ranges

@@ -236,9 +236,7 @@ def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> N
     tilted = _placed(0.0, 0.5 * math.pi, axis, [x, y, SENSOR_HEIGHT_M])
     meshcat.SetTransform(path, tilted)
     length = 0.8
-    radius = length * math.tan(
-        math.radians(scenario.sensing.ultrasonic.beam_half_angle_deg)
-    )
+    radius = length * math.tan(scenario.sensing.ultrasonic.half_angles[sensor])
     for look, role, alpha in (("echo", "echo", 0.55), ("empty", "empty", 0.18)):
         cone = MeshcatCone(length, 0.35 * radius, radius)
         meshcat.SetObject(f"{path}/{look}", cone, _colour(role, alpha))

@@ -160,9 +160,10 @@ def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
     Returns:
         x, y, theta of the sensor's frame U in B, m and rad.
     """
-    x, y = scenario.sensing.ultrasonic.places[sensor]
-    axis = math.radians(scenario.sensing.ultrasonic.axes_deg[sensor])
-    return scenario.only.robot.control_point_m + x, y, axis
+    own = scenario.sensing.ultrasonic.sensors[sensor]
+    x, y = own.position_m
+    ahead = scenario.only.robot.control_point_m
+    return ahead + x, y, math.radians(own.axis_deg)
 
 
 def compose(

@@ -306,7 +306,7 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
     if not sensors:
         return
     step = max(1, math.ceil(len(times) / CONE_INSTANTS))
-    half = result.scenario.sensing.ultrasonic.beam_half_angle_deg
+    half_angles = result.scenario.sensing.ultrasonic.half_angles
     labelled: set[bool] = set()
     for time in times[::step]:
         tick = tick_at(result, time)
@@ -316,6 +316,7 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
             pose = result.poses("WB")[tick]
             x, y, theta = compose(pose, sensor_pose(result.scenario, sensor))
             axis = math.degrees(theta)
+            half = math.degrees(half_angles[sensor])
             wedge = Wedge(
                 (x, y),
                 result.columns[f"range_{sensor + 1}"][tick],

@@ -161,8 +161,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "plain": {},
     "no noise": {"ultrasonic": {"noise_m": 0.0}},
     "noise of 1 cm": {"ultrasonic": {"noise_m": 0.01}},
-    "ring of 12": {"ultrasonic": {"axes_deg": 12}},
-    "36 narrow beams": {"ultrasonic": {"axes_deg": 36, "beam_half_angle_deg": 5.0}},
+    "ring of 12": {"ultrasonic": {"sensors": 12}},
+    "36 narrow beams": {"ultrasonic": {"sensors": 36, "beam_half_angle_deg": 5.0}},
     "in turn": {"ultrasonic": {"firing": "sequential"}},
     "tick of 12.5 ms": {"tick_s": 0.0125},
     "tick of 50 ms": {

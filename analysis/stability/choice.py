@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagrams.scenario.loading import scenario_from_mapping
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, LAWS, ROUTE_LAWS
 

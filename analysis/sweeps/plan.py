@@ -22,14 +22,10 @@ from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
 from analysis.sweeps.sweep_file import read_sweep
 from diagrams.scenario.fields.explain import explain
-from diagrams.scenario.loading import (
-    load_scenario,
-    resolve_sound,
-    scenario_from_mapping,
-    set_fields,
-)
+from diagrams.scenario.loading import resolve_sound, written_fields
 from diagrams.scenario.own_code import own_files
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.scenario import Scenario, scenario_from_mapping
+from diagrams.scenario.settings import apply_settings
 from diagrams.scenario.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
@@ -131,11 +127,12 @@ class SweepPlan(Parameters):
 
     @cached_property
     def base(self) -> dict[str, Any]:
-        """Every field of the scenario, with ``set`` applied; not to be changed."""
-        data = load_scenario(self.source).model_dump(mode="json")
-        set_fields(data, copy.deepcopy(self.set).items())
+        """Fields of the scenario's file, with ``set`` applied; not to be changed."""
+        data = written_fields(self.source)
+        apply_settings(data, copy.deepcopy(self.set))
         resolve_sound(data, Path(self.folder))
-        return scenario_from_mapping(data).model_dump(mode="json")
+        scenario_from_mapping(data)
+        return data
 
     @cached_property
     def _base_copy(self) -> bytes:
@@ -216,7 +213,7 @@ class SweepPlan(Parameters):
     def scenario_of(self, point: SweepPoint) -> Scenario:
         """The scenario of a run."""
         data = pickle.loads(self._base_copy)
-        set_fields(data, copy.deepcopy(point.fields).items())
+        apply_settings(data, copy.deepcopy(point.fields))
         data["seed"] = point.seed
         resolve_sound(data, Path(self.folder))
         return scenario_from_mapping(data)
@@ -224,7 +221,8 @@ class SweepPlan(Parameters):
     @property
     def digest(self) -> str:
         """Hash of everything that the draws and the runs depend on."""
-        document = {**self.model_dump(mode="json"), "base": self.base}
+        base = scenario_from_mapping(self.base).model_dump(mode="json")
+        document = {**self.model_dump(mode="json"), "base": base}
         if self.file_digests:
             document["files"] = self.file_digests
         return hashlib.sha256(json.dumps(document).encode()).hexdigest()

@@ -25,7 +25,7 @@ from analysis.run_error import RunError
 from analysis.sweeps.one_run import Outcome, is_row, parquet_bytes, results_table
 from analysis.sweeps.plan import SweepPlan, SweepPoint, dump_plan
 from diagrams import write_scenario
-from diagrams.scenario.loading import scenario_from_mapping
+from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError, shortened
 
 _LOGGER = logging.getLogger("phonotaxis")

@@ -204,6 +204,7 @@ def robot_blocks(
         WheelOdometry(
             robot=robot.robot,
             odometry=robot.odometry,
+            faults=robot.faults,
             plant=robot.plant,
             initial_pose=robot.start.pose,
             tick_s=scenario.tick_s,

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import csv
 import json
+import logging
 import re
-import warnings
 from collections.abc import Iterator, Mapping
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from diagrams.scenario.shorthand import ROBOT_FIELDS
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 
+_LOGGER = logging.getLogger("phonotaxis")
 _TABLE = Path(__file__).with_suffix(".tsv")
 #: Names of sensor elements in the lists of faults of the previous version.
 _ELEMENTS = {"microphone", "sensor", "switch"}
@@ -75,14 +76,11 @@ def renewed(data: dict[str, Any]) -> dict[str, Any]:
         notes |= dict.fromkeys(_renewed(where, fields))
     if notes:
         _drop_groups_of_other_kinds(data)
-        warnings.warn(
-            f"fields of the previous version, accepted for now: {'; '.join(notes)}",
-            FutureWarning,
-            stacklevel=2,
-        )
+        _LOGGER.warning("fields of the previous version: %s", "; ".join(notes))
     return data
 
 
+@lru_cache(maxsize=1024)
 def renamed(path: str) -> str:
     """Returns the present path of a field, with a note if it had another name.
 
@@ -99,8 +97,7 @@ def renamed(path: str) -> str:
             if former.new and f"{rest}.".startswith(f"{former.path}."):
                 new = f"{begin}{former.new}{rest.removeprefix(former.path)}"
     if new != path:
-        note = f"field of the previous version, accepted for now: {path} is now {new}"
-        warnings.warn(note, FutureWarning, stacklevel=2)
+        _LOGGER.warning("field of the previous version: %s is now %s", path, new)
     return new
 
 
@@ -129,6 +126,7 @@ def _robots_and_sources(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, A
 
 
 def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
+    _renew_safety_filter(fields)
     for former in former_fields():
         path = former.path
         if where.startswith("sources."):
@@ -151,6 +149,20 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
             )
         else:
             yield f"{where}{path} is now a constant"
+    yield from _renewed_faults(where, fields)
+
+
+def _renew_safety_filter(fields: Mapping[str, Any]) -> None:
+    """Makes the filter of the adaptive law true or false; it was a group or null."""
+    for laws in (fields.get("repulsion"), fields.get("laws")):
+        adaptive = laws.get("trajectory_adaptive") if isinstance(laws, dict) else None
+        if isinstance(adaptive, dict) and "safety_filter" in adaptive:
+            given = adaptive["safety_filter"]
+            adaptive["safety_filter"] = given is not None and given is not False
+
+
+def _renewed_faults(where: str, fields: dict[str, Any]) -> Iterator[str]:
+    """Collects the faults of all sensors in one list."""
     for group, kind in _FAULTS.items():
         faults = _taken(fields, [group, "faults"])
         if isinstance(faults, list):

@@ -9,7 +9,6 @@ from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.yaml_text import dump_yaml
 from systems.base.robot import microphones_B
 from systems.framework.input_error import shortened
-from systems.sound.parameters import MicArrayParameters
 
 #: Least standard deviations in the file: of the positions, and of the speed of sound.
 _LEAST_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
@@ -39,7 +38,7 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
         f"its full scale is {own.microphones.full_scale} counts of the converter.",
         "Positions in the robot's frame B, m: origin midway between the wheels,",
         "x ahead, y to the left.",
-        *_faults(own.microphones),
+        *_faults(own),
     ]
     # Positions are uniformly distributed within the tolerance. The least standard
     # deviation is the rounding of a drawing.
@@ -55,9 +54,9 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
     return "".join(f"# {line}\n" for line in comments) + document
 
 
-def _faults(array: MicArrayParameters) -> list[str]:
+def _faults(own: HasMicrophones) -> list[str]:
     """Returns errors of the array that the fields cannot express, one line each."""
-    lines = []
+    array, lines = own.microphones, []
     if any(array.channel_skew_s):
         times = ", ".join(f"{1e6 * skew:g}" for skew in array.channel_skew_s)
         lines.append(f"The channels are sampled {times} us late (channel_skew_s).")
@@ -69,6 +68,7 @@ def _faults(array: MicArrayParameters) -> list[str]:
         if value:
             lines.append(f"Each may be off by {value:g} {unit} ({name}), see the seed.")
     return lines + [
-        f"Microphone {each.microphone} is {each.kind} from {each.start_s:g} s on."
-        for each in array.faults
+        f"Microphone {each.number} is {each.kind} from {each.start_s:g} s on."
+        for each in own.faults
+        if each.sensor == "microphones"
     ]

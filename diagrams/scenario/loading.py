@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Iterable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic_core import ValidationError
-
-from diagrams.scenario.fields.explain import explain
-from diagrams.scenario.fields.near_miss import did_you_mean
-from diagrams.scenario.fields.shipped import SCHEMA_FILE, scenario_schema
-from diagrams.scenario.former_fields import renamed, renewed
-from diagrams.scenario.shorthand import as_written, begins_anew, require_effect
+from diagrams.scenario.fields.shipped import SCHEMA_FILE
+from diagrams.scenario.former_fields import renewed
+from diagrams.scenario.settings import apply_settings, plain_settings
+from diagrams.scenario.suggestions import did_you_mean
 from diagrams.scenario.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
 
@@ -53,59 +48,31 @@ def load_scenario(
             of the wrong type or out of range. The error names each field by its full
             path.
     """
-    path = _find(source)
-    data = renewed(read_mapping(path))
-    data.setdefault("name", path.stem)
-    resolve_sound(data, path.parent)
-    settings = [(renamed(key), value) for key, value in _settings(overrides)]
-    set_fields(data, settings)
-    require_effect(data, [key for key, _ in settings])
+    from diagrams.scenario.scenario import scenario_from_mapping
+
+    data = written_fields(source)
+    apply_settings(data, dict(plain_settings(overrides)))
     resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
 
 
-def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """Returns a copy of a scenario with changes, see ``Scenario.with_``."""
-    data = scenario.model_dump(mode="json")
-    settings = list(_settings(changes))
-    set_fields(data, settings)
-    require_effect(data, [key for key, _ in settings])
-    return scenario_from_mapping(data)
+def written_fields(source: str | Path) -> dict[str, Any]:
+    """Reads the fields that the file of a scenario sets.
 
+    Args:
+        source: See ``load_scenario``.
 
-def _settings(
-    overrides: Iterable[str] | Mapping[str, Any],
-) -> Iterable[tuple[str, Any]]:
-    if isinstance(overrides, Mapping):
-        return [(key, _plain(key, value)) for key, value in overrides.items()]
-    if isinstance(overrides, str):
-        raise InputError(
-            "overrides", f"is the text {overrides!r}; give a list of key=value"
-        )
-    return map(parse_setting, overrides)
+    Returns:
+        Plain values by present names, with a name, and with absolute paths of sounds.
 
-
-def _plain(key: str, value: Any) -> Any:
-    """Returns a copy of the value as plain data, in the form of a file."""
-    try:
-        return json.loads(json.dumps(value))
-    except (TypeError, ValueError):
-        raise InputError(
-            key,
-            f"{value!r} is not a plain value; give a number, a text, a truth "
-            "value, or a list or mapping of them",
-        ) from None
-
-
-def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
-    """Validates a mapping of plain values; see ``load_scenario``."""
-    from diagrams.scenario.scenario import Scenario
-
-    try:
-        return Scenario.model_validate(data)
-    except ValidationError as error:
-        written = partial(as_written, data=data)
-        raise explain(error, scenario_schema(), "a scenario", written) from None
+    Raises:
+        InputError: The name is unknown, or the file is unreadable.
+    """
+    path = _find(source)
+    data = renewed(read_mapping(path))
+    data.setdefault("name", path.stem)
+    resolve_sound(data, path.parent)
+    return data
 
 
 def dump_scenario(scenario: Scenario) -> str:
@@ -195,86 +162,3 @@ def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]
     named = data.get(group)
     found = named.items() if isinstance(named, dict) else ()
     return {name: fields for name, fields in found if isinstance(fields, dict)}
-
-
-def parse_setting(text: str) -> tuple[str, Any]:
-    """Splits ``key=value`` into the key and the value, which is YAML.
-
-    Raises:
-        InputError: The text does not have this form.
-    """
-    key, equals, value_text = text.partition("=")
-    if not equals or not all(key.split(".")):
-        raise InputError(
-            text or "--set", "is not of the form key=value, for example seed=2"
-        )
-    return key, parse_yaml(value_text, key)
-
-
-def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
-    """Sets fields of a mapping.
-
-    The function sets presets first, so that all other fields override them. If a group
-    already has a preset, a new preset clears the group. Missing groups on the path to a
-    field are created.
-
-    Args:
-        data: Fields of a scenario, changed in place.
-        fields: Dotted paths and plain values. An entry of a list is given by its index
-            (``obstacles.0.size_m``) or by its name (``obstacles.cart.size_m``). If two
-            paths are the same, the later value wins.
-
-    Raises:
-        InputError: A path leads into a plain value or past the end of a list, or a
-            name in it is the name of no entry or of several entries of a list.
-    """
-    for key, value in sorted(fields, key=lambda field: not _is_preset(*field)):
-        _set_field(data, key, value)
-
-
-def _is_preset(key: str, value: Any) -> bool:
-    return begins_anew({key.rpartition(".")[2]: value})
-
-
-def _set_field(data: dict[str, Any], key: str, value: Any) -> None:
-    *parents, last = key.split(".")
-    node: Any = data
-    for depth, part in enumerate(parents):
-        node = _descend(node, part, ".".join(parents[: depth + 1]))
-    if isinstance(node, list):
-        node[_index(node, last, key)] = value
-    elif isinstance(node, dict):
-        if begins_anew(node) and _is_preset(key, value):
-            node.clear()
-        node[last] = value
-    else:
-        raise InputError(key, "leads into a plain value; shorten the key")
-
-
-def _descend(node: Any, part: str, key: str) -> Any:
-    if isinstance(node, list):
-        return node[_index(node, part, key)]
-    if isinstance(node, dict):
-        if node.get(part) is None:  # missing, or null, for example room
-            node[part] = {}
-        return node[part]
-    raise InputError(key, "leads into a plain value; shorten the key")
-
-
-def _index(node: list[Any], part: str, key: str) -> int:
-    if part.isdigit() and int(part) < len(node):
-        return int(part)
-    names = [each.get("name") for each in node if isinstance(each, dict)]
-    found = [k for k, each in enumerate(names) if each == part]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise InputError(
-            key, f"{len(found)} entries have the name {part!r}; use an index, from 0"
-        )
-    known = ", ".join(repr(name) for name in names if name)
-    raise InputError(
-        key,
-        f"{part!r} is neither an index of a list of {len(node)} nor the name of an "
-        f"entry; count from 0{f', or use {known}' if known else ''}",
-    )

@@ -21,10 +21,12 @@ from pydantic import (
     model_validator,
 )
 
-from diagrams.scenario.fields.near_miss import unknown_law
+from diagrams.scenario.suggestions import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
+from systems.framework.faults import Faults, FaultySensor, faults_of
+from systems.framework.input_error import InputError
 from systems.framework.parameters import Angle, Parameters, Point, SoundSpeed
 from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
@@ -34,10 +36,13 @@ from systems.hearing.parameters import (
 )
 from systems.laws.catalogue import LAWS
 from systems.laws.parameters import AttractionParameters
-from systems.odor.parameters import AirflowParameters, GasSensorParameters
+from systems.odor.parameters import (
+    GAS_SENSORS,
+    AirflowParameters,
+    GasSensorParameters,
+)
 from systems.ranging.parameters import (
     CollisionVectorParameters,
-    ContactParameters,
     ObjectSensorParameters,
     UltrasonicParameters,
 )
@@ -115,7 +120,7 @@ class Robot(Parameters):
     replaces the robot's block with the same part; a block with a new part is added."""
     loudspeaker: SoundParameters | None = None
     """Sound that the robot itself plays at the origin of B, so that other robots can
-    follow it. Fields that are missing are those of ``sound``."""
+    follow it. Its fields are those of ``sound``, which also has the defaults."""
     start: StartParameters = StartParameters()
     assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed of sound that hearing and range sensors assume, m/s; null: the true speed
@@ -123,6 +128,8 @@ class Robot(Parameters):
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
+    faults: Faults = ()
+    """Sensors that fail during a run."""
 
     @field_validator("law")
     @classmethod
@@ -130,6 +137,25 @@ class Robot(Parameters):
         if ":" not in law and law not in LAWS:
             raise unknown_law(law, LAWS)
         return law
+
+    @model_validator(mode="after")
+    def _check_faults(self) -> Robot:
+        known = self.sensor_counts
+        for index, fault in enumerate(self.faults):
+            if fault.sensor not in known:
+                raise InputError(
+                    f"faults.{index}.sensor",
+                    f"{fault.sensor} is not a sensor of this robot; use "
+                    f"{' or '.join(known)}",
+                )
+        for sensor, count in known.items():
+            faults_of(self.faults, sensor, count)
+        return self
+
+    @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return {"odometry": 1}
 
     @property
     def own_guard(self) -> GuardParameters | None:
@@ -181,6 +207,14 @@ class Follower(Robot):
         return self
 
     @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return super().sensor_counts | {
+            "microphones": len(self.robot.microphones_m),
+            "ultrasonic": self.ultrasonic.count,
+        }
+
+    @property
     def gains(self) -> Any:
         """Gains of the robot's law; None for a law without gains."""
         return getattr(self.laws, self.law, None)
@@ -226,6 +260,21 @@ class Router(Robot):
     """Gains by law. Only the gains of the robot's law have an effect."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _check_route(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and data.get("route") is None:
+            law = data.get("law")
+            raise InputError(
+                "route", f"is missing, and law {law!r} drives on one; set route.goal_m"
+            )
+        return data
+
+    @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return super().sensor_counts | {"ultrasonic": self.ultrasonic.count}
+
     @property
     def gains(self) -> Any:
         """Gains of the robot's law; None for a law without gains."""
@@ -242,9 +291,16 @@ class OdorSearcher(Robot):
     search: PlumeSearchParameters = PlumeSearchParameters()
     gas_sensors: GasSensorParameters = GasSensorParameters()
     airflow_sensors: AirflowParameters = AirflowParameters()
-    contact_switches: ContactParameters = ContactParameters()
     compass: CompassParameters = CompassParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
+
+    @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return super().sensor_counts | {
+            "gas_sensors": GAS_SENSORS,
+            "contact_switches": 2,
+        }
 
 
 class SoundSearcher(Robot):
@@ -264,6 +320,11 @@ class SoundSearcher(Robot):
     def _check_channels(self) -> SoundSearcher:
         channel_skew(self.microphones, len(self.robot.microphones_m))
         return self
+
+    @property
+    def sensor_counts(self) -> dict[FaultySensor, int]:
+        """Number of sensors of each kind that can fail."""
+        return super().sensor_counts | {"microphones": len(self.robot.microphones_m)}
 
     @property
     def listens(self) -> bool:

@@ -7,6 +7,7 @@ name, one default and one legal range. ``load_scenario`` reads a scenario from Y
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import combinations
 from typing import Annotated, Any, TypeVar
 
@@ -16,6 +17,7 @@ from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
     StringConstraints,
+    ValidationError,
     model_serializer,
     model_validator,
 )
@@ -31,6 +33,8 @@ from diagrams.scenario.bodies import (
 from diagrams.scenario.checks.goal_checks import check_goals
 from diagrams.scenario.checks.guard_checks import check_guard
 from diagrams.scenario.checks.search_checks import check_searches
+from diagrams.scenario.fields.explain import explain
+from diagrams.scenario.fields.shipped import scenario_schema
 from diagrams.scenario.participants import (
     AnyRobot,
     Follower,
@@ -43,7 +47,8 @@ from diagrams.scenario.participants import (
     SourceParameters,
 )
 from diagrams.scenario.run_parameters import RunParameters
-from diagrams.scenario.shorthand import SOURCE, file_form, resolved
+from diagrams.scenario.settings import apply_settings, plain_settings
+from diagrams.scenario.shorthand import SOURCE, as_written, file_form, resolved
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
@@ -238,9 +243,9 @@ class Scenario(RunParameters):
         Raises:
             InputError: See ``load_scenario``.
         """
-        from diagrams.scenario.loading import changed
-
-        return changed(self, changes)
+        data = self.model_dump(mode="json")
+        apply_settings(data, dict(plain_settings(changes)))
+        return scenario_from_mapping(data)
 
     def require_one_robot(self, purpose: str) -> None:
         """Refuses several robots or sources.
@@ -541,6 +546,15 @@ class Scenario(RunParameters):
             if isinstance(robot, Follower):
                 bodies = self.surroundings(name).bodies
                 check_guard(f"robots.{name}.", robot, bodies, self.tick_s)
+
+
+def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
+    """Validates a mapping of plain values; see ``load_scenario``."""
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        written = partial(as_written, data=data)
+        raise explain(error, scenario_schema(), "a scenario", written) from None
 
 
 def frame_of(robot: Robot) -> float:

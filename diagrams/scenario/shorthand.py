@@ -55,8 +55,14 @@ def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
     result = {} if begins_anew(changes) else dict(base)
     for key, value in changes.items():
         before = _plain(result.get(key))
+        listed: dict[str, Any] = {}
+        if isinstance(before, list | tuple):
+            listed = {str(k): each for k, each in enumerate(before)}
         if isinstance(value, Mapping) and isinstance(before, Mapping):
             result[key] = joined(before, value)
+        elif isinstance(value, Mapping) and listed and value.keys() <= listed.keys():
+            # Changes to some elements of a list, by index.
+            result[key] = [*joined(listed, value).values()]
         else:
             result[key] = value
     return result
@@ -75,11 +81,16 @@ def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
     Returns:
         Fields of the run, with complete ``robots`` and ``sources``. Values of a wrong
         type stay as they are, for the validator.
+
+    Raises:
+        InputError: ``source`` has a sound.
     """
     run = {key: value for key, value in data.items() if key not in ROBOT_FIELDS}
     shared = {key: value for key, value in data.items() if key in ROBOT_FIELDS}
     source, sound = _plain(run.pop("source", {})), _plain(run.pop("sound", {}))
     robots = run.get("robots") or {ROBOT: {}}
+    if "sound" in _group(data.get("source")):
+        raise InputError("source.sound", "is not a field of a scenario; use sound")
     if isinstance(robots, Mapping):
         robots = _robots(robots, shared, sound)
         run["robots"] = robots
@@ -244,11 +255,28 @@ def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
         else:
             continue
         named = _group(data.get(group))
-        if below and named and all(_has(own, below) for own in named.values()):
+        leaves = [[*below, *leaf] for leaf in _leaves(data, place)]
+        if (
+            below
+            and named
+            and all(_has(own, leaf) for own in named.values() for leaf in leaves)
+        ):
             names = ", ".join(f"{group}.{name}.{'.'.join(below)}" for name in named)
             raise InputError(
                 field, f"has no effect, because {names} are set; set these instead"
             )
+
+
+def _leaves(tree: Any, place: Sequence[str]) -> Iterator[list[str]]:
+    """Paths of the leaves below a place of a tree, relative to this place."""
+    if place:
+        below = tree.get(place[0]) if isinstance(tree, Mapping) else None
+        yield from _leaves(below, place[1:])
+    elif isinstance(tree, Mapping) and tree:
+        for key, value in tree.items():
+            yield from ([key, *leaf] for leaf in _leaves(value, []))
+    else:
+        yield []
 
 
 def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
+from systems.framework.faults import Fault
 from systems.framework.signals import AudioFrame, Emission
 from systems.hearing.cross_power_estimator import ArrayListener, Direction
 from systems.hearing.cross_powers import CrossPowers, gather_frame, no_powers
@@ -17,7 +18,6 @@ from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import (
     MicArrayParameters,
-    MicrophoneFaultParameters,
     RoomParameters,
     SoundParameters,
 )
@@ -55,7 +55,7 @@ class BearingTrial:
     """Of a fan 2 m away with steady noise, rad; None: there is none."""
     fan_snr_db: float = 0.0
     """Level of the sound at the array over the fan's, dB."""
-    faults: tuple[MicrophoneFaultParameters, ...] = field(default=())
+    faults: tuple[Fault, ...] = field(default=())
 
 
 def hear_once(
@@ -76,9 +76,7 @@ def hear_once(
     """
     robot = RobotParameters(preset="song2011_hearing")
     at_1m = trial.snr_db + 20.0 * math.log10(trial.distance)
-    microphones = MicArrayParameters(
-        sample_rate_hz=32_000.0, snr_db_at_1m=at_1m, faults=trial.faults
-    )
+    microphones = MicArrayParameters(sample_rate_hz=32_000.0, snr_db_at_1m=at_1m)
     listener = method(robot, SOUND_SPEED_M_S, microphones)
     nothing = no_powers(listener.facts)
     heard = {"noise": nothing, "sound": nothing}
@@ -127,6 +125,7 @@ def _frames(
         room=trial.room,
         sources=len(sounds),
         seed=trial.seed,
+        faults=trial.faults,
     )
     count = round((trial.noise_s + trial.listen_s) / _FRAME_S)
     reach = microphone_reach(trial.room, SOUND_SPEED_M_S)

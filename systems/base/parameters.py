@@ -36,6 +36,3 @@ class OdometryParameters(Parameters):
     rounding: bool = True
     """Whether angles are rounded to whole pulses. A linearization needs exact
     angles."""
-    lost_at_s: Duration | None = None
-    """Time of a fault that resets the pose of the odometry to (0, 0, 0), s. none: no
-    fault."""

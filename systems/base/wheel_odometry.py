@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
@@ -12,6 +13,7 @@ from systems.base.lagged_motion import LaggedMotion, advance_pose, lagged_motion
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block_, Port, RunFacts, Step
+from systems.framework.faults import Fault, fault_ticks
 from systems.framework.finite import check_finite
 from systems.framework.input_error import InputError
 from systems.framework.scalar_types import define_for_scalars
@@ -105,6 +107,7 @@ def WheelOdometry_(T):
         Args:
             robot: Wheel radius and separation.
             odometry: ``OdometryParameters``.
+            faults: Faults of the robot; that of ``odometry`` applies.
             plant: Lag of the motors.
             initial_pose: Known pose (x, y, theta) in W at time zero, m and rad.
             tick_s: Period of the update, s.
@@ -135,6 +138,7 @@ def WheelOdometry_(T):
             *,
             robot: RobotParameters = RobotParameters(),
             odometry: OdometryParameters = OdometryParameters(),
+            faults: Sequence[Fault] = (),
             plant: PlantParameters = PlantParameters(),
             initial_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
             tick_s: float = TICK_S,
@@ -149,12 +153,12 @@ def WheelOdometry_(T):
                     "has no derivative; set odometry.rounding to false",
                 )
             self.set_name("wheel_odometry")
-            lost_s = odometry.lost_at_s
+            ((kind, begin),) = fault_ticks(faults, "odometry", 1, tick_s).tolist()
             numbers = OdometryNumbers(
                 robot,
                 odometry.pulses_per_revolution if odometry.rounding else 0,
                 lagged_motion(tick_s, plant.motor_lag_s),
-                -1 if lost_s is None else round(lost_s / tick_s),
+                begin if kind else -1,
             )
             self.declare(
                 Step(odometry_step, numbers, [*initial_pose, 0.0, 0.0]), tick_s=tick_s

@@ -21,7 +21,7 @@ from systems.planning.guarded_drive import (
 from systems.planning.looks import HazardSensors
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import GuardParameters
-from systems.safety.views import range_error
+from systems.safety.views import range_errors
 
 
 def guarded_step(
@@ -139,12 +139,12 @@ def hazard_sensors(
     Returns:
         Positions, directions, and errors of the sensors.
     """
-    axes, places, half_angle = sensors.beams
+    axes, places, half_angles = sensors.beams
     return HazardSensors(
         np.add(places, [robot.control_point_m, 0.0]),
-        np.column_stack([axes, np.full(len(axes), half_angle)]),
-        sensors.maximum_range_m,
-        range_error(sensors),
-        sensors.noise_m,
+        np.column_stack([axes, half_angles]),
+        sensors.each("maximum_range_m"),
+        range_errors(sensors),
+        sensors.each("noise_m"),
         tick_s,
     )

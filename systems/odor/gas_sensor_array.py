@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
+from systems.framework.faults import DEAD, FROZEN, Fault, fault_ticks
 from systems.framework.noise import (
     BEFORE_THE_RUN,
     TickNoise,
@@ -27,7 +29,6 @@ from systems.odor.parameters import GAS_EXPONENT, GAS_SENSORS, GasSensorParamete
 _TIMES_S = {"song2011": (2.5, 5.8), "tgs2620": (2.96, 15.71)}
 #: Mismatch of the exponents, divided by the mismatch of R0.
 _EXPONENT_MISMATCH = 3.0
-_DEAD, _STUCK = 1, 2
 
 
 class GasNumbers(NamedTuple):
@@ -44,9 +45,8 @@ class GasNumbers(NamedTuple):
     recovery: float
     """Share of the deviation that vanishes per tick while the concentration falls."""
     noise_share: float
-    faults: NDArray[np.float64]
-    """(3, 2) for each sensor: kind of the fault (0: none) and start of the fault, s."""
-    tick_s: float
+    faults: NDArray[np.int64]
+    """(3, 2) faults, see ``fault_ticks``."""
     noise: TickNoise
 
 
@@ -73,7 +73,6 @@ def gas_sensor_step(
     gas = np.empty(3)
     _concentrations(inputs[0], inputs[1], numbers.positions, gas)
     normals = tick_normals(numbers.noise, tick, 1, 4)
-    time = tick * numbers.tick_s
     for k in range(3):
         # First-order lag toward the steady ratio. More gas means a smaller ratio.
         rest = (1.0 + gas[k]) ** -numbers.exponents[k]
@@ -82,10 +81,10 @@ def gas_sensor_step(
         # Mismatch, noise and faults.
         value = state[k] * numbers.scales[k]
         value *= 1.0 + numbers.noise_share * float(normals[0, k])
-        kind = numbers.faults[k, 0] if time >= numbers.faults[k, 1] else 0.0
-        if kind == _DEAD:
+        kind, begin = numbers.faults[k]
+        if kind == DEAD and tick >= begin:
             value = 1.0
-        elif kind == _STUCK:
+        elif kind == FROZEN and tick >= begin:
             value = state[3 + k]
         state[3 + k] = value
         ratios[k], truths[k] = value, gas[k]
@@ -103,7 +102,8 @@ class GasSensorArray(Block):
     updated every tick. There is no latency apart from the lag.
 
     Args:
-        parameters: Positions, lag, errors and faults.
+        parameters: Positions, lag and errors.
+        faults: Faults of the robot; those of ``gas_sensors`` apply.
         seed: Seed of noise and mismatch.
         tick_s: Period of the robot, s.
 
@@ -135,12 +135,13 @@ class GasSensorArray(Block):
         self,
         *,
         parameters: GasSensorParameters = GasSensorParameters(),
+        faults: Sequence[Fault] = (),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("gas_sensor_array")
-        self._numbers_of = partial(_numbers, parameters, tick_s)
+        self._numbers_of = partial(_numbers, parameters, faults, tick_s)
         state = [1.0] * (2 * GAS_SENSORS)
         self.declare(
             Step(gas_sensor_step, self._numbers_of(seed), state),
@@ -154,13 +155,11 @@ class GasSensorArray(Block):
         return self.step._replace(numbers=numbers)
 
 
-def _numbers(own: GasSensorParameters, tick_s: float, seed: int) -> GasNumbers:
+def _numbers(
+    own: GasSensorParameters, faults: Sequence[Fault], tick_s: float, seed: int
+) -> GasNumbers:
     drawn = standard_normals((2, GAS_SENSORS), seed, BEFORE_THE_RUN)
     response_s, recovery_s = _TIMES_S[own.preset]
-    faults = np.zeros((GAS_SENSORS, 2))
-    for fault in own.faults:
-        kind = _DEAD if fault.kind == "dead" else _STUCK
-        faults[fault.sensor - 1] = kind, fault.start_s
     return GasNumbers(
         np.array(own.positions_m),
         1.0 + own.mismatch * drawn[0],
@@ -168,7 +167,6 @@ def _numbers(own: GasSensorParameters, tick_s: float, seed: int) -> GasNumbers:
         -math.expm1(-tick_s / response_s),
         -math.expm1(-tick_s / recovery_s),
         own.noise,
-        faults,
-        tick_s,
+        fault_ticks(faults, "gas_sensors", GAS_SENSORS, tick_s),
         tick_noise(seed),
     )

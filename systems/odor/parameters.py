@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict
 
-from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Angle,
     Length,
@@ -58,18 +57,6 @@ class OdorParameters(Parameters):
     uniform background. null: an open room."""
 
 
-class GasSensorFaultParameters(Parameters):
-    """A fault of a gas sensor."""
-
-    sensor: int = Field(default=1, ge=1, le=GAS_SENSORS)
-    """Number of the sensor: 1 right front, 2 rear, 3 left front."""
-    kind: Literal["dead", "stuck"] = "dead"
-    """``dead``: the reading is 1 (clean air) without noise. ``stuck``: the sensor
-    repeats its last reading."""
-    start_s: Time = 0.0
-    """Start of the fault, s."""
-
-
 class GasSensorParameters(Parameters):
     """Three TGS2620 sensors on arms of 20 cm, 120 deg apart (Song 2011, 2.1)."""
 
@@ -89,21 +76,6 @@ class GasSensorParameters(Parameters):
     mismatch: float = Field(default=0.01, ge=0.0, le=0.05)
     """Relative standard deviation of R0 between sensors. The exponent of the power law
     deviates three times as much. Each sensor has constant values."""
-    faults: Annotated[
-        tuple[GasSensorFaultParameters, ...], Strict(False), Field(max_length=8)
-    ] = ()
-    """Faults of the sensors, at most one per sensor."""
-
-    @model_validator(mode="after")
-    def _check(self) -> GasSensorParameters:
-        failing = [fault.sensor for fault in self.faults]
-        if len({*failing}) < len(failing):
-            raise InputError(
-                "faults",
-                f"sensors {failing}: a sensor has two faults; keep one fault "
-                "per sensor",
-            )
-        return self
 
 
 class AirflowParameters(Parameters):

@@ -206,7 +206,7 @@ def track_hazards(
         elif (
             unknown
             and goes_on(look, look_of(hazards.looks, 1, k), tick_s)
-            and came_from_free(space, look, half, sensors.margin_m)
+            and came_from_free(space, look, half, sensors.margin_m[k])
         ):
             _begin(hazards, k, sensors)
     _forget(hazards, time, pose)
@@ -323,7 +323,7 @@ def _weigh(
     the new weights is the likelihood of the look if the body exists anywhere in its
     track. If the track has not echoed, this sum lowers the probability of the track.
     """
-    p, fit_m = _particles_of(hazards, t), math.hypot(_FIT_M, sensors.noise_m)
+    p, fit_m = _particles_of(hazards, t), math.hypot(_FIT_M, sensors.noise_m[k])
     look, half = look_of(hazards.looks, 0, k), sensors.directions[k, 1]
     echoed, total = t == best, 0.0
     for n in range(len(p.x)):
@@ -331,7 +331,7 @@ def _weigh(
         edge = _EDGE_M / max(distance, 0.1)
         gap = look.range_m + _BEYOND_M - distance
         if look.heard < 0.5:
-            gap = np.inf if distance < sensors.farthest_m - 0.05 else 0.0
+            gap = np.inf if distance < sensors.farthest_m[k] - 0.05 else 0.0
         # Outside the aperture.
         if off > half + edge:
             if echoed:
@@ -400,7 +400,7 @@ def _begin(
     look, then = look_of(hazards.looks, 0, k), look_of(hazards.looks, 1, k)
     half, since = sensors.directions[k, 1], look.time_s - then.time_s
     rate = (look.range_m - then.range_m) / since
-    rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m / since)
+    rate_error = math.hypot(_RATE_M_S, 1.5 * sensors.noise_m[k] / since)
     own_x, own_y = (look.x - then.x) / since, (look.y - then.y) / since
     at = look.range_m + _BEYOND_M
     t = int(np.argmin(hazards.exists))
@@ -446,7 +446,7 @@ def _was_visible(
         if ago > oldest_s:
             continue
         distance, off = seen_from(look, p.x[n] - ago * p.vx[n], p.y[n] - ago * p.vy[n])
-        reach = look.range_m if look.heard > 0.5 else sensors.farthest_m
+        reach = look.range_m if look.heard > 0.5 else sensors.farthest_m[k]
         inside = off < half - 0.03 / max(distance, 0.1)
         if inside and distance + 0.03 < reach:
             return True

@@ -29,12 +29,12 @@ class HazardSensors(NamedTuple):
     """(sensors, 2) position relative to the axle in B, m."""
     directions: NDArray[np.float64]
     """(sensors, 2) direction of the axis in B and half of the aperture, rad."""
-    farthest_m: float
-    """Greatest range, m."""
-    margin_m: float
-    """Largest error of a range, m."""
-    noise_m: float
-    """Standard deviation of a range, m."""
+    farthest_m: NDArray[np.float64]
+    """(sensors,) greatest range, m."""
+    margin_m: NDArray[np.float64]
+    """(sensors,) largest error of a range, m."""
+    noise_m: NDArray[np.float64]
+    """(sensors,) standard deviation of a range, m."""
     tick_s: float
 
 

@@ -33,8 +33,8 @@ class BeamNumbers(NamedTuple):
 
     apart_rad: NDArray[np.float64]
     """(n,) angle between each beam and its right neighbor, rad; 0 if it has none."""
-    maximum_range_m: float
-    """Largest range, m. Surfaces farther away give no echo."""
+    maximum_ranges_m: NDArray[np.float64]
+    """(n,) largest range of each beam, m. Surfaces farther away give no echo."""
 
 
 @njit(cache=True)
@@ -74,7 +74,7 @@ def _is_open(
         return True
     if heard[other] < 0.5:
         # A flat face perpendicular to the own beam would be out of range there.
-        return ranges[own] > beams.maximum_range_m * math.cos(apart)
+        return bool(ranges[own] > beams.maximum_ranges_m[other] * math.cos(apart))
     return bool(ranges[other] < ranges[own])
 
 

@@ -18,6 +18,8 @@ from systems.world.geometry import control_point, rotate
 
 #: Largest number of collision vectors in one tick.
 SLOTS = 3
+#: Largest distance between two echoes of the same obstacle, m.
+PAIR_SEPARATION_M = 0.5
 
 
 @register_jitable
@@ -131,21 +133,19 @@ def collision_vectors(
         [(0.0, 0.0) if point is None else point for point in points],
         [point is not None for point in points],
         [*neighbours],
-        parameters.pair_separation_m,
         joined=parameters.aggregation == "paper",
         every=parameters.aggregation == "sum",
     )
 
 
 @register_jitable
-def _vectors(points, heard, neighbours, separation, joined, every):
+def _vectors(points, heard, neighbours, joined, every):
     """Compiled form of ``collision_vectors``.
 
     Args:
         points: n positions (x, y) from P, m; arbitrary where there is no echo.
         heard: n flags, true where there is an echo.
         neighbours: Pairs of adjacent sensors, each with the left sensor first.
-        separation: Largest distance between joined echoes, m.
         joined: Whether to join the nearest echo with its nearer neighbor.
         every: Whether to return one vector per pair and per single echo.
     """
@@ -166,7 +166,7 @@ def _vectors(points, heard, neighbours, separation, joined, every):
         for pair in neighbours
         if heard[int(pair[0])]
         and heard[int(pair[1])]
-        and _close(points[int(pair[0])], points[int(pair[1])], separation)
+        and _close(points[int(pair[0])], points[int(pair[1])])
     ]
     if every:
         return _all_vectors(points, heard, pairs, found)
@@ -193,8 +193,8 @@ def _squared(point):
 
 
 @register_jitable
-def _close(a, b, separation):
-    return _squared((b[0] - a[0], b[1] - a[1])) < separation * separation
+def _close(a, b):
+    return _squared((b[0] - a[0], b[1] - a[1])) < PAIR_SEPARATION_M**2
 
 
 @register_jitable
@@ -269,8 +269,6 @@ COLLISION_PORTS = (
 class CollisionNumbers(NamedTuple):
     """Parameters of ``collision_step``."""
 
-    separation_m: float
-    """Largest distance between joined echoes, m."""
     joined: bool
     """Whether the nearest echo is joined with a neighboring echo."""
     every: bool
@@ -323,7 +321,6 @@ def collision_step(
         points,
         [flag > 0.5 for flag in echo],
         numbers.neighbours,
-        numbers.separation_m,
         numbers.joined,
         numbers.every,
     )
@@ -380,7 +377,6 @@ def CollisionVector_(T):
             self.set_name("collision_vector")
             past_poses = sensors.round_ticks(tick_s) - 1
             numbers = CollisionNumbers(
-                parameters.pair_separation_m,
                 parameters.aggregation == "paper",
                 parameters.aggregation == "sum",
                 [*sensors.axes],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,10 +12,12 @@ from numpy.typing import NDArray
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
+from systems.framework.faults import STUCK_CLOSED, STUCK_OPEN, Fault, fault_ticks
 from systems.framework.signals import TICK_S
-from systems.ranging.parameters import ContactParameters
 from systems.world.geometry import beyond_rectangle
 
+#: Distance between a body and the front edge up to which a switch closes, m.
+REACH_M = 0.01
 #: Number of test points on each half of the front edge, in addition to its middle.
 _POINTS = 8
 #: A touch within this distance of the middle closes both switches. The distance is a
@@ -29,24 +32,17 @@ class SwitchNumbers(NamedTuple):
     """(n, 2) test points of the front edge in B, m, from left to right."""
     middle_m: float
     """A touch within this distance of the longitudinal axis closes both switches, m."""
-    reach_m: float
-    """Largest distance between a body and a test point at which a switch closes, m."""
     length_m: float
     """Length of the body at ``pose_WS``, m."""
     width_m: float
     """Width of the body at ``pose_WS``, m."""
-    open_from_s: tuple[float, float]
-    """Time from which the left and the right switch are stuck open, s; infinite:
-    never."""
-    closed_from_s: tuple[float, float]
-    """Time from which the left and the right switch are stuck closed, s; infinite:
-    never."""
-    tick_s: float
+    faults: NDArray[np.int64]
+    """(2, 2) faults of the left and the right switch, see ``fault_ticks``."""
 
 
 @njit(cache=True)
 def _feel(
-    pose: Any, body: Any, points: Any, middle: float, reach: float
+    pose: Any, body: Any, points: Any, middle: float
 ) -> tuple[bool, bool]:  # pragma: no cover  (compiled)
     """Whether a body closes the left and the right switch.
 
@@ -55,11 +51,12 @@ def _feel(
         body: x, y, theta, length and width of the body in W, m and rad.
         points: (n, 2) test points of the front edge in B, m.
         middle: A touch within this distance of the x axis closes both switches, m.
-        reach: A switch closes up to this distance between body and test point, m.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    # Skip a body whose circumscribed circle is more than 1 m from the origin of B.
-    far = 0.5 * math.hypot(body[3], body[4]) + 1.0
+    # Skip a body whose circumscribed circle no switch can reach. The first test point,
+    # a corner of the robot, is as far from the origin of B as any test point.
+    far = 0.5 * math.hypot(body[3], body[4]) + REACH_M
+    far += math.hypot(points[0, 0], points[0, 1])
     if math.hypot(body[0] - pose[0], body[1] - pose[1]) > far:
         return False, False
     left, right = False, False
@@ -68,7 +65,7 @@ def _feel(
         place = pose[0] + c * x - s * y, pose[1] + s * x + c * y
         box = body[0], body[1], body[2], body[3], body[4]
         off = beyond_rectangle(place, box)
-        if math.hypot(off[0], off[1]) <= reach:
+        if math.hypot(off[0], off[1]) <= REACH_M:
             left = left or y >= -middle
             right = right or y <= middle
     return left, right
@@ -95,17 +92,18 @@ def contact_switches_step(
             for k in range(3):
                 body[k] = followed[k]
             body[3], body[4] = numbers.length_m, numbers.width_m
-        felt = _feel(pose, body, numbers.points, numbers.middle_m, numbers.reach_m)
+        felt = _feel(pose, body, numbers.points, numbers.middle_m)
         if felt[0] or felt[1]:
             touched = number
         left, right = left or felt[0], right or felt[1]
-    time, contact = tick * numbers.tick_s, outputs[0]
+    contact = outputs[0]
     contact[0], contact[1] = 1.0 if left else 0.0, 1.0 if right else 0.0
     # A fault changes the reading of a switch, but not the number of the touched body.
     for k in range(2):
-        if time >= numbers.open_from_s[k]:
+        kind, begin = numbers.faults[k]
+        if kind == STUCK_OPEN and tick >= begin:
             contact[k] = 0.0
-        if time >= numbers.closed_from_s[k]:
+        elif kind == STUCK_CLOSED and tick >= begin:
             contact[k] = 1.0
     outputs[1][0] = float(touched)
 
@@ -114,7 +112,7 @@ class ContactSwitches(Block):
     """Detects bodies at the front of the robot.
 
     Each switch belongs to one half of the front edge. It closes when a body is within
-    ``reach_m`` of this half. In the middle of the edge, both switches close. The flanks
+    ``REACH_M`` of this half. In the middle of the edge, both switches close. The flanks
     and the rear of the robot have no switches. ``touched`` is the true number of the
     touched body, counted from 0. The body at ``pose_WS`` has the last number. The
     switches cannot distinguish a source from a wall.
@@ -122,7 +120,7 @@ class ContactSwitches(Block):
     The block has no state and no latency. It computes its outputs every tick.
 
     Args:
-        parameters: Reach and faults, ``ContactParameters``.
+        faults: Faults of the robot; those of ``contact_switches`` apply.
         robot: Size of the robot.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
         source_size: Length and width of the body at ``pose_WS``, m.
@@ -146,7 +144,7 @@ class ContactSwitches(Block):
     def __init__(
         self,
         *,
-        parameters: ContactParameters = ContactParameters(),
+        faults: Sequence[Fault] = (),
         robot: RobotParameters = RobotParameters(),
         bodies: int = 0,
         source_size: tuple[float, float] = (0.08, 0.08),
@@ -159,11 +157,8 @@ class ContactSwitches(Block):
         numbers = SwitchNumbers(
             front,
             _MIDDLE * robot.width_m,
-            parameters.reach_m,
             *source_size,
-            _since(parameters, "stuck_open"),
-            _since(parameters, "stuck_closed"),
-            tick_s,
+            fault_ticks(faults, "contact_switches", 2, tick_s),
         )
         self.declare(
             Step(contact_switches_step, numbers),
@@ -171,15 +166,3 @@ class ContactSwitches(Block):
             sizes={"bodies": bodies},
             arrays=True,
         )
-
-
-def _since(own: ContactParameters, kind: str) -> tuple[float, float]:
-    """Start times of a fault of the left and the right switch, s; infinite: never."""
-    left, right = (
-        min(
-            (f.start_s for f in own.faults if f.kind == kind and f.switch == switch),
-            default=math.inf,
-        )
-        for switch in (1, 2)
-    )
-    return left, right

@@ -191,7 +191,7 @@ def _numbers(
     return DetectorNumbers(
         axes,
         places,
-        BeamNumbers(apart, sensors.maximum_range_m),
+        BeamNumbers(apart, sensors.each("maximum_range_m")),
         TrackNumbers(math.hypot(NOISE_M, sensors.noise_m), tick_s),
         robot.control_point_m,
         oldest_s=(sensors.round_ticks(tick_s) + 0.5) * tick_s,

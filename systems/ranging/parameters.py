@@ -1,17 +1,25 @@
-"""Parameters of range sensors, contact switches, and object sensors."""
+"""Parameters of range sensors and object sensors."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, Strict, field_validator, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    Strict,
+    model_serializer,
+    model_validator,
+)
 
-from systems.framework.input_error import InputError, shortened
+from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Angle,
     Fraction,
@@ -22,11 +30,16 @@ from systems.framework.parameters import (
     Period,
     Point,
     Time,
-    with_preset,
 )
 from systems.framework.signals import TICK_S, whole
-from systems.ranging.sensor_faults import SensorFaultParameters
-from systems.ranging.sensor_presets import SENSOR_PRESETS, SensorPreset
+from systems.ranging.sensor_presets import SensorPreset
+from systems.ranging.sensor_shorthand import (
+    add_shorthand,
+    check_shared,
+    expanded,
+    mark_shared,
+    shortened_sensors,
+)
 
 #: Number of slots of a port with objects, and number of elements of each slot; see
 #: ``systems.ranging.objects``.
@@ -35,30 +48,18 @@ OBJECT_SLOTS, OBJECT_SIZE = 8, 8
 #: The directions of neighboring sensors differ by at most this angle, deg.
 NEIGHBOURS_DEG = 90.0
 
-_Axes = Annotated[tuple[Angle, ...], Strict(False), Field(min_length=1, max_length=360)]
 
-_Places = Annotated[tuple[Point, ...], Strict(False), Field(max_length=360)]
+class RangeSensorParameters(Parameters):
+    """One range sensor with a cone: an SRF-05 (Han 2019, 4.2), or another one."""
 
-_Faults = Annotated[
-    tuple[SensorFaultParameters, ...], Strict(False), Field(max_length=360)
-]
+    model_config = ConfigDict(json_schema_extra=mark_shared)
 
-
-class UltrasonicParameters(Parameters):
-    """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
-
-    preset: SensorPreset = "three"
-    """Named set of sensors. It provides the defaults of the other fields; fields that
-    are set take precedence."""
-    axes_deg: _Axes = (30.0, 0.0, -30.0)
-    """Directions of the cones in B, counterclockwise from the x axis, deg. They are
-    listed from left to right. An integer n stands for n evenly spaced cones all around,
-    and the first cone points backward."""
-    positions_m: _Places = ()
-    """Positions of the sensors from P, in B axes, m. One position applies to all
-    sensors; without a position, all sensors are at P."""
+    axis_deg: Angle = 0.0
+    """Direction of the axis of the cone in B, counterclockwise from the x axis, deg."""
+    position_m: Point = (0.0, 0.0)
+    """Position of the sensor from P, in B axes, m."""
     beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
-    """Half of the opening angle of each cone, deg."""
+    """Half of the opening angle of the cone, deg."""
     minimum_range_m: Length = 0.03
     """Smallest reported range, m; nearer surfaces also give this range."""
     maximum_range_m: Length = 3.0
@@ -67,78 +68,115 @@ class UltrasonicParameters(Parameters):
     """Standard deviation of a range, m."""
     dropout_probability: Fraction = 0.0
     """Probability that an echo is lost."""
+
+
+_THREE = tuple(RangeSensorParameters(axis_deg=axis) for axis in (30.0, 0.0, -30.0))
+
+
+class UltrasonicParameters(Parameters):
+    """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
+
+    # After validation, each sensor has a complete record. The input may be shorter, see
+    # ``sensor_shorthand``.
+    model_config = ConfigDict(
+        json_schema_extra=lambda schema: add_shorthand(schema, RangeSensorParameters)
+    )
+
+    preset: SensorPreset = "three"
+    """Named set of sensors. It provides the defaults of the other fields; fields that
+    are set take precedence."""
+    sensors: Annotated[tuple[RangeSensorParameters, ...], Strict(False)] = _THREE
+    """The sensors, from left to right. Each has ``axis_deg``, and may have values of
+    its own of the fields from ``position_m`` to ``dropout_probability``. A number n
+    stands for n sensors with evenly spaced axes all around, of which the first one
+    points backward."""
     period_s: Period = TICK_S
     """Time from one firing to the next, s."""
     firing: Literal["simultaneous", "sequential"] = "simultaneous"
     """Whether all sensors fire at once, or one after the other with one period between
     them."""
-    faults: _Faults = ()
-    """Sensors that fail during a run."""
 
     @model_validator(mode="before")
     @classmethod
-    def _fill(cls, data: Any) -> Any:
-        return with_preset(data, SENSOR_PRESETS)
+    def _expand(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        check_shared(data, RangeSensorParameters)
+        return expanded(data)
+
+    @model_serializer(mode="wrap")
+    def _shorten(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return shortened_sensors(standard(self))
 
     @model_validator(mode="after")
     def _check(self) -> UltrasonicParameters:
-        if self.minimum_range_m >= self.maximum_range_m:
-            raise InputError(
-                "minimum_range_m",
-                f"{self.minimum_range_m} must be below "
-                f"maximum_range_m {self.maximum_range_m}",
-            )
-        if any(b >= a for a, b in pairwise(self.axes_deg)):
-            raise InputError(
-                "axes_deg",
-                f"{shortened(str(self.axes_deg), 80)} must fall from left to "
-                "right, for example 30, 0, -30",
-            )
+        for k, sensor in enumerate(self.sensors):
+            if sensor.minimum_range_m >= sensor.maximum_range_m:
+                raise InputError(
+                    f"sensors.{k}.minimum_range_m",
+                    f"{sensor.minimum_range_m} must be below "
+                    f"maximum_range_m {sensor.maximum_range_m}",
+                )
+        for k, (left, right) in enumerate(pairwise(self.axes_deg), start=1):
+            if right >= left:
+                raise InputError(
+                    f"sensors.{k}.axis_deg",
+                    f"{right:g} must be below {left:g}, that of the sensor before; "
+                    "list the sensors from left to right, for example 30, 0, -30",
+                )
         if self.axes_deg[0] - self.axes_deg[-1] >= 360.0:
             raise InputError(
-                "axes_deg",
+                f"sensors.{self.count - 1}.axis_deg",
                 f"{self.axes_deg[0]:g} to {self.axes_deg[-1]:g} is a turn or "
                 "more; end before the first direction repeats",
             )
-        for number, fault in enumerate(self.faults):
-            if fault.sensor > self.count:
-                raise InputError(
-                    f"faults.{number}.sensor",
-                    f"{fault.sensor} is not one of {self.count} sensors; lower it",
-                )
-        if len(self.positions_m) not in (0, 1, self.count):
-            raise InputError(
-                "positions_m",
-                f"has {len(self.positions_m)} positions for {self.count} sensors "
-                "of axes_deg; give one per sensor, one for all, or none",
-            )
         return self
-
-    @field_validator(
-        "axes_deg",
-        mode="before",
-        json_schema_input_type=_Axes | Annotated[int, Field(ge=1, le=360)],
-    )
-    @classmethod
-    def _ring(cls, axes: Any) -> Any:
-        """Replaces a number by that many directions all around, starting at 180 deg."""
-        if isinstance(axes, int) and not isinstance(axes, bool):
-            if not 1 <= axes <= 360:
-                raise InputError("", f"{axes} sensors; use 1 to 360")
-            return tuple(180.0 - 360.0 * k / axes for k in range(axes))
-        return axes
 
     @property
     def count(self) -> int:
         """Number of sensors."""
-        return len(self.axes_deg)
+        return len(self.sensors)
+
+    @property
+    def axes_deg(self) -> tuple[float, ...]:
+        """Directions of the cones in B, deg."""
+        return tuple(sensor.axis_deg for sensor in self.sensors)
+
+    @property
+    def minimum_range_m(self) -> float:
+        """Smallest range that any sensor reports, m."""
+        return float(np.min(self.each("minimum_range_m")))
+
+    @property
+    def maximum_range_m(self) -> float:
+        """Largest range of any sensor, m."""
+        return float(np.max(self.each("maximum_range_m")))
+
+    @property
+    def noise_m(self) -> float:
+        """Standard deviation of the ranges of the noisiest sensor, m."""
+        return float(np.max(self.each("noise_m")))
+
+    @property
+    def dropout_probability(self) -> float:
+        """Largest probability of any sensor that an echo is lost."""
+        return float(np.max(self.each("dropout_probability")))
 
     @property
     def places(self) -> tuple[tuple[float, float], ...]:
         """Positions of the sensors from P, in B axes, m."""
-        if len(self.positions_m) == self.count:
-            return self.positions_m
-        return (self.positions_m or ((0.0, 0.0),)) * self.count
+        return tuple(sensor.position_m for sensor in self.sensors)
+
+    def each(self, field: str) -> NDArray[np.float64]:
+        """Returns the values of a field of all sensors.
+
+        Args:
+            field: Name of a field of ``RangeSensorParameters``.
+
+        Returns:
+            (n,) values; (n, 2) for ``position_m``.
+        """
+        return np.array([getattr(sensor, field) for sensor in self.sensors])
 
     @cached_property
     def neighbours(self) -> tuple[tuple[int, int], ...]:
@@ -157,10 +195,16 @@ class UltrasonicParameters(Parameters):
         return tuple(map(math.radians, self.axes_deg))
 
     @cached_property
-    def beams(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Directions (n,), rad, and positions (n, 2), m, in B; and half angle, rad."""
-        half_angle = math.radians(self.beam_half_angle_deg)
-        return np.array(self.axes), np.array(self.places), half_angle
+    def half_angles(self) -> tuple[float, ...]:
+        """Halves of the opening angles of the cones, rad."""
+        return tuple(math.radians(each.beam_half_angle_deg) for each in self.sensors)
+
+    @cached_property
+    def beams(
+        self,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """(n,) axes, rad, (n, 2) positions, m, and (n,) half angles, rad, all in B."""
+        return np.array(self.axes), np.array(self.places), np.array(self.half_angles)
 
     def period_ticks(self, tick_s: float) -> int:
         """Number of ticks from one firing to the next.
@@ -187,35 +231,6 @@ class UltrasonicParameters(Parameters):
         turns = np.arange(self.count) * self.period_ticks(tick_s)
         return turns if self.firing == "sequential" else 0 * turns
 
-    def errors(self, stretch: float) -> tuple[float, float, float, float, float]:
-        """Errors and limits of the ranges.
-
-        Args:
-            stretch: Assumed divided by true speed of sound.
-
-        Returns:
-            The stretch, by which the ranges are too long; standard deviation of the
-            noise, m; the number ``least_luck``; smallest range, m; and largest range,
-            m.
-        """
-        limits = self.minimum_range_m, self.maximum_range_m
-        return stretch, self.noise_m, self.least_luck, *limits
-
-    def fault_ticks(self, tick_s: float) -> NDArray[np.int64]:
-        """(n, 2) kind of the fault of each sensor, 0 for none, and its first tick."""
-        ticks = np.zeros((self.count, 2), dtype=np.int64)
-        for fault in self.faults:
-            begin = round(fault.start_s / tick_s)
-            ticks[fault.sensor - 1] = fault.number, begin
-        return ticks
-
-    @cached_property
-    def least_luck(self) -> float:
-        """An echo is lost if its standard normal number is below this."""
-        from scipy.special import ndtri  # takes longer to load than all parameters
-
-        return float(ndtri(self.dropout_probability))
-
 
 Aggregation = Literal["paper", "nearest", "sum"]
 VelocityTerm = Literal["printed", "closing"]
@@ -229,33 +244,9 @@ class CollisionVectorParameters(Parameters):
     If both neighbors are close enough, the echo nearer to P is used. ``nearest``: only
     the nearest echo. ``sum``: one vector per pair and per unpaired echo, but only the
     nearest three vectors. The forces of the vectors are added."""
-    pair_separation_m: NonNegativeLength = 0.5
-    """Largest distance between two echoes of the same obstacle, m."""
     velocity_term: VelocityTerm = "printed"
     """Definition of the speed s of an obstacle in the laws: ``printed`` is |dC/dt|,
     ``closing`` is the speed of approach only."""
-
-
-class ContactFaultParameters(Parameters):
-    """A switch that fails during a run, and the kind of its fault."""
-
-    switch: int = Field(default=1, ge=1, le=2)
-    """Number of the switch: 1 is left, 2 is right."""
-    kind: Literal["stuck_open", "stuck_closed"] = "stuck_open"
-    """``stuck_open``: the switch never closes; ``stuck_closed``: it never opens."""
-    start_s: Time = 0.0
-    """Start of the fault, s."""
-
-
-class ContactParameters(Parameters):
-    """The two switches behind the front bumper (Song 2011, 2.1), with our sizes."""
-
-    reach_m: Length = 0.01
-    """Distance between a body and the front edge up to which a switch closes, m."""
-    faults: Annotated[
-        tuple[ContactFaultParameters, ...], Strict(False), Field(max_length=2)
-    ] = ()
-    """Switches that fail during a run."""
 
 
 class ObjectSensorParameters(Parameters):

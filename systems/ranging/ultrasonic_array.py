@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
+from systems.framework.faults import (
+    BLIND,
+    FROZEN,
+    NOISY,
+    SILENT,
+    Fault,
+    fault_ticks,
+)
 from systems.framework.finite import check_finite
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.parameters import (
@@ -18,12 +27,6 @@ from systems.framework.parameters import (
 )
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
-from systems.ranging.sensor_faults import (
-    BLIND,
-    FROZEN,
-    NOISY,
-    SILENT,
-)
 from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.world.geometry import fan_ranges
 
@@ -104,46 +107,67 @@ def cone_ranges(
     return fan_ranges(pose, rectangles, *parameters.beams, control_point_m)
 
 
+class RangeErrors(NamedTuple):
+    """Errors and limits of the ranges."""
+
+    stretch: float
+    """Factor of all ranges, due to the assumed speed of sound."""
+    noise_m: NDArray[np.float64]
+    """(n,) standard deviation of the noise of each sensor, m."""
+    least_luck: NDArray[np.float64]
+    """(n,) an echo is lost if its standard normal number is below this."""
+    low_m: NDArray[np.float64]
+    """(n,) smallest range of each sensor, m."""
+    high_m: NDArray[np.float64]
+    """(n,) largest range of each sensor, m."""
+
+
+def range_errors(parameters: UltrasonicParameters, stretch: float = 1.0) -> RangeErrors:
+    """Collects the errors of all sensors.
+
+    Args:
+        parameters: The sensors.
+        stretch: Assumed divided by true speed of sound.
+
+    Returns:
+        The errors, one element per sensor.
+    """
+    from scipy.special import ndtri  # takes longer to load than all parameters
+
+    return RangeErrors(
+        stretch,
+        parameters.each("noise_m"),
+        ndtri(parameters.each("dropout_probability")),
+        parameters.each("minimum_range_m"),
+        parameters.each("maximum_range_m"),
+    )
+
+
+@njit(cache=True)
 def measured_ranges(
     true_ranges: NDArray[np.float64],
-    parameters: UltrasonicParameters,
     numbers: NDArray[np.floating],
-    stretch: float = 1.0,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    errors: RangeErrors,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     """Ranges that the sensors report.
 
     Args:
         true_ranges: (n,) true ranges, m; infinite where a cone is empty.
-        parameters: Errors of the sensors.
         numbers: (2, n) standard normal numbers. The first row is the noise. The second
-            row decides about dropouts: an echo is lost if its number is below the
-            quantile of the dropout probability.
-        stretch: Assumed divided by true speed of sound.
+            row decides about dropouts.
+        errors: Errors and limits of the n sensors.
 
     Returns:
-        (n,) ranges in [minimum, maximum], m, and (n,) echoes, 0 or 1. Without an echo,
-        the range is finite but has no meaning.
+        (n,) ranges within the limits of each sensor, m, and (n,) echoes, 0 or 1.
+        Without an echo, the range is the largest one and has no meaning.
     """
-    return _measured_ranges(true_ranges, numbers, *parameters.errors(stretch))
-
-
-@njit(cache=True)
-def _measured_ranges(
-    true_ranges: NDArray[np.float64],
-    numbers: NDArray[np.floating],
-    stretch: float,
-    noise_m: float,
-    least_luck: float,
-    low: float,
-    high: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     count = len(true_ranges)
-    ranges, echo = np.full(count, high), np.zeros(count)
+    ranges, echo = np.copy(errors.high_m), np.zeros(count)
     for k in range(count):
         noise, luck = numbers[0, k], numbers[1, k]
-        if true_ranges[k] <= high and luck >= least_luck:
-            measured = stretch * true_ranges[k] + noise_m * noise
-            ranges[k] = min(max(measured, low), high)
+        if true_ranges[k] <= errors.high_m[k] and luck >= errors.least_luck[k]:
+            measured = errors.stretch * true_ranges[k] + errors.noise_m[k] * noise
+            ranges[k] = min(max(measured, errors.low_m[k]), errors.high_m[k])
             echo[k] = 1.0
     return ranges, echo
 
@@ -155,14 +179,13 @@ class UltrasonicNumbers(NamedTuple):
     """(n,) directions of the cones in B, rad."""
     places: NDArray[np.float64]
     """(n, 2) positions of the sensors from P in B axes, m."""
-    half_angle: float
-    """Half of the opening angle of the cones, rad."""
+    half_angles: NDArray[np.float64]
+    """(n,) halves of the opening angles of the cones, rad."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     source_size: tuple[float, float]
     """Length and width of the leader, m."""
-    errors: tuple[float, float, float, float, float]
-    """See ``UltrasonicParameters.errors``."""
+    errors: RangeErrors
     noise: TickNoise
     turns: NDArray[np.int64]
     """(n,) tick within the round at which each sensor fires."""
@@ -170,7 +193,7 @@ class UltrasonicNumbers(NamedTuple):
     """Length of a round, ticks."""
     tick_s: float
     faults: NDArray[np.int64]
-    """(n, 2) faults, see ``UltrasonicParameters.fault_ticks``."""
+    """(n, 2) faults, see ``fault_ticks``."""
 
 
 def ultrasonic_step(
@@ -222,11 +245,12 @@ def _read_ranges(
     ticks at which it fires. The outputs are the stored readings and their ages.
     """
     ranges, echo, ages = outputs
-    beams = numbers.axes, numbers.places, numbers.half_angle
+    beams = numbers.axes, numbers.places, numbers.half_angles
+    errors = numbers.errors
     true = fan_ranges(pose_WB, bodies, *beams, numbers.control_point_m)
     count = len(true)
     normals = tick_normals(numbers.noise, tick, 2, count)
-    new_ranges, new_echo = _measured_ranges(true, normals, *numbers.errors)
+    new_ranges, new_echo = measured_ranges(true, normals, errors)
     for k in range(count):
         age = (tick - numbers.turns[k]) % numbers.round
         kind, begin = numbers.faults[k]
@@ -235,11 +259,10 @@ def _read_ranges(
             # The age counts from the last reading before the fault.
             age = late + 1 + (begin - 1 - numbers.turns[k]) % numbers.round
         elif late >= 0 and kind == BLIND:
-            new_ranges[k], new_echo[k] = numbers.errors[4], 0.0
+            new_ranges[k], new_echo[k] = errors.high_m[k], 0.0
         elif late >= 0 and kind == NOISY:
-            low, high = numbers.errors[3], numbers.errors[4]
             range_ = new_ranges[k] + _NOISY_M * float(normals[0, k])
-            new_ranges[k] = min(max(range_, low), high)
+            new_ranges[k] = min(max(range_, errors.low_m[k]), errors.high_m[k])
         if age == 0 and (late < 0 or kind != FROZEN):
             state[k], state[count + k] = new_ranges[k], new_echo[k]
         ranges[k], echo[k] = state[k], state[count + k]
@@ -248,6 +271,9 @@ def _read_ranges(
 
 class UltrasonicArray(Block):
     """Measures the ranges of the nearest surfaces in cones.
+
+    Each sensor has its own position, cone, range and errors, so that sensors of
+    different kinds can work together.
 
     The leader is a body like the obstacles; without a leader there is no port
     ``pose_WS``. Surfaces beyond the maximum range give no echo. Surfaces nearer than
@@ -264,7 +290,8 @@ class UltrasonicArray(Block):
     a round of 75 ms.
 
     Args:
-        parameters: Positions, directions, errors and faults of the sensors.
+        parameters: The sensors, and the times at which they fire.
+        faults: Faults of the robot; those of ``ultrasonic`` apply.
         robot: Position of P.
         sound_speed_m_s: True speed of sound, m/s.
         assumed_sound_speed_m_s: Speed of sound with which the sensors convert time to
@@ -275,7 +302,8 @@ class UltrasonicArray(Block):
         tick_s: Control period of the robot, s.
 
     Raises:
-        InputError: The period of the sensors is not a multiple of the tick.
+        InputError: The period of the sensors is not a multiple of the tick, or a fault
+            is that of a missing sensor.
     """
 
     part, stage = "ultrasonic", "obstacle sensing"
@@ -295,6 +323,7 @@ class UltrasonicArray(Block):
         self,
         *,
         parameters: UltrasonicParameters = UltrasonicParameters(),
+        faults: Sequence[Fault] = (),
         robot: RobotParameters = RobotParameters(),
         sound_speed_m_s: float = SOUND_SPEED_M_S,
         assumed_sound_speed_m_s: float | None = None,
@@ -311,20 +340,21 @@ class UltrasonicArray(Block):
             *parameters.beams,
             robot.control_point_m,
             source_size or (0.0, 0.0),
-            parameters.errors(
-                (assumed_sound_speed_m_s or sound_speed_m_s) / sound_speed_m_s
+            range_errors(
+                parameters,
+                (assumed_sound_speed_m_s or sound_speed_m_s) / sound_speed_m_s,
             ),
             tick_noise(seed),
             parameters.turns(tick_s),
             parameters.round_ticks(tick_s),
             tick_s,
-            parameters.fault_ticks(tick_s),
+            fault_ticks(faults, "ultrasonic", count, tick_s),
         )
         self.declare(
             Step(
                 ultrasonic_step if source_size else sourceless_ultrasonic_step,
                 numbers,
-                [parameters.maximum_range_m] * count + [0.0] * count,
+                [*parameters.each("maximum_range_m").tolist(), *[0.0] * count],
             ),
             tick_s=tick_s,
             sizes={"bodies": obstacle_count, "sensors": count},

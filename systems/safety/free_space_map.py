@@ -28,7 +28,7 @@ from systems.safety.views import (
     PlaceError,
     Sectors,
     lasting,
-    range_error,
+    range_errors,
     sensor_sectors,
 )
 
@@ -44,8 +44,9 @@ class MapNumbers(NamedTuple):
     """(sensors, 2) direction of the axis in B and half of the aperture, rad."""
     places: NDArray[np.float64]
     """(sensors, 2) position relative to the axle in B, m."""
-    limits: tuple[float, float, float]
-    """Least and greatest range, and largest amount by which a range is too long, m."""
+    limits: NDArray[np.float64]
+    """(sensors, 3) least and greatest range, and largest amount by which a range is too
+    long, m."""
     error: PlaceError
     """Quantities that determine the position error of a cell due to odometry."""
     least_way: float
@@ -83,7 +84,6 @@ def map_step(
     ranges, echo, ages, pose, commanded = inputs
     space, was_at, error = state.free_space, state.was_at, numbers.error
     time = tick * numbers.tick_s
-    low, high, margin = numbers.limits
     move_window(space, pose[0], pose[1])
     # The first tick clears the bubble. Each later tick adds the way rolled since the
     # tick before.
@@ -112,6 +112,7 @@ def map_step(
         readings[k, 0], readings[k, 1] = 0.0, np.inf
         if ages[k] > 0.5 * numbers.tick_s:
             continue
+        low, high, margin = numbers.limits[k]
         # For an object nearer than the least range, the sensor reports the least range.
         # In this case, nothing counts as free.
         if echo[k] < 0.5:
@@ -208,22 +209,24 @@ class FreeSpaceMap(Block):
         super().__init__()
         parameters.check(robot)
         self.set_name("free_space_map")
-        axes, places, half_angle = sensors.beams
+        axes, places, half_angles = sensors.beams
         place_error = PlaceError.of(parameters, robot, odometry)
         least_way = 0.0
         if place_error.pulse_m > 0.0:
             motion = lagged_motion(tick_s, plant.motor_lag_s)
             steady = robot.wheel_radius_m * tick_s
             least_way = motion.least_share * steady
-        points = 2 + math.ceil(2.0 * half_angle / _ARC_STEP)
+        points = 2 + math.ceil(2.0 * max(half_angles) / _ARC_STEP)
         numbers = MapNumbers(
             sensor_sectors(sensors, robot.control_point_m),
-            np.column_stack([axes, np.full(len(axes), half_angle)]),
+            np.column_stack([axes, half_angles]),
             np.add(places, [robot.control_point_m, 0.0]),
-            (
-                sensors.minimum_range_m,
-                sensors.maximum_range_m,
-                range_error(sensors),
+            np.column_stack(
+                [
+                    sensors.each("minimum_range_m"),
+                    sensors.each("maximum_range_m"),
+                    range_errors(sensors),
+                ]
             ),
             place_error,
             least_way,

@@ -45,18 +45,18 @@ class MonitorNumbers(NamedTuple):
 
     limits: tuple[float, float]
     """Largest motion of the axle, m, and of the heading, rad, in one tick."""
-    ranges: tuple[float, float]
-    """Least and greatest range, m. Only ranges between these limits are checked for
-    equal echoes."""
+    ranges: NDArray[np.float64]
+    """(n, 2) least and greatest range of each sensor, m. Only ranges between these
+    limits are checked for equal echoes."""
     silent_s: float
     """A sensor is silent if its range is older than this, s."""
-    equal: float
-    """A sensor is frozen after this number of equal echoes. The number is infinite
+    equal: NDArray[np.float64]
+    """(n,) a sensor is frozen after this number of equal echoes. The number is infinite
     without noise."""
-    turn_rad: float
-    """Largest turn during which echoes may stay equal, rad."""
-    step_m: float
-    """Largest second difference of a range that motion and noise can cause, m."""
+    turn_rad: NDArray[np.float64]
+    """(n,) largest turn during which echoes may stay equal, rad."""
+    step_m: NDArray[np.float64]
+    """(n,) largest second difference of a range that motion and noise can cause, m."""
     tick_s: float
 
 
@@ -96,18 +96,18 @@ def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untype
     While the robot turns slowly, it checks the second difference of the last three
     ranges, and updates the mean share of strange readings.
     """
-    last, heard, (low, high) = state.last[k], state.heard[k], numbers.ranges
+    last, heard, (low, high) = state.last[k], state.heard[k], numbers.ranges[k]
     if heard > 0.5 and range_ == last and low < range_ < high:
         state.equal[k] += 1.0
     else:
         state.equal[k], state.heading[k] = 0.0, heading
     if heard > 1.5 and slow:
         change = range_ - 2.0 * last + state.before[k]
-        strange = 1.0 if abs(change) > numbers.step_m else 0.0
+        strange = 1.0 if abs(change) > numbers.step_m[k] else 0.0
         state.strange[k] += _PART * (strange - state.strange[k])
     state.last[k], state.before[k], state.heard[k] = range_, last, heard + 1.0
     turned = abs(heading - state.heading[k])
-    if state.equal[k] >= numbers.equal or turned > numbers.turn_rad:
+    if state.equal[k] >= numbers.equal[k] or turned > numbers.turn_rad[k]:
         return _FROZEN
     return _NOISY if state.strange[k] > _MOST_STRANGE else _NONE
 
@@ -203,14 +203,16 @@ class SensingMonitor(Block):
         super().__init__()
         self.set_name("sensing_monitor")
         way = _FASTER * robot.top_wheel_speed * robot.wheel_radius_m * tick_s
-        round_s = sensors.round_ticks(tick_s) * tick_s
+        round_s, noise_m = sensors.round_ticks(tick_s) * tick_s, sensors.each("noise_m")
         numbers = MonitorNumbers(
             (way, 2.0 * way / robot.wheel_separation_m),
-            (sensors.minimum_range_m, sensors.maximum_range_m),
+            np.column_stack(
+                [sensors.each("minimum_range_m"), sensors.each("maximum_range_m")]
+            ),
             max(_ROUNDS * round_s, _SILENT_S),
-            _MOST_EQUAL if sensors.noise_m > 0.0 else math.inf,
-            2.0 * math.radians(sensors.beam_half_angle_deg) + _BESIDE_RAD,
-            _STEP_M + _STEP_M_S2 * round_s**2 + _SIGMAS * sensors.noise_m,
+            np.where(noise_m > 0.0, float(_MOST_EQUAL), math.inf),
+            2.0 * np.array(sensors.half_angles) + _BESIDE_RAD,
+            _STEP_M + _STEP_M_S2 * round_s**2 + _SIGMAS * noise_m,
             tick_s,
         )
         sizes = [3, 1] + [sensors.count] * (len(MonitorState._fields) - 2)

@@ -131,9 +131,9 @@ def lasting(distance: float, error: PlaceError) -> float:
     return (math.sqrt(b * b + 4.0 * a * left) - b) / (2.0 * a)
 
 
-def range_error(sensors: UltrasonicParameters) -> float:
-    """Returns the largest amount by which a range is too long, m."""
-    return RANGE_MARGIN_M + _SIGMAS * sensors.noise_m
+def range_errors(sensors: UltrasonicParameters) -> NDArray[np.float64]:
+    """(n,) largest amounts by which the ranges of each sensor are too long, m."""
+    return RANGE_MARGIN_M + _SIGMAS * sensors.each("noise_m")
 
 
 def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sectors:
@@ -146,13 +146,13 @@ def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sec
     Returns:
         The sectors.
     """
-    half = math.radians(sensors.beam_half_angle_deg)
+    axes, halves = sensors.axes, sensors.half_angles
     places: dict[tuple[float, float], list[int]] = {}
     for k, place in enumerate(sensors.places):
         places.setdefault(place, []).append(k)
     first, right, left, seen_by = [0], [], [], []
     for members in places.values():
-        spans = [(sensors.axes[k] - half, sensors.axes[k] + half) for k in members]
+        spans = [(axes[k] - halves[k], axes[k] + halves[k]) for k in members]
         for a, b in _between(spans):
             middle = 0.5 * (a + b)
             right.append(a)

@@ -9,26 +9,7 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.framework.finite import check_finite
-from systems.framework.input_error import InputError
 from systems.sound.parameters import MicArrayParameters
-
-
-def check_faults(parameters: MicArrayParameters, count: int) -> None:
-    """Refuses faults of microphones that do not exist.
-
-    Args:
-        parameters: Parameters with the faults.
-        count: Number of microphones.
-
-    Raises:
-        InputError: The number of a faulty microphone is above ``count``.
-    """
-    beyond = [f.microphone for f in parameters.faults if f.microphone > count]
-    if beyond:
-        raise InputError(
-            "microphones.faults",
-            f"microphone {beyond[0]} of {count}; give a number from 1 to {count}",
-        )
 
 
 @njit(cache=True)

@@ -12,6 +12,7 @@ from pydrake.systems.framework import BasicVector
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
 from systems.framework.cache import declare_cache
+from systems.framework.faults import Fault
 from systems.framework.finite import check_finite, check_record, read_arrays
 from systems.framework.host_step import host_step
 from systems.framework.signals import (
@@ -85,6 +86,7 @@ class MicArray(Block):
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound, m/s.
         room: Walls, if there are any.
+        faults: Faults of the robot; those of ``microphones`` apply.
         others: Names of further sources that the robot does not follow. Each name adds
             an input port ``emission_<name>`` [Emission].
         seed: Seed of the noise and of the errors of the array.
@@ -110,6 +112,7 @@ class MicArray(Block):
         robot: RobotParameters = RobotParameters(),
         sound_speed_m_s: float = SOUND_SPEED_M_S,
         room: RoomParameters | None = None,
+        faults: Sequence[Fault] = (),
         others: Sequence[str] = (),
         seed: int = 0,
     ) -> None:
@@ -124,6 +127,7 @@ class MicArray(Block):
             room=room,
             sources=1 + len(others),
             seed=seed,
+            faults=faults,
         )
         self._declare_errors(sound_speed_m_s)
         followed, *motion = self.inputs

@@ -98,18 +98,6 @@ class SoundParameters(Parameters):
         return (phase >= 0.0) & (phase % self.period_s < self.on_s)
 
 
-class MicrophoneFaultParameters(Parameters):
-    """A microphone that fails during a run, and the kind of its fault."""
-
-    microphone: int = Field(default=1, ge=1, le=64)
-    """Number of the microphone, starting at 1."""
-    kind: Literal["dead", "frozen"] = "dead"
-    """``dead``: its counts are 0; ``frozen``: its counts stay at a quarter of full
-    scale."""
-    start_s: Time = 0.0
-    """Start of the fault, s."""
-
-
 class MicArrayParameters(Parameters):
     """Microphones, amplifier and converter (Han 2019, 4.1)."""
 
@@ -157,10 +145,6 @@ class MicArrayParameters(Parameters):
     """Largest time by which each channel is sampled earlier or later, s."""
     gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
     """Largest error of the gain of each channel, noise included, dB."""
-    faults: Annotated[
-        tuple[MicrophoneFaultParameters, ...], Strict(False), Field(max_length=64)
-    ] = ()
-    """Microphones that fail during a run."""
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
@@ -175,13 +159,6 @@ class MicArrayParameters(Parameters):
                 "sample_rate_hz",
                 f"{self.sample_rate_hz:g} Hz gives {samples:.4f} samples in a frame of "
                 f"{self.frame_s:g} s; use {round(samples) / self.frame_s:g}",
-            )
-        failing = [fault.microphone for fault in self.faults]
-        if len({*failing}) < len(failing):
-            raise InputError(
-                "faults",
-                f"microphones {failing}: a microphone has two faults; keep "
-                "one fault per microphone",
             )
         return self
 

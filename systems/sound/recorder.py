@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from typing import NamedTuple
 
@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters, microphones_B
+from systems.framework.faults import Fault, faults_of
 from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.framework.signals import AudioFrame, Emission, read_only
-from systems.sound.adc import check_faults, convert
+from systems.sound.adc import convert
 from systems.sound.array_tolerances import RealArray, draw_tolerances, real_array
 from systems.sound.ego_noise import EgoNoise
 from systems.sound.parameters import (
@@ -38,6 +39,7 @@ def record_frame(
     seed: int,
     reflections: Sequence[NDArray[np.float32] | None] = (),
     ego_noise: NDArray[np.float32] | None = None,
+    faults: Mapping[int, Fault] | None = None,
 ) -> AudioFrame:
     """Frame that ends now.
 
@@ -53,6 +55,7 @@ def record_frame(
             Pa, or None if the source is silent.
         ego_noise: (n, samples) ego noise divided by the level of the first source at 1
             m.
+        faults: Fault of each microphone that fails, by its index.
 
     Returns:
         (n, samples) counts, with their full scale, rate and time.
@@ -69,10 +72,9 @@ def record_frame(
         noise += np.float32(snr) * ego_noise
     noise_pa = emissions[0].level_pa / snr
     counts = convert(pressure, noise, noise_pa, parameters, array.gains)
-    for fault in parameters.faults:
-        if time > fault.start_s and fault.microphone <= len(counts):
-            rest = parameters.full_scale // 4 if fault.kind == "frozen" else 0
-            counts[fault.microphone - 1] = rest
+    for k, fault in (faults or {}).items():
+        if time > fault.start_s:
+            counts[k] = parameters.full_scale // 4 if fault.kind == "frozen" else 0
     read_only(counts)
     return AudioFrame(
         counts=counts,
@@ -134,6 +136,7 @@ class Recorder:
         room: Walls, if there are any.
         sources: Number of sources.
         seed: Seed of the noise and of the errors of the array.
+        faults: Faults of the robot; those of ``microphones`` apply.
 
     Raises:
         ValueError: See ``MicArray``.
@@ -148,8 +151,10 @@ class Recorder:
         room: RoomParameters | None,
         sources: int,
         seed: int,
+        faults: Sequence[Fault] = (),
     ) -> None:
-        check_faults(parameters, len(robot.microphones_m))
+        count = len(robot.microphones_m)
+        self._faults = faults_of(faults, "microphones", count)
         self._parameters, self._robot, self._c = parameters, robot, c
         self._reverberation, self._ego_noise, places = None, None, None
         if room:
@@ -157,7 +162,7 @@ class Recorder:
             self._update_frames = max(1, round(UPDATE_PERIOD_S / parameters.frame_s))
             places = np.r_[-np.inf, np.zeros(3 + 2 * sources)]
         if parameters.ego_noise_file is not None:
-            self._ego_noise = EgoNoise(parameters, len(robot.microphones_m), seed)
+            self._ego_noise = EgoNoise(parameters, count, seed)
         self.blank = MicMemory(np.r_[-np.inf, np.zeros(6)], places)
         """State before the first frame."""
         self._draw(seed)
@@ -275,4 +280,5 @@ class Recorder:
             seed=self._seed,
             reflections=self._reflections(emissions, time, pose, memory.places, array),
             ego_noise=ego_noise,
+            faults=self._faults,
         )

@@ -205,7 +205,7 @@ def fan_ranges(
     rectangles: NDArray[np.float64],
     axes: NDArray[np.float64],
     places: NDArray[np.float64],
-    half_angle: float,
+    half_angles: NDArray[np.float64],
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes ``cone_range`` for each sensor of a body.
@@ -215,7 +215,7 @@ def fan_ranges(
         rectangles: (m, 5) rectangles in W.
         axes: (n,) directions of the cones in B, rad.
         places: (n, 2) positions of the sensors relative to P in the axes of B, m.
-        half_angle: Half of the opening angle, rad.
+        half_angles: (n,) halves of the opening angles, rad.
         control_point_m: Distance of P ahead of the origin of B, m.
 
     Returns:
@@ -230,7 +230,7 @@ def fan_ranges(
             x + c * ahead - s * left,
             y + s * ahead + c * left,
             theta + axes[k],
-            half_angle,
+            half_angles[k],
             rectangles,
         )
     return ranges

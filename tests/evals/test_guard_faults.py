@@ -27,8 +27,12 @@ def faulty(law, *settings, name="two_static_obstacles"):
 @pytest.mark.parametrize(
     ("setting", "fault", "sensor"),
     [
-        ("ultrasonic.faults=[{sensor: 2, kind: silent, start_s: 3}]", "silent", 2),
-        ("odometry.lost_at_s=3", "odometry lost", 0),
+        (
+            "faults=[{sensor: ultrasonic, number: 2, kind: silent, start_s: 3}]",
+            "silent",
+            2,
+        ),
+        ("faults=[{sensor: odometry, kind: lost, start_s: 3}]", "odometry lost", 0),
     ],
 )
 def test_it_stops_and_says_why(law, setting, fault, sensor):
@@ -52,7 +56,7 @@ def test_it_stops_and_says_why(law, setting, fault, sensor):
 @pytest.mark.parametrize("kind", ["frozen", "noisy"])
 def test_echoes_that_cannot_be_halt_it_before_a_wall(kind):
     """They are known once there are echoes; what reads none may be right."""
-    fault = f"ultrasonic.faults=[{{sensor: 2, kind: {kind}, start_s: 2}}]"
+    fault = f"faults=[{{sensor: ultrasonic, number: 2, kind: {kind}, start_s: 2}}]"
     run = faulty("active", fault, name="u_trap")
     assert run.collision is None
     (halt, *_) = halts_of(run)

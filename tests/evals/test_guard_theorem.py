@@ -28,7 +28,7 @@ from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.ranging.parameters import UltrasonicParameters
-from systems.ranging.ultrasonic_array import measured_ranges
+from systems.ranging.ultrasonic_array import RangeErrors, measured_ranges, range_errors
 from systems.safety.braking import braked, roll_on
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
@@ -73,11 +73,12 @@ def test_a1_obstacles_rest_else_they_come_from_where_nobody_looks():
 def test_a2_no_obstacle_is_nearer_than_a_reading_inside_its_aperture():
     """Points of boxes, outline and inside, against the ranges of the cones."""
     draw, inside_any = np.random.default_rng(0), 0
-    axes, places, half = UltrasonicParameters().beams
+    axes, places, halves = UltrasonicParameters().beams
+    half = halves[0]
     for _ in range(300):
         pose = draw.uniform(-1.0, 1.0, 3)
         boxes = draw.uniform([-2, -2, -3, 0.02, 0.02], [2, 2, 3, 1.0, 1.0], (4, 5))
-        ranges = fan_ranges(pose, boxes, axes, places, half, 0.175)
+        ranges = fan_ranges(pose, boxes, axes, places, halves, 0.175)
         sensor = pose[:2] + 0.175 * np.array([math.cos(pose[2]), math.sin(pose[2])])
         for x, y, theta, length, width in boxes:
             u, v = draw.uniform(-0.5, 0.5, (2, 400))
@@ -96,13 +97,16 @@ def test_a2_no_obstacle_is_nearer_than_a_reading_inside_its_aperture():
 @pytest.mark.parametrize("noise_m", [0.0, 0.001, 0.01])
 def test_a2_noise_stays_below_the_margin_but_for_one_range_in_millions(noise_m):
     """The margin is 2 mm and five standard deviations: 3e-7 by Gauss."""
-    sensors = UltrasonicParameters(noise_m=noise_m)
-    margin = FreeSpaceMap(sensors=sensors).step.numbers.limits[2]
+    sensors = UltrasonicParameters.model_validate({"noise_m": noise_m})
+    sensors = sensors.model_copy(update={"sensors": sensors.sensors[:1]})
+    ((_, _, margin),) = FreeSpaceMap(sensors=sensors).step.numbers.limits
     assert margin == pytest.approx(0.002 + 5.0 * noise_m)
     draw = np.random.default_rng(1)
     numbers = draw.standard_normal((2, 300_000))
     true = draw.uniform(0.1, 3.2, 300_000)
-    ranges, echo = measured_ranges(true, sensors, numbers)
+    stretch, *limits = range_errors(sensors)
+    errors = RangeErrors(stretch, *(np.repeat(each, len(true)) for each in limits))
+    ranges, echo = measured_ranges(true, numbers, errors)
     seen = np.where(echo > 0.5, ranges, 3.0) - margin
     assert (seen < true).all()
 

@@ -126,13 +126,13 @@ def test_slower_sensors_enter_all_of_the_map(slower):
 
 def test_the_law_brings_its_guard():
     scenario = load_scenario("default", ["law=guarded"])
-    assert scenario.guard is None
+    assert scenario.follower.guard is None
     fine = load_scenario("default", ["law=guarded", "guard.cell_m=0.04"])
     for each in (scenario, fine):
-        guard = each.all_robots["robot"].own_guard
+        guard = each.only.own_guard
         assert guard is not None
         assert guard.obstacle_speed_m_s == 0.6
-    assert load_scenario("default").all_robots["robot"].own_guard is None
+    assert load_scenario("default").only.own_guard is None
 
 
 def test_it_needs_ranges():

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from diagrams.scenario.loading import load_scenario
 from diagrams.scenario.scenario import Scenario
 
 #: What a run is made short with, where it should come to that.
@@ -78,31 +79,31 @@ _NAMES = (
 LAWS = """
 import functools, math, sys
 from pydrake.systems.framework import LeafSystem
-def good(c, s, repulsion): return 1.0 / c
+def good(c, s, laws): return 1.0 / c
 def two(c, s): return 1.0
-def none(c, s, repulsion): pass
-def nan(c, s, repulsion): return float("nan")
-def infinite(c, s, repulsion): return float("inf")
-def text(c, s, repulsion): return "x" * 100000
-def imaginary(c, s, repulsion): return 1j
-def listed(c, s, repulsion): return [1.0]
-def raises(c, s, repulsion): raise KeyError("k" * 10000)
-def leaves(c, s, repulsion): sys.exit(0)
-def stops(c, s, repulsion): raise KeyboardInterrupt
+def none(c, s, laws): pass
+def nan(c, s, laws): return float("nan")
+def infinite(c, s, laws): return float("inf")
+def text(c, s, laws): return "x" * 100000
+def imaginary(c, s, laws): return 1j
+def listed(c, s, laws): return [1.0]
+def raises(c, s, laws): raise KeyError("k" * 10000)
+def leaves(c, s, laws): sys.exit(0)
+def stops(c, s, laws): raise KeyboardInterrupt
 class Odd(BaseException): pass
-def odd(c, s, repulsion): raise Odd("o" * 10000)
-def late_odd(c, s, repulsion): return odd(c, s, 0) if c < 2.4 else 1.0 / c
-def late(c, s, repulsion): return math.sqrt(0.5 - c) if c < 2.4 else 1.0 / c
-def near(c, s, repulsion): return 1.0 / c if c > 2.0 or c < 0.2 else None
+def odd(c, s, laws): raise Odd("o" * 10000)
+def late_odd(c, s, laws): return odd(c, s, 0) if c < 2.4 else 1.0 / c
+def late(c, s, laws): return math.sqrt(0.5 - c) if c < 2.4 else 1.0 / c
+def near(c, s, laws): return 1.0 / c if c > 2.0 or c < 0.2 else None
 class Plain: pass
 class Block(LeafSystem): pass
 class Portless(LeafSystem):
-    def __init__(self, robot, attraction, repulsion): super().__init__()
+    def __init__(self, robot, attraction, laws): super().__init__()
 class Rude:
     def __repr__(self): raise RuntimeError("no")
-    def __call__(self, c, s, repulsion): return self
+    def __call__(self, c, s, laws): return self
 rude = Rude()
-partial = functools.partial(lambda k, c, s, repulsion: k / c, 2.0)
+partial = functools.partial(lambda k, c, s, laws: k / c, 2.0)
 number = 5
 """
 _LAW_NAMES = [
@@ -136,7 +137,7 @@ _LAW_FILES = {
     "stops.py": "raise KeyboardInterrupt\n",
     "odd.py": "class Odd(BaseException): pass\nraise Odd('x' * 5000)\n",
     "closes.py": "raise GeneratorExit\n",
-    "talks.py": "print('a line')\ndef good(c, s, repulsion): return 1.0 / c\n",
+    "talks.py": "print('a line')\ndef good(c, s, laws): return 1.0 / c\n",
     "raises.py": "raise RuntimeError('x' * 5000)\n",
     "imports.py": "import nothing_of_that_name\n",
     "empty.py": "",
@@ -195,14 +196,16 @@ def _value(draw: random.Random) -> str:
     return draw.choice(_VALUES).replace("·", " ")
 
 
-def _fields() -> list[str]:
-    """Dotted paths of all fields of a scenario with one of everything."""
-    one_of_each = {
-        "obstacles": [{"name": "box"}],
-        "robots": {"robot": {}, "other": {"start": {"position_m": [-2.0, 0.0]}}},
-        "sources": {"source": {}, "radio": {"waypoints_m": [[0.0, 3.0]]}},
-        "room": {},
-    }
+_ONE_OF_EACH = {
+    "obstacles": [{"name": "box"}],
+    "robots": {"robot": {}, "other": {"start": {"position_m": [-2.0, 0.0]}}},
+    "sources": {"source": {}, "radio": {"waypoints_m": [[0.0, 3.0]]}},
+    "room": {},
+}
+
+
+def _fields(scenario: Scenario) -> list[str]:
+    """Dotted paths of all fields of a scenario."""
     found: list[str] = []
 
     def walk(value: Any, path: str) -> None:
@@ -211,13 +214,17 @@ def _fields() -> list[str]:
         for key, item in items or enumerate(value if isinstance(value, list) else ()):
             walk(item, f"{path}.{key}")
 
-    plain = Scenario.model_validate(one_of_each).model_dump(mode="json")
-    for key, value in plain.items():
+    for key, value in scenario.model_dump(mode="json").items():
         walk(value, key)
     return found
 
 
-_FIELDS = _fields()
+_FIELDS = _fields(Scenario.model_validate(_ONE_OF_EACH))
+#: Fields of robots that do not follow a sound, by a scenario that has them.
+_OTHER_FIELDS = {
+    name: _fields(load_scenario(name))
+    for name in ("unknown_block", "odor_search", "sound_search")
+}
 
 
 def _words(draw: random.Random) -> Made:
@@ -265,10 +272,16 @@ def _words(draw: random.Random) -> Made:
 
 def _settings(draw: random.Random) -> Made:
     """Any field with any value."""
-    words = ["simulate", *SHORT]
-    words += ["--set", draw.choice(["hearing=ideal", "hearing=ideal", "hearing=audio"])]
+    words, fields = ["simulate", *SHORT], _FIELDS
+    if draw.random() < 0.3:
+        name = draw.choice([*_OTHER_FIELDS])
+        words.insert(1, name)
+        fields = _OTHER_FIELDS[name]
+    else:
+        hearing = draw.choice(["hearing=ideal", "hearing=ideal", "hearing=audio"])
+        words += ["--set", hearing]
     for _ in range(draw.choice([1, 1, 1, 2])):
-        key = draw.choice(_FIELDS)
+        key = draw.choice(fields)
         if draw.random() < 0.1:
             key = draw.choice(
                 [f"{key}.x", f".{key}", f"{key}.", "x" * 5000, "a\nb", ""]

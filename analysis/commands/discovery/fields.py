@@ -38,8 +38,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[list[Field]]:
     from diagrams.scenario.fields.field_list import fields_of_law, find_fields
-    from diagrams.scenario.fields.near_miss import unknown_law
     from diagrams.scenario.fields.shipped import scenario_schema, schema_text
+    from diagrams.scenario.suggestions import unknown_law
     from systems.laws.catalogue import LAWS
 
     schema = scenario_schema()

@@ -76,6 +76,7 @@ def _hearing(
             robot=robot.robot,
             sound_speed_m_s=scenario.sound_speed_m_s,
             room=scenario.room,
+            faults=robot.faults,
             others=others,
             seed=seed_of("mic_array"),
         ),
@@ -151,6 +152,7 @@ def _obstacle_sensing(
     sensing = [
         UltrasonicArray(
             parameters=robot.ultrasonic,
+            faults=robot.faults,
             sound_speed_m_s=scenario.sound_speed_m_s,
             assumed_sound_speed_m_s=robot.assumed_sound_speed_m_s,
             seed=seed_of("ultrasonic_array"),

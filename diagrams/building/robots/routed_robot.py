@@ -122,6 +122,7 @@ def _seen_objects(
     return [
         UltrasonicArray(
             parameters=router.ultrasonic,
+            faults=router.faults,
             sound_speed_m_s=scenario.sound_speed_m_s,
             assumed_sound_speed_m_s=router.assumed_sound_speed_m_s,
             robot=robot,

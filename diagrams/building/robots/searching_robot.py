@@ -98,6 +98,7 @@ def _smell(
     return [
         GasSensorArray(
             parameters=robot.gas_sensors,
+            faults=robot.faults,
             seed=seed_of("gas_sensor_array"),
             tick_s=tick_s,
         ),
@@ -107,7 +108,7 @@ def _smell(
             tick_s=tick_s,
         ),
         ContactSwitches(
-            parameters=robot.contact_switches,
+            faults=robot.faults,
             robot=robot.robot,
             bodies=bodies,
             source_size=CONTAINER_M,
@@ -128,6 +129,7 @@ def _ears(
             robot=robot.robot,
             sound_speed_m_s=scenario.sound_speed_m_s,
             room=scenario.room,
+            faults=robot.faults,
             others=others,
             seed=seed_of("mic_array"),
         ),

@@ -71,9 +71,9 @@ def _check_view(prefix: str, robot: Follower) -> None:
     ahead = (turns < 0.0) & (turns + sectors.left - sectors.right > 0.0)
     if not np.any(ahead.any(axis=1) & sectors.seen_by.any(axis=1)):
         raise InputError(
-            f"{prefix}ultrasonic.axes_deg",
+            f"{prefix}ultrasonic.sensors",
             "no sensor looks straight ahead, so that the guard would never let the "
-            "robot drive there; add the direction 0, or leave guard out",
+            "robot drive there; add one with axis_deg 0, or leave guard out",
         )
 
 

@@ -14,6 +14,14 @@ from diagrams.scenario.shorthand import ROBOT_FIELDS
 from systems.framework.input_error import InputError, shortened
 from systems.laws.catalogue import LAWS
 
+#: What robots of each kind do, for messages.
+_KINDS = {
+    "follower": "follow a sound",
+    "router": "drive on a route",
+    "odor_searcher": "search for an odor",
+    "sound_searcher": "search for a sound",
+}
+
 
 def explain(
     error: ValidationError,
@@ -64,7 +72,8 @@ def _faults(
         # Replace words of Python by words of YAML.
         message = re.sub(r"dictionary( or instance of \w+)?", "mapping", message)
         message = message.replace("valid tuple", "valid list")
-        value = shortened(repr(details["input"]), 80)
+        given = details["input"]
+        value = "null" if given is None else shortened(repr(given), 80)
         yield InputError(field, f"is {value}; {message[0].lower()}{message[1:]}")
 
 
@@ -76,8 +85,8 @@ def _unknown(
     if kinds:
         laws = [name for name, law in LAWS.items() if law.robot in kinds]
         return (
-            f"is not a field of a {loc[2].replace('_', ' ')}; remove it, or use one of "
-            f"the laws of robots that have it: {', '.join(laws)}"
+            f"is not a field of robots that {_KINDS[loc[2]]}; remove it, or use one of "
+            f"the laws {', '.join(laws)}"
         )
     if constant := constant_now(".".join(loc[3:] if loc[0] == "robots" else loc)):
         return f"is no longer a field, but {constant}; remove it"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
-from diagrams.scenario.fields.near_miss import did_you_mean
 from diagrams.scenario.fields.schema_walk import options, resolved
+from diagrams.scenario.suggestions import did_you_mean
 from systems.framework.input_error import InputError
 
 _KINDS = {
@@ -118,6 +118,8 @@ def _fields(
     robots: tuple[str, ...],
 ) -> Iterator[Field]:
     for name, field in node.get("properties", {}).items():
+        if field.get("shared"):  # the group above also has this field
+            continue
         # A group may override the defaults of its model.
         default = field.get("default")
         if isinstance(defaults, Mapping) and name in defaults:
@@ -145,6 +147,8 @@ def _field(
         meaning=node.get("description") or _meaning(schema, node),
         robots=robots,
     )
+    if "same_fields_as" in node:
+        return
     for each in groups:
         yield from _fields(schema, each, f"{path}.", default, robots)
     for each in choices:

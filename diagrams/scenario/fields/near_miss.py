@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from difflib import get_close_matches
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from diagrams.scenario.fields.schema_walk import at_place, leaf_paths
-from systems.framework.input_error import InputError
+from diagrams.scenario.suggestions import did_you_mean
 
 #: Groups of synonyms with different letters; scenarios use one word of each group.
 _SAME_THING = (
@@ -16,24 +15,6 @@ _SAME_THING = (
     ("speed", "velocity"),
     ("heading", "angle", "yaw", "orientation", "theta"),
 )
-
-
-def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """Returns the end of a message that suggests similar names.
-
-    Args:
-        name: The mistyped name.
-        known: The valid names.
-        most: Greatest number of suggestions.
-
-    Returns:
-        The text; empty if no name is similar.
-    """
-    by_folded = {each.casefold(): each for each in known}
-    near = get_close_matches(name.casefold(), by_folded, n=most)
-    if not near:
-        return ""
-    return f" (did you mean {' or '.join(repr(by_folded[each]) for each in near)}?)"
 
 
 def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
@@ -55,23 +36,6 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
         did_you_mean(last, siblings)
         or _of_that_meaning(last, siblings)
         or _elsewhere(schema, place)
-    )
-
-
-def unknown_law(name: str, known: Collection[str]) -> InputError:
-    """Returns the error for an unknown law.
-
-    Args:
-        name: The unknown name.
-        known: Names of the laws.
-
-    Returns:
-        The error to raise.
-    """
-    near = did_you_mean(name, known)
-    return InputError(
-        "",  # the model with the field adds the path
-        f"{name!r} is not known; use {', '.join(known)}, or file.py:Name{near}",
     )
 
 

@@ -18,13 +18,12 @@ from systems.base.robot import body_radius
 from systems.base.tyre_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError, shortened
 from systems.ranging.parameters import UltrasonicParameters
-from systems.ranging.sensor_faults import BLIND
 from systems.safety.parameters import LEAST_MARGIN_M
 from systems.safety.views import (
     RANGE_MARGIN_M,
     PlaceError,
     place_error,
-    range_error,
+    range_errors,
     sensor_sectors,
     stopping_way,
     unseen_approach,
@@ -145,7 +144,8 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
     tick_s = scenario.tick_s
     keep = body_radius(scenario.only.robot) + guard.place_error_m + guard.margin_m
     sensors, lag = scenario.follower.ultrasonic, scenario.only.plant.motor_lag_s
-    error = range_error(sensors)
+    # The range error of the noisiest sensor counts for all sensors.
+    error = float(max(range_errors(sensors)))
     # A reading of a sensor is at most one round of readings old.
     age = sensors.round_ticks(tick_s) * tick_s
     way = speed**2 / (2.0 * guard.braking_m_s2) + speed * (lag + 2.0 * tick_s)
@@ -220,10 +220,11 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
     guard, sensors, body = own.own_guard, own.ultrasonic, own.robot
     speed = (guard and guard.obstacle_speed_m_s) or 0.0
     needed = clear_way(alone, body.top_speed_m_s, speed)
-    axes, places, half_angle = sensors.beams
-    forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angle
-    far = np.max(np.reshape(places, (-1, 2))[forward, 0], initial=-np.inf)
-    seen = body.control_point_m + float(far) + sensors.maximum_range_m
+    axes, places, half_angles = sensors.beams
+    forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angles
+    # Of the sensors that look ahead, the one that sees farthest counts.
+    reach = body.control_point_m + places[:, 0] + sensors.each("maximum_range_m")
+    seen = float(np.max(reach[forward], initial=-np.inf))
     return (
         _of_speeds(corner_speeds(scenario, robot), speed),
         *_of_ranges(alone),
@@ -265,11 +266,18 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A2: no body is nearer than a range reading minus the margin."""
+    """A2: no body is nearer than a range reading minus the margin.
+
+    Of the sensors, the one that misses most echoes and the one that sees farthest
+    count.
+    """
     sensors = scenario.follower.ultrasonic
     stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s
     excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m
-    blind = sum(fault.number == BLIND for fault in sensors.faults)
+    blind = sum(
+        fault.sensor == "ultrasonic" and fault.kind == "blind"
+        for fault in scenario.only.faults
+    )
     return (
         Assumption(
             "A2",
@@ -279,9 +287,7 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
             "of 1",
             field="ultrasonic.dropout_probability",
         ),
-        Assumption(
-            "A2", "number of blind sensors", blind, 0.0, "", field="ultrasonic.faults"
-        ),
+        Assumption("A2", "number of blind sensors", blind, 0.0, "", field="faults"),
         Assumption(
             "A2",
             "excess of the farthest range due to the assumed speed of sound",

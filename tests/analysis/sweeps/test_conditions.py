@@ -13,7 +13,7 @@ from scipy import ndimage
 from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.plan import SweepPlan
 from diagrams import Scenario
-from diagrams.scenario.loading import scenario_from_mapping
+from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 from systems.world.geometry import nearest_point_on_rectangle
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from analysis.sweeps.plan import SweepPlan, dump_plan, load_sweep
 from analysis.sweeps.sweep import reproducing_command
 from diagrams import dump_scenario, load_scenario
-from diagrams.scenario.loading import scenario_from_mapping
+from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 
 SPEED = "obstacles.0.speed_m_s"

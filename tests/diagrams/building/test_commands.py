@@ -30,7 +30,7 @@ from pydrake.systems.framework import LeafSystem
 class Constant(LeafSystem):
     command: dict = {}
 
-    def __init__(self, robot, attraction, repulsion):
+    def __init__(self, robot, attraction, laws):
         super().__init__()
         self.set_name("constant")
         for name, value in self.command.items():

@@ -16,12 +16,12 @@ from systems.laws.catalogue import FORCE_LAWS, LAWS
 
 OWN_LAWS = """
 from systems import ConventionalImpedanceController
-from diagrams.scenario.follower.laws import RepulsionParameters
+from diagrams.scenario.participants import LawGains
 
 number = 5
 
 
-def inverse(c, s, repulsion: RepulsionParameters):
+def inverse(c, s, laws: LawGains):
     return 1.5 / c
 
 
@@ -70,7 +70,7 @@ def test_laws_of_the_package_read_their_own_gains(law, force):
     """At rho_0/2, at rest: K_0 rho_0/2; the same and d_ref mu_0; K_0/c."""
     data = {
         "law": law,
-        "repulsion": {
+        "laws": {
             "conventional": {"stiffness_n_m": 15.0},
             "active": {
                 "matched_stiffness_n_m": 16.0,
@@ -171,14 +171,14 @@ def test_own_blocks_get_what_they_name(tmp_path):
     """One that takes any keyword gets what its base takes, with the base's gains."""
     file = tmp_path / "own_blocks.py"
     file.write_text(OWN_BLOCKS, encoding="utf-8")
-    repulsion = {
+    laws = {
         "active": {"reference_damping_n_s_m": 0.2, "matched_stiffness_n_m": 16.0},
         "stop_when_near": {"stop_m": 0.3},
     }
-    own = {"law": f"{file}:Anything", "repulsion": repulsion}
+    own = {"law": f"{file}:Anything", "laws": laws}
     block = make_controller(Scenario.model_validate(own))
     assert repulsion_of(block) == pytest.approx(-16.0 * 0.4 - 0.2 * 0.72)
-    own = {"law": f"{file}:Asking", "repulsion": repulsion}
+    own = {"law": f"{file}:Asking", "laws": laws}
     block = make_controller(Scenario.model_validate(own), bodies=3, seed=7)
     assert block.step.numbers.own.stop_m == 0.3
     assert type(block).asked == {"bodies": 3, "seed": 7, "cell": 0.05}

@@ -74,11 +74,17 @@ def test_sound_is_made_only_while_somebody_listens(engine, monkeypatch):
     assert max(recorded) < 0.6
 
 
+def faults(sensor: str, kind: str, *numbers: int) -> str:
+    each = [f"{{sensor: {sensor}, kind: {kind}, number: {k}}}" for k in numbers]
+    return f"faults=[{', '.join(each)}]"
+
+
 ENDINGS = {
     "wind.speed_m_s=0.0": "there is no wind to follow",
-    "gas_sensors.faults=[{sensor: 1}, {sensor: 2}]": "two or more gas sensors are dead",
-    "contact_switches.faults=[{switch: 1, kind: stuck_closed}, {switch: 2, kind: "
-    "stuck_closed}]": "both contact switches are stuck",
+    faults("gas_sensors", "dead", 1, 2): "two or more gas sensors are dead",
+    faults("contact_switches", "stuck_closed", 1, 2): (
+        "both contact switches are stuck"
+    ),
     "search.most_steps=2": "all steps are used up",
 }
 
@@ -92,13 +98,9 @@ def test_a_search_that_cannot_go_on_is_lost_with_its_reason(setting):
 
 
 def test_one_dead_sensor_and_one_stuck_switch_do_not_end_it():
-    faults = [
-        "gas_sensors.faults=[{sensor: 2}]",
-        "contact_switches.faults=[{switch: 1, kind: stuck_closed}]",
-    ]
-    result = simulate(
-        load_scenario("odor_search", [*SHORT, *faults]), engine="compiled"
-    )
+    both = "faults=[{sensor: gas_sensors, number: 2, kind: dead}, "
+    both += "{sensor: contact_switches, kind: stuck_closed}]"
+    result = simulate(load_scenario("odor_search", [*SHORT, both]), engine="compiled")
     assert result.cause == "found"
     assert result.columns["search_fault"][-1] == 2 + 8
 
@@ -120,7 +122,7 @@ def test_those_that_are_not_called_are_lost_with_their_reason(setting, monkeypat
 
 
 SOUND_ENDINGS = {
-    "microphones.faults=[{microphone: 2}, {microphone: 3}]": "two or more microphones",
+    faults("microphones", "dead", 2, 3): "two or more microphones",
     "sound.kind=tone": "the sound fits several directions",
     "sound.start_s=300.0": "the caller is not heard",
 }
@@ -135,7 +137,7 @@ def test_a_sound_that_tells_nothing_ends_it_by_name(setting):
 
 
 def test_with_three_microphones_it_still_finds():
-    settings = ["room=null", "microphones.faults=[{microphone: 3}]"]
+    settings = ["room=null", faults("microphones", "dead", 3)]
     settings += ["sound_search.radio_stop_m=0.5"]
     result = simulate(load_scenario("sound_search", settings), engine="compiled")
     assert result.cause == "found"
@@ -144,18 +146,18 @@ def test_with_three_microphones_it_still_finds():
 
 REFUSED = [
     ("odor_search", ["odor=null"], "odor: is missing"),
-    ("odor_search", ["guard={}"], "guard: is set"),
+    ("odor_search", ["guard={}"], "guard: is not a field of an odor searcher"),
     ("odor_search", ["odor.kind=steady", "wind.speed_m_s=0.0"], "wind.speed_m_s: is 0"),
     (
         "odor_search",
         ["room={size_m: [5.2, 3.2, 2.7]}", "odor.position_m=[9.0, 0.0]"],
         "odor.position_m",
     ),
-    ("odor_search", ["gas_sensors.faults=[{sensor: 1}, {sensor: 1}]"], "two faults"),
+    ("odor_search", [faults("gas_sensors", "dead", 1, 1)], "two faults"),
     ("odor_search", ["obstacles.0.name=odor"], "the name 'odor' is taken"),
     ("odor_search", ["robots={odor: {}}"], "the name 'odor' is taken"),
     ("odor_search", ["robots={world: {}}"], "the name 'world' is taken"),
-    ("sound_search", ["hearing=ideal"], "hearing: is 'ideal'"),
+    ("sound_search", ["hearing=ideal"], "hearing: is not a field of a sound searcher"),
     ("sound_search", ["robot.preset=han2019"], "robot.microphones_m: has 3"),
     ("sound_search", ["sound_search.await_call=true"], "sound_search.await_call: is"),
     (

@@ -19,11 +19,11 @@ OWN_LAW = """
 from pydrake.math import exp
 
 
-def gaussian(c, s, repulsion):
+def gaussian(c, s, laws):
     return 6.0 * exp(-c * c / laws.active.alpha_m) + 0.5 * s
 
 
-def wordy(c, s, repulsion):
+def wordy(c, s, laws):
     return 1.0 / float(str(c))
 """
 
@@ -102,7 +102,7 @@ def assert_same(name, *overrides):
         ("obstacle_free", ("ideal_hearing.bearing_noise_deg=3", "tracker.hold=robot")),
         ("default", ("sound.start_s=30", "stop.lost_after_s=5")),
         ("default", ("start.heading_deg=180", "stop.diverged_range_m=2.5")),
-        ("u_trap", ("ultrasonic.axes_deg=8", "collision_vector.aggregation=sum")),
+        ("u_trap", ("ultrasonic.sensors=8", "collision_vector.aggregation=sum")),
         ("convoy", ("ideal_hearing.range_noise_fraction=0.01", "law=none", *FINER)),
         ("convoy", (*TOUCHING, "law=none", *FINER)),
     ],

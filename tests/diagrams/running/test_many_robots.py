@@ -12,6 +12,7 @@ from diagrams import RunResult, Scenario, load_scenario, simulate
 from diagrams.building.builder import build_sound_follower
 from diagrams.building.robot import make_robot
 from diagrams.scenario.loading import scenario_from_mapping
+from diagrams.scenario.participants import Follower
 from systems.framework.input_error import InputError
 from systems.hearing.tdoa_estimator import may_sound
 from systems.sound.parameters import SoundParameters
@@ -31,7 +32,7 @@ from pydrake.systems.framework import LeafSystem
 
 
 class Ahead(LeafSystem):
-    def __init__(self, robot, attraction, repulsion):
+    def __init__(self, robot, attraction, laws):
         super().__init__()
         self.set_name("ahead")
         self.DeclareVectorOutputPort(
@@ -259,13 +260,15 @@ def test_one_robots_settings_do_not_touch_another_and_follow_the_scenarios():
     }
     scenario = scenario_from_mapping(data)
     a, b = scenario.robots["a"], scenario.robots["b"]
+    assert isinstance(a, Follower)
+    assert isinstance(b, Follower)
     assert (a.law, b.law) == ("conventional", "none")
     assert a.attraction.damping_n_s_m == 1.0
     assert b.attraction.damping_n_s_m == 3.0
     assert a.attraction.follow_distance_m == b.attraction.follow_distance_m == 0.9
     assert a.start.position_m == (0.0, 5.0)
-    other = scenario.with_robot(law="active")
-    assert other.robots["a"].law == "active"
+    other = scenario_from_mapping(data | {"law": "active"})
+    assert (other.robots["a"].law, other.robots["b"].law) == ("active", "none")
 
 
 def test_parts_are_asked_for_by_name_where_there_are_several():

@@ -111,7 +111,7 @@ def test_time_goes_on_while_nobody_listens(tmp_path, engine, monkeypatch):
     expected, hear = np.zeros((4, 6 * 32_000)), CrossPowerEstimator.hear
 
     def listen(
-        self: Any, asked: int, audio: Callable[[], AudioFrame], memory: Any
+        self: Any, inputs: Any, audio: Callable[[], AudioFrame], memory: Any
     ) -> Any:
         def noted() -> AudioFrame:
             frame = audio()
@@ -119,7 +119,7 @@ def test_time_goes_on_while_nobody_listens(tmp_path, engine, monkeypatch):
             expected[:, begin : begin + 800] = frame.counts
             return frame
 
-        return hear(self, asked, noted, memory)
+        return hear(self, inputs, noted, memory)
 
     # Compiles or loads, a tick aside, what would otherwise be noted, too.
     words = "sound_search", "duration_s=6"

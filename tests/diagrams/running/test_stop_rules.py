@@ -18,6 +18,7 @@ from diagrams import (
     make_simulator,
     simulate,
 )
+from diagrams.running import stop_rules
 from diagrams.running.monitor import Monitor
 from diagrams.running.referee import Referee
 from diagrams.running.stop_rules import FOUND, judge_search

@@ -9,18 +9,21 @@ from typing import Any, get_args, get_origin
 
 import pytest
 from hypothesis import given, strategies as st
+from pydantic import BaseModel
 from ruamel.yaml import YAML
 
 from diagrams import load_scenario, simulate
-from diagrams.scenario.loading import (
-    dump_scenario,
-    library_scenarios,
-    scenario_from_mapping,
-)
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario import participants
+from diagrams.scenario.loading import dump_scenario, library_scenarios
+from diagrams.scenario.participants import Follower
+from diagrams.scenario.run_parameters import RunParameters
+from diagrams.scenario.scenario import Scenario, scenario_from_mapping
+from diagrams.scenario.shorthand import joined
+from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
-from systems.sound.parameters import RoomParameters
+from systems.sound.parameters import RoomParameters, SoundParameters
+from tests.diagrams.scenario.kinds import KINDS
 
 ONE_OF_EVERYTHING = """
 name: one of everything
@@ -50,14 +53,15 @@ assumed_sound_speed_m_s: 340
 ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
 ultrasonic: {noise_m: 0, firing: sequential}
-collision_vector: {aggregation: sum}
+collision_vector: {aggregation: sum, velocity_term: closing}
 attraction: {follow_distance_m: 0.6, damping_n_s_m: 4}
-repulsion: {velocity_term: closing}
+laws: {conventional: {damping_n_s_m: 0.9}}
 robot: {mass_kg: 5}
 plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
 odometry: {rounding: false}
 guard: {margin_m: 0.02, cell_m: 0.04}
 integration_step_s: 0.005
+faults: [{sensor: ultrasonic, number: 2, kind: noisy, start_s: 1}]
 """
 
 
@@ -93,38 +97,20 @@ def test_library_loads_and_says_what_it_is(name):
     assert "\n" not in scenario.description
 
 
-#: What only robots that search have.
-SEARCHING = {
-    "airflow_sensors",
-    "compass",
-    "contact_switches",
-    "gas_sensors",
-    "motor_driver",
-    "odor",
-    "radio",
-    "search",
-    "sound_search",
-    "wind",
-}
+def untouched(model: Parameters) -> set[str]:
+    """Fields that have the values of their defaults."""
+    return {
+        name
+        for name, field in type(model).model_fields.items()
+        if getattr(model, name) == field.default
+    }
 
 
 def test_one_of_everything_runs(tmp_path):
     scenario = load_scenario(write(tmp_path, ONE_OF_EVERYTHING))
-    untouched = {
-        name
-        for name in Scenario.model_fields
-        if getattr(scenario, name) == Scenario.model_fields[name].default
-    }
-    assert untouched == {
-        "blocks",
-        "engine",
-        "objects",
-        "route",
-        "sound",
-        "microphones",
-        "tdoa",
-        *SEARCHING,
-    }
+    run, robot = untouched(scenario), untouched(scenario.of_robot("robot").follower)
+    assert run == {"engine", "odor", "radio", "wind"}
+    assert robot == {"blocks", "obstacle_sensing", "microphones", "tdoa"}
     assert simulate(scenario).simulated_s == pytest.approx(0.1)
 
 
@@ -133,7 +119,8 @@ def test_values_arrive(tmp_path):
     assert scenario.seed == 9
     assert scenario.source.waypoints_m == ((1.0, 0.0), (3.0, 0.0))
     assert scenario.obstacles[1].name == "cart"
-    assert scenario.only.plant.slip == (0.1, 0.0)
+    for robot in scenario.robots.values():
+        assert robot.plant.slip == (0.1, 0.0)
 
 
 @pytest.mark.parametrize("name", sorted(library_scenarios()))
@@ -147,6 +134,7 @@ def test_relative_files_lie_beside_the_scenario(tmp_path):
 sound: {kind: wav, file: a.wav}
 microphones: {ego_noise_file: c.wav}
 sources:
+  source: {}
   fan: {sound: {kind: wav, file: b.wav}}
 robots:
   robot: {}
@@ -156,7 +144,7 @@ robots:
     assert [
         scenario.source.sound.file,
         scenario.sources["fan"].sound.file,
-        scenario.follower.microphones.ego_noise_file,
+        scenario.of_robot("robot").follower.microphones.ego_noise_file,
         scenario.sounds()["second"].file,
     ] == [str((tmp_path / f"{name}.wav").resolve()) for name in "abcd"]
 
@@ -228,6 +216,7 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("sead=2", "sead", "not a field.*did you mean 'seed'"),
         ("source.sped_m_s=2", "source.sped_m_s", "did you mean 'speed_m_s'"),
         ("obstacles.0.sise_m=[1, 1]", "obstacles.0.sise_m", "not a field"),
+        ("source.sound.kind=tone", "source.sound", "use sound"),
         ("zzzzz=2", "zzzzz", "not a field of a scenario; remove it"),
         (
             "robot.wheel_radius_m=-1",
@@ -242,7 +231,7 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("seed=1.5", "seed", "valid integer"),
         ("hearing=ears", "hearing", "'audio' or 'ideal'"),
         ("odometry.rounding=1", "odometry.rounding", "valid boolean"),
-        ("arena_m=[1]", "arena_m.1", "required"),
+        ("arena_m=[1]", "arena_m.1", "is missing; set it"),
         ("arena_m=[1, -1]", "arena_m.1", "greater than"),
         ("start.position_m=[0, .nan]", "start.position_m.1", "finite"),
         ("obstacles.0.waypoints_m=[[1, x]]", "obstacles.0.waypoints_m.0.1", "'x'"),
@@ -255,7 +244,11 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("obstacles.0.waypoints_m=[[0, 0]]", "obstacles.0", "is on.*move"),
         ("source.waypoints_m=[[0, 0]]", "source", "is on.*move"),
         ("obstacles.0.name=source", "obstacles", "'source' is taken; give"),
-        ("ultrasonic.minimum_range_m=4", "ultrasonic.minimum_range_m", "below"),
+        (
+            "ultrasonic.minimum_range_m=4",
+            "ultrasonic.sensors.0.minimum_range_m",
+            "below",
+        ),
         (
             "laws.active.reference_stiffness_n_m=1",
             "laws.active.reference_stiffness_n_m",
@@ -294,51 +287,64 @@ def test_later_overrides_win():
     assert load_scenario("default", ["seed=2", "seed=3"]).seed == 3
 
 
-def float_fields(model: type[Parameters], prefix: str = "") -> Iterator[str]:
+def float_fields(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     """Paths of all fields that hold a number, in every block."""
     for name, info in model.model_fields.items():
         kinds = (info.annotation, *get_args(info.annotation))
-        if isinstance(info.annotation, type) and issubclass(
-            info.annotation, Parameters
-        ):
+        if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
             yield from float_fields(info.annotation, f"{prefix}{name}.")
         elif float in kinds and get_origin(info.annotation) is not tuple:
             yield prefix + name
 
 
-FLOAT_FIELDS = sorted(float_fields(Scenario))
+#: The kind of a robot, and a field of such a robot, of its run or of its source.
+FLOAT_FIELDS = sorted(
+    {("follower", path) for path in float_fields(RunParameters)}
+    | {("follower", path) for path in float_fields(SourceRobotParameters, "source.")}
+    | {("follower", path) for path in float_fields(SoundParameters, "sound.")}
+    | {
+        (kind, path)
+        for kind in KINDS
+        for path in float_fields(participants.KINDS[kind])
+    }
+)
 
 
-def set_at(path: str, value: Any) -> dict[str, Any]:
+def set_at(kind: str, path: str, value: Any) -> dict[str, Any]:
     *parents, last = path.split(".")
     data: dict[str, Any] = {last: value}
     for parent in reversed(parents):
         data = {parent: data}
-    return data
+    return joined(KINDS[kind], data)
 
 
 def test_the_walk_finds_the_fields():
     assert {
-        "duration_s",
-        "robot.wheel_radius_m",
-        "sound_speed_m_s",
-        "sound.level_pa",
-        "attraction.follow_distance_m",
+        ("follower", "duration_s"),
+        ("follower", "sound_speed_m_s"),
+        ("follower", "sound.level_pa"),
+        ("follower", "attraction.follow_distance_m"),
+        ("follower", "laws.active.reference_stiffness_n_m"),
+        ("router", "route.clearance_m"),
+        ("odor_searcher", "search.wait_s"),
+        ("sound_searcher", "robot.wheel_radius_m"),
     } <= set(FLOAT_FIELDS)
-    assert len(FLOAT_FIELDS) > 50
+    assert len(FLOAT_FIELDS) > 150
 
 
 @given(st.sampled_from(FLOAT_FIELDS), st.sampled_from([math.nan, math.inf, -math.inf]))
-def test_no_number_may_be_nan_or_infinite(path, value):
+def test_no_number_may_be_nan_or_infinite(field, value):
+    kind, path = field
     with pytest.raises(InputError) as error:
-        scenario_from_mapping(set_at(path, value))
+        scenario_from_mapping(set_at(kind, path, value))
     assert field_of(error) == path
 
 
 @given(st.sampled_from(FLOAT_FIELDS), st.sampled_from(["1", True, [1.0], {}]))
-def test_no_number_may_be_anything_else(path, value):
+def test_no_number_may_be_anything_else(field, value):
+    kind, path = field
     with pytest.raises(InputError) as error:
-        scenario_from_mapping(set_at(path, value))
+        scenario_from_mapping(set_at(kind, path, value))
     assert field_of(error).startswith(path)
 
 

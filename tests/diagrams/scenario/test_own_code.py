@@ -24,7 +24,7 @@ LAW = """
 from own_gains import GAIN
 
 
-def soft(c, s, repulsion):
+def soft(c, s, laws):
     return GAIN / (1.0 + c)
 """
 NAMES = "own_laws.py:soft", "own_laws:soft"

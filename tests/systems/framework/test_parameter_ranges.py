@@ -6,7 +6,11 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from diagrams.scenario.scenario import Scenario
+from pydantic.json_schema import models_json_schema
+
+from diagrams.scenario import participants
+from diagrams.scenario.run_parameters import RunParameters
+from systems.laws.catalogue import LAWS
 
 #: What the unit at the end of a field's name allows, longest ending first. A robot on
 #: a floor stays within a kilometre, a run within a day; nothing that divides is 0.
@@ -52,12 +56,18 @@ def schemas() -> dict[str, dict[str, Any]]:
 
     It is that of what a field holds, which may be given in a shorter form.
     """
-    scenario = Scenario.model_json_schema(mode="serialization")
-    models = {"Scenario": scenario, **scenario["$defs"]}
+    models = (
+        RunParameters,
+        participants.SourceParameters,
+        *participants.KINDS.values(),
+        *(law.gains for law in LAWS.values() if law.gains is not None),
+    )
+    pairs: Any = [(model, "validation") for model in models]
+    _, schema = models_json_schema(pairs)
     return {
         f"{model}.{field}": schema
-        for model, whole in models.items()
-        for field, schema in whole["properties"].items()
+        for model, whole in schema["$defs"].items()
+        for field, schema in whole.get("properties", {}).items()
     }
 
 

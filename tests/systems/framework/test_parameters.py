@@ -21,7 +21,7 @@ from systems.framework.parameters import (
     Size,
 )
 from systems.laws.active import ActiveParameters
-from systems.ranging.parameters import UltrasonicParameters
+from systems.ranging.parameters import RangeSensorParameters, UltrasonicParameters
 from systems.sound.acoustics import sound_speed
 
 
@@ -139,8 +139,9 @@ def test_a_changed_copy_keeps_nothing_that_was_worked_out():
     gains = ActiveParameters()
     sensors = UltrasonicParameters()
     assert gains.alpha_m > 0.0
-    assert sensors.beams[2] > 0.0
+    assert len(sensors.beams[2]) == 3
     reach = gains.model_copy(update={"reach_m": 2.0 * gains.reach_m})
     assert reach.alpha_m == pytest.approx(2.0 * gains.alpha_m)
-    wide = sensors.model_copy(update={"beam_half_angle_deg": 30.0})
-    assert wide.beams[2] == pytest.approx(math.pi / 6.0)
+    wide = RangeSensorParameters(beam_half_angle_deg=30.0)
+    changed = sensors.model_copy(update={"sensors": (wide,)})
+    assert changed.beams[2].tolist() == pytest.approx([math.pi / 6.0])

@@ -12,12 +12,12 @@ from pydrake.systems.analysis import Simulator
 from studies.support.bearing_trials import BearingTrial, hear_once
 from studies.support.listening_methods import PlaneListener, PrintedListener
 from systems.base.robot import RobotParameters
+from systems.framework.faults import Fault
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
 from systems.hearing.cross_power_estimator import ArrayListener, CrossPowerEstimator
 from systems.sound.parameters import (
     MicArrayParameters,
-    MicrophoneFaultParameters,
     SoundParameters,
 )
 
@@ -73,13 +73,13 @@ def test_silence_is_not_heard():
 
 @pytest.mark.parametrize("microphone", [1, 2, 4])
 def test_three_microphones_are_enough_for_a_bearing(microphone):
-    fault = MicrophoneFaultParameters(microphone=microphone)
+    fault = Fault(sensor="microphones", number=microphone, kind="dead")
     trial = BearingTrial(SIREN, 1.0, 1.1, seed=2, faults=(fault,))
     assert off_deg(trial) < 10.0
 
 
 def test_two_are_not():
-    faults = tuple(MicrophoneFaultParameters(microphone=k) for k in (2, 3))
+    faults = tuple(Fault(sensor="microphones", number=k, kind="dead") for k in (2, 3))
     assert hear_once(BearingTrial(SIREN, 1.0, 1.1, seed=2, faults=faults)) is None
 
 

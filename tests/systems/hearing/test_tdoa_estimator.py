@@ -16,7 +16,6 @@ from systems.framework.noise import frame_noise
 from systems.framework.signals import AudioFrame
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.tdoa_estimator import TDOAEstimator, robot_localiser
-from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.adc import convert
 from systems.sound.parameters import MicArrayParameters
 
@@ -30,7 +29,7 @@ DEFAULT = TDOAParameters()
 def localise(frame, parameters=DEFAULT, *, limited=True):
     """What a frame says to one who has heard nothing before."""
     localiser, _ = robot_localiser(
-        parameters, RobotParameters(), AcousticParameters(), limited=limited
+        parameters, RobotParameters(), SOUND_SPEED_M_S, limited=limited
     )
     return localiser.localise(frame, localiser.blank())[0]
 
@@ -226,7 +225,7 @@ def test_ports_show_the_frame_after_one_tick():
 
 def test_speed_of_sound_that_the_estimator_believes_in():
     """Far away sin(bearing) = c tau_13 / 2l: 3 % too fast reads 3 % too much."""
-    block = TDOAEstimator(parameters=TDOAParameters(sound_speed_m_s=1.03 * C))
+    block = TDOAEstimator(sound_speed_m_s=1.03 * C)
     context = listen(block, audio(heard(chirp, 30.0, 1e4, 30.0)))
     bearing = read(block, context)["source_bearing"][0]
     assert math.sin(bearing) == pytest.approx(1.03 * 0.5, abs=2e-3)

@@ -76,7 +76,7 @@ def test_block_adds_attraction_and_repulsion(bench, distance, least, push):
     """The least range is the sensors'."""
     block = ConventionalImpedance2017Controller(
         gains=GAINS,
-        sensors=UltrasonicParameters(minimum_range_m=least),
+        sensors=UltrasonicParameters.model_validate({"minimum_range_m": least}),
     )
     at = bench(
         block,
@@ -107,6 +107,6 @@ def test_gradient(controller_bench, check_gradient, velocity_term, least):
         attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
         gains=GAINS,
         velocity_term=velocity_term,
-        sensors=UltrasonicParameters(minimum_range_m=least),
+        sensors=UltrasonicParameters.model_validate({"minimum_range_m": least}),
     )
     check_gradient(block, respond, [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1])

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numba import njit
 
+from systems.framework.faults import Fault
 from systems.odor import airflow_sensors
 from systems.odor.airflow_sensors import AirflowSensors
 from systems.odor.gas_sensor_array import GasSensorArray
 from systems.odor.odor_plume import PLUME_SIZE
 from systems.odor.parameters import (
     AirflowParameters,
-    GasSensorFaultParameters,
     GasSensorParameters,
     WindParameters,
 )
@@ -23,10 +23,10 @@ from systems.odor.wind import WindField
 QUIET = {"noise": 0.0, "mismatch": 0.0}
 
 
-def ratios(levels, compiled=False, **own):
+def ratios(levels, compiled=False, faults=(), **own):
     """(ticks, 3) where the whole floor has the concentrations of ``levels``."""
     step = GasSensorArray(
-        parameters=GasSensorParameters(**{**QUIET, **own}), seed=1
+        parameters=GasSensorParameters(**{**QUIET, **own}), faults=faults, seed=1
     ).step
     work = njit(step.step) if compiled else step.step
     state, rows = np.array(step.state), []
@@ -67,10 +67,10 @@ def test_compiled_it_reads_the_same():
     )
 
 
-def test_a_dead_sensor_reads_clean_air_and_a_stuck_one_what_it_read():
-    dead = GasSensorFaultParameters(sensor=3, start_s=5.0)
-    stuck = GasSensorFaultParameters(sensor=1, kind="stuck", start_s=5.0)
-    rows = ratios([1.0] * 400, noise=0.01, faults=(dead, stuck))
+def test_a_dead_sensor_reads_clean_air_and_a_frozen_one_what_it_read():
+    dead = Fault(sensor="gas_sensors", number=3, kind="dead", start_s=5.0)
+    frozen = Fault(sensor="gas_sensors", number=1, kind="frozen", start_s=5.0)
+    rows = ratios([1.0] * 400, noise=0.01, faults=(dead, frozen))
     assert (rows[200:, 2] == 1.0).all()
     assert (rows[200:, 0] == rows[199, 0]).all()
     assert len(set(rows[200:, 1].tolist())) == 200

@@ -13,7 +13,7 @@ from systems.safety.free_space import make_free_space
 from systems.world.geometry import fan_ranges
 
 TICK_S, CELLS, CELL_M, AHEAD_M, FARTHEST_M = 0.025, 240, 0.05, 0.175, 3.0
-AXES, HALF = np.radians([30.0, 0.0, -30.0]), math.radians(15.0)
+AXES, HALVES = np.radians([30.0, 0.0, -30.0]), np.full(3, math.radians(15.0))
 PLACES = np.zeros((3, 2))
 NOWHERE = math.inf, math.inf, 0.35
 
@@ -21,10 +21,10 @@ NOWHERE = math.inf, math.inf, 0.35
 def sensors(noise_m=0.001):
     return HazardSensors(
         np.full((3, 2), [AHEAD_M, 0.0]),
-        np.column_stack([AXES, np.full(3, HALF)]),
-        FARTHEST_M,
-        0.002 + 5.0 * noise_m,
-        noise_m,
+        np.column_stack([AXES, HALVES]),
+        np.full(3, FARTHEST_M),
+        np.full(3, 0.002 + 5.0 * noise_m),
+        np.full(3, noise_m),
         TICK_S,
     )
 
@@ -57,7 +57,7 @@ def look(
         time = tick * TICK_S
         pose = np.array(pose_at(time))
         bodies = np.array(bodies_at(time), dtype=float).reshape(-1, 5)
-        true = fan_ranges(pose, bodies, AXES, PLACES, HALF, AHEAD_M)
+        true = fan_ranges(pose, bodies, AXES, PLACES, HALVES, AHEAD_M)
         echo = (true <= FARTHEST_M).astype(float)
         ranges = np.where(echo > 0.5, true + noise_m * rng.normal(size=3), FARTHEST_M)
         readings = ranges, echo, np.zeros(3)

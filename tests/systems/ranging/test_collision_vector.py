@@ -14,7 +14,11 @@ from systems.ranging.collision_vector import (
     echo_point,
     foot_on_segment,
 )
-from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
+from systems.ranging.parameters import (
+    CollisionVectorParameters,
+    RangeSensorParameters,
+    UltrasonicParameters,
+)
 
 PAPER = CollisionVectorParameters()
 NEAREST = CollisionVectorParameters(aggregation="nearest")
@@ -177,8 +181,11 @@ def test_a_range_without_echo_means_nothing(bench):
 
 def test_sensors_places_and_axes_are_used(bench):
     sensors = UltrasonicParameters(
-        axes_deg=(90.0, 0.0, -90.0),
-        positions_m=((0.0, 0.3), (0.1, 0.0), (0.0, -0.3)),
+        sensors=(
+            RangeSensorParameters(axis_deg=90.0, position_m=(0.0, 0.3)),
+            RangeSensorParameters(axis_deg=0.0, position_m=(0.1, 0.0)),
+            RangeSensorParameters(axis_deg=-90.0, position_m=(0.0, -0.3)),
+        )
     )
     block = CollisionVector(parameters=SUM, sensors=sensors)
     at = bench(block, ranges=[1.0, 2.0, 1.5], echo=[1, 1, 1])
@@ -190,7 +197,9 @@ def test_sensors_places_and_axes_are_used(bench):
 @pytest.mark.parametrize("parameters", [PAPER, NEAREST, SUM])
 @pytest.mark.parametrize("ranges", [(0.6, 0.5, 0.8), (0.9, 0.7, 0.45), (2.0, 0.4, 1.0)])
 def test_gradient(bench, check_gradient, parameters, ranges):
-    sensors = UltrasonicParameters(axes_deg=(35.0, 5.0, -30.0))
+    sensors = UltrasonicParameters(
+        sensors=tuple(RangeSensorParameters(axis_deg=a) for a in (35.0, 5.0, -30.0))
+    )
 
     def respond(block, x):
         at = bench(block, ranges=x, echo=[1, 1, 1])

@@ -7,8 +7,8 @@ import pytest
 from numba import njit
 
 from systems.base.robot import RobotParameters
+from systems.framework.faults import Fault
 from systems.ranging.contact_switches import ContactSwitches
-from systems.ranging.parameters import ContactFaultParameters, ContactParameters
 
 BODY = RobotParameters(length_m=0.2, width_m=0.3)
 
@@ -19,17 +19,19 @@ def felt(
     box=(5.0, 5.0, 0.0),
     compiled=False,
     width=0.1,
-    **own,
+    size=(0.2, 0.2),
+    robot=BODY,
+    faults=(),
 ):
     """Left, right and touched, of a box of 0.2 m and what is followed, 0.1 m long."""
     block = ContactSwitches(
-        parameters=ContactParameters(**own),
-        robot=BODY,
+        faults=faults,
+        robot=robot,
         bodies=1,
         source_size=(0.1, width),
     )
     work = njit(block.step.step) if compiled else block.step.step
-    inputs = tuple(map(np.array, (pose, box, (0.2, 0.2), followed)))
+    inputs = tuple(map(np.array, (pose, box, size, followed)))
     outputs = np.zeros(2), np.zeros(1)
     work(4, np.zeros(0), inputs, outputs, block.step.numbers)
     return [*outputs[0].tolist(), outputs[1][0]]
@@ -60,11 +62,13 @@ def test_a_wall_closes_them_as_the_source_does():
 
 def test_switches_that_are_stuck_say_so_always():
     stuck = (
-        ContactFaultParameters(switch=1, kind="stuck_open"),
-        ContactFaultParameters(switch=2, kind="stuck_closed", start_s=0.1),
+        Fault(sensor="contact_switches", number=1, kind="stuck_open"),
+        Fault(sensor="contact_switches", number=2, kind="stuck_closed", start_s=0.1),
     )
     assert felt((0, 0, 0), (0.155, 0.0, 0.0), faults=stuck)[:2] == [0, 1]
-    late = (ContactFaultParameters(switch=2, kind="stuck_closed", start_s=0.2),)
+    late = (
+        Fault(sensor="contact_switches", number=2, kind="stuck_closed", start_s=0.2),
+    )
     assert felt((0, 0, 0), faults=late)[:2] == [0, 0]
 
 
@@ -75,3 +79,18 @@ def test_switches_that_are_stuck_say_so_always():
 def test_a_post_near_the_middle_closes_both(y, switches):
     """The middle is a tenth of the width to either side: 3 cm."""
     assert felt((0, 0, 0), (0.155, y, 0.0), width=0.01)[:2] == switches
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize(("gap", "switches"), [(0.009, [1, 1, 0]), (0.011, [0, 0, -1])])
+def test_a_wall_of_ten_meters_is_felt_at_its_end_too(gap, switches, compiled):
+    """Across the front, 0.1 m ahead: its middle is 4.8 m to the side."""
+    wall = (0.1 + gap + 0.05, 4.8, 0.0)
+    assert felt((0, 0, 0), box=wall, size=(0.1, 10.0), compiled=compiled) == switches
+
+
+def test_a_robot_longer_than_two_meters_feels_ahead_of_its_front():
+    """A post at its front, which is 1.5 m from the origin of B."""
+    long = RobotParameters(length_m=3.0, width_m=0.3)
+    assert felt((0, 0, 0), box=(1.559, 0.0, 0.0), size=(0.1, 0.1), robot=long)[0] == 1
+    assert felt((0, 0, 0), box=(1.561, 0.0, 0.0), size=(0.1, 0.1), robot=long)[0] == 0

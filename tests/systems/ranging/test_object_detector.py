@@ -13,7 +13,7 @@ from systems.base.robot import RobotParameters
 from systems.ranging.beam_groups import EXTENT, NEAR_X, NEAR_Y, OPEN, group_beams
 from systems.ranging.object_detector import ObjectDetector, object_detector_step
 from systems.ranging.objects import KNOWN, RADIUS, THERE, VX, VY, X, Y
-from systems.ranging.parameters import UltrasonicParameters
+from systems.ranging.parameters import RangeSensorParameters, UltrasonicParameters
 from systems.ranging.ultrasonic_array import cone_ranges
 
 BURGER = RobotParameters.model_validate({"preset": "turtlebot3_burger"})
@@ -24,7 +24,7 @@ REST = (-EPSILON, 0.0, 0.0)
 
 def ring(count: int, **fields: Any) -> UltrasonicParameters:
     """Rays all around P that see 2 m far."""
-    own = {"axes_deg": count, "beam_half_angle_deg": 0.05, "maximum_range_m": 2.0}
+    own = {"sensors": count, "beam_half_angle_deg": 0.05, "maximum_range_m": 2.0}
     return UltrasonicParameters.model_validate({**own, **fields})
 
 
@@ -274,7 +274,11 @@ def test_held_ranges_stay_where_they_were_seen():
     Objects of single hits, at the first ticks, are forgotten by then.
     """
     sensors = UltrasonicParameters(
-        axes_deg=(40.0, 0.0, -40.0), beam_half_angle_deg=0.1, firing="sequential"
+        sensors=tuple(
+            RangeSensorParameters(axis_deg=axis, beam_half_angle_deg=0.1)
+            for axis in (40.0, 0.0, -40.0)
+        ),
+        firing="sequential",
     )
     driven, held = Driven(sensors), [math.inf] * 3
     for tick in range(31):

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from diagrams import load_scenario, simulate
+from systems.framework.faults import FROZEN, LOST, Fault, fault_ticks
 from systems.framework.input_error import InputError
-from systems.ranging.parameters import UltrasonicParameters
-from systems.ranging.sensor_faults import SensorFaultParameters
 
-BEGIN_S, BEGIN = 1.0, 40
+BEGIN = 40  # tick at 1 s
 SETTINGS = (
     "hearing=ideal",
     "duration_s=3",
-    "ultrasonic.axes_deg=[30,0,-30]",
     "ultrasonic.firing=sequential",
 )
 
@@ -40,7 +37,7 @@ def sound():
 
 @pytest.mark.parametrize("kind", ["silent", "blind", "frozen", "noisy"])
 def test_it_fails_from_then_on_and_the_others_do_not(sound, kind):
-    fault = f"ultrasonic.faults=[{{sensor: 2, kind: {kind}, start_s: {BEGIN_S}}}]"
+    fault = f"faults=[{{sensor: ultrasonic, number: 2, kind: {kind}, start_s: 1}}]"
     place = "obstacles.0.waypoints_m=[[1.6,0]]"
     runs = [log(place, fault, engine=engine) for engine in ("compiled", "drake")]
     for name, values in readings(runs[0]).items():
@@ -64,6 +61,45 @@ def test_it_fails_from_then_on_and_the_others_do_not(sound, kind):
         assert (late == middle[BEGIN - 1]).all()
 
 
-def test_a_sensor_that_is_not_there_is_named():
-    with pytest.raises((InputError, ValidationError), match=r"faults\.0\.sensor.*4"):
-        UltrasonicParameters(faults=(SensorFaultParameters(sensor=4),))
+@pytest.mark.parametrize(
+    ("faults", "field", "told"),
+    [
+        ("{sensor: ultrasonic, number: 4, kind: blind}", "faults.0.number", "4 is not"),
+        ("{sensor: ultrasonic, kind: dead}", "faults.0.kind", "silent or blind"),
+        ("{sensor: gas_sensors, kind: dead}", "faults.0.sensor", "not a sensor of"),
+        ("{sensor: lidar, kind: dead}", "faults.0.sensor", "'microphones'"),
+        ("{sensor: odometry}", "faults.0.kind", "missing"),
+        (
+            "{sensor: odometry, kind: lost}, {sensor: odometry, kind: lost}",
+            "faults.1.number",
+            "has two faults",
+        ),
+    ],
+)
+def test_faults_that_cannot_be_are_named(faults, field, told):
+    with pytest.raises(InputError, match=told) as error:
+        load_scenario("default", [f"faults=[{faults}]"])
+    assert error.value.field == field
+
+
+def test_a_robot_may_have_faults_of_its_own():
+    robots = "robots={one: {}, two: {start: {position_m: [-2, -1]}, faults: [{sensor: "
+    settings = [robots + "odometry, kind: lost}]}}", *SETTINGS]
+    one, two = load_scenario("default", settings).robots.values()
+    assert one.faults == ()
+    assert two.faults == (Fault(sensor="odometry", kind="lost"),)
+
+
+def test_several_kinds_of_sensors_share_one_list():
+    """Each kind finds its own; the first tick is that of the start."""
+    faults = (
+        Fault(sensor="ultrasonic", number=2, kind="frozen", start_s=1.0),
+        Fault(sensor="odometry", kind="lost", start_s=0.5),
+    )
+    assert fault_ticks(faults, "ultrasonic", 3, 0.025).tolist() == [
+        [0, 0],
+        [FROZEN, 40],
+        [0, 0],
+    ]
+    assert fault_ticks(faults, "odometry", 1, 0.025).tolist() == [[LOST, 20]]
+    assert not fault_ticks(faults, "gas_sensors", 3, 0.025).any()

@@ -53,7 +53,7 @@ def test_a_ring_sees_a_body_at_every_bearing(name):
         assert found.min() == pytest.approx(1.49, abs=1e-9), degrees
         heading = ring.axes[int(np.argmin(found))] + POSE[2]
         off = abs(math.remainder(heading - angle, 2.0 * math.pi))
-        half = math.radians(ring.beam_half_angle_deg) + 0.01 / 1.49
+        half = ring.half_angles[0] + 0.01 / 1.49
         assert off <= half, "one that looks there"
 
 
@@ -66,7 +66,7 @@ def test_the_papers_three_do_not():
 @pytest.mark.parametrize("name", RINGS)
 def test_a_ring_has_no_gaps_and_stands_over_the_axle(name):
     ring = sensors(name)
-    assert 2.0 * ring.beam_half_angle_deg == pytest.approx(360.0 / ring.count)
+    np.testing.assert_allclose(ring.half_angles, math.pi / ring.count)
     assert set(ring.places) == {MAST}
     assert len(ring.neighbours) == ring.count
 
@@ -132,15 +132,16 @@ def test_a_saved_scenario_has_the_effective_values(tmp_path, name):
     assert load_scenario(path) == scenario
     text = path.read_text("utf-8")
     assert f"preset: {name}" in text
-    assert f"beam_half_angle_deg: {sensors(name).beam_half_angle_deg}" in text
+    half = sensors(name).sensors[0].beam_half_angle_deg
+    assert text.count(f"beam_half_angle_deg: {half}") == 1
     # Another preset takes the place of all of them.
     other = load_scenario(path, ["ultrasonic.preset=ring_12"])
     assert other.follower.ultrasonic == sensors("ring_12")
 
 
 def test_a_ring_of_any_number_on_the_mast():
-    assert set(sensors("ring_12", axes_deg=16).places) == {MAST}
-    assert sensors("ring_12", axes_deg=16).count == 16
+    assert set(sensors("ring_12", sensors=16).places) == {MAST}
+    assert sensors("ring_12", sensors=16).count == 16
 
 
 def test_each_robot_may_have_another():
@@ -148,8 +149,9 @@ def test_each_robot_may_have_another():
     robots += "{position_m: [-2, -1]}}}"
     words = [robots, "ultrasonic.noise_m=0.003"]
     scenario = load_scenario("default", words)
-    assert scenario.robots["second"].ultrasonic == sensors("ring_8")
-    assert scenario.robots["robot"].ultrasonic == sensors("three", noise_m=0.003)
+    assert scenario.of_robot("second").sensing.ultrasonic == sensors("ring_8")
+    first = scenario.of_robot("robot").sensing.ultrasonic
+    assert first == sensors("three", noise_m=0.003)
 
 
 def test_a_robot_may_be_named_preset():

@@ -18,13 +18,17 @@ from systems.ranging.ultrasonic_array import cone_ranges
 SIX = UltrasonicParameters.model_validate({"preset": "six"})
 
 
+def along(*axes: float) -> list[dict[str, float]]:
+    return [{"axis_deg": axis} for axis in axes]
+
+
 def sensors(**fields: Any) -> UltrasonicParameters:
     return UltrasonicParameters.model_validate({"noise_m": 0.0, **fields})
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 12, 36])
 def test_a_ring_looks_all_around_and_once_ahead(count):
-    ring = sensors(axes_deg=count)
+    ring = sensors(sensors=count)
     assert ring.count == count
     steps = -np.diff([*ring.axes_deg, ring.axes_deg[0] - 360.0])
     np.testing.assert_allclose(steps, 360.0 / count)
@@ -32,22 +36,21 @@ def test_a_ring_looks_all_around_and_once_ahead(count):
 
 
 def test_a_ring_of_even_number_has_one_ahead():
-    assert 0.0 in sensors(axes_deg=8).axes_deg
+    assert 0.0 in sensors(sensors=8).axes_deg
 
 
 @pytest.mark.parametrize(
-    ("axes", "neighbours"),
+    ("listed", "neighbours"),
     [
-        ((30.0, 0.0, -30.0), {(0, 1), (1, 2)}),
-        (SIX.axes_deg, {(0, 1), (1, 2), (3, 4), (4, 5)}),
+        (along(30.0, 0.0, -30.0), {(0, 1), (1, 2)}),
+        (along(*SIX.axes_deg), {(0, 1), (1, 2), (3, 4), (4, 5)}),
         (4, {(0, 1), (1, 2), (2, 3), (3, 0)}),
         (3, set()),
-        ((0.0,), set()),
+        (along(0.0), set()),
     ],
 )
-def test_neighbours_are_next_to_one_another_and_not_far(axes, neighbours):
-    positions = {"positions_m": ()}
-    assert set(sensors(axes_deg=axes, **positions).neighbours) == neighbours
+def test_neighbours_are_next_to_one_another_and_not_far(listed, neighbours):
+    assert set(sensors(sensors=listed).neighbours) == neighbours
 
 
 def test_a_thin_ring_measures_a_round_of_walls():
@@ -60,7 +63,7 @@ def test_a_thin_ring_measures_a_round_of_walls():
             [0.0, -2.5, 0.0, 8.0, 1.0],
         ]
     )
-    lidar = sensors(axes_deg=36, beam_half_angle_deg=0.5)
+    lidar = sensors(sensors=36, beam_half_angle_deg=0.5)
     found = cone_ranges([0.0, 0.0, 0.0], walls, lidar, 0.0)
     # The nearest point within the beam is at its edge nearer to the wall's foot.
     directions = np.radians(np.array(lidar.axes_deg))
@@ -71,7 +74,7 @@ def test_a_thin_ring_measures_a_round_of_walls():
 
 def test_echoes_to_both_sides_of_the_back_are_joined():
     """Of twelve, the first (180 deg) and the last (-150 deg) are neighbours."""
-    ring = sensors(axes_deg=12)
+    ring = sensors(sensors=12)
     ranges, echo = np.full(12, 3.0), np.zeros(12)
     ranges[[0, 11]], echo[[0, 11]] = 0.5, 1.0
     points = echo_points(ranges, echo, ring)
@@ -119,7 +122,7 @@ def test_the_back_is_defended_by_sensors_that_look_back():
 
 @pytest.mark.parametrize("firing", ["simultaneous", "sequential"])
 def test_a_ring_runs(firing):
-    ring = ["hearing=ideal", "ultrasonic.axes_deg=8", f"ultrasonic.firing={firing}"]
+    ring = ["hearing=ideal", "ultrasonic.sensors=8", f"ultrasonic.firing={firing}"]
     result = simulate(load_scenario("default", [*ring, "duration_s=3"]))
     assert result.simulated_s == pytest.approx(3.0)
 
@@ -127,15 +130,18 @@ def test_a_ring_runs(firing):
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"axes_deg": 0}, "0 sensors; use 1 to 360"),
-        ({"axes_deg": 361}, "361 sensors"),
-        ({"axes_deg": ()}, "at least 1 item"),
-        ({"axes_deg": (30.0, 30.0)}, "must fall from left to right"),
-        ({"axes_deg": (180.0, 0.0, -180.0)}, "is a turn or more"),
+        ({"sensors": 0}, "0 sensors; use 1 to 360"),
+        ({"sensors": 361}, "361 sensors"),
+        ({"sensors": []}, "0 sensors"),
+        ({"sensors": along(30.0, 30.0)}, r"sensors\.1\.axis_deg: 30 must be below 30"),
+        ({"sensors": along(180.0, 0.0, -180.0)}, "is a turn or more"),
+        ({"sensors": {"3": {"noise_m": 0.1}}}, r"sensors\.3: is not one of 3 sensors"),
+        ({"sensors": {"1": {"noise_m": -1.0}}}, r"sensors\.1\.noise_m"),
+        ({"sensors": [{"axis": 1.0}]}, r"sensors\.0\.axis"),
+        ({"noise_m": -1.0}, "noise_m: is -1.0; input should be greater"),
         ({"axes_deg": (10.0, -10.0), "positions_m": ((0, 0),) * 3}, "3 positions for"),
         ({"preset": "five"}, "'ring_8', 'ring_12', 'lidar' or 'scan_7'"),
         ({"preset": ["six"]}, "'three', 'six'"),
-        ({"preset": "six", "axes_deg": 8}, "6 positions for 8 sensors"),
     ],
 )
 def test_bad_sets(fields, message):

@@ -41,7 +41,9 @@ def approach(
     The robot drives along its heading at ``robot`` m/s, a long wall across its
     path comes at ``wall`` m/s.
     """
-    sensors = UltrasonicParameters(noise_m=0.0, firing=firing, period_s=period)
+    sensors = UltrasonicParameters.model_validate(
+        {"noise_m": 0.0, "firing": firing, "period_s": period}
+    )
     far = {"poses_WO": [0.0] * 3, "sizes": [1.0, 30.0], "pose_WS": [90.0, 0.0, 0.0]}
     array = bench(
         UltrasonicArray(parameters=sensors, obstacle_count=1),

@@ -12,7 +12,7 @@ from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.ultrasonic_array import UltrasonicArray
 from systems.sound.acoustics import sound_speed
 
-QUIET = UltrasonicParameters(noise_m=0.0)
+QUIET = UltrasonicParameters.model_validate({"noise_m": 0.0})
 FAR = [50.0, 0.0, 0.0]
 
 
@@ -113,7 +113,9 @@ def readings(bench, parameters, ticks: int, *, seed: int = 3) -> np.ndarray:
 
 
 def test_noise_has_the_set_deviation(bench):
-    noisy = readings(bench, UltrasonicParameters(noise_m=0.02), 1500)[:, :3]
+    noisy = readings(
+        bench, UltrasonicParameters.model_validate({"noise_m": 0.02}), 1500
+    )[:, :3]
     side = 1.0 / math.cos(math.radians(15))
     errors = noisy - [side, 1.0, side]
     # Five standard errors of a mean and of a deviation from 4500 draws.
@@ -124,14 +126,16 @@ def test_noise_has_the_set_deviation(bench):
 
 
 def test_dropouts_come_at_the_set_rate(bench):
-    rows = readings(bench, UltrasonicParameters(dropout_probability=0.3), 1500)
+    rows = readings(
+        bench, UltrasonicParameters.model_validate({"dropout_probability": 0.3}), 1500
+    )
     echo = rows[:, 3:]
     assert (1 - echo).mean() == pytest.approx(0.3, abs=5 * math.sqrt(0.21 / 4500))
     np.testing.assert_array_equal(rows[:, :3][echo == 0], 3.0)
 
 
 def test_seed_decides_the_noise(bench):
-    parameters = UltrasonicParameters(noise_m=0.02)
+    parameters = UltrasonicParameters.model_validate({"noise_m": 0.02})
     first, again = (readings(bench, parameters, 20) for _ in range(2))
     other = readings(bench, parameters, 20, seed=4)
     np.testing.assert_array_equal(first, again)
@@ -139,7 +143,9 @@ def test_seed_decides_the_noise(bench):
 
 
 def test_sensors_fire_one_after_the_other(bench):
-    parameters = UltrasonicParameters(noise_m=0.0, firing="sequential")
+    parameters = UltrasonicParameters.model_validate(
+        {"noise_m": 0.0, "firing": "sequential"}
+    )
     at = bench(make_array(parameters), **wall_ahead(1.0))
     side = 1.0 / math.cos(math.radians(15))
     expected = [
@@ -154,7 +160,9 @@ def test_sensors_fire_one_after_the_other(bench):
 
 
 def test_a_sensor_keeps_its_reading_until_it_fires_again(bench):
-    parameters = UltrasonicParameters(noise_m=0.0, firing="sequential")
+    parameters = UltrasonicParameters.model_validate(
+        {"noise_m": 0.0, "firing": "sequential"}
+    )
     at = bench(make_array(parameters), **wall_ahead(1.0)).tick().tick().tick()
     nearer = wall_ahead(0.5)
     port = at.block.GetInputPort("poses_WO")
@@ -169,11 +177,14 @@ def test_a_sensor_keeps_its_reading_until_it_fires_again(bench):
     ("settings", "message"),
     [
         ({"minimum_range_m": 3.0}, "minimum_range_m: 3.0 must be below"),
-        ({"axes_deg": (-30.0, 0.0, 30.0)}, "axes_deg: .* must fall from left"),
+        (
+            {"sensors": [{"axis_deg": 0.0}, {"axis_deg": 30.0}]},
+            "sensors.1.axis_deg: .* from left to right",
+        ),
         ({"beam_half_angle_deg": 90.0}, "less than 90"),
         ({"dropout_probability": 1.5}, "less than or equal to 1"),
     ],
 )
 def test_impossible_sensors_are_refused(settings, message):
     with pytest.raises(ValidationError, match=message):
-        UltrasonicParameters(**settings)
+        UltrasonicParameters.model_validate(settings)

@@ -30,18 +30,28 @@ CONTROL_POINT_M = 0.175
 CELL_M = 0.05
 EXACT = PlaceError(0.0, 0.0, 0.41, 0.0)
 BEHIND = ((0, 0), (0, 0), (0, 0), (-0.35, 0), (-0.35, 0), (-0.35, 0))
+
+
+def at(axes: Any, places: Any = ((0, 0),) * 6) -> list[dict[str, Any]]:
+    return [
+        {"axis_deg": axis, "position_m": place}
+        for axis, place in zip(axes, places, strict=False)
+    ]
+
+
 SETS: dict[str, dict[str, Any]] = {
     "the papers' three": {},
-    "ring of 12": {"axes_deg": 12},
+    "ring of 12": {"sensors": 12},
     "three more behind": {
-        "axes_deg": (30.0, 0.0, -30.0, -150.0, -180.0, -210.0),
-        "positions_m": BEHIND,
+        "sensors": at((30.0, 0.0, -30.0, -150.0, -180.0, -210.0), BEHIND),
     },
-    "apart from each other": {"positions_m": ((0, 0.3), (0.02, 0), (0, -0.3))},
-    "72 narrow beams": {"axes_deg": 72, "beam_half_angle_deg": 2.5},
-    "with overlaps": {"axes_deg": (25.0, 0.0, -12.0), "beam_half_angle_deg": 17.0},
-    "ring that overlaps": {"axes_deg": 8, "beam_half_angle_deg": 40.0},
-    "with a gap": {"axes_deg": (40.0, 0.0, -30.0)},
+    "apart from each other": {
+        "sensors": at((30.0, 0.0, -30.0), ((0, 0.3), (0.02, 0), (0, -0.3)))
+    },
+    "72 narrow beams": {"sensors": 72, "beam_half_angle_deg": 2.5},
+    "with overlaps": {"sensors": at((25.0, 0.0, -12.0)), "beam_half_angle_deg": 17.0},
+    "ring that overlaps": {"sensors": 8, "beam_half_angle_deg": 40.0},
+    "with a gap": {"sensors": at((40.0, 0.0, -30.0))},
 }
 
 
@@ -161,9 +171,8 @@ def test_a_cell_whose_whole_round_is_seen_from_one_place_is_free(name):
 
 
 def ring_of(count: int, half_angle_deg: float) -> set[tuple[int, int]]:
-    sensors = UltrasonicParameters(
-        axes_deg=count,  # type: ignore[arg-type]
-        beam_half_angle_deg=half_angle_deg,
+    sensors = UltrasonicParameters.model_validate(
+        {"sensors": count, "beam_half_angle_deg": half_angle_deg}
     )
     return free_cells(
         seen_space(sensors, np.array([0.013, 0.02, 0.3]), np.empty((0, 5)))

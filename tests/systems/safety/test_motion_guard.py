@@ -12,7 +12,7 @@ import pytest
 from diagrams import Scenario, load_scenario, simulate
 from systems import FreeSpaceMap, MotionGuard, WheelCommand
 from systems.base.parameters import OdometryParameters
-from systems.base.robot import body_radius
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import RunFacts
 from systems.framework.input_error import InputError
 from systems.safety.braking import HALTED
@@ -142,7 +142,10 @@ def test_a_bubble_that_is_too_small_for_the_body_is_refused():
     [
         (["obstacle_sensing=ideal"], "obstacle_sensing"),
         (["guard.start_bubble_m=0.5"], "guard.start_bubble_m"),
-        (["ultrasonic.axes_deg=[60, -60]"], "ultrasonic.axes_deg"),
+        (
+            ["ultrasonic.sensors=[{axis_deg: 60}, {axis_deg: -60}]"],
+            "ultrasonic.sensors",
+        ),
         (["obstacles=[{name: box, waypoints_m: [[0.9, 0]]}]"], "start.position_m"),
         (["source.waypoints_m=[[1.1, 0]]"], "start.position_m"),
         (
@@ -227,7 +230,7 @@ def test_pulses_make_a_tick_count_half_a_pulse_more_and_a_reversal_its_command()
 def test_by_the_encoders_of_the_papers_robot_a_cell_is_known_for_14_m():
     """(q/L) (s + d) + q = 6 mm at d = 2 m, with pulses of q = 0.145 mm at the rim."""
     pulse = 0.06 * math.tau / 2600
-    error = PlaceError.of(GuardParameters(), Scenario().robot, OdometryParameters())
+    error = PlaceError.of(GuardParameters(), RobotParameters(), OdometryParameters())
     expected = (0.006 - pulse) * 0.41 / pulse - 2.0
     assert lasting(2.0, error) == pytest.approx(expected)
     assert 14.0 < expected < 15.0
@@ -245,7 +248,7 @@ MOVING = "guard.obstacle_speed_m_s=0.3"
         ("two_static_obstacles", (GUARD, "seed=3")),
         ("one_moving_obstacle", (MOVING,)),
         ("corridor", (GUARD, "law=conventional", "ultrasonic.noise_m=0.01")),
-        ("u_trap", (GUARD, "ultrasonic.axes_deg=12")),
+        ("u_trap", (GUARD, "ultrasonic.sensors=12")),
         ("two_static_obstacles", (MOVING, "ultrasonic.firing=sequential")),
         ("default", (GUARD, "ultrasonic.period_s=0.05")),
         ("corridor", (GUARD, "tick_s=0.0125")),

@@ -21,7 +21,7 @@ class Watched:
     """A monitor that is told what is read, tick by tick."""
 
     def __init__(self, **sensors):
-        block = SensingMonitor(sensors=UltrasonicParameters(**sensors))
+        block = SensingMonitor(sensors=UltrasonicParameters.model_validate(sensors))
         self.step, self.ticks = block.step, count()
         self.state = copied(block.step.state)
 

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from pydrake.common.value import Value
 
 from systems.base.robot import RobotParameters, microphones_B
+from systems.framework.faults import Fault
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame, Emission
 from systems.sound.acoustics import sound_speed
 from systems.sound.mic_array import MicArray
-from systems.sound.parameters import MicArrayParameters, MicrophoneFaultParameters
+from systems.sound.parameters import MicArrayParameters
 
 pytestmark = pytest.mark.drake
 
@@ -311,23 +311,25 @@ def test_source_out_of_reach_is_refused(sounding):
 def test_dead_and_frozen_microphones_fail_from_their_time_on():
     """Dead is 0, frozen a quarter of full scale; the others do not change."""
     faults = (
-        MicrophoneFaultParameters(microphone=1, start_s=0.4),
-        MicrophoneFaultParameters(microphone=2, kind="frozen"),
-        MicrophoneFaultParameters(microphone=3, start_s=TIME),
+        Fault(sensor="microphones", number=1, kind="dead", start_s=0.4),
+        Fault(sensor="microphones", number=2, kind="frozen"),
+        Fault(sensor="microphones", number=3, kind="dead", start_s=TIME),
+        Fault(sensor="odometry", kind="lost"),
     )
     sound = recorded(emission((1.5, 1.2)), parameters=quiet())
-    faulty = recorded(emission((1.5, 1.2)), parameters=quiet(faults=faults))
+    faulty = recorded(emission((1.5, 1.2)), parameters=quiet(), faults=faults)
     assert np.all(faulty.counts[0] == 0)
     assert np.all(faulty.counts[1] == 2**13)
     np.testing.assert_array_equal(faulty.counts[2], sound.counts[2])
 
 
 def test_faults_of_no_microphone_or_twice_of_one_are_refused():
-    fault = MicrophoneFaultParameters(microphone=4)
-    with pytest.raises(InputError, match="4 of 3; give a number from 1 to 3"):
-        MicArray(parameters=quiet(faults=(fault,)))
-    with pytest.raises(ValidationError, match="has two faults"):
-        quiet(faults=(fault, fault))
+    third = Fault(sensor="microphones", number=3, kind="dead")
+    fourth = Fault(sensor="microphones", number=4, kind="dead")
+    with pytest.raises(InputError, match=r"4 is not one of 3.*from 1 to 3"):
+        MicArray(faults=(fourth,))
+    with pytest.raises(InputError, match="has two faults"):
+        MicArray(faults=(third, third))
 
 
 def test_frames_of_32_khz_hold_the_same_sound():

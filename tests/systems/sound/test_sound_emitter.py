@@ -12,7 +12,6 @@ from pydrake.systems.framework import DiagramBuilder
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.source_robot import SourceRobot
 from systems.framework.block import RunFacts
-from systems.sound.acoustics import AcousticParameters
 from systems.sound.mic_array import MicArray
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import (
@@ -202,7 +201,6 @@ def test_a_called_sound_of_a_loop_is_that_of_the_block():
         ticks=12,
         tick_s=0.025,
         initial_pose=(0.0, 0.0, 0.0),
-        scheme="runge_kutta3",
         step_s=0.025,
         seed_of=lambda _: 0,
         carried={},

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from diagrams import load_scenario
-from diagrams.scenario.loading import scenario_from_mapping
+from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 
 

@@ -14,6 +14,7 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.sound.parameters import RoomParameters
 from systems.world.parameters import ObstacleParameters
+from tests.diagrams.scenario.kinds import KINDS
 
 SCHEMA = scenario_schema()
 FIELDS = {field.path: field for field in list_fields(SCHEMA)}
@@ -29,10 +30,21 @@ def leaves(value: Any, path: str = "") -> dict[str, Any]:
     return found
 
 
-def test_defaults_are_those_of_the_models() -> None:
-    defaults = leaves(Scenario().model_dump(mode="json"))
-    assert len(defaults) > 300
-    assert {path: FIELDS[path].default for path in defaults} == defaults
+@pytest.mark.parametrize("kind", KINDS)
+def test_defaults_are_those_of_the_models(kind: str) -> None:
+    scenario = Scenario.model_validate(KINDS[kind])
+    defaults = leaves(scenario.model_dump(mode="json"))
+    assert len(defaults) > 60
+    stated = {
+        path
+        for path in defaults
+        if path.partition(".")[0] in KINDS[kind] and path.partition(".")[0] != "route"
+    }
+    listed = {path: FIELDS[path].default for path in defaults}
+    assert {path for path in listed if listed[path] != defaults[path]} <= stated
+
+
+def test_defaults_of_groups_that_are_unset_are_those_of_the_models() -> None:
     for path, model in (("room", RoomParameters), ("obstacles.0", ObstacleParameters)):
         for name, value in model().model_dump(mode="json").items():
             assert FIELDS[f"{path}.{name}"].default == value
@@ -54,16 +66,16 @@ def test_every_field_has_a_meaning_and_what_is_no_plain_number_a_unit() -> None:
 
 def test_ranges_are_those_that_the_models_hold_to() -> None:
     """What the list says is the least and the most is taken, and nothing beyond."""
-    for field in (
-        "wind.meander_intensity",
-        "gas_sensors.mismatch",
-        "compass.noise_deg",
+    for name, field in (
+        ("default", "wind.meander_intensity"),
+        ("odor_search", "gas_sensors.mismatch"),
+        ("sound_search", "compass.noise_deg"),
     ):
         low, high = re.findall(r"[-\d.e+]+", FIELDS[field].range)
         for value, step in ((low, -1e-3), (high, 1e-3)):
-            load_scenario("default", [f"{field}={value}"])
+            load_scenario(name, [f"{field}={value}"])
             with pytest.raises(InputError, match=field):
-                load_scenario("default", [f"{field}={float(value) + step}"])
+                load_scenario(name, [f"{field}={float(value) + step}"])
 
 
 @pytest.mark.parametrize(

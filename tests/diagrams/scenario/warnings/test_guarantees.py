@@ -10,7 +10,7 @@ from diagrams import load_scenario
 from diagrams.scenario.warnings.guarantees import clear_way, guarantees, seen_angle_deg
 from systems.framework.input_error import InputError
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.views import range_error
+from systems.safety.views import range_errors
 
 
 def facts(name="two_static_obstacles", *settings):
@@ -33,7 +33,7 @@ def test_by_default_nothing_that_rests_is_touched():
     [
         (["ultrasonic.dropout_probability=0.1"], "A2"),
         (["assumed_sound_speed_m_s=400"], "A2"),
-        (["ultrasonic.faults=[{sensor: 1, kind: blind}]"], "A2"),
+        (["faults=[{sensor: ultrasonic, kind: blind}]"], "A2"),
         (["plant.slip=[0.01, -0.01]"], "A4"),
         (["plant.friction=0.15"], "A5"),
         (["plant.friction=0.6"], "A5"),
@@ -113,8 +113,8 @@ def test_the_clear_way_by_hand():
     """R 0.446 and 12 mm, v^2/2a, lag and two ticks, margins of ranges, bodies' way."""
     scenario = load_scenario("two_static_obstacles", ["guard={}"])
     lag, error = (
-        scenario.plant.motor_lag_s,
-        range_error(scenario.ultrasonic),
+        scenario.only.plant.motor_lag_s,
+        range_errors(scenario.follower.ultrasonic).max(),
     )
     disc = 0.5 * math.hypot(0.35, 0.82) + 0.012
     way = 0.6**2 / 3.0 + 0.6 * (lag + 0.05) + error

@@ -136,7 +136,7 @@ def test_what_is_warned_of_leaves_all_that_is_stable():
     own = load_scenario(
         "unknown_block",
         ["law=trajectory_adaptive", f"{ADAPTIVE}.rate=5000"],
-    ).repulsion.trajectory_adaptive
+    ).router.laws.trajectory_adaptive
     loop = PointLoop(own, motor_lag_s=0.05)
     targets = swinging_target(1.0, 60.0, 0.025)
     assert np.abs(run_point(loop, targets).gains[:, 1]).max() > 80.0

@@ -56,11 +56,7 @@ def test_the_audits_cart_names_speed_limit_and_field():
             "A2",
         ),
         ("ultrasonic.dropout_probability=0.1", "ultrasonic.dropout_probability", "A2"),
-        (
-            "ultrasonic.faults=[{sensor: 1, kind: blind}]",
-            "ultrasonic.faults",
-            "A2",
-        ),
+        ("faults=[{sensor: ultrasonic, kind: blind}]", "faults", "A2"),
         ("plant.slip=[0.01, -0.01]", "guard.wheel_error", "A4"),
         ("plant.friction=0.6", "plant.friction", "A5"),
     ],
@@ -74,7 +70,7 @@ def test_every_broken_assumption_is_told(setting, field, told):
 
 def test_what_is_true_or_reckoned_with_is_not_told():
     known = "guard={wheel_error: 0.01, place_error_m: 0.1}"
-    faults = "ultrasonic.faults=[{sensor: 1, kind: silent}]"
+    faults = "faults=[{sensor: ultrasonic, kind: silent}]"
     assert warned("guard={}") == ()
     assert warned("guard={}", "plant.slip=[0.01, -0.01]", known) == ()
     assert warned("guard={}", "assumed_sound_speed_m_s=300") == ()

@@ -1,0 +1,146 @@
+"""Settings: fields that a user gives by their dotted paths, for example ``--set``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from diagrams.scenario.former_fields import renamed
+from diagrams.scenario.shorthand import begins_anew, require_effect
+from diagrams.scenario.yaml_text import parse_yaml
+from systems.framework.input_error import InputError
+
+
+def plain_settings(
+    overrides: Iterable[str] | Mapping[str, Any],
+) -> Iterable[tuple[str, Any]]:
+    """Returns settings as pairs of path and plain value.
+
+    Args:
+        overrides: See ``load_scenario``.
+
+    Returns:
+        The pairs, in order.
+
+    Raises:
+        InputError: A text does not have the form key=value, or a value is not plain.
+    """
+    if isinstance(overrides, Mapping):
+        return [(key, _plain(key, value)) for key, value in overrides.items()]
+    if isinstance(overrides, str):
+        raise InputError(
+            "overrides", f"is the text {overrides!r}; give a list of key=value"
+        )
+    return map(parse_setting, overrides)
+
+
+def _plain(key: str, value: Any) -> Any:
+    """Returns a copy of the value as plain data, in the form of a file."""
+    try:
+        return json.loads(json.dumps(value))
+    except (TypeError, ValueError):
+        raise InputError(
+            key,
+            f"{value!r} is not a plain value; give a number, a text, a truth "
+            "value, or a list or mapping of them",
+        ) from None
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """Splits ``key=value`` into the key and the value, which is YAML.
+
+    Raises:
+        InputError: The text does not have this form.
+    """
+    key, equals, value_text = text.partition("=")
+    if not equals or not all(key.split(".")):
+        raise InputError(
+            text or "--set", "is not of the form key=value, for example seed=2"
+        )
+    return key, parse_yaml(value_text, key)
+
+
+def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:
+    """Sets fields of a scenario that a user has given by their paths.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+        settings: Plain values by dotted path. Former names are accepted.
+
+    Raises:
+        InputError: See ``set_fields``, or a field has no effect because all robots or
+            all sources have values of their own.
+    """
+    fields = {renamed(key): value for key, value in settings.items()}
+    set_fields(data, fields.items())
+    require_effect(data, fields)
+
+
+def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
+    """Sets fields of a mapping.
+
+    The function sets presets first, so that all other fields override them. If a group
+    already has a preset, a new preset clears the group. Missing groups on the path to a
+    field are created.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+        fields: Dotted paths and plain values. An entry of a list is given by its index
+            (``obstacles.0.size_m``) or by its name (``obstacles.cart.size_m``). If two
+            paths are the same, the later value wins.
+
+    Raises:
+        InputError: A path leads into a plain value or past the end of a list, or a
+            name in it is the name of no entry or of several entries of a list.
+    """
+    for key, value in sorted(fields, key=lambda field: not _is_preset(*field)):
+        _set_field(data, key, value)
+
+
+def _is_preset(key: str, value: Any) -> bool:
+    return begins_anew({key.rpartition(".")[2]: value})
+
+
+def _set_field(data: dict[str, Any], key: str, value: Any) -> None:
+    *parents, last = key.split(".")
+    node: Any = data
+    for depth, part in enumerate(parents):
+        node = _descend(node, part, ".".join(parents[: depth + 1]))
+    if isinstance(node, list):
+        node[_index(node, last, key)] = value
+    elif isinstance(node, dict):
+        if begins_anew(node) and _is_preset(key, value):
+            node.clear()
+        node[last] = value
+    else:
+        raise InputError(key, "leads into a plain value; shorten the key")
+
+
+def _descend(node: Any, part: str, key: str) -> Any:
+    if isinstance(node, list):
+        return node[_index(node, part, key)]
+    if isinstance(node, dict):
+        if node.get(part) is None:  # missing, or null, for example room
+            node[part] = {}
+        return node[part]
+    raise InputError(key, "leads into a plain value; shorten the key")
+
+
+def _index(node: list[Any], part: str, key: str) -> int:
+    if part.isdigit() and int(part) < len(node):
+        return int(part)
+    names = [each.get("name") for each in node if isinstance(each, dict)]
+    found = [k for k, each in enumerate(names) if each == part]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise InputError(
+            key, f"{len(found)} entries have the name {part!r}; use an index, from 0"
+        )
+    known = ", ".join(repr(name) for name in names if name)
+    raise InputError(
+        key,
+        f"{part!r} is neither an index of a list of {len(node)} nor the name of an "
+        f"entry; count from 0{f', or use {known}' if known else ''}",
+    )

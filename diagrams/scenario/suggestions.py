@@ -1,0 +1,43 @@
+"""Suggests valid names that are similar to a mistyped name."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from difflib import get_close_matches
+
+from systems.framework.input_error import InputError
+
+
+def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
+    """Returns the end of a message that suggests similar names.
+
+    Args:
+        name: The mistyped name.
+        known: The valid names.
+        most: Greatest number of suggestions.
+
+    Returns:
+        The text; empty if no name is similar.
+    """
+    by_folded = {each.casefold(): each for each in known}
+    near = get_close_matches(name.casefold(), by_folded, n=most)
+    if not near:
+        return ""
+    return f" (did you mean {' or '.join(repr(by_folded[each]) for each in near)}?)"
+
+
+def unknown_law(name: str, known: Collection[str]) -> InputError:
+    """Returns the error for an unknown law.
+
+    Args:
+        name: The unknown name.
+        known: Names of the laws.
+
+    Returns:
+        The error to raise.
+    """
+    near = did_you_mean(name, known)
+    return InputError(
+        "",  # the model with the field adds the path
+        f"{name!r} is not known; use {', '.join(known)}, or file.py:Name{near}",
+    )

@@ -1,0 +1,126 @@
+"""Faults of the sensors of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, Strict, model_validator
+
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Parameters, Time
+
+FaultySensor = Literal[
+    "microphones", "ultrasonic", "gas_sensors", "contact_switches", "odometry"
+]
+FaultKind = Literal[
+    "dead", "frozen", "silent", "blind", "noisy", "stuck_open", "stuck_closed", "lost"
+]
+#: Numbers of the kinds of faults; 0 is a sensor without a fault.
+DEAD, FROZEN, SILENT, BLIND, NOISY, STUCK_OPEN, STUCK_CLOSED, LOST = range(1, 9)
+
+#: Kinds of faults of each sensor.
+KINDS: Mapping[FaultySensor, tuple[FaultKind, ...]] = {
+    "microphones": ("dead", "frozen"),
+    "ultrasonic": ("silent", "blind", "frozen", "noisy"),
+    "gas_sensors": ("dead", "frozen"),
+    "contact_switches": ("stuck_open", "stuck_closed"),
+    "odometry": ("lost",),
+}
+
+
+class Fault(Parameters):
+    """A sensor that fails during a run, and the kind of its fault."""
+
+    sensor: FaultySensor
+    """Sensors to which the failing one belongs."""
+    number: int = Field(default=1, ge=1, le=360)
+    """Number of the failing one, starting at 1. Microphones: their order in
+    ``robot.microphones_m``; ultrasonic: from left to right; gas sensors: 1 right front,
+    2 rear, 3 left front; contact switches: 1 left, 2 right; odometry: 1."""
+    kind: FaultKind
+    """Microphones: ``dead`` (its counts are 0) or ``frozen`` (its counts stay at a
+    quarter of full scale). Ultrasonic: ``silent`` (it no longer fires), ``blind`` (it
+    never has an echo), ``frozen`` (it repeats its last reading) or ``noisy`` (the
+    standard deviation of its range is 0.3 m larger). Gas sensors: ``dead`` (its reading
+    is 1, clean air, without noise) or ``frozen`` (it repeats its last reading). Contact
+    switches: ``stuck_open`` (it never closes) or ``stuck_closed`` (it never opens).
+    Odometry: ``lost`` (its pose is reset to (0, 0, 0) once)."""
+    start_s: Time = 0.0
+    """Start of the fault, s."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Fault:
+        if self.kind not in (kinds := KINDS[self.sensor]):
+            raise InputError(
+                "kind",
+                f"{self.kind} is not a fault of {self.sensor}; use "
+                f"{' or '.join(kinds)}",
+            )
+        return self
+
+
+Faults = Annotated[tuple[Fault, ...], Strict(False), Field(max_length=360)]
+
+
+def faults_of(
+    faults: Iterable[Fault], sensor: FaultySensor, count: int
+) -> dict[int, Fault]:
+    """Returns the faults of some sensors of a robot.
+
+    Args:
+        faults: All faults of the robot.
+        sensor: The sensors.
+        count: Number of these sensors.
+
+    Returns:
+        The fault of each sensor that fails, by its index, counted from 0.
+
+    Raises:
+        InputError: A number is above ``count``, or one sensor has two faults.
+    """
+    found: dict[int, Fault] = {}
+    for index, fault in enumerate(faults):
+        if fault.sensor != sensor:
+            continue
+        field = f"faults.{index}.number"
+        if fault.number > count:
+            raise InputError(
+                field,
+                f"{fault.number} is not one of {count} {sensor}; give a number from 1 "
+                f"to {count}",
+            )
+        if fault.number - 1 in found:
+            raise InputError(
+                field,
+                f"{sensor} {fault.number} has two faults; keep one of them",
+            )
+        found[fault.number - 1] = fault
+    return found
+
+
+def fault_ticks(
+    faults: Iterable[Fault], sensor: FaultySensor, count: int, tick_s: float
+) -> NDArray[np.int64]:
+    """Returns the faults of some sensors as numbers, for compiled code.
+
+    Args:
+        faults: All faults of the robot.
+        sensor: The sensors.
+        count: Number of these sensors.
+        tick_s: Control period of the robot, s.
+
+    Returns:
+        (count, 2) number of the kind of the fault of each sensor, 0 for none, and first
+        tick of the fault.
+
+    Raises:
+        InputError: See ``faults_of``.
+    """
+    ticks = np.zeros((count, 2), dtype=np.int64)
+    for k, fault in faults_of(faults, sensor, count).items():
+        number = get_args(FaultKind).index(fault.kind) + 1
+        ticks[k] = number, round(fault.start_s / tick_s)
+    return ticks
