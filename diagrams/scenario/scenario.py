@@ -179,6 +179,11 @@ class Scenario(RunParameters):
         """Longest audio frame of all robots with microphones, s; 0 without any."""
         return max(map(frame_of, self.robots.values()))
 
+    @property
+    def law_names(self) -> str:
+        """The laws of all robots, each once, separated by commas."""
+        return ", ".join(dict.fromkeys(robot.law for robot in self.robots.values()))
+
     def target(self, robot: str) -> str:
         """Name of the target of a robot: a source, a leader, its goal, or the odor."""
         own = self.robots[robot]
