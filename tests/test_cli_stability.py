@@ -24,7 +24,7 @@ def quick_parts(
     """Stand-ins for analyses that take their time."""
 
     def verdicts(study):
-        return (judge(MASS, study.scenario.robot.mass_kg),)
+        return (judge(MASS, study.scenario.only.robot.mass_kg),)
 
     def impossible(study):
         raise InputError("law", "has no such thing; choose another one")
