@@ -309,6 +309,10 @@ PAIR = "robots={a: {}, b: {start: {position_m: [-2, 0]}}}"
         ([PAIR, "robots.b.follows=a"], r"robots\.b\.follows: 'a' is neither "),
         (["follows=robot"], r"follows: 'robot' is neither a source .*use source"),
         (
+            [PAIR, "robots.a.follows=b", "robots.b.follows=a"],
+            r"robots\.a\.follows: 'b' is neither .*; add a source, or a loudspeaker$",
+        ),
+        (
             ["sources={s: {body: false}}"],
             r"sources\.s\.body: is off, but robot 'robot' follows it",
         ),
