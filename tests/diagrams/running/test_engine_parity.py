@@ -178,7 +178,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "law": "trajectory_adaptive",
             "laws.trajectory_adaptive.rate": 5.0,
             "laws.trajectory_adaptive.contact_rate": 2.0,
-            "ideal_hearing.range_noise_fraction": 0.05,
         },
     ),
     "by beams": (
