@@ -11,8 +11,8 @@ import pytest
 from diagrams import RunResult, Scenario, load_scenario, simulate
 from diagrams.building.builder import build_sound_follower
 from diagrams.building.robot import make_robot
-from diagrams.scenario.loading import scenario_from_mapping
 from diagrams.scenario.participants import Follower
+from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 from systems.hearing.tdoa_estimator import may_sound
 from systems.sound.parameters import SoundParameters
