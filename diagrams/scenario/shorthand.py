@@ -255,11 +255,28 @@ def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
         else:
             continue
         named = _group(data.get(group))
-        if below and named and all(_has(own, below) for own in named.values()):
+        leaves = [[*below, *leaf] for leaf in _leaves(data, place)]
+        if (
+            below
+            and named
+            and all(_has(own, leaf) for own in named.values() for leaf in leaves)
+        ):
             names = ", ".join(f"{group}.{name}.{'.'.join(below)}" for name in named)
             raise InputError(
                 field, f"has no effect, because {names} are set; set these instead"
             )
+
+
+def _leaves(tree: Any, place: Sequence[str]) -> Iterator[list[str]]:
+    """Paths of the leaves below a place of a tree, relative to this place."""
+    if place:
+        below = tree.get(place[0]) if isinstance(tree, Mapping) else None
+        yield from _leaves(below, place[1:])
+    elif isinstance(tree, Mapping) and tree:
+        for key, value in tree.items():
+            yield from ([key, *leaf] for leaf in _leaves(value, []))
+    else:
+        yield []
 
 
 def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:

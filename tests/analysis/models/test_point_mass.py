@@ -37,7 +37,9 @@ def block_force(scenario, law, state, *, before=None):
         pushes.append(repulsion_force(C_W, s, law))
     F_b = np.sum(pushes, axis=0)
     p_WS = scenario.source.path().pose(0.0)[:2]
-    F_m = attraction_force(state[:2], state[2:], p_WS, 1.0, scenario.follower.attraction, 3.94)
+    F_m = attraction_force(
+        state[:2], state[2:], p_WS, 1.0, scenario.follower.attraction, 3.94
+    )
     return F_m[0] + F_b[0], F_m[1] + F_b[1]
 
 

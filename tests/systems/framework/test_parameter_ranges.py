@@ -52,9 +52,18 @@ WIDER = {
 
 
 def schemas() -> dict[str, dict[str, Any]]:
-    """Schema of every field of the scenario's tree, as `Model.field`."""
-    scenario = Scenario.model_json_schema()
-    models = {"Scenario": scenario, **scenario["$defs"]}
+    """Schema of every field of the scenario's tree, as `Model.field`.
+
+    It is that of what a field holds, which may be given in a shorter form.
+    """
+    models = (
+        RunParameters,
+        participants.SourceParameters,
+        *participants.KINDS.values(),
+        *(law.gains for law in LAWS.values() if law.gains is not None),
+    )
+    pairs: Any = [(model, "validation") for model in models]
+    _, schema = models_json_schema(pairs)
     return {
         f"{model}.{field}": schema
         for model, whole in schema["$defs"].items()
