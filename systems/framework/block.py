@@ -184,7 +184,7 @@ class _Declared:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        if cls.inputs or cls.outputs:  # its own ports, or those of its base
+        if cls.inputs or cls.outputs:
             cls.__doc__ = _with_port_table(cls)
 
     def declare_ports(
