@@ -48,7 +48,13 @@ from diagrams.scenario.participants import (
 )
 from diagrams.scenario.run_parameters import RunParameters
 from diagrams.scenario.settings import apply_settings, plain_settings
-from diagrams.scenario.shorthand import SOURCE, as_written, file_form, resolved
+from diagrams.scenario.shorthand import (
+    SOURCE,
+    as_written,
+    field_in,
+    file_form,
+    resolved,
+)
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
@@ -417,11 +423,12 @@ class Scenario(RunParameters):
             field = f"robots.{name}.follows"
             target = self.target(name)
             if target not in played or target == name:
-                can = [each for each in played if each != name]
+                can = ", ".join(each for each in played if each != name)
+                remedy = f"use {can}" if can else "add a source, or a loudspeaker"
                 raise InputError(
                     field,
                     f"{target!r} is neither a source nor another robot with a "
-                    f"loudspeaker; use {', '.join(can)}",
+                    f"loudspeaker; {remedy}",
                 )
             if target in sources and not sources[target].body:
                 raise InputError(
@@ -539,7 +546,7 @@ class Scenario(RunParameters):
                         field,
                         f"{name!r} is on the robot's start at "
                         f"{self.robots[robot].start.position_m}; move its first "
-                        f"waypoint or start.position_m of the robot",
+                        f"waypoint, or {field_in('robots', robot, 'start.position_m')}",
                     )
 
     def _check_guards(self) -> None:

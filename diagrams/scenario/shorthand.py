@@ -99,7 +99,10 @@ def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
     base = joined({"sound": sound}, source)
     sources = run.get("sources") or {}
     if isinstance(robots, Mapping) and not sources:
-        follows = any(_follows_a_source(each, robots) for each in robots.values())
+        follows = any(
+            _follows_a_source(each, [other for other in robots if other != name])
+            for name, each in robots.items()
+        )
         sources = {SOURCE: {}} if follows else {}
     if isinstance(sources, Mapping):
         run["sources"] = {
@@ -153,11 +156,11 @@ def _robots(
     return found
 
 
-def _follows_a_source(robot: Any, robots: Mapping[str, Any]) -> bool:
+def _follows_a_source(robot: Any, others: Sequence[str]) -> bool:
     if KINDS[kind_of(robot)].has_goal:
         return False
     follows = robot.get("follows") if isinstance(robot, Mapping) else robot.follows
-    return follows not in robots
+    return follows not in others
 
 
 def as_written(place: Sequence[str], data: Mapping[str, Any]) -> list[str]:
