@@ -66,7 +66,7 @@ def _faults(
         if not isinstance(inner, InputError):
             inner = InputError("", str(inner))
         for fault in inner.all:
-            below = [part for part in fault.field.split(".") if part]
+            below = fault.field.split(".") if fault.field else []
             yield InputError(".".join(written([*loc, *below])), fault.message)
     else:
         # Replace words of Python by words of YAML.
