@@ -222,7 +222,7 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
     needed = clear_way(alone, body.top_speed_m_s, speed)
     axes, places, half_angles = sensors.beams
     forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angles
-    # Of the sensors that look ahead, the one that sees farthest counts.
+    # Only the sensor that sees farthest ahead counts.
     reach = body.control_point_m + places[:, 0] + sensors.each("maximum_range_m")
     seen = float(np.max(reach[forward], initial=-np.inf))
     return (
@@ -268,8 +268,7 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
     """A2: no body is nearer than a range reading minus the margin.
 
-    Of the sensors, the one that misses most echoes and the one that sees farthest
-    count.
+    The sensor that misses most echoes and the sensor that sees farthest count.
     """
     sensors = scenario.follower.ultrasonic
     stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s
