@@ -184,7 +184,8 @@ class _Declared:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        if cls.inputs or cls.outputs:
+        own = cls.__doc__ or ""
+        if (cls.inputs or cls.outputs) and ".. pydrake_system::" not in own:
             cls.__doc__ = _with_port_table(cls)
 
     def declare_ports(
