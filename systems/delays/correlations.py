@@ -1,4 +1,4 @@
-"""Correlations of channels from their cross-spectra."""
+"""Computes correlations of channels from their cross-spectra."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-# The whitened spectrum decreases to zero where the cross-spectrum is below this share
-# of its mean. Otherwise bins of noise would count as much as bins of sound.
+# Share of the mean of the cross-spectrum. Where the cross-spectrum is below this share,
+# the whitened spectrum decreases to zero. Otherwise bins of noise would count as much
+# as bins of sound.
 _PHAT_FLOOR = 0.1
 
 
@@ -23,7 +24,7 @@ def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
 def correlations_at_lags(
     cross: NDArray[Any], band: slice, length: int, reach: int
 ) -> NDArray[Any]:
-    """Computes the correlations of pairs of channels up to a lag.
+    """Computes the correlations of pairs of channels up to a largest lag.
 
     Args:
         cross: (p, bins) cross-spectra within the band, single or double precision.

@@ -1,4 +1,4 @@
-"""Errors of delays due to echoes that remain after their suppression."""
+"""Computes errors of delays due to echoes that remain after their suppression."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ _ARRIVAL_S = 1.2e-6
 _DIRECTION_RAD = 2e-3
 _NEWS = 0.12
 
-# An echo with the delay d shifts the peak of a correlation in proportion to 1 / (w^2
-# d). The phase of the echo varies with the frequency w within the band, so that most of
-# its effect cancels. The errors above apply at this root mean square frequency, rad/s.
+# Root mean square angular frequency at which the errors above apply, rad/s. An echo
+# with the delay d shifts the peak of a correlation in proportion to 1 / (w^2 d). The
+# phase of the echo varies with the frequency w within the band, so that most of its
+# effect cancels.
 _BAND = 2.0 * math.pi * 4.5e3
 
-# Number of parts of a frame. Fewer parts detect the start of a sound less well. With
-# more parts, noise in a narrow band causes more false detections.
+# Number of parts into which a frame is divided. Fewer parts detect the start of a sound
+# less well. With more parts, noise in a narrow band causes more false detections.
 _PARTS = 5
 
 
@@ -34,7 +35,7 @@ def echo_errors(
     """Computes the covariance of the delays of a frame after the suppression of echoes.
 
     Args:
-        shape: The microphones.
+        shape: The n microphones.
         c: Speed of sound, m/s.
         news: Share of the frame's energy that is no echo, above 0.
         angular_frequency: Root mean square angular frequency of the remaining sound,
@@ -51,7 +52,7 @@ def echo_errors(
 
 
 def energy_spread(frame: NDArray[np.float32]) -> float:
-    """Computes the share of a frame over which its energy is spread.
+    """Computes the share of a frame of audio over which its energy is spread.
 
     The frame is divided into five parts. The result is the squared mean of their
     energies, divided by the mean of their squared energies. If a steady sound fills the

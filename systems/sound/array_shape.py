@@ -199,7 +199,7 @@ class ArrayShape:
 
     @cached_property
     def equal_row(self) -> EqualRow | None:
-        """Returns the row of three equally spaced microphones; None for other arrays."""
+        """Returns a row of three equally spaced microphones; None for other arrays."""
         ahead = self.ahead
         if ahead is None or self.kind != "row" or self.count != 3:
             return None
@@ -245,7 +245,7 @@ def _distances(p: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _upward(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the normal that points up; if level, to +x, or to +y across x."""
+    """Returns the normal that points up; a level normal points to +x or +y."""
     for part in normal[::-1] if abs(normal[2]) > _FLATNESS else normal:
         if abs(part) > _FLATNESS:
             return normal * np.sign(part)

@@ -246,7 +246,7 @@ class MicArray(Block):
 
         @lru_cache(maxsize=1)
         def audio(tick: int) -> AudioFrame:
-            """Returns the frame that ends at a tick. The frame is computed only once."""
+            """Returns the frame that ends at a tick. Computes the frame only once."""
             emissions = [emission(tick) for emission in emitted]
             time = tick * run.tick_s
             return recorder.record(emissions, time, now, before, recorder.array)

@@ -105,7 +105,7 @@ class Reverberation:
         new: tuple[float, ...],
         array: RealArray,
     ) -> NDArray[np.float32] | None:
-        """Computes the reflections of one source over the frame; None if it is silent."""
+        """Computes the reflections of one source in a frame; None if it is silent."""
         end = round((time - emission.start_time) * SAMPLE_RATE_HZ) + self._margin
         if end < self._needed:
             longest_m = self._images.length / SAMPLE_RATE_HZ * self._c

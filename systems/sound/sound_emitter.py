@@ -66,7 +66,7 @@ def emitted_samples(
 
 @cache
 def _gate(on_s: float, period_s: float, start_s: float) -> tuple[int, int, int]:
-    """Returns the numbers of samples of a burst, a period, and before the first burst."""
+    """Returns the samples in a burst, in a period, and before the first burst."""
     burst, period, start = (
         round(time * SAMPLE_RATE_HZ) for time in (on_s, period_s, start_s)
     )
@@ -116,7 +116,7 @@ def make_emission(
 
 @cache
 def _history(ticks: int, tick_s: float) -> tuple[NDArray[np.float64], int]:
-    """Returns the ages of the last ticks, s, and the number of samples of an emission."""
+    """Returns the ages of the last ticks, s, and the samples of an emission."""
     ages = tick_s * np.arange(ticks - 1.0, -1.0, -1.0)
     return ages, round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
 
