@@ -28,10 +28,11 @@ _EXACT_SHARE = 1e-6
 # almost silent channel is therefore no copy.
 _LIKE_SHARE = 0.01
 
-# Two inputs of one microphone differ by the noise of their converters. During a sound,
-# their difference is below the share _SHARED_SOUND of its power. In a pause, their
-# difference is below the share _SHARED_PAUSE of the power in the pause. A pause has
-# less than the share _PAUSE of the power of the sound.
+# Two inputs of one microphone differ by the noise of their converters. Three limits
+# apply to this difference:
+# - _SHARED_SOUND: largest share of the power of a sound, during the sound.
+# - _SHARED_PAUSE: largest share of the power in a pause, during the pause.
+# - _PAUSE: largest ratio of the power in a pause to the power of a sound.
 _SHARED_SOUND, _SHARED_PAUSE, _PAUSE = 1e-3, 0.02, 0.01
 
 # First, only _PROBE samples in the middle of a frame are compared. This comparison
@@ -39,7 +40,7 @@ _SHARED_SOUND, _SHARED_PAUSE, _PAUSE = 1e-3, 0.02, 0.01
 # the whole frame.
 _PROBE, _PROBE_MARGIN = 128, 4.0
 
-# Lengths of the two sections that are examined, the loudest and the quietest one, s.
+# Length of the loudest section that is examined, then length of the quietest one, s.
 _LOUD_S, _PAUSE_S = 0.25, 0.05
 
 

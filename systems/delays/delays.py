@@ -23,9 +23,9 @@ from systems.delays.delay_search import DelaySearch, search_delays
 from systems.delays.occupied_band import occupied_band
 from systems.delays.transforms import transform_rows
 
-# The channels are cut again if an arrival changes by _SETTLED samples or more. They are
-# cut at most _CUTS times.
+# Change of an arrival from which on the channels are cut again, samples.
 _SETTLED = 0.75
+# Largest number of cuts.
 _CUTS = 4
 
 

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-# Echoes that remain are mainly reflections off the floor. They shift each arrival
-# independently (standard deviation ``_ARRIVAL_S``) and turn the whole direction
-# (standard deviation ``_DIRECTION_RAD``). These values apply if at least the share
-# ``_NEWS`` of a frame's energy is no echo. For smaller shares, the errors are larger.
-# All values are from the trials in rooms, docs/results_hearing.md.
+# Echoes that remain are mainly reflections off the floor. The values below are from the
+# trials in rooms, docs/results_hearing.md.
+# Standard deviation of the independent shift of each arrival by echoes, s.
 _ARRIVAL_S = 1.2e-6
+# Standard deviation of the turn of the whole direction by echoes, rad.
 _DIRECTION_RAD = 2e-3
+# Least share of a frame's energy that is no echo, for which these standard deviations
+# apply. For smaller shares, the errors are larger.
 _NEWS = 0.12
 
 # Root mean square angular frequency at which the errors above apply, rad/s. An echo

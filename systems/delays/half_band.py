@@ -46,7 +46,8 @@ def halve_rate(
 
     Returns:
         (n, samples // 2) float32 filtered values at the second, fourth ... sample. The
-        filter assumes silence before and after the frame. Therefore the first and last four or five values are inexact.
+        filter assumes silence before and after the frame. Therefore the first and last
+        four or five values are inexact.
     """
     channels, samples = frame.shape
     half = samples // 2
