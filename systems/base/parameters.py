@@ -21,8 +21,8 @@ class PlantParameters(Parameters):
     """Time constant of each wheel's speed loop, s (not printed, our choice)."""
     slip: Annotated[tuple[_Slip, _Slip], Strict(False)] = (0.0, 0.0)
     """Shares of the rim speed that the left and the right wheel lose by slip. The
-    encoders do not measure this loss. A negative share describes a wheel that is larger
-    than ``wheel_radius_m`` states."""
+    encoders do not measure this loss. A negative share describes a wheel whose radius
+    is larger than ``wheel_radius_m`` by this share."""
     friction: Annotated[float, Field(ge=1e-3, le=100.0)] | None = None
     """Coefficient of friction between tires and floor. If the motion needs more force
     than this share of the weight, the wheels slip. None: the wheels never slip."""

@@ -35,8 +35,8 @@ class RobotParameters(Parameters):
     """
 
     preset: RobotPreset = "han2019"
-    """Named robot that gives the defaults of the other fields. Fields that are set
-    take precedence."""
+    """Named robot that gives the default values of the other fields. Values of fields
+    that are set take precedence over the preset."""
     length_m: Length = 0.35
     """Extent of the body along its x axis, m."""
     width_m: Length = 0.82

@@ -74,7 +74,9 @@ def frame_repeats(
     *,
     noisy: bool,
 ) -> bool:
-    """Returns whether a channel of a frame repeats another one, with or without lag.
+    """Returns whether a channel of an audio frame repeats another channel.
+
+    The repetition may have a lag.
 
     Args:
         frame: (n, samples) channels; integers are counts.

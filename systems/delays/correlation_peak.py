@@ -168,8 +168,7 @@ def _arrival_variances(
     the channels i and j of a pair. Let w be the angular frequency and W the weight. The
     variance of the peak of a correlation is sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) /
     2 / (sum w^2 W s)^2. For equal weights and much signal, this is the bound of Knapp
-    and Carter (1976). The powers of each channel follow from the coherences of its
-    pairs.
+    and Carter (1976). The coherences of the pairs give the powers of each channel.
     """
     channels = energy.size
     # Share q of signal in the energy of each channel, from the coherences r.
@@ -234,19 +233,18 @@ def measure_peaks(
     """Computes the fields of ``Peaks``. If a pair has no peak, the correlation is 0.
 
     Args:
-        cross: (p, bins) cross-spectra of the pairs, units of the frame squared.
-        weights: (p, bins) weights.
-        energy: (n,) energies of the channels, units of the frame squared.
-        arrivals: (n,) arrival times to start from, see ``find_peaks``, samples.
-        tables: ``PairTables``.
-        sizes: First bin; length of the transform, samples; and effective length of the
-            cut channels, samples. The effective length is the length minus the loss at
-            the soft edges.
+        cross: (p, bins) cross-spectra of the pairs, units of the audio frame squared.
+        weights: (p, bins) weights of the cross-spectra.
+        energy: (n,) energies of the channels, units of the audio frame squared.
+        arrivals: (n,) times of arrival to start from, see ``find_peaks``, samples.
+        tables: Pairs of channels and their matrices, see ``PairTables``.
+        sizes: Three numbers: the first bin; the length of the transform, samples; and
+            the length of the cut channels minus the loss at their soft edges, samples.
         newton: See ``find_peaks``.
 
     Returns:
-        (n,) arrivals, samples; their (n - 1, n - 1) covariance, samples^2; and the
-        fields ``correlation`` to ``closure`` of ``Peaks``, in their order.
+        (n,) times of arrival, samples; their (n - 1, n - 1) covariance, samples^2; and
+        the fields ``correlation`` to ``closure`` of ``Peaks``, in their order.
     """
     pairs, to_delays, to_shares = tables
     first, length, cut_samples = sizes

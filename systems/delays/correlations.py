@@ -29,8 +29,8 @@ def correlations_at_lags(
     Args:
         cross: (p, bins) cross-spectra within the band, single or double precision.
         band: Bins of the transform that ``cross`` contains. All other bins are zero.
-        length: Length of the transform, columns.
-        reach: Largest lag in either direction, columns.
+        length: Length of the transform, in columns of the result.
+        reach: Largest lag in either direction, in columns of the result.
 
     Returns:
         (p, 2 reach + 1) correlations of the same precision. Lag 0 is in the middle.

@@ -49,9 +49,10 @@ class PairTables(NamedTuple):
     """(n - 1, p) matrix that converts the delays of all pairs to the delays t_k - t_0
     by least squares."""
     to_shares: NDArray[np.float64]
-    """(n, p) matrix that converts the coherences of the pairs to the shares of signal
-    in the channels. The matrix applies to logarithms, by least squares. A coherence is
-    the geometric mean of two shares. The conversion is exact for three channels."""
+    """(n, p) matrix that computes the shares of signal in the channels from the
+    coherences of the pairs. The matrix converts logarithms, by least squares. A
+    coherence is the geometric mean of two shares. The result is exact for three
+    channels."""
 
     @classmethod
     def of(cls, pairs: NDArray[np.int64]) -> PairTables:
@@ -104,7 +105,7 @@ def find_peaks(
         frame: (n, samples) channels.
         arrivals: (n,) times of arrival to start from, relative to channel 0, samples.
         tables: The pairs of channels.
-        length: Length of the Fourier transform, at least that of the frame.
+        length: Length of the Fourier transform, at least that of the audio frame.
         band: Bins of the transform to use.
         phat: Whether to whiten the cross-spectra.
         newton: Whether to refine the delays between samples by Newton's method.

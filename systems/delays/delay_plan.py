@@ -27,7 +27,9 @@ _LEAST_OVERLAP = 0.25
 
 @dataclass(frozen=True, eq=False)
 class DelayPlan:
-    """Constants of the delay measurement that are computed before the first frame.
+    """Constants of the measurement of delays between channels of audio frames.
+
+    The constants are computed before the first frame.
 
     Raises:
         InputError: The band does not fit the sample rate, or the frames are too short

@@ -215,7 +215,7 @@ def _judge(
         moments: (e, 2) sums of ``_cross_spectra``.
         edges: (e, 2) channels of each edge.
         gates: (e,) largest lags, samples of the correlation.
-        padding: Length of the transform divided by the length of the frame.
+        padding: Length of the transform divided by the length of the audio frame.
         stretch: Samples of the frame per sample of the correlation.
 
     Returns:
@@ -244,10 +244,10 @@ def _judge(
 def weakest_sound(plan: DelayPlan, rate: float) -> float:
     """Computes the level of the weakest sound that can be distinguished from noise.
 
-    Of all sounds with the same energy, a sound with the spectrum of the noise has the
-    highest correlation relative to noise (Cauchy-Schwarz inequality). This sound is the
-    easiest to detect. The weakest sound that can be detected therefore has this
-    spectrum.
+    The easiest sound to detect has the spectrum of the noise. This sound has the
+    highest correlation relative to noise of all sounds with the same energy
+    (Cauchy-Schwarz inequality). The weakest sound that can be detected therefore has
+    this spectrum.
 
     Args:
         plan: Rates, band and array.

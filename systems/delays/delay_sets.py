@@ -41,7 +41,7 @@ def estimate_delay_sets(
     seen: tuple[DelaySearch, slice],
     count: int,
 ) -> list[DelayEstimate]:
-    """Measures the delays of the sounds of a frame, one set of delays per sound.
+    """Measures the delays of the sounds of an audio frame, one set of delays per sound.
 
     The function finds and refines the set with the greatest sum of correlations. It
     then removes the peaks of this set and repeats the search.
@@ -114,12 +114,13 @@ def consistent_lags(
     """Finds the sets of lags with the greatest sum of correlations over all pairs.
 
     The function adds the channels one after another. It combines each set with each
-    peak of the next channel, and keeps the best combinations.
+    peak of the next channel, and keeps the best combinations. The unit of a lag is one
+    column of the correlations.
 
     Args:
         correlations: (p, 2 m + 1) correlation of each pair. Lag 0 is in the middle.
-        pairs: (p, 2) channels i < j of n.
-        reach: (p,) longest lag of each pair in either direction, columns, at most m.
+        pairs: (p, 2) pairs i < j of the n channels.
+        reach: (p,) longest lag of each pair in either direction, at most m columns.
         count: Largest number of sets.
 
     Returns:

@@ -112,7 +112,7 @@ def estimate_delays(
     find_band: bool = False,
     seen: tuple[DelaySearch, slice] | None = None,
 ) -> DelayEstimate | None:
-    """Measures the delays between the channels of a frame.
+    """Measures the delays between the channels of an audio frame.
 
     Args:
         frame: (n, frame_samples) channels, any unit.
@@ -135,7 +135,7 @@ def settled_delays(
     method: str,
     seen: tuple[DelaySearch, slice],
 ) -> DelayEstimate | None:
-    """Measures the delays of a frame near the delays that a search has found.
+    """Measures the delays of an audio frame near the delays that a search has found.
 
     Args:
         frame: (n, frame_samples) channels, any unit.

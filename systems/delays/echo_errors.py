@@ -33,12 +33,12 @@ _PARTS = 5
 def echo_errors(
     shape: ArrayShape, c: float, news: float, angular_frequency: float
 ) -> NDArray[np.float64]:
-    """Computes the covariance of the delays of a frame after the suppression of echoes.
+    """Computes the covariance of delays after the suppression of echoes.
 
     Args:
         shape: The n microphones.
         c: Speed of sound, m/s.
-        news: Share of the frame's energy that is no echo, above 0.
+        news: Share of the audio frame's energy that is no echo, above 0.
         angular_frequency: Root mean square angular frequency of the remaining sound,
             rad/s.
 

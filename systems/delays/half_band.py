@@ -39,7 +39,7 @@ _TAPS = _taps()
 def halve_rate(
     frame: NDArray[Any],
 ) -> NDArray[np.float32]:  # pragma: no cover  (compiled)
-    """Filters a frame and keeps every other sample.
+    """Filters an audio frame and keeps every other sample.
 
     Args:
         frame: (n, samples) channels, floats or counts.

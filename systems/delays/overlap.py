@@ -30,8 +30,8 @@ def cut_to_overlap(
             sample.
 
     Returns:
-        (n, m) channels in the unit of the frame. Here m is the length of the frame
-        minus the largest difference between two arrivals, in whole samples.
+        (n, m) channels in the unit of the audio frame. Here m is the length of the
+        frame minus the largest difference between two arrivals, in whole samples.
     """
     cut, length = cut_rows(frame, arrivals, *frame.shape)
     return np.ascontiguousarray(cut[:, :length])

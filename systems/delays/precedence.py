@@ -56,7 +56,7 @@ class EchoMemory:
         """Returns the memory of past power after a silence.
 
         Args:
-            memory: (n, bins) power that echoes may still have, units of the frame
+            memory: (n, bins) power that echoes may still have, units of the audio frame
                 squared.
             samples: Length of the silence, samples.
 

@@ -1,4 +1,4 @@
-"""Computes Fourier transforms of the channels of a frame, in compiled code.
+"""Computes Fourier transforms of the channels of an audio frame, in compiled code.
 
 The results are equal to those of SciPy to the last bit. For these short transforms,
 SciPy spends half of the time on the selection of the function.
@@ -63,7 +63,7 @@ def transform_rows(
         length: Length of the transform, samples; at least that of the channels.
 
     Returns:
-        (n, length // 2 + 1) spectra in the unit of the frame.
+        (n, length // 2 + 1) spectra in the unit of the audio frame.
     """
     channels, samples = frame.shape
     rows = np.zeros((filled_rows(channels), length), dtype=np.float32)

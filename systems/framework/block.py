@@ -6,8 +6,8 @@ class ``Block`` creates:
 - the Drake ports, the state and its update;
 - the check that all inputs are finite;
 - the table of ports in the docstring;
-- the columns in the table of a run;
-- the step of the compiled loop.
+- the columns in the results table of a run;
+- the step of the compiled simulation loop.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Port(NamedTuple):
         return int(factor or 1) * sizes[name]
 
     def column_names(self, sizes: Mapping[str, int]) -> tuple[str, ...]:
-        """Returns the names of the elements in the table of a run.
+        """Returns the names of the elements in the results table of a run.
 
         Args:
             sizes: Sizes that the block received when it was constructed, by name.
@@ -88,8 +88,8 @@ class Port(NamedTuple):
 class Step(NamedTuple):
     """The computation of a block in one control period (tick).
 
-    Drake and the compiled loops use the same computation. The function ``step(tick,
-    state, inputs, outputs, numbers)`` does three things:
+    Drake and the compiled simulation loops use the same computation. The function
+    ``step(tick, state, inputs, outputs, numbers)`` does three things:
 
     - It reads the inputs.
     - It fills the outputs, element by element.
@@ -122,7 +122,7 @@ class Step(NamedTuple):
 
 
 class RunFacts(NamedTuple):
-    """Facts about a run that a step needs in a compiled loop.
+    """Facts about a run that a step needs in a compiled simulation loop.
 
     Several runs use the same blocks, but differ in start, seed and layout of the
     obstacles. Therefore these values replace the values with which a block was
@@ -351,7 +351,7 @@ class _Declared:
         self.declare_output(name, calc, {self.__computed.ticket()})
 
     def step_for(self: Any, run: RunFacts) -> Step:
-        """Returns the step of the block for one run of a compiled loop.
+        """Returns the step of the block for one run of a compiled simulation loop.
 
         Args:
             run: The facts about the run.

@@ -10,8 +10,9 @@ and other clones stays in the cache until it has not been used for 30 days.
 No function uses the option ``fastmath`` of numba. With this option, the compiler may
 reorder sums. The last bit of a sum would then depend on the machine, on the caller and
 on the order of compilation. In a run of 40 s, the difference grows to centimeters
-(``tests/evals/test_compiled_code.py``). Without ``fastmath``, the compiled loop of a
-robot that listens takes 10 to 15 % longer, and the loop of Drake takes 5 % longer.
+(``tests/evals/test_compiled_code.py``). Without ``fastmath``, the compiled simulation
+loop of a robot that listens takes 10 to 15 % longer, and the loop of Drake takes 5 %
+longer.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Makes steps of blocks in Python that a compiled loop calls.
+"""Makes steps of blocks in Python that a compiled simulation loop calls.
 
 Blocks that process frames of sound use libraries, for example for Fourier transforms
 and room responses. Compiled code cannot call these libraries. Therefore the compiled
-loop calls a Python function for each of these blocks. A call takes one or two
-microseconds.
+simulation loop calls a Python function for each of these blocks. A call takes one or
+two microseconds.
 """
 
 from __future__ import annotations

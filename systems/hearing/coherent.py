@@ -99,7 +99,7 @@ def refine_source(
             the highest frequency of the sound.
         shape: The n microphones.
         c: Speed of sound, m/s.
-        sample_rate_hz: Sample rate of the frame, Hz.
+        sample_rate_hz: Sample rate of the audio frame, Hz.
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:

@@ -77,7 +77,7 @@ class ArrayListener:
     Args:
         robot: Positions of the microphones, the middle microphone first.
         c: Speed of sound, m/s.
-        microphones: Sample rate and length of the frames.
+        microphones: Sample rate and length of the audio frames.
 
     Raises:
         InputError: There are fewer than four microphones.
@@ -130,7 +130,8 @@ class ArrayListener:
 
         Args:
             sound: Sums of spectra from the time in which the source sounded.
-            noise: Sums of spectra from before the sound. They may contain no frame.
+            noise: Sums of spectra from before the sound. They may contain no audio
+                frame.
 
         Returns:
             The direction. None if nothing is heard, or if fewer than three microphones
@@ -332,7 +333,7 @@ class CrossPowerEstimator(FrameBlock):
         audio: Callable[[], AudioFrame],
         memory: _Memory,
     ) -> tuple[NDArray[np.float64], _Memory]:
-        """Adds one frame to the sums or makes an estimate, see ``FrameBlock.hear``.
+        """Adds an audio frame to the sums or estimates, see ``FrameBlock.hear``.
 
         The function calls ``audio`` only if it needs the frame.
         """

@@ -81,7 +81,7 @@ def gather_frame(
     before: NDArray[np.float64],
     now: NDArray[np.float64],
 ) -> CrossPowers:
-    """Adds the spectra of a frame and of the previous frame to the sums.
+    """Adds the spectra of an audio frame and of the previous frame to the sums.
 
     Args:
         facts: Sizes of frames and spectra.
@@ -116,15 +116,15 @@ def signal_powers(
     the strongest bin.
 
     Args:
-        facts: Sizes of frames and spectra.
+        facts: Sizes of audio frames and spectra.
         sound: Sums of at least one frame while the source sounded.
         noise: Sums from before the sound, which are subtracted. None: nothing is
             subtracted.
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        Two arrays. The first is the (pairs, bins) mean cross powers. The second is
-        (pairs, bins) whether a bin is occupied.
+        Two arrays. The first is the (pairs, bins) mean cross powers. The second has the
+        (pairs, bins) Boolean values: whether a bin is occupied.
     """
     mean, own = sound.pairs / sound.frames, sound.own / sound.frames
     steady = np.zeros_like(own)
@@ -150,7 +150,7 @@ def cross_correlations(
     """Computes the cross-correlations of channels from weighted cross powers.
 
     Args:
-        facts: Sizes of frames and spectra.
+        facts: Sizes of audio frames and spectra.
         weighted: (pairs, bins) weighted cross powers.
         fine: Number of correlation values per sample.
 

@@ -88,7 +88,7 @@ class FrameBlock(Block):
         """Declares the ports, the state and the update.
 
         Args:
-            memory: Memory before the first frame.
+            memory: Memory before the first audio frame.
             microphones: Sample rate and length of the frames.
         """
         self._microphones, self._blank = microphones, memory
@@ -146,7 +146,7 @@ class FrameBlock(Block):
         discrete_state.set_value(0, heard.values)
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step of the block for the frames of a compiled loop.
+        """Returns the step of the block for the frames of a compiled simulation loop.
 
         Args:
             run: Facts about the run, which provide the frames.

@@ -164,7 +164,7 @@ def IdealSourceSensor_(T):
         The block replaces ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator``. It has
         the outputs of ``TDOAEstimator``. Its discrete state has the position of the
         source relative to the control point P, and ``detected``. The block updates the
-        state every frame. Its latency is one control period, like that of the
+        state every audio frame. Its latency is one control period, like that of the
         estimator, so that the control loop is the same with either block. Like sound,
         the block reaches 30 m. Unlike the estimator with a row of microphones, the
         block distinguishes front from back.
@@ -229,7 +229,7 @@ def IdealSourceSensor_(T):
             self.declare(step, tick_s=frame_s)
 
         def _sounds(self, frame: Any) -> Any:
-            """Returns whether there is sound in the middle of a measured frame.
+            """Returns whether there is sound in the middle of a measured audio frame.
 
             The frame ends at the time of the measurement.
 

@@ -55,7 +55,7 @@ _ECHO_AMBIGUITY = 0.7
 _SHARED_CHANCE = 1e-3
 
 # Number of standard deviations by which a quiet frame may be below its expected energy.
-# Of the frames with the weakest detectable sound, one percent are quieter.
+# One percent of the frames with the weakest detectable sound are quieter.
 _QUIET = 2.33
 
 # Number of sets of delays that are examined if sounds overlap.
@@ -231,7 +231,7 @@ class Localiser:
     def localise(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[SourceFix | None, HearingMemory]:
-        """Locates the dominant sound of a frame.
+        """Locates the dominant sound of an audio frame.
 
         Args:
             frame: (n, samples) channels, in any unit, for example counts.
@@ -256,7 +256,7 @@ class Localiser:
     def candidates(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[list[Candidate], HearingMemory]:
-        """Locates each of the sounds of a frame.
+        """Locates each of the sounds of an audio frame.
 
         Args:
             frame: (n, samples) channels, in any unit, for example counts.
@@ -290,7 +290,7 @@ class Localiser:
         return [c for c in found if not self._is_copied(frame, c.fix, memory)], after
 
     def _one_of_several(self, delays: DelayEstimate) -> Candidate | None:
-        """Returns the position that explains a set of delays of one of several sounds.
+        """Locates one of several sounds from the set of its delays.
 
         The other sounds act as noise. The delays of the pairs may therefore disagree by
         an additional multiple of their standard deviation.
@@ -305,7 +305,7 @@ class Localiser:
     def _sound(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[_Sound | None, HearingMemory]:
-        """Detects a sound in a frame by three tests.
+        """Detects a sound in an audio frame by three tests.
 
         1. The energy must be above the energy of noise.
         2. The correlation peaks must be too high for noise alone.
@@ -363,7 +363,7 @@ class Localiser:
         *,
         begins: bool,
     ) -> tuple[Candidate | None, HearingMemory]:
-        """Locates the sound that ``look`` found in a frame.
+        """Locates the sound that ``look`` found in an audio frame.
 
         If the channels share almost all of their energy, the delays of the frame are
         used as they are. Otherwise echoes are suppressed, and the delays are measured
@@ -429,7 +429,7 @@ class Localiser:
         fix: SourceFix,
         memory: HearingMemory,
     ) -> bool:
-        """Returns whether two channels of a frame repeat each other.
+        """Returns whether two channels of an audio frame repeat each other.
 
         Without noise, microphones at equal distances from the source record equal
         samples. Therefore, in frames without noise, pairs of microphones at equal
@@ -457,7 +457,7 @@ class Localiser:
     def _after_noise(
         self, memory: HearingMemory, energy: float, noise_energy: float | None = None
     ) -> HearingMemory:
-        """Returns the memory after a frame of noise.
+        """Returns the memory after an audio frame of noise.
 
         Args:
             memory: Memory after the previous frame.
@@ -500,7 +500,7 @@ class Localiser:
         frame: NDArray[np.float32] | None = None,
         echoes: NDArray[np.float64] | None = None,
     ) -> Candidate | None:
-        """Returns the position that explains the delays of a frame.
+        """Returns the position that explains the delays of an audio frame.
 
         Args:
             delays: Delays of the sound.

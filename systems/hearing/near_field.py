@@ -46,7 +46,9 @@ def _ranges(
 def source_from_delays(
     tau_12: float, tau_13: float, spacing: float, c: float
 ) -> tuple[float, float, int]:  # pragma: no cover  (compiled)
-    """Computes bearing and range of a source seen from the middle microphone M2.
+    """Computes bearing and range of a source seen from the middle of three microphones.
+
+    The microphones M1, M2 and M3 form a row from left to right.
 
     Args:
         tau_12: Time by which the sound reaches M2 later than M1, s.

@@ -42,7 +42,7 @@ class TDOAParameters(Parameters):
     ignores frames that cannot contain sound of the source. This separates the source
     from sources that sound at other times, and from the robot's own loudspeaker."""
     choose: Literal["loudest", "followed"] = "loudest"
-    """Which of several overlapping sounds to use. ``loudest``: the loudest sound.
+    """Choice of the sound if several sounds overlap. ``loudest``: the loudest sound.
     ``followed``: the sound of the source that was followed so far."""
     first_bearing_deg: Angle | None = None
     """Bearing of the source to follow at the start, deg CCW, seen from the centroid of

@@ -1,4 +1,4 @@
-"""Chooses the sound of the followed source among the sounds of a frame.
+"""Chooses the sound of the followed source among the sounds of an audio frame.
 
 Each known source has a position in the world frame W with a covariance. The tracker
 gives the position of the followed source. The position of every other source is the
@@ -144,7 +144,7 @@ class ChoiceMemory(NamedTuple):
 
 
 class SourceChoice:
-    """Chooses the sound of the followed source among the sounds of successive frames.
+    """Chooses the sound of the followed source in successive audio frames.
 
     Args:
         shape: The microphones, in a plane, in the axes of the body frame B.
@@ -189,7 +189,7 @@ class SourceChoice:
         The assignment with the least total cost gives the sound of the followed source.
 
         Args:
-            candidates: Sounds of a frame.
+            candidates: Sounds of an audio frame.
             memory: Memory after the previous frame.
             belief: Present estimate of the source, and pose of the robot.
             may_sound: Whether the schedule of the source permits a sound in this frame.

@@ -73,14 +73,14 @@ class SourceFix:
     bearing: float
     """Azimuth in the x-y plane, CCW from +x, in (-pi, pi], rad."""
     bearing_std: float
-    """Standard deviation of the bearing, rad; infinite if the array cannot measure
-    it."""
+    """Standard deviation of the bearing, rad. It is infinite if the array cannot
+    measure the bearing."""
     elevation: float | None
-    """Elevation from the x-y plane, rad. None for positions in the plane, and for a
-    level row, which cannot measure it."""
+    """Elevation from the x-y plane, rad. None for positions in the plane. Also None for
+    a level row of microphones, which cannot measure the elevation."""
     elevation_std: float | None
-    """Standard deviation of the elevation, rad; infinite if the array cannot measure
-    it."""
+    """Standard deviation of the elevation, rad. It is infinite if the array cannot
+    measure the elevation."""
     range: float
     """Distance from the centroid, m; 0 if it is not valid."""
     range_status: int

@@ -37,7 +37,7 @@ def robot_localiser(
         parameters: Parameters of the estimator.
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound that the robot assumes, m/s.
-        microphones: Sample rate and length of the frames.
+        microphones: Sample rate and length of the audio frames.
         limited: See ``Localiser``.
 
     Returns:
@@ -69,7 +69,7 @@ def robot_choice(
         robot: Distance of the control point P ahead of the axle.
         p_PA_B: (2,) centroid of the microphones relative to P, in the axes of the body
             frame B, m.
-        frame_s: Period of the frames, s.
+        frame_s: Period of the audio frames, s.
 
     Returns:
         The choice. Its first bearing is that of the localizer's parameters.
@@ -87,7 +87,7 @@ def robot_choice(
 def may_sound(
     sound: SoundParameters, time: float, longest_way: float, frame_s: float
 ) -> bool:
-    """Returns whether the schedule of a source permits direct sound in a frame.
+    """Returns whether the schedule of a source permits direct sound in an audio frame.
 
     Args:
         sound: Schedule of the source.
@@ -124,7 +124,7 @@ class _Memory(NamedTuple):
 
 
 class TDOAEstimator(FrameBlock):
-    """Estimates where the sound source is from the frames of the microphones.
+    """Estimates where the sound source is from the audio frames of the microphones.
 
     The module ``systems.hearing.localise`` measures the delays of all pairs of
     channels. It finds the position that explains the delays, and the errors of this
@@ -257,7 +257,7 @@ def port_values(
         fix: Estimate of the source, or None.
         p_PA_B: (2,) centroid of the microphones relative to the control point P, in the
             axes of the body frame B, m.
-        heard: Whether the frame contains a sound although there is no estimate.
+        heard: Whether the audio frame contains a sound although there is no estimate.
 
     Returns:
         Seven arrays, in this order:

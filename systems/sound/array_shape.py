@@ -27,8 +27,9 @@ class EqualRow(NamedTuple):
     spacing_m: float
     """Distance between adjacent microphones, m."""
     to_delays: NDArray[np.float64]
-    """(2, 2) matrix that maps the delays t_k - t_0 to tau_12 and tau_13. The delays t_k
-    - t_0 are in the order of the array's channels."""
+    """(2, 2) matrix that converts delays relative to the first channel to tau_12 and
+    tau_13. The delays to convert are in the order of the channels of the array. The
+    delay tau_ij is the time by which the sound reaches Mj later than Mi."""
     axes: NDArray[np.float64]
     """(d, 2) unit vectors ahead and to the left, as columns."""
 

@@ -78,8 +78,8 @@ def real_array(
 
     Args:
         p_BM: (n, 2) stated positions of the microphones in the body frame B, m.
-        parameters: Stated skew (sampling delays) of the channels, and length of a
-            frame.
+        parameters: Stated skew (sampling delays) of the channels, and length of an
+            audio frame.
         tolerances: Errors of positions, delays and gains.
         c: Speed of sound, m/s.
 

@@ -63,7 +63,7 @@ class EgoNoise:
         return other
 
     def frame(self, number: int) -> NDArray[np.float32]:
-        """Returns the noise in one frame.
+        """Returns the noise in one audio frame.
 
         Args:
             number: Number of the frame. Frame 0 ends at time zero.

@@ -222,7 +222,7 @@ class MicArray(Block):
         output.set_value(frame)
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step that the block takes at each frame of a compiled loop.
+        """Returns the step for each audio frame of a compiled simulation loop.
 
         Args:
             run: Seed and period of the run, and emissions of the sources.

@@ -227,9 +227,9 @@ class RoomParameters(Parameters):
     )
     """Extents along x and y of W, and height, m."""
     corner_m: Point | None = None
-    """Corner of smallest x and y, in W, m.
+    """Corner of smallest x and y, in the world frame W, m.
 
-    If unset, the origin of W is in the middle of the floor.
+    If the corner is not set, the origin of W is in the middle of the floor.
     """
     reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
     """Time in which sound decays by 60 dB according to Sabine's formula, s.
@@ -246,7 +246,8 @@ class RoomParameters(Parameters):
     maximum_order: int | None = Field(default=None, ge=1, le=GREATEST_ORDER)
     """Largest number of reflections of one sound.
 
-    If unset, all reflections that arrive within the reverberation time are computed.
+    If the number is not set, all reflections that arrive within the reverberation time
+    are computed.
     """
 
     @model_validator(mode="after")

@@ -406,7 +406,7 @@ def propagate(
     count: int,
     c: float,
 ) -> NDArray[np.float32]:
-    """Computes the sound pressure at moving microphones over one frame.
+    """Computes the sound pressure at moving microphones over one audio frame.
 
     The sample rate of the microphones may differ from that of the emission. The delay
     is exact at knots and follows cubic polynomials between them. With knots every 2.5

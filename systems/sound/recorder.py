@@ -127,7 +127,7 @@ class MicMemory(NamedTuple):
 
 
 class Recorder:
-    """Records frame by frame, as a ``MicArray`` does, but without a Drake context.
+    """Records audio frames as a ``MicArray`` does, but without a Drake context.
 
     Args:
         parameters: Microphones, amplifier and converter.
@@ -193,7 +193,7 @@ class Recorder:
         now: tuple[NDArray[np.float64], NDArray[np.float64]],
         memory: MicMemory,
     ) -> MicMemory:
-        """Returns the state of the recorder after a frame.
+        """Returns the state of the recorder after an audio frame.
 
         Args:
             emissions: Sounds of the sources, the followed source first.

@@ -32,8 +32,8 @@ class Reverberation:
 
     The class convolves the sound of each source with the impulse response of the room.
     A response assumes that robot and source are at rest in given positions. If the
-    positions change, a frame fades from the response for the old positions to the
-    response for the new positions. The class keeps the most recent responses in a
+    positions change, an audio frame fades from the response for the old positions to
+    the response for the new positions. The class keeps the most recent responses in a
     cache. Therefore it computes only one response while robot and source are at rest.
 
     Args:
@@ -73,12 +73,12 @@ class Reverberation:
         new: NDArray[np.float64],
         array: RealArray,
     ) -> list[NDArray[np.float32] | None]:
-        """Computes the sound pressure of the reflections over the frame that ends now.
+        """Computes the sound pressure of the reflections over one audio frame.
 
         Args:
             emissions: Sounds of the k sources. Each must reach back by the length of
                 the response.
-            time: Present time, s.
+            time: End of the frame, s.
             old: (3 + 2 k,) values at the beginning of the frame: x, y, theta of the
                 robot in the world frame W, then x and y of each source, m and rad.
             new: (3 + 2 k,) values at the end of the frame, in the same order.

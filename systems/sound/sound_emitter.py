@@ -146,13 +146,13 @@ def history_ticks(
 ) -> int:
     """Returns the number of control periods (ticks) of the source's motion to store.
 
-    The stored motion begins before the earliest sound that can arrive in the present
-    frame left the source.
+    Sound needs time to travel. The stored motion must therefore begin before the
+    emission of the earliest sound that can arrive in the present audio frame.
 
     Args:
         maximum_range_m: Largest distance that sound travels, m.
         c: Speed of sound, m/s.
-        frame_s: Longest frame of a listener, s.
+        frame_s: Longest audio frame of a listener, s.
         tick_s: Time from one tick to the next, s.
 
     Returns:
@@ -179,7 +179,7 @@ class SoundEmitter(Block):
         sound_speed_m_s: Speed of sound, m/s.
         maximum_range_m: Largest distance that sound travels to a listener, including
             reflections, m.
-        frame_s: Longest frame of a listener, s.
+        frame_s: Longest audio frame of a listener, s.
         seed: Seed of the waveforms with noise.
         tick_s: Period of the update, s.
         called: Whether the loudspeaker is silent until its input ``calling`` is 1.
@@ -263,7 +263,9 @@ class SoundEmitter(Block):
         )
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step that stores the motion of the source in a compiled loop.
+        """Returns the step of the block for a compiled simulation loop.
+
+        The step stores the motion of the source.
 
         Args:
             run: Seed and period of the run.

@@ -291,7 +291,7 @@ def segment_clearance(
 def contact_time(
     a: NDArray[np.float64], b: NDArray[np.float64], vx: float, vy: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the time until two rectangles touch that move without turning.
+    """Computes the time until two rectangles touch, if they move without turning.
 
     The function projects both rectangles onto the normal of each side. On each normal,
     the two projections overlap during one interval of time. The rectangles are in

@@ -17,7 +17,7 @@ floats, and ``fold.py_func`` and ``expected.py_func`` run them with AutoDiffXd. 
 and its helper functions change arrays in place.
 
 The arrays have these layouts (in m and s, in the world frame W). A sighting is an
-estimate of the position from one frame.
+estimate of the position from one audio frame.
 
 - track, 16 numbers: age of its last estimate; then, at the moment of that estimate,
   position (2), velocity (2), covariance of the position (xx, xy, yy), covariance of
@@ -170,7 +170,7 @@ def _predict(track: NDArray[Any], seconds: Any) -> None:
 def _innovation(
     track: NDArray[Any], sighting: NDArray[Any], floor: float, scale: Any, extra: float
 ) -> tuple[Any, ...]:
-    """Compares a sighting (estimate of the position from one frame) with a track.
+    """Compares a sighting (estimate of the position from one audio frame) with a track.
 
     With a range, the innovation is the difference of the positions. Without a range, it
     is the offset from the track to the line of the bearing.

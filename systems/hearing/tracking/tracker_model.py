@@ -171,7 +171,9 @@ def _for_scalars(function: Any) -> Any:
 
 @register_jitable
 def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
-    """Interpolates the odometry pose some control periods (ticks) ago linearly.
+    """Returns the odometry pose some control periods (ticks) ago.
+
+    Between two ticks, the function interpolates linearly.
 
     Args:
         pose: (3,) present x, y, theta in the world frame W, m and rad; floats or
