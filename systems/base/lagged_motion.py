@@ -90,9 +90,9 @@ def advance_pose(pose: Any, travelled: Any, steady: Any, motion: LaggedMotion) -
     Args:
         pose: (x, y, theta) at the start in the world frame W, m and rad; floats or
             AutoDiffXd.
-        travelled: Path length, m, and turn, rad, of the body in the period.
-        steady: Path length, m, and turn, rad, of the steady part. The body would move
-            so if the wheels ran at their commanded speeds from the start.
+        travelled: Actual path length, m, and turn, rad, of the body in the period.
+        steady: Path length, m, and turn, rad, that would result if the wheels ran at
+            their commanded speeds from the start.
         motion: Constants of the period.
 
     Returns:

@@ -18,10 +18,11 @@ from scipy import fft
 
 from systems.framework.compiling import njit
 
-# Limits of the mean square difference between a channel and its copy. _ROUNDING is a
-# share of the squared step between two sample values. Rounding causes 1/12 of it.
-# _EXACT_SHARE is a share of the power of the copy. The larger limit counts.
+# The mean square difference between a channel and its copy is below one of two limits.
+# First limit, as a share of the squared step between two sample values. Rounding alone
+# causes a share of 1/12.
 _ROUNDING = 0.1
+# Second limit, as a share of the power of the copy.
 _EXACT_SHARE = 1e-6
 
 # The mean square difference must also be below this share of the power of the copy. An
@@ -83,8 +84,8 @@ def frame_repeats(
         pairs: (p, 2) channels to compare.
         later: (n - 1,) delays of the channels 1 ... n - 1 relative to channel 0,
             samples.
-        at_once: (p,) whether to compare each pair at lag 0. False if the two
-            microphones may record the same signal at the same time.
+        at_once: (p,) Boolean values: whether to compare each pair at lag 0. The value
+            is False if the two microphones may record the same signal at the same time.
         noisy: Whether the frames contain noise. Without noise, a sound that arrives
             later by whole samples looks like a copy. In this case, pairs are compared
             only at lag 0.

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-# Largest number of Newton steps. The search ends when a step is below _TOLERANCE
-# samples.
+# Largest number of Newton steps.
 _ITERATIONS = 10
+# Step below which the search ends, samples.
 _TOLERANCE = 1e-6
 
 # Variance of an arrival due to rounding to whole samples, samples^2. The delay of a

@@ -68,8 +68,8 @@ def _halve_row(
 ) -> None:  # pragma: no cover  (compiled)
     """Filters one channel and keeps every other sample.
 
-    ``odd`` (half,) and the inside of ``even`` are scratch memory. The ends of ``even``
-    must be zero.
+    The array ``odd`` (half,) and the inside of ``even`` are scratch memory. The ends of
+    ``even`` must be zero.
     """
     inside = even[_PAIRS - 1 : _PAIRS - 1 + odd.size]
     for k in range(odd.size):

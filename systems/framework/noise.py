@@ -136,13 +136,14 @@ class TickNoise(NamedTuple):
 
 
 def tick_noise(seed: int) -> TickNoise:
-    """Makes the ``TickNoise`` of a block.
+    """Makes the source of random numbers of a block for compiled code.
 
     Args:
         seed: Seed of the block.
 
     Returns:
-        The argument ``noise`` of ``tick_normals``.
+        Seed and table of quantiles. They are the argument ``noise`` of
+        ``tick_normals``.
     """
     return TickNoise(np.uint64(seed & _WORD), _QUANTILES)
 

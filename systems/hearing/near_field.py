@@ -75,7 +75,8 @@ def _slopes(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the (4, 2) derivatives of range, bearing, x and y of the source.
 
-    The derivatives are with respect to the delays tau_12 and tau_13.
+    The derivatives are with respect to the delays tau_12 and tau_13. The delay tau_1j
+    is the time by which the sound reaches microphone j later than microphone 1.
     """
     sine, cosine = math.sin(bearing), math.cos(bearing)
     r1, r3 = r2 - a, r2 - a + b

@@ -15,20 +15,19 @@ from systems.sound.array_shape import ArrayShape
 #: is rejected.
 NEAREST_M = 0.2
 
-#: Statuses of a range.
-#: The frame has no sound.
+#: Status of a range: the audio frame has no sound.
 NOTHING_HEARD = 0
-#: There is a range.
+#: Status: there is a range.
 RANGED = 1
-#: The delays are those of a plane wave: no finite range fits.
+#: Status: the delays are those of a plane wave, so no finite range fits.
 PLANE_WAVE = 2
-#: No position has these delays.
+#: Status: no position has these delays.
 NO_PLACE = 3
-#: The error of the range is too large.
+#: Status: the error of the range is too large.
 UNCERTAIN = 4
-#: There are too few microphones for a range in addition to the direction.
+#: Status: there are too few microphones for a range in addition to the direction.
 TOO_FEW_MICROPHONES = 5
-#: The frame has a sound, but the estimator rejects it.
+#: Status: the frame has a sound, but the estimator rejects the sound.
 REJECTED = 6
 
 

@@ -47,7 +47,7 @@ def interpolate_sphere(
 
 
 def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:
-    """Computes the bearing of a source from range differences as if it were far away.
+    """Computes the bearing of a source on the assumption that the source is far away.
 
     Args:
         p_RM: (n, 2) positions of the other microphones relative to the reference

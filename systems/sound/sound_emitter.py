@@ -128,14 +128,15 @@ def _silence(count: int) -> NDArray[np.float32]:
 
 @cache
 def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParameters:
-    """Returns the sound of a loudspeaker that starts when the robot calls it.
+    """Returns the sound of a loudspeaker that sounds only after the robot calls it.
 
     Args:
         sound: Sound of the loudspeaker. Its first burst is ``start_s`` after the call.
         on_since_s: Time of the call, s; None before the call.
 
     Returns:
-        The sound with a fixed start time. Before the call, the start time is one day.
+        The sound with a fixed start time. Before the call, the start time is one day,
+        so that the loudspeaker stays silent.
     """
     since = _NEVER_S if on_since_s is None else on_since_s + sound.start_s
     return sound.model_copy(update={"start_s": since})

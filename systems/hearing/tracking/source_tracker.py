@@ -25,7 +25,7 @@ _OLDEST_S = 2.0
 @define_for_scalars("SourceTracker_", __name__)
 def SourceTracker_(T):
     class Impl(Block_[T]):
-        """Tracks the position of the source between and during its bursts of sound.
+        """Tracks the position of the sound source during and between its bursts.
 
         The block contains a Kalman filter in the world frame W
         (``systems.hearing.tracking.target_filter``). Each new estimate of the position

@@ -8,9 +8,10 @@ A row of microphones gives two candidates for the position: the position ahead a
 mirror image behind the row. Hypothesis 0 says that the source is ahead now. Hypothesis
 1 says that it is behind. Each hypothesis keeps the better of the two histories that
 lead to it (the Viterbi recursion). The cost of a hypothesis is a negative
-log-likelihood. It is half of a sum over its innovations. The terms of the sum are the
-squared normalized innovation and the logarithm of the determinant of its covariance.
-When the robot moves, the mirror image moves too, which is unlikely for a source.
+log-likelihood. Each innovation (difference between an estimate and its prediction) adds
+half of two terms. The terms are the squared normalized innovation and the logarithm of
+the determinant of its covariance. When the robot moves, the mirror image moves too,
+which is unlikely for a source.
 
 All functions use only flat arrays and numbers. numba therefore compiles them for
 floats, and ``fold.py_func`` and ``expected.py_func`` run them with AutoDiffXd. ``fold``
@@ -439,8 +440,9 @@ def fold(
     """Updates the memory of the filter with a sighting (estimate of the position).
 
     Args:
-        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) memory, which the function
-            changes. Its ages are those at the arrival of the sighting.
+        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) memory of one or two
+            hypotheses. The function changes the memory. The ages of the tracks are
+            those at the arrival of the sighting.
         sighting: (10,) sighting, see the docstring of the module.
         settings: Floor of the errors, and age of the sightings.
 
@@ -469,8 +471,8 @@ def expected(memory: NDArray[Any]) -> NDArray[Any]:
     """Returns a copy of the chosen track of the source, predicted to the present.
 
     Args:
-        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) memory of the filter, with
-            present ages.
+        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) memory of one or two
+            hypotheses. The ages of the tracks are those at present.
 
     Returns:
         (TRACK,) elements as in TRACK_NAMES. If the source was never heard, the track is
