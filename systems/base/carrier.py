@@ -94,7 +94,7 @@ def drive(
     poses: NDArray[np.float64],
     twists: NDArray[np.float64],
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Drives along planned poses with feed-forward and feedback control.
+    """Simulates a carrier that follows planned poses by feed-forward and feedback.
 
     The function does these steps in each control period (tick):
 

@@ -18,7 +18,8 @@ from scipy import fft
 
 from systems.framework.compiling import njit
 
-# The mean square difference between a channel and its copy is below one of two limits.
+# The mean square difference between a channel and its copy is below the larger of two
+# limits.
 # First limit, as a share of the squared step between two sample values. Rounding alone
 # causes a share of 1/12.
 _ROUNDING = 0.1

@@ -164,11 +164,12 @@ def _arrival_variances(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the (n,) variance of each channel's time of arrival, samples^2.
 
-    Let n be the power of the noise per bin and s the power of the signal per bin, for
-    the channels i and j of a pair. Let w be the angular frequency and W the weight. The
-    variance of the peak of a correlation is sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) /
-    2 / (sum w^2 W s)^2. For equal weights and much signal, this is the bound of Knapp
-    and Carter (1976). The coherences of the pairs give the powers of each channel.
+    Each channel i has the noise power n_i and the signal power s_i per bin. The signal
+    power s of a pair is the geometric mean of the powers s_i and s_j. Let w be the
+    angular frequency and W the weight. The variance of the peak of a correlation is sum
+    w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2. For equal weights and
+    much signal, this is the bound of Knapp and Carter (1976). The coherences of the
+    pairs give the powers of each channel.
     """
     channels = energy.size
     # Share q of signal in the energy of each channel, from the coherences r.

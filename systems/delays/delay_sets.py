@@ -4,11 +4,11 @@ Independent sounds add up in the correlations. Each sound has a peak in the corr
 of every pair of channels. The height of the peak is the sound's share of the power. The
 lags of one sound add up to zero around every triangle of channels.
 
-In a room, each channel contains the direct sound and its echoes. The correlation of two
-channels has a peak for every combination of an arrival in one channel and an arrival in
-the other channel. The peak of an echo may be the highest. The lags of the direct sound
-are consistent: the lag from channel i to k is the sum of the lags from i to j and from
-j to k.
+In a room, each channel contains the direct sound and its echoes. Each of these arrivals
+in one channel correlates with each arrival in the other channel. The correlation of two
+channels therefore has many peaks. The peak of an echo may be the highest. The lags of
+the direct sound are consistent: the lag from channel i to k is the sum of the lags from
+i to j and from j to k.
 """
 
 from __future__ import annotations

@@ -21,6 +21,7 @@ from systems.framework.compiling import njit
 # Length of the window of a spectrum, s. It is short compared with the delay of the
 # first echoes, and long compared with a period of the lowest band.
 _WINDOW_S = 2.56e-3
+# Number of windows that overlap at each sample.
 _HOPS_PER_WINDOW = 4
 
 # Time constant of the memory, s. The sound in a room with a reverberation time (60 dB)

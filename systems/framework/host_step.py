@@ -34,8 +34,8 @@ class HostCall:
     """A Python function that compiled code calls by its address.
 
     An exception cannot pass through compiled code. If the function raises an exception,
-    ``error`` stores the exception, and the loop ends with ``HostError``. The address is
-    valid while this object exists.
+    ``error`` stores the exception, and the compiled simulation loop ends with
+    ``HostError``. The address is valid while this object exists.
 
     Args:
         function: The function, see ``HostFunction``.
@@ -126,8 +126,9 @@ def host_step(
         function: The function, see ``HostFunction``.
         inputs: Number of elements of all input ports.
         outputs: Number of elements of all output ports. The step publishes these
-            elements at the next tick (control period). If there are none, the loop
-            calls the function before the steps that publish outputs.
+            elements at the next tick (control period). If there are no outputs, the
+            compiled simulation loop calls the function before the steps that publish
+            outputs.
         period_ticks: Period of the calls, ticks.
 
     Returns:

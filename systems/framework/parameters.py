@@ -84,7 +84,7 @@ class Parameters(BaseModel):
 
 
 def with_preset(data: Any, presets: Mapping[str, Mapping[str, Any]]) -> Any:
-    """Completes the input of a model with the values of the preset that it names.
+    """Adds the values of a named preset to the input of a parameter model.
 
     The field ``preset`` of the input names the preset.
 

@@ -32,7 +32,9 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.hearing.source_fix import RANGED, range_status
 
+# Largest number of Gauss-Newton steps.
 _STEPS = 30
+# Largest change of a coordinate in the last step.
 _SETTLED = 1e-9
 
 # Limit of the difference between two chi-squares. If the chi-squares of two positions

@@ -70,8 +70,8 @@ def near_or_far(
 
     Errors can change the sign of the sum of the range differences. Spherical
     interpolation then turns the bearing by 180 deg. Therefore the position is used only
-    up to 4 m, and only if its bearing is within 15 deg of the bearing of the plane
-    wave.
+    if its range is at most 4 m, and if its bearing is near that of the plane wave
+    (within 15 deg).
 
     Args:
         p_RM: (n, 2) positions of the other microphones relative to the reference

@@ -93,7 +93,7 @@ class SoundParameters(Parameters):
         return self
 
     def sounds(self, time: Any) -> Any:
-        """Whether the source sounds at a time in s, or at each time of an array."""
+        """Returns whether the source sounds at a time, s, or at an array of times."""
         phase = time - self.start_s
         return (phase >= 0.0) & (phase % self.period_s < self.on_s)
 

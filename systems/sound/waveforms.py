@@ -21,7 +21,7 @@ _NOISE_SECONDS = 2.0
 
 
 def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
-    """Makes the sound pressure at 1 m while the source sounds.
+    """Makes the waveform of the loudspeaker: sound pressure at a distance of 1 m.
 
     The source sounds in bursts. The waveform has whole bursts, end to end.
 
@@ -92,7 +92,7 @@ def _tone(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 
 
 def _horn(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
-    """Makes two reeds a major third apart, with many harmonics and a slight tremolo."""
+    """Makes the sound of two reeds a major third apart, with a slight tremolo."""
     time = _time(sound.on_s)
     tremble = 0.004 / 11.0 * np.sin(2.0 * np.pi * 11.0 * time)
     total = np.zeros_like(time)

@@ -211,7 +211,7 @@ def fan_ranges(
     half_angles: NDArray[np.float64],
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes ``cone_range`` for each range sensor of a body.
+    """Computes the range of each range sensor of a body by ``cone_range``.
 
     Args:
         pose_WB: (3,) x, y, theta of the body frame B in the world frame W, m and rad.

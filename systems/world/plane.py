@@ -1,4 +1,4 @@
-"""Computes with points and rectangles in the plane, without compiled code.
+"""Computes geometry of points and rectangles in the plane, without compiled code.
 
 The checks of parameters use these functions. Compiled code gets the same functions from
 ``systems.world.geometry``.

@@ -17,21 +17,36 @@ All functions use only flat arrays and numbers. numba therefore compiles them fo
 floats, and ``fold.py_func`` and ``expected.py_func`` run them with AutoDiffXd. ``fold``
 and its helper functions change arrays in place.
 
-The arrays have these layouts (in m and s, in the world frame W). A sighting is an
-estimate of the position from one audio frame.
+The arrays have these layouts, in m and s, in the world frame W. The number of elements
+is in parentheses.
 
-- track, 16 numbers: age of its last estimate; then, at the moment of that estimate,
-  position (2), velocity (2), covariance of the position (xx, xy, yy), covariance of
-  position and velocity (xx, xy, yx, yy), and covariance of the velocity (xx, xy, yy);
-  then the scatter, which is the ratio of the actual variance of sightings to their
-  stated covariance
-- hypothesis, 34 numbers: cost, number of consecutive outliers that agree, track, and
-  track of these outliers
-- memory: index of the chosen hypothesis, then one hypothesis, or two if front and back
-  are to be distinguished
-- sighting, 10 numbers: position of the source, or the unit vector to it if there is no
-  range (2); its covariance (xx, xy, yy); center of the microphones (2); unit normal of
-  their row, which points ahead (2); and 1 if there is a range, otherwise 0
+A track (16) has these elements:
+
+- age of the last estimate (1);
+- position (2), velocity (2), covariance of the position (xx, xy, yy), covariance of
+  position and velocity (xx, xy, yx, yy), and covariance of the velocity (xx, xy, yy),
+  all at the moment of the last estimate;
+- scatter (1), the ratio of the actual variance of sightings to their stated covariance.
+
+A hypothesis (34) has these elements:
+
+- cost (1);
+- number of consecutive outliers that agree (1);
+- track (16), and track of these outliers (16).
+
+A memory has these elements:
+
+- index of the chosen hypothesis (1);
+- one hypothesis, or two hypotheses if front and back are to be distinguished.
+
+A sighting is an estimate of the position from one audio frame. It has these elements
+(10):
+
+- position of the source, or the unit vector to the source if there is no range (2);
+- covariance of this position (xx, xy, yy);
+- center of the microphones (2);
+- unit normal of the row of microphones, which points ahead (2);
+- 1 if there is a range, otherwise 0 (1).
 """
 
 from __future__ import annotations
