@@ -501,7 +501,7 @@ def _draw_anew(p: Particles, random: Any) -> None:  # pragma: no cover  (compile
 def _at_equal_steps(
     weight: Any, count: int
 ) -> NDArray[np.int64]:  # pragma: no cover  (compiled)
-    """Returns the indices of ``count`` particles at equal steps of cumulative weight."""
+    """Returns the indices of particles at equal steps of the cumulative weight."""
     found = np.empty(count, dtype=np.int64)
     passed, m = weight[0], 0
     for n in range(count):
