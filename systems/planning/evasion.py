@@ -18,25 +18,29 @@ from systems.planning.hazards import Sample
 from systems.planning.turning import turn_rate, wrapped
 from systems.safety.braking import SLOW_TURN_RAD_S
 
-# The prediction of motions covers 4 s in steps of 0.2 s.
+# ``_AHEAD_S``: duration of the prediction of motions, s.
+# ``_STEP_S``: time step of the prediction, s.
 _AHEAD_S, _STEP_S = 4.0, 0.2
-# A particle within 0.15 m of the robot's body counts fully. Up to 0.43 m, the particle
-# counts less and less.
+# ``_HIT_M``: a particle nearer to the robot's body than this distance counts fully, m.
+# ``_NEAR_M``: a particle farther away than this distance does not count, m.
 _HIT_M, _NEAR_M = 0.15, 0.43
 #: A contact at the end of the prediction counts less than a contact now, by this share.
 _LATER = 0.2
-# A particle that comes nearer than 0.8 m is a full threat. From 0.8 to 1.6 m, the
-# threat decreases to zero. This prediction covers 4 s.
+# ``_THREAT_M``: a particle that comes nearer than this distance is a full threat, m.
+# ``_NO_THREAT_M``: a particle that stays beyond this distance is no threat, m.
+# ``_THREAT_S``: duration of the prediction of threats, s.
 _THREAT_M, _NO_THREAT_M, _THREAT_S = 0.8, 1.6, 4.0
 #: Factor that reduces the threat of a particle that moves away.
 _GOING = 0.25
-# The need to watch a track of a body is a factor without unit. The need is 1 if the
-# track had no echo for 0.8 s. The need is also 1 if the standard deviation of the
-# velocity is 0.15 m/s, which is 1.5 times ``_UNSURE_M_S``. The least need is 0.1. The
-# largest need of a track without echoes is 2.
+# The need to watch a track of a body is a factor without unit.
+# ``_STALE_S``: the need is 1 after this time without an echo, s.
+# ``_UNSURE_M_S``: the need is 1 if the standard deviation of the track's velocity is
+#   1.5 times this value, m/s.
+# ``_LEAST_NEED``: least need.
+# ``_MOST_NEED``: largest need of a track without echoes.
 _STALE_S, _UNSURE_M_S, _LEAST_NEED, _MOST_NEED = 0.8, 0.1, 0.1, 2.0
-# A threat is in view if its direction is within 0.55 rad of the heading. The angle out
-# of view counts up to 1 rad.
+# ``_IN_VIEW_RAD``: largest angle between the heading and a threat in view, rad.
+# ``_OUT_OF_VIEW_RAD``: largest angle out of view that counts, rad.
 _IN_VIEW_RAD, _OUT_OF_VIEW_RAD = 0.55, 1.0
 #: Speeds that are tried in addition to the wanted speed, m/s.
 _SPEEDS = (-0.6, -0.4, -0.2, 0.0, 0.15, 0.3, 0.45, CRUISE_SPEED_M_S)
@@ -45,16 +49,20 @@ _ASIDE = (0.0, 0.5, -0.5, 1.0, -1.0)
 #: Largest angle between the wanted heading and a heading toward a threat, rad.
 _GAZE_RAD = 0.8
 # The guard limits the motion of the robot if a moving body is beside the robot. A body
-# is beside the robot if its gap to the robot's disc is below a limit. The limit is 0.09
-# m plus the distance that the robot covers in 0.4 s. A turn counts as 0.2 m per rad. If
-# a body is beside the robot, the guard permits only motions away from the body. At
-# least the share 0.2 of the speed must lead away from the body.
+# is beside the robot if its gap to the robot's disc is below ``_BESIDE_M`` plus a
+# distance. The robot covers this distance in ``_BESIDE_S``.
+# ``_BESIDE_M``: gap that counts as beside a robot at rest, m.
+# ``_BESIDE_S``: time over which the motion of the robot counts, s.
+# ``_BESIDE_TURN_M``: distance that a turn counts as, m/rad.
+# ``_WITHDRAWS``: least share of the robot's speed that must lead away from a body
+#   beside the robot.
 _BESIDE_M, _BESIDE_S, _BESIDE_TURN_M, _WITHDRAWS = 0.09, 0.4, 0.2, 0.2
 #: Total weight of particles that counts as a body.
 _BODY_SHARE = 0.3
-# Prices are losses of wanted speed. A predicted contact with a body costs 8 m/s. A
-# threat that is 1 rad out of view costs 0.7 m/s. A deviation from the weaving heading
-# costs 0.1 m/s per rad.
+# Prices are losses of wanted speed.
+# ``_RISK_PRICE``: price of a predicted contact with a body, m/s.
+# ``_WATCH_PRICE``: price of a threat that is 1 rad out of view, m/s.
+# ``_TURN_PRICE``: price of a deviation from the weaving heading, m/s per rad.
 _RISK_PRICE, _WATCH_PRICE, _TURN_PRICE = 8.0, 0.7, 0.1
 #: If the guard has refused a speed, the robot does not try this direction of motion
 #: again at headings within this angle of its own heading, rad.

@@ -9,10 +9,11 @@ from numba.extending import register_jitable
 
 from systems.planning.turning import TURN_RATE_RAD_S
 
-# The largest wanted speed is 0.62 m/s. The robot backs off at 0.15 m/s.
+# ``CRUISE_SPEED_M_S``: largest wanted speed, m/s.
+# ``BACK_SPEED_M_S``: largest speed of backing off, m/s.
 CRUISE_SPEED_M_S, BACK_SPEED_M_S = 0.62, 0.15
-# The wanted speed is 1.2 1/s times the remaining distance, plus the share 0.8 of the
-# target's speed.
+# ``APPROACH_GAIN``: wanted speed per remaining distance, 1/s.
+# ``SOURCE_SHARE``: share of the target's speed that is added to the wanted speed.
 APPROACH_GAIN, SOURCE_SHARE = 1.2, 0.8
 #: Limits of laws that command motions instead of forces: least speed, m/s, largest
 #: speed, m/s, and largest yaw rate, rad/s.

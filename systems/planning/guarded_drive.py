@@ -57,7 +57,7 @@ WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)
 
 #: Distance that routes keep between the disc around the body and occupied cells, m.
 CLEARANCE_M = 0.02
-#: Distance from the target within which echoes count as echoes of the target, m. The
+#: Echoes within this distance from the target count as echoes of the target, m. The
 #: robot expects no other body there.
 SOURCE_RADIUS_M = 0.35
 #: Distance from the target within which echoes do not block routes, m.
@@ -68,30 +68,36 @@ _REPLAN_S = 0.5
 _LOOK_AHEAD_M = 1.5
 #: A route is straight if its length is below this multiple of the direct distance.
 _DETOUR = 1.15
-# The robot has arrived if two conditions hold. The error of its distance from the
-# target is below 0.2 m. The target is slower than 0.1 m/s.
+# The robot has arrived if both of these values are below their limits.
+# ``_THERE_M``: limit of the error of the distance from the target, m.
+# ``_RESTS_M_S``: limit of the speed of the target, m/s.
 _THERE_M, _RESTS_M_S = 0.2, 0.1
 
-# The heading of the robot weaves, so that the sensor cones sweep over the floor. The
-# amplitude is 0.3 rad to both sides, and the period is 2.4 s.
+# The heading of the robot weaves, so that the sensor cones sweep over the floor.
+# ``_WEAVE_RAD``: amplitude of weaving to both sides, rad.
+# ``_WEAVE_S``: period of weaving, s.
 _WEAVE_RAD, _WEAVE_S = 0.3, 2.4
-# While the target or another body moves, the amplitude is 1 rad and the period is 3.4
-# s.
+# ``_SEARCH_RAD``: amplitude of weaving while the target or another body moves, rad.
+# ``_SEARCH_S``: period of weaving while the target or another body moves, s.
 _SEARCH_RAD, _SEARCH_S = 1.0, 3.4
 #: Time after the detection of a moving body during which the robot weaves widely, s.
 _MOVES_S = 5.0
-# If the robot lags behind the target, the robot weaves less. The reduction starts at a
-# lag of 0.3 m. At a lag of 0.9 m, the amplitude is smaller by the share 0.3.
+# If the robot lags behind the target, the robot weaves less.
+# ``_LITTLE_BEHIND_M``: lag at which the reduction of the amplitude starts, m.
+# ``_FAR_BEHIND_M``: lag at which the reduction is complete, m.
+# ``_LESS``: share by which the amplitude is then smaller.
 _LITTLE_BEHIND_M, _FAR_BEHIND_M, _LESS = 0.3, 0.9, 0.3
 
 #: Time for which the guard blocks the robot before the robot looks around, s.
 _PATIENCE_S = 0.3
-# A look turns the robot to both sides of a direction. The angle to each side is 0.4 rad
-# for the first look, before the robot has moved. The angle is 0.6 rad for a look at a
-# cell that blocks the robot.
+# A look turns the robot to both sides of a direction.
+# ``_FIRST_LOOK_RAD``: angle to each side in the first look, before the robot has moved,
+#   rad.
+# ``_LOOK_RAD``: angle to each side in a look at a cell that blocks the robot, rad.
 _FIRST_LOOK_RAD, _LOOK_RAD = 0.4, 0.6
-# A heading of a look is done if the heading error is below 0.1 rad. The yaw rate during
-# a look is 4 1/s times the heading error.
+# ``_LOOKED_RAD``: a heading of a look is done if the heading error is below this angle,
+#   rad.
+# ``_LOOK_GAIN``: yaw rate per heading error during a look, 1/s.
 _LOOKED_RAD, _LOOK_GAIN = 0.1, 4.0
 #: A look ends early if the body's disc is farther from non-free space than required.
 #: The distance must exceed the required distance by this amount, m.
@@ -100,8 +106,9 @@ _ROOM_M = 0.03
 _MOST_CELLS = 1_000
 #: Time for which routes avoid a place that was marked as blocked, s.
 _MARK_S = 10.0
-# The robot stays in one place until it has moved by more than 0.15 m. If the robot
-# stays in one place for 5.5 s, it marks the place ahead as blocked and backs off.
+# ``_STAYS_M``: the robot stays in one place until it has moved by more than this, m.
+# ``_GIVE_UP_S``: if the robot stays in one place for this time, it marks the place
+#   ahead as blocked and backs off, s.
 _STAYS_M, _GIVE_UP_S = 0.15, 5.5
 #: Duration of backing off, s.
 _BACKING_S = 2.0
@@ -109,8 +116,8 @@ _BACKING_S = 2.0
 #: this time, the robot reports that it gives up.
 _SEARCH_WAY_S = 20.0
 
-# The robot evades bodies within 3.5 m. If the number of bodies that the robot has to
-# watch is below 0.05, the robot does not evade.
+# ``_NEAR_M``: distance within which the robot evades bodies, m.
+# ``_WATCHED``: least number of bodies to be watched for which the robot evades.
 _NEAR_M, _WATCHED = 3.5, 0.05
 #: After the guard has refused a speed, the robot avoids this speed for this time, s.
 _HELD_S = 0.4

@@ -29,8 +29,9 @@ from systems.planning.looks import (
 )
 from systems.safety.free_space import FreeSpace
 
-# There are 8 tracks with 200 particles each. The choice of a motion uses 25 particles
-# of each track.
+# ``_TRACKS``: number of tracks.
+# ``_PARTICLES``: number of particles per track.
+# ``_PICKED``: number of particles per track that are used to choose a motion.
 _TRACKS, _PARTICLES, _PICKED = 8, 200, 25
 #: Greatest speed of the bodies that are tracked, m/s.
 TOP_SPEED_M_S = 0.6
@@ -39,48 +40,50 @@ _BEYOND_M = 0.02
 #: A range fits a particle if the range differs from the distance of the particle by
 #: less than this, m.
 _GATE_M = 0.10
-#: A body may be in an aperture although its particle is up to this distance, m, outside
-#: the edge.
+#: Distance of a particle outside the edge of an aperture, m. Up to this distance, a
+#: part of the body may still be inside the aperture.
 _EDGE_M = 0.04
-# The weight of a particle is multiplied by 0.1 if the sensor should have seen the
-# particle but did not. The weight is multiplied by 0.5 if the particle does not fit the
-# echo of its track.
+# ``_UNSEEN``: factor for the weight of a particle that the sensor should have seen but
+#   has not seen.
+# ``_ELSEWHERE``: factor for the weight of a particle that does not fit the echo of its
+#   track.
 _UNSEEN, _ELSEWHERE = 0.1, 0.5
-# The range error of a particle with the right velocity has a standard deviation of 0.01
-# m, in addition to the noise of the sensor. A wrong range multiplies the weight of a
-# particle by at least 0.5.
+# ``_FIT_M``: standard deviation of the range error of a particle with the right
+#   velocity, m. The noise of the sensor comes in addition.
+# ``_LEAST_FIT``: least factor for the weight of a particle with a wrong range.
 _FIT_M, _LEAST_FIT = 0.01, 0.5
 #: Share of the range error per tick that corrects the velocity of a particle.
 _TO_VELOCITY = 0.1
-#: Standard deviation of the first range rate of a track, m/s. It is large because the
-#: nearest visible point jumps between corners when a body enters an aperture.
+#: Standard deviation of the first range rate of a track, m/s. The value is large,
+#: because the nearest visible point jumps between corners when a body enters an
+#: aperture.
 _RATE_M_S = 0.2
-# When particles are drawn again, noise is added to them. The noise of the velocity is
-# 0.5 times the spread of the velocity, and at least 0.01 m/s. The noise of the position
-# is 0.005 m.
+# Noise is added to particles that are drawn again.
+# ``_JITTER``: noise of the velocity as a share of the spread of the velocity.
+# ``_JITTER_M_S``: least noise of the velocity, m/s.
+# ``_JITTER_M``: noise of the position, m.
 _JITTER, _JITTER_M_S, _JITTER_M = 0.5, 0.01, 0.005
 #: Share of bodies that stop per second.
 _STOPS_HZ = 0.04
-# A track ends if its probability is below 0.03. A track explains an echo if the product
-# of two numbers exceeds 0.03: the probability of the track, and the share of its
-# particles near the echo.
+# ``_LEAST_EXISTS``: a track ends if its probability is below this value.
+# ``_LEAST_SHARE``: a track explains an echo only if its probability, times the share of
+#   its particles near the echo, exceeds this value.
 _LEAST_EXISTS, _LEAST_SHARE = 0.03, 0.03
-# The highest probability of a track is 0.98. One echo removes the share 0.2 of the
-# remaining doubt.
+# ``_CERTAIN``: highest probability of a track.
+# ``_SEEN_AGAIN``: share of the remaining doubt that one echo removes.
 _CERTAIN, _SEEN_AGAIN = 0.98, 0.2
-# A track ends if no sensor has seen the body for 12 s, or if the track is farther away
-# than 5 m.
+# ``_FORGET_S``: a track ends if no sensor has seen the body for this time, s.
+# ``_FAR_M``: a track ends if it is farther away than this distance, m.
 _FORGET_S, _FAR_M = 12.0, 5.0
-# ``find_movers`` lists a track if its probability is at least 0.3 and a sensor has seen
-# the body within the last 3 s. Echoes within 0.5 m of the position of the track come
-# from the body.
+# ``_LIKELY``: least probability of a track that ``find_movers`` lists.
+# ``_LATELY_S``: longest time since a sensor has seen the body of such a track, s.
+# ``_BODY_M``: distance from the track within which echoes come from the body, m.
 _LIKELY, _LATELY_S, _BODY_M = 0.3, 3.0, 0.5
 #: Largest number of draws of a new particle. The draw is repeated if a sensor would
 #: have seen the particle before.
 _TRIES = 12
-#: A look (a reading of a sensor) is too old for a comparison with a new particle if its
-#: age exceeds a limit. The limit is this multiple of the time between the last two
-#: looks.
+#: Largest age of a look (a reading of a sensor) that is compared with a new particle.
+#: The age is a multiple of the time between the last two looks.
 _TOO_OLD = 10.0
 
 

@@ -14,11 +14,12 @@ from systems.safety.free_space import FreeSpace, cell_is_free
 
 #: Number of looks per sensor that are kept.
 _LOOKS = 3
-# The points at which an arc is checked are 0.3 cells apart. The points reach up to 0.6
-# cells behind the arc.
+# ``_ARC_STEP``: spacing of the points at which an arc is checked, cells.
+# ``_BEHIND``: distance behind the arc up to which the points reach, cells.
 _ARC_STEP, _BEHIND = 0.3, 0.6
-# A range that changes faster than 2 m/s belongs to another body. A look that is older
-# than 4.5 ticks is not compared with the next look.
+# ``_FASTEST_M_S``: a range that changes faster than this belongs to another body, m/s.
+# ``_OLDEST_TICKS``: a look that is older than this is not compared with the next look,
+#   ticks.
 _FASTEST_M_S, _OLDEST_TICKS = 2.0, 4.5
 
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.safety.free_space import FreeSpace, cells_within
 
-# A cell with less than 1 hit is not occupied. More than 6 hits do not increase the
-# certainty.
+# ``_LEAST_HITS``: least number of hits of an occupied cell.
+# ``_MOST_HITS``: number of hits above which the certainty does not increase.
 _LEAST_HITS, _MOST_HITS = 1.0, 6.0
 
 

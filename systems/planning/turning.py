@@ -6,7 +6,8 @@ import math
 
 from numba.extending import register_jitable
 
-# The yaw rate is 3 1/s times the error of the heading, and at most 2 rad/s.
+# ``TURN_GAIN``: yaw rate per error of the heading, 1/s.
+# ``TURN_RATE_RAD_S``: largest wanted yaw rate, rad/s.
 TURN_GAIN, TURN_RATE_RAD_S = 3.0, 2.0
 #: If the heading error exceeds this angle, rad, the robot turns before it drives.
 _TURN_FIRST_RAD = 1.0

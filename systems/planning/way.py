@@ -14,20 +14,26 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.safety.free_space import NEVER, FreeSpace
 
-# Prices of a cell. ``FREE``: the cell was seen free. ``UNKNOWN``: the cell is unknown.
-# The other prices depend on the position of the body's disc if its center is in the
-# cell. ``NEAR``: the disc is near an occupied cell. ``TIGHT``: the disc is very near an
-# occupied cell. ``DOUBTFUL``: the disc is over a possibly occupied cell. ``OCCUPIED``:
-# the disc is over an occupied cell.
+# Prices of a cell. The last four prices depend on the position of the body's disc if
+# its center is in the cell.
+# ``FREE``: the cell was seen free.
+# ``UNKNOWN``: the cell is unknown.
+# ``NEAR``: the disc is near an occupied cell.
+# ``TIGHT``: the disc is very near an occupied cell.
+# ``DOUBTFUL``: the disc is over a possibly occupied cell.
+# ``OCCUPIED``: the disc is over an occupied cell.
 FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
-# A cell with at least 1.5 hits is possibly occupied. A cell with at least 6 hits is
-# occupied.
+# ``_DOUBTFUL_HITS``: least number of hits of a possibly occupied cell.
+# ``_OCCUPIED_HITS``: least number of hits of an occupied cell.
 _DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
-# If the gap between the disc and an occupied cell is below 0.07 m, the price is
-# ``TIGHT``. If the gap is below 0.19 m, the price is ``NEAR``.
+# ``_TIGHT_M``: gap between the disc and an occupied cell below which the price is
+#   ``TIGHT``, m.
+# ``_NEAR_M``: gap between the disc and an occupied cell below which the price is
+#   ``NEAR``, m.
 _TIGHT_M, _NEAR_M = 0.07, 0.19
-# A straight step has the length 10, and a diagonal step has the length 14. A step costs
-# its length times the price of the cell that the step enters.
+# A step costs its length times the price of the cell that the step enters.
+# ``STRAIGHT``: length of a straight step.
+# ``ACROSS``: length of a diagonal step.
 STRAIGHT, ACROSS = 10, 14
 #: Number of buckets of the queue. This number exceeds the cost of any step.
 _BUCKETS = 2048

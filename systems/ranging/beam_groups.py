@@ -11,18 +11,19 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.ranging.collision_vector import foot_on_segment
 
-# Columns of the row of a group: NEAR is the vector from P to the nearest point of the
-# group, m. MIDDLE is the vector from P to the middle between the two outer hits of the
-# group, m. EXTENT is the distance between the outer hits, m. CHORD is the spacing of
-# the beams at the nearest point, m. OPEN is 1 if the surface may continue beyond an
-# outer hit, otherwise 0.
+# Columns of the row of a group of hits. Outer hits are the first and the last hit.
+# ``NEAR``: vector from P to the nearest point of the group, m.
+# ``MIDDLE``: vector from P to the middle between the outer hits, m.
+# ``EXTENT``: distance between the outer hits, m.
+# ``CHORD``: spacing of the beams at the nearest point, m.
+# ``OPEN``: 1 if the surface may continue beyond an outer hit, otherwise 0.
 NEAR_X, NEAR_Y, MIDDLE_X, MIDDLE_Y, EXTENT, CHORD, OPEN = range(7)
 GROUP_SIZE = 7
 
 # Adjacent hits belong to one surface if their distance is below the sum of two terms.
-# The first term is 0.2 m. The second term is the spacing of the beams on an oblique
-# surface, whose normal is turned from the beam by 60 deg. On this surface, the spacing
-# of the beams is larger by the factor ``_STRETCH``.
+# ``_GAP_M``: first term, m.
+# ``_STRETCH``: second term as a multiple of the spacing of the beams. The factor is
+#   that of an oblique surface, whose normal is turned from the beam by 60 deg.
 _GAP_M, _STRETCH = 0.2, 1.0 / math.cos(math.radians(60.0))
 #: Rise of the distance from P that separates two objects, m. A surface is split at a
 #: maximum of its distance from P if the maximum exceeds the minima on both sides by

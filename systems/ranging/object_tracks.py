@@ -45,18 +45,21 @@ _MEMORY_S = 0.5
 #: Speed below which an object counts as at rest, m/s.
 _RESTING_M_S = 0.05
 
-# Indices of the elements of a track: EXISTS: 1 if the track exists, otherwise 0. SURE:
-# time for which the motion has been visible without interruption, s. UNSEEN: time since
-# the object was last seen, s. QX and QY: position of the nearest point of the object in
-# W, m. RADIUS: radius of the object, m. DEPTH: distance from the nearest point to the
-# tracked position, away from P, m. STATE: position and velocity of the object in W, m
-# and m/s. COVARIANCE: 4 x 4 covariance of STATE, row by row.
+# Indices of the elements of a track.
+# ``EXISTS``: 1 if the track exists, otherwise 0.
+# ``SURE``: time for which the motion has been visible without interruption, s.
+# ``UNSEEN``: time since the object was last seen, s.
+# ``QX``, ``QY``: position of the nearest point of the object in W, m.
+# ``RADIUS``: radius of the object, m.
+# ``DEPTH``: distance from the nearest point to the tracked position, away from P, m.
+# ``STATE``: position and velocity of the object in W, m and m/s.
+# ``COVARIANCE``: 4 x 4 covariance of ``STATE``, row by row.
 _EXISTS, _SURE, _UNSEEN, _QX, _QY, _RADIUS, _DEPTH, _STATE = range(8)
 _COVARIANCE = _STATE + 4
 TRACK_SIZE = _COVARIANCE + 16
 
-# The standard deviation of each component of an initial velocity is 0.5 m/s. The
-# standard deviation of an unknown position along a surface is 10 m.
+# ``_FIRST_M_S``: standard deviation of each component of an initial velocity, m/s.
+# ``_ANYWHERE_M``: standard deviation of an unknown position along a surface, m.
 _FIRST_M_S, _ANYWHERE_M = 0.5, 10.0
 # Time constant with which the depth of a track follows the measured depth, s.
 _DEPTH_S = 4.0

@@ -41,7 +41,9 @@ from systems.ranging.sensor_shorthand import (
     shortened_sensors,
 )
 
-# A port with objects has 8 slots with 8 elements each; see ``systems.ranging.objects``.
+# See ``systems.ranging.objects`` for the port with objects.
+# ``OBJECT_SLOTS``: number of slots of the port.
+# ``OBJECT_SIZE``: number of elements of a slot.
 OBJECT_SLOTS, OBJECT_SIZE = 8, 8
 
 #: Two adjacent sensors are neighbors if their directions differ by at most this angle,
@@ -170,13 +172,14 @@ class UltrasonicParameters(Parameters):
         return tuple(sensor.position_m for sensor in self.sensors)
 
     def each(self, field: str) -> NDArray[np.float64]:
-        """Returns the values of a field of all sensors.
+        """Returns the values of one field for all sensors.
 
         Args:
             field: Name of a field of ``RangeSensorParameters``.
 
         Returns:
-            (n,) values; (n, 2) for ``position_m``.
+            (n,) array with one value per sensor. For ``position_m``, the shape is (n,
+            2).
         """
         return np.array([getattr(sensor, field) for sensor in self.sensors])
 

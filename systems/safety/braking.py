@@ -31,8 +31,8 @@ SLOW_TURN_RAD_S = 0.3
 #: below this number, m/s. The distance that the axle still moves due to the lag of the
 #: motors is below ``IN_PLACE_M``.
 _IN_PLACE_M_S = 1e-6
-#: The robot withdraws from obstacles in view if at least this share of its motion leads
-#: away from them. With a larger share, the robot could not drive on if an obstacle
+#: Least share of the robot's motion that leads away from obstacles in view while the
+#: robot withdraws. With a larger share, the robot could not drive on if an obstacle
 #: approached from behind.
 _WITHDRAWS = 0.2
 #: A robot between ``least_m`` and ``keep_m`` from non-free space may come nearer to

@@ -16,9 +16,9 @@ register_jitable(lasting)
 
 #: Value of a cell that was never seen free.
 NEVER = -1.0
-# The window moves when its middle is more than 20 cells away from the robot. In a small
-# window, the limit is 1/8 of the side of the window.
+#: The window moves when its middle is farther from the robot than this number of cells.
 _SLACK = 20
+#: In a small window, this limit is the side of the window divided by this number.
 _SLACK_SHARE = 8
 #: A reading updates only one row of cells out of this number of rows. Later readings
 #: update the other rows.

@@ -21,21 +21,25 @@ _NONE, _LOST, _SILENT, _FROZEN, _NOISY = range(5)
 #: The odometry is lost if the pose changes too much in one tick. The limit is this
 #: multiple of the largest motion that the wheels can cause.
 _FASTER = 2.0
-# A sensor is silent if it has not fired for 3 rounds and for at least 0.2 s. A round is
-# the time in which every sensor fires once.
+# A sensor is silent if it has not fired for both of these times.
+# ``_ROUNDS``: number of rounds. In a round, every sensor fires once.
+# ``_SILENT_S``: time, s.
 _ROUNDS, _SILENT_S = 3, 0.2
-# A sensor with noise is frozen after 12 consecutive equal echoes. Any sensor is frozen
-# if its echoes stay equal while the robot turns by the aperture of the sensor plus 0.1
-# rad.
+# ``_MOST_EQUAL``: number of consecutive equal echoes after which a sensor with noise is
+#   frozen.
+# ``_BESIDE_RAD``: any sensor is frozen if its echoes stay equal while the robot turns
+#   by the aperture of the sensor plus this angle, rad.
 _MOST_EQUAL, _BESIDE_RAD = 12, 0.1
-# The second difference of the ranges of a sensor has a largest value that motion and
-# noise can cause. This value is the sum of three terms: the constant 0.03 m, an
-# acceleration of 2 m/s^2 times the squared time of a round, and 15 standard deviations
-# of the noise.
+# Motion and noise can cause a second difference of a range up to the sum of three
+# terms.
+# ``_STEP_M``: first term, m.
+# ``_STEP_M_S2``: acceleration in the second term, m/s^2. The factor is the squared time
+#   of a round.
+# ``_SIGMAS``: third term as a number of standard deviations of the noise.
 _STEP_M, _STEP_M_S2, _SIGMAS = 0.03, 2.0, 15.0
-# A strange reading is a reading that motion and noise cannot explain. One reading has
-# the weight 0.1 in the mean share of strange readings. A sensor is noisy if this share
-# exceeds 0.5.
+# A strange reading is a reading that motion and noise cannot explain.
+# ``_PART``: weight of one reading in the mean share of strange readings.
+# ``_MOST_STRANGE``: mean share above which a sensor is noisy.
 _PART, _MOST_STRANGE = 0.1, 0.5
 #: Largest yaw rate at which ranges are checked for noise, rad/s. In a faster turn, the
 #: edges of apertures move along surfaces, so that the ranges change quickly.

@@ -21,8 +21,8 @@ REST_M = 2e-4
 #: A robot turns on the spot if the lag of the motors will move its axle by less than
 #: this distance, m.
 IN_PLACE_M = 5e-5
-# A range without noise is too long by at most 2 mm. The noise of a range is at most 5
-# standard deviations.
+# ``RANGE_MARGIN_M``: largest amount by which a range without noise is too long, m.
+# ``_SIGMAS``: number of standard deviations that bounds the noise of a range.
 RANGE_MARGIN_M, _SIGMAS = 0.002, 5.0
 #: Longest time between two positions that the guard checks against cells, s.
 _PART_S = 0.025
@@ -263,8 +263,8 @@ def unseen_approach(
     )
     radius, half = body_radius(robot), min(0.5 * top * part_s, body_radius(robot))
     corner = radius - math.sqrt(radius * radius - half * half)
-    # The largest deviation of the path from its chord. It occurs if half of the rim's
-    # top speed drives the axle forward, and the other half turns the robot.
+    # The path deviates most from its chord if half of the rim's top speed drives the
+    # axle forward, and the other half turns the robot.
     bow = 0.25 * (0.5 * top * part_s) * (top * part_s / robot.wheel_separation_m)
     # Speed at the start of the part, if the command reverses to full speed and the axle
     # is back at its starting point at the end of the part.

@@ -23,12 +23,12 @@ from systems.laws.parameters import AttractionParameters
 from systems.planning.following import SPEED_LIMITS, FollowNumbers, approach
 from systems.planning.turning import wrapped
 
-# The grid over a window has 9 speeds and 17 yaw rates.
+# ``_SPEEDS``: number of speeds in the grid over a window.
+# ``_TURNS``: number of yaw rates in the grid over a window.
 _SPEEDS, _TURNS = 9, 17
 #: Half side of the square around the robot in which cells count, m.
 _REACH_M = 2.5
-#: Acceleration that limits the window, m/s^2. The braking deceleration has this value,
-#: too.
+#: Acceleration that limits the window, and deceleration of a robot that brakes, m/s^2.
 _ACCELERATION_M_S2 = 1.0
 #: Time from one choice to the next, s.
 _PERIOD_S = 0.1

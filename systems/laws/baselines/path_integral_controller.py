@@ -35,10 +35,11 @@ from systems.safety.parameters import GuardParameters
 
 #: Half side of the window of the distance field, m. A sequence stays within it.
 _WINDOW_M = 2.5
-# The random numbers repeat after 16 plans. Each plan tries 500 sequences of motions.
-# Each sequence has 25 steps.
+# ``_ROUNDS``: number of plans after which the random numbers repeat.
+# ``_SAMPLES``: number of sequences of motions that each plan tries.
+# ``_STEPS``: number of steps of a sequence.
 _ROUNDS, _SAMPLES, _STEPS = 16, 500, 25
-#: Duration of a step of a sequence, s. A new plan follows after the same time.
+#: Duration of a step of a sequence, s. This time is also the time between two plans.
 _STEP_S = 0.1
 #: Standard deviation of the sampled speeds, m/s (Nav2: 0.2).
 _SPEED_SPREAD_M_S = 0.2
@@ -53,8 +54,10 @@ _FORWARD_GAIN = 0.81
 _COLLISION_COST = 1_000.0
 #: Number of discs that cover the body from side to side.
 _DISCS = 3
-# A route is a detour if it is longer than the straight line times 1.15. On a detour the
-# robot drives toward a point of the route that is at most 1.5 m away.
+# ``_DETOUR``: a route is a detour if its length exceeds the straight distance times
+#   this factor.
+# ``_LOOK_AHEAD_M``: on a detour, the robot drives toward a point of the route. The
+#   point is at most this far away, m.
 _DETOUR, _LOOK_AHEAD_M = 1.15, 1.5
 #: Length of a step to a diagonal neighbor, in cells.
 _ACROSS = math.sqrt(2.0)

@@ -20,13 +20,13 @@ from systems.planning.following import CRUISE_SPEED_M_S, FollowNumbers, approach
 from systems.planning.half_planes import nearest_velocity
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
-# The robot keeps a distance of 0.02 m from all bodies. Bodies farther away than 5 m do
-# not count.
+# ``_CLEARANCE_M``: distance that the robot keeps from all bodies, m.
+# ``_FARTHEST_M``: distance beyond which bodies do not count, m.
 _CLEARANCE_M, _FARTHEST_M = 0.02, 5.0
 #: Time within which the robot must leave a contact, s.
 _OUT_S = 0.1
-# A robot slower than 0.05 m/s is at rest. Two velocities are equal if they differ by
-# less than 1e-6 m/s.
+# ``_RESTS_M_S``: speed below which the robot is at rest, m/s.
+# ``_UNCHANGED_M_S``: difference below which two velocities are equal, m/s.
 _RESTS_M_S, _UNCHANGED_M_S = 0.05, 1e-6
 
 
@@ -216,9 +216,9 @@ def reciprocal_avoidance_step(
     turn = (c * vy - s * vx) / own.offset_m
     limit = TURN_RATE_RAD_S
     twist[0], twist[1] = c * vx + s * vy, min(max(turn, -limit), limit)
-    # The robot turns to the target if it is at rest, or if it backs off freely. While
-    # it backs off, the twist above would turn it away from the target. At rest it would
-    # turn back, and so on.
+    # The robot turns to the target if it is at rest, or if it backs off without an
+    # obstacle. While the robot backs off, the twist above would turn the robot away
+    # from the target. At rest, the robot would turn back, and the motion would repeat.
     changed = math.hypot(vx - preferred[0], vy - preferred[1])
     backs = wanted < 0.0 and changed < _UNCHANGED_M_S
     if inputs[2][0] > 0.5 and (backs or math.hypot(vx, vy) < _RESTS_M_S):

@@ -19,10 +19,12 @@ from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
-# There are 72 sectors of 5 deg, as in the paper. A narrow valley has at most 16.
+# ``_SECTORS``: number of sectors of the histogram (5 deg each, as in the paper).
+# ``_WIDE``: largest number of sectors of a narrow valley.
 _SECTORS, _WIDE = 72, 16
-# Weights as in the paper: mu_1 of the target's direction is 5, and mu_2 of the robot's
-# heading is 2.
+# ``_TARGET_GAIN``: weight mu_1 of the angle to the target's direction (as in the
+#   paper).
+# ``_HEADING_GAIN``: weight mu_2 of the angle to the robot's heading (as in the paper).
 _TARGET_GAIN, _HEADING_GAIN = 5.0, 2.0
 #: Ratio of the high threshold of the density to the low threshold.
 _THRESHOLDS_RATIO = 2.0

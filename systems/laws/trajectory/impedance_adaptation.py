@@ -23,16 +23,17 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
-# The state begins with the three gains at index 0. Four sensitivities for each gain
-# follow from index 3 on.
+# ``_GAINS``: index in the state of the first of the three gains.
+# ``_SENSITIVITIES``: index in the state of the first sensitivity. There are four
+#   sensitivities for each gain.
 _GAINS, _SENSITIVITIES = 0, 3
 #: Names of the gains that adapt.
 _ADAPTED = "stiffness", "damping", "contact_stiffness"
-# All constants below are our choice.
-#: Weight tau_v^2 of velocity errors, s^2. A velocity error of 1 m/s counts as much as a
-#: position error of 0.5 m.
+#: Weight tau_v^2 of velocity errors, s^2 (our choice, like all constants here). A
+#: velocity error of 1 m/s counts as much as a position error of 0.5 m.
 _VELOCITY_WEIGHT_S2 = 0.5**2
-# Limits of gains with limits: K from 0.5 to 6 N/m, and D from 3 to 8 N s/m.
+# ``STIFFNESS_BOX_N_M``: least and greatest K of gains with limits, N/m.
+# ``DAMPING_BOX_N_S_M``: least and greatest D of gains with limits, N s/m.
 STIFFNESS_BOX_N_M, DAMPING_BOX_N_S_M = (0.5, 6.0), (3.0, 8.0)
 #: Least and greatest K_e of gains with limits, N/m.
 _CONTACT_BOX_N_M = (0.5, 24.0)
@@ -85,8 +86,8 @@ def adaptation_step(
     found = contacts_of_objects(objects, v_WP, numbers.contacts)
     sources = sensitivity_sources(p_WP, v_WP, target, found, numbers.mass)
     gains = state[0], state[1], state[2]
-    # Errors against the reference, and gradient of the safety term. Its distance
-    # d_sec is S.
+    # Errors against the reference, and gradient of the safety term. The distance d_sec
+    # of the safety term is S.
     ex, ey = p_WP[0] - reference[0], p_WP[1] - reference[1]
     evx, evy = v_WP[0] - reference[2], v_WP[1] - reference[3]
     gx, gy = penalty_gradient(found, numbers.contacts.begins_m, numbers.penalty)
