@@ -15,14 +15,16 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 def matched_decay(limit: float, ratio: float) -> float:
-    """Computes the decay constant of a gain that changes by a ratio over half a limit.
+    """Computes the decay constant of an exponential gain from the ratio of two gains.
+
+    The gain changes by the factor ``ratio`` over half of the limit.
 
     Args:
-        limit: Limit of distance or speed, m or m/s.
+        limit: Limit of the distance in m, or limit of the speed in m/s.
         ratio: Ratio of the larger gain to the smaller gain, above 1.
 
     Returns:
-        limit / (2 ln ratio), in the unit of the limit.
+        Decay constant limit / (2 ln ratio), in the unit of the limit.
     """
     return limit / (2.0 * math.log(ratio))
 
@@ -31,21 +33,23 @@ def matched_share(limit: float, decay: float) -> float:
     """Computes the ratio of two gains from a decay constant (see ``matched_decay``).
 
     Args:
-        limit: Limit of distance or speed, m or m/s.
-        decay: Decay length or decay speed, in the unit of the limit.
+        limit: Limit of the distance in m, or limit of the speed in m/s.
+        decay: Decay constant of the gain, in the unit of the limit.
 
     Returns:
-        exp(-limit / (2 decay)), the ratio of the smaller gain to the larger gain.
+        Ratio of the smaller gain to the larger gain, exp(-limit / (2 decay)).
     """
     return math.exp(-limit / (2.0 * decay))
 
 
 class ActiveParameters(Parameters):
-    """Spring and damper that vary with distance and speed (Han 2019, eq. 20-22).
+    """Gains of a law whose stiffness and damping vary (Han 2019, eq. 20-22).
 
-    alpha and beta follow from the other fields. At half the reach, the spring term
-    equals that of a law with the constant stiffness K_0. At half the speed limit, the
-    velocity term equals that of a law with the constant damping D_0.
+    The stiffness varies with the distance of the obstacle. The damping varies with the
+    speed of the obstacle. The decay constants alpha and beta follow from the other
+    fields. At the distance rho_0/2, the spring term equals that of a law with the
+    constant stiffness K_0. At the speed mu_0/2, the velocity term equals that of a law
+    with the constant damping D_0.
     """
 
     reference_stiffness_n_m: Stiffness = 84.5
@@ -93,16 +97,18 @@ class ActiveParameters(Parameters):
 
 
 def active_force(c: Any, s: Any, gains: ActiveParameters) -> Any:
-    """Computes k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s).
+    """Computes the force k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s).
 
-    This is eq. 20 of Han 2019. The spring term is bounded. It is largest at c = alpha
-    and zero at contact. The velocity term is d_ref mu_0 for an obstacle at rest, at any
-    distance. Eq. 19-b has a further factor (rho_0 - c) at K_0(c). The function follows
-    eq. 20, which agrees with table 4.
+    The force is eq. 20 of Han 2019. The first term is the spring term. The spring term
+    is largest at c = alpha and zero at contact. The second term is the velocity term.
+    For an obstacle at rest, the velocity term is d_ref mu_0 at any distance.
+
+    Eq. 19-b of the paper has another factor (rho_0 - c) at K_0(c). This function
+    follows eq. 20, because eq. 20 agrees with table 4.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Speed of the obstacle, m/s. At mu_0 and above, the velocity term is 0
+        s: Speed of the obstacle, m/s. If s is mu_0 or more, the velocity term is 0
             (table 4).
         gains: Gains of the law.
 

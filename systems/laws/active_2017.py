@@ -9,9 +9,9 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 class Active2017Parameters(Parameters):
-    """Push that grows as the distance falls, up to a limit (Kim 2017, eq. 21, fig. 6).
+    """Gains of a law whose push grows near the obstacle (Kim 2017, eq. 21, fig. 6).
 
-    Kim 2017 does not print the gains.
+    Below the distance rho_1, the push is constant. Kim 2017 does not print the gains.
     """
 
     distance_gain_j: Positive = 1.22
@@ -21,21 +21,26 @@ class Active2017Parameters(Parameters):
     damping_n_s_m: Damping = 0.8
     """Damping D_0, N s/m."""
     saturation_speed_m_s: Speed = 0.72
-    """Speed mu_1 above which the velocity term stays at D_0 mu_1, m/s. Kim 2017
-    (section 5) chooses mu_1 by trial so that the robot stays below 720 mm/s, and prints
-    no value. The default of mu_1 is 720 mm/s."""
+    """Speed mu_1 above which the velocity term is constant, m/s.
+
+    Kim 2017 (section 5) prints no value. The paper chooses mu_1 by trial, so that the
+    robot stays below 720 mm/s. The default of mu_1 is this speed of 720 mm/s."""
 
 
 def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
-    """Computes K_a(c)/c + D_a(s) s, in which both terms saturate.
+    """Computes the force K_a(c)/c + D_a(s) s, in which both terms saturate.
 
-    Kim 2017 prints eq. 21 and describes K_a and D_a in words (figure 6). The push must
-    saturate below rho_1, and the velocity term must saturate above mu_1. In our
-    reading, K_a is K_0 at distances above rho_1 and K_0 c/rho_1 below rho_1. D_a is D_0
-    at speeds below mu_1 and D_0 mu_1/s above mu_1. The paper says that K *increases* as
-    c falls to rho_1. In our reading, K_a stays constant and the push K_a/c increases.
+    Kim 2017 prints eq. 21, but describes K_a and D_a only in words and in figure 6. The
+    push K_a/c must saturate below the distance rho_1. The velocity term D_a s must
+    saturate above the speed mu_1. We therefore choose:
 
-    The law has no limit of reach. The push halves when the distance doubles.
+    - K_a is K_0 if c is above rho_1, and K_0 c/rho_1 otherwise.
+    - D_a is D_0 if s is below mu_1, and D_0 mu_1/s otherwise.
+
+    According to the paper, the gain K increases as c falls to rho_1. In our reading,
+    the gain K_a stays constant in this range and the push K_a/c increases.
+
+    The law acts at any distance. If the distance doubles, the push halves.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
@@ -43,7 +48,7 @@ def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
         gains: Gains of the law.
 
     Returns:
-        Force away from the obstacle, N: K_0/max(c, rho_1) + D_0 min(s, mu_1).
+        Force away from the obstacle, K_0/max(c, rho_1) + D_0 min(s, mu_1), N.
     """
     near, fast = gains.saturation_distance_m, gains.saturation_speed_m_s
     spring = gains.distance_gain_j / (c if c > near else near + 0.0 * c)

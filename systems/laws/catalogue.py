@@ -44,9 +44,10 @@ LAWS: Mapping[str, Law] = {
     )
 }
 
-#: Names of the laws that are forces on the virtual mass. The analyses compare them.
+#: Names of the laws that compute a force on the virtual mass. The analyses compare
+#: these laws.
 FORCE_LAWS = tuple(name for name, law in LAWS.items() if law.force is not None)
-#: Names of the laws of robots on planned routes.
+#: Names of the laws for robots that drive on planned routes.
 ROUTE_LAWS = tuple(name for name, law in LAWS.items() if law.robot == "router")
 
 

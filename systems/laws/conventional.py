@@ -20,7 +20,9 @@ class ConventionalParameters(Parameters):
 
 
 def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
-    """Computes K_0 (rho_0 - c) + D_0 s below rho_0, else 0 (Han 2019, eq. 19-a).
+    """Computes the force K_0 (rho_0 - c) + D_0 s (Han 2019, eq. 19-a).
+
+    If the distance c is rho_0 or more, the force is 0.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
@@ -28,7 +30,7 @@ def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
         gains: Gains of the law.
 
     Returns:
-        Force away from the obstacle, N. It jumps by D_0 s at rho_0.
+        Force away from the obstacle, N. At c = rho_0 the force jumps by D_0 s.
     """
     if c < gains.reach_m:
         return gains.stiffness_n_m * (gains.reach_m - c) + gains.damping_n_s_m * s

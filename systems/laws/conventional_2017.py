@@ -9,7 +9,7 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 class Conventional2017Parameters(Parameters):
-    """Push that grows without a bound as the distance falls (Kim 2017, eq. 20).
+    """Gains of a law whose push is proportional to 1/distance (Kim 2017, eq. 20).
 
     Kim 2017 does not print the gains.
     """
@@ -23,11 +23,13 @@ class Conventional2017Parameters(Parameters):
 def conventional_2017_force(
     c: Any, s: Any, gains: Conventional2017Parameters, least_range_m: float
 ) -> Any:
-    """Computes K_0/c + D_0 s at any distance (Kim 2017, eq. 20).
+    """Computes the force K_0/c + D_0 s at any distance c (Kim 2017, eq. 20).
 
-    As printed, the push has no bound as c approaches 0. Here the least range of the
-    sensors bounds the push, because the sensors cannot distinguish distances below this
-    range. The law has no limit of reach. The push halves when the distance doubles.
+    In the printed equation, the push K_0/c becomes infinite as c approaches 0. In this
+    function, c counts at least as the least range of the sensors. The sensors cannot
+    distinguish distances below this range.
+
+    The law acts at any distance. If the distance doubles, the push halves.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
@@ -36,7 +38,8 @@ def conventional_2017_force(
         least_range_m: Least range of the sensors, m, above 0.
 
     Returns:
-        Force away from the obstacle, N. For s = 0 it is at most K_0/least_range_m.
+        Force away from the obstacle, N. For s = 0 the force is at most
+        K_0/least_range_m.
     """
     nearest = c if c > least_range_m else least_range_m + 0.0 * c
     return gains.distance_gain_j / nearest + gains.damping_n_s_m * s

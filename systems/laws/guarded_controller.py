@@ -1,4 +1,4 @@
-"""The guarded law, which plans a route on a map and looks before it moves."""
+"""The controller of the guarded law, which plans routes and evades moving bodies."""
 
 from __future__ import annotations
 
@@ -37,44 +37,56 @@ def guarded_step(
 
 
 class GuardedController(Block):
-    """Plans a route to the target through free and unknown space, and looks ahead.
+    """Plans a route to the target and commands the speed and yaw rate to follow it.
 
-    Every 0.5 s the block finds the cheapest route for the disc that holds the
-    body. Unknown cells cost a little more than free cells. Cells with echoes cost much
-    more. The robot drives toward the farthest point of the route that it can reach
-    straight at little extra cost. Its speed depends on the remaining distance. It
-    weaves, so that its narrow sensor cones sweep the space beside it.
+    The route leads through free and unknown space. The block computes the cheapest
+    route every 0.5 s. The route is for the smallest disc around the axle that contains
+    the body at every heading. An unknown cell of the map costs a little more than a
+    free cell. A cell with echoes costs much more.
 
-    The robot looks to both sides before it first moves. If the guard stops it, it looks
-    past both sides of the blocking cell. If the sensors do not show that this cell is
-    free, routes avoid the cell for a time. If the robot still does not get away, it
-    backs off.
+    The robot drives toward a point of the route. The block chooses the farthest point
+    that the robot can reach on a straight line at little extra cost. The speed of the
+    robot depends on the remaining distance. The robot weaves from side to side, so that
+    its narrow sensor cones sweep the space beside it.
+
+    The block reacts to obstacles in these ways:
+
+    - Before the robot first moves, it looks to both sides.
+    - If the guard stops the robot, the robot looks past both sides of the cell that
+      blocks it. If the sensors do not show that this cell is free, routes avoid the
+      cell for a time.
+    - If the robot still does not get away, it backs off.
+    - If every route crosses cells with echoes for 20 s, the robot stops. The port
+      ``gives_up`` is then 1 until there is a route.
 
     The block tracks moving bodies (``systems.planning.hazards``). If an echo comes from
     floor that was free before, the block assumes that a body has moved there. While a
-    body may come near, the block compares several pairs of speed and heading, and
+    body may come near, the block compares several pairs of speed and heading. The block
     chooses the pair of least cost. The cost has three terms: the deviation from the
     wanted motion, the distance from the bodies, and whether the sensors see the bodies.
 
-    If every route crosses cells with echoes for 20 s, the robot stops. It
-    reports at the port ``gives_up`` that it gives up, until there is a route.
+    The port ``plan`` has four numbers: the mode, the position (x, y) of the point to
+    which the robot drives, m, and the remaining distance, m. The modes are:
 
-    The port ``plan`` has the mode, the point for which the robot heads, and the
-    remaining distance. The modes are: 0, no target; 1, driving; 2, looking; 3, backing
-    off; 4, no route found. This law needs the guard, because it does not avoid
-    obstacles by itself.
+    - 0: no target
+    - 1: driving
+    - 2: looking
+    - 3: backing off
+    - 4: no route found
+
+    This law needs the guard, because the law alone does not avoid obstacles.
 
     The abstract state is ``DriveState``. The outputs are functions of the state and the
-    present inputs at every tick. There is no latency.
+    present inputs in every control period. There is no latency.
 
     Args:
-        robot: Size of the body, and position of P.
-        attraction: ``AttractionParameters``; uses the follow distance.
+        robot: Size of the body, and position of the control point P ahead of the axle.
+        attraction: Parameters of the attraction. Only the follow distance is used.
         sensors: Parameters of the range sensors.
-        guard: Parameters of the map.
-        tick_s: Period of the controller, s.
+        guard: Parameters of the guard and its map.
+        tick_s: Control period, s.
 
-    Reference: ours; docs/guard.md.
+    Reference: our own work; docs/guard.md.
     """
 
     inputs = (
@@ -129,15 +141,15 @@ class GuardedController(Block):
 def hazard_sensors(
     sensors: UltrasonicParameters, robot: RobotParameters, tick_s: float
 ) -> HazardSensors:
-    """Returns the sensor constants that the tracker of moving bodies uses.
+    """Collects the properties of the sensors that the tracker of moving bodies needs.
 
     Args:
         sensors: Parameters of the range sensors.
-        robot: Robot, for the position of P.
-        tick_s: Period of the controller, s.
+        robot: Parameters of the robot, for the position of the control point P.
+        tick_s: Control period, s.
 
     Returns:
-        Positions, directions, and errors of the sensors.
+        Positions, directions, ranges, and errors of the sensors.
     """
     axes, places, half_angles = sensors.beams
     return HazardSensors(

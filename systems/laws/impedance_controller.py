@@ -1,13 +1,15 @@
-"""The block of all laws that compute a force, and the functions of these forces.
+"""Controllers of all laws that compute a force, and the functions of these forces.
 
-The virtual mass M at the control point P moves by::
+A virtual mass M is at the control point P, which is ahead of the axle. The mass moves
+according to::
 
     M p'' = F_m + sum of f(c, s) u,   u = -C/|C|,  c = |C|,  s = |dC/dt|
 
-F_m is the attraction. C is the collision vector from P to an obstacle.
+F_m is the attraction to the target. C is the collision vector, which points from P to
+an obstacle. f is the push of the law.
 
-Han 2019, eq. 17-18 print the repulsion with the wrong sign and with forces
-that grow with distance; eq. 19 replaces them. See docs/errata.md.
+Eq. 17-18 of Han 2019 print the repulsion with the wrong sign and with forces that grow
+with distance. Eq. 19 replaces eq. 17-18. See docs/errata.md.
 """
 
 from __future__ import annotations
@@ -34,10 +36,10 @@ from systems.ranging.collision_vector import SLOTS
 from systems.ranging.parameters import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
-#: How many numbers the state has per tick: feature, C_x, and C_y of each slot.
+#: Number of state variables per tick: the feature, C_x, and C_y of each slot.
 _ROW = 3 * SLOTS
 
-#: Distance in m. If a target is straight behind P by more, the pull turns aside.
+#: If a target is straight behind P by more than this distance, m, the pull turns aside.
 _BEHIND_M = 0.3
 #: Time constant of the stop when there is no target, s (our choice).
 BRAKE_TIME_S = 0.5
@@ -47,18 +49,22 @@ BRAKE_TIME_S = 0.5
 def attraction_force(
     p_WP: Any, v_WP: Any, p_WS: Any, valid: Any, attraction: Any, mass: Any
 ) -> Any:
-    """Computes the force that pulls the virtual mass to the follow distance.
+    """Computes the force that pulls the virtual mass toward the follow distance.
 
     Args:
-        p_WP: Position (x, y) of the control point in W, m; floats or AutoDiffXd.
+        p_WP: Position (x, y) of the control point P in the world frame W, m; floats or
+            AutoDiffXd.
         v_WP: Velocity (vx, vy) of the virtual mass in W, m/s.
         p_WS: Position (x, y) of the target in W, m.
-        valid: Whether there is a target. If not, the force brakes the mass.
-        attraction: ``AttractionParameters``.
+        valid: Whether there is a target. If there is no target, the force brakes the
+            mass.
+        attraction: ``AttractionParameters``: stiffness K_r, damping D_r, and follow
+            distance d_f.
         mass: Virtual mass, kg.
 
     Returns:
-        (Fx, Fy) in W, N: K_r (p_S - p) (1 - d_f/|p_S - p|) - D_r v.
+        Force (Fx, Fy) in W, N. With the target at p_S and P at p, the force is K_r (p_S
+        - p) (1 - d_f/|p_S - p|) - D_r v.
     """
     if not valid:
         brake = mass / BRAKE_TIME_S
@@ -73,16 +79,20 @@ def attraction_force(
 
 @register_jitable
 def obstacle_speed(C_now: Any, C_before: Any, closing: Any, period_s: Any) -> Any:
-    """Computes the speed s at which a collision vector changes.
+    """Computes the speed s of an obstacle from the change of its collision vector.
+
+    A collision vector C points from the control point P to an obstacle.
 
     Args:
-        C_now: Collision vector (x, y) in W, m; floats or AutoDiffXd.
-        C_before: Collision vector of the same feature one period earlier, m.
-        closing: Whether s is max(0, -d|C|/dt) instead of |dC/dt|.
+        C_now: Present collision vector (x, y) in the world frame W, m; floats or
+            AutoDiffXd.
+        C_before: Collision vector (x, y) of the same feature ``period_s`` ago in W, m.
+        closing: Definition of s. If true, s is max(0, -d|C|/dt). If false, s is
+            |dC/dt|.
         period_s: Time between both vectors, s.
 
     Returns:
-        s, m/s, not negative. It has the scalar type of ``C_now``.
+        Speed s, m/s, at least 0. The scalar type is that of ``C_now``.
     """
     if not closing:
         return safe_norm(C_now[0] - C_before[0], C_now[1] - C_before[1]) / period_s
@@ -97,13 +107,15 @@ def repulsion_force(C_W: Any, s: Any, force: Any, arguments: Any = ()) -> Any:
     """Computes the force that pushes the virtual mass away from one obstacle.
 
     Args:
-        C_W: Collision vector (x, y) in W, m; floats or AutoDiffXd.
+        C_W: Collision vector (x, y) from the control point P to the obstacle in the
+            world frame W, m; floats or AutoDiffXd.
         s: Speed of the obstacle, m/s.
-        force: Function ``force(c, s, *arguments)`` that returns the force in N.
+        force: Function ``force(c, s, *arguments)`` that returns the push in N for the
+            distance c in m.
         arguments: Further arguments of ``force`` after c and s.
 
     Returns:
-        (Fx, Fy) in W, N.
+        Force (Fx, Fy) in W, N.
     """
     c = safe_norm(C_W[0], C_W[1])
     f = force(c, s, *arguments)
@@ -131,15 +143,22 @@ class ImpedanceNumbers(NamedTuple):
 def impedance_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Computes the acceleration of the virtual mass, the forces and the speeds s.
+    """Computes the acceleration of the virtual mass, the forces, and the speeds s.
 
-    The state has one row for each tick of a sensor round, most recent tick first. A row
-    has the feature, C_x, and C_y (in W, m) of each slot.
+    The state has one row for each control period of a sensor round, most recent period
+    first. A sensor round is the time in which every sensor fires once. A row has three
+    numbers for each slot of the input port: the feature, C_x, and C_y. C is the
+    collision vector from the control point P to an obstacle, in the world frame W, m.
+    The feature is the number of the sensors or the body that the vector belongs to.
 
-    For each occupied slot, the step searches the row of one round ago for the same
-    feature. If it finds the feature, it computes s from the old and the new vector.
-    Otherwise s is 0. The step sums the attraction and the pushes of all occupied slots.
-    Then it shifts the rows by one tick and writes the new vectors to the first row.
+    The step works in three stages:
+
+    1. For each occupied slot, the step searches the oldest row for the same feature. If
+       the step finds the feature, it computes s from the old and the new vector.
+       Otherwise s is 0.
+    2. The step adds the attraction and the pushes of all occupied slots.
+    3. The step shifts the rows by one period, and writes the new vectors to the first
+       row.
     """
     p_WS, valid, C_B, features, pose, v_WP = inputs
     # Attraction, computed relative to P.
@@ -214,30 +233,38 @@ def ImpedanceController_(T):
         """Pulls the robot to the target and pushes it away from obstacles.
 
         The law computes the push from the length c of a collision vector and a speed s.
+        A collision vector points from the control point P to an obstacle. The feature
+        of a vector is the number of the sensors or the body that the vector belongs to.
+
         The block computes s from two collision vectors of the same feature: the present
         vector and the vector of one sensor round ago. If the feature was absent one
-        round ago, s is 0. A round is the time in which every sensor fires once: one
-        tick if all sensors fire at every tick, three ticks if three sensors fire in
-        turn. During a round, every range is measured anew. Therefore s is exact at
-        constant velocities, even if a vector comes from two sensors. If the velocities
-        change, s is the mean over a round. The ranges in the present vector may be up
-        to one round minus one tick old.
+        round ago, s is 0. A sensor round is the time in which every sensor fires once.
+        If all sensors fire in every control period, a round is one period. If three
+        sensors fire in turn, a round is three periods.
 
-        The discrete state has the collision vectors of the last sensor round. It is
-        updated every tick. The outputs are functions of the state and the present
-        input. There is no latency.
+        During a round, every range is measured anew. Therefore s is exact at constant
+        velocities, even if a vector comes from two sensors. If the velocities change, s
+        is the mean over one round. The ranges in the present vector may be up to one
+        round minus one period old.
+
+        The discrete state has the collision vectors of the last sensor round. The state
+        is updated every control period. The outputs are functions of the state and the
+        present input. There is no latency.
 
         Args:
             law: A law of ``systems.laws.catalogue`` that has a force, or a function
                 ``law(c, s, gains)``. The function returns the force away from the
-                obstacle in N for a distance c in m and a speed s in m/s. It must use
-                pydrake.math to be differentiable.
-            gains: Gains of the law. None: a law of the catalogue has its default gains.
-            velocity_term: Definition of s.
-            robot: Mass, and position of P.
+                obstacle in N for a distance c in m and a speed s in m/s. The function
+                must use pydrake.math, so that Drake can differentiate the function.
+            gains: Gains of the law. If None, a law of the catalogue uses its default
+                gains.
+            velocity_term: Definition of s. ``printed`` is the rate of change of the
+                collision vector. ``closing`` is the speed of approach.
+            robot: Virtual mass, and position of the control point P.
             attraction: ``AttractionParameters``.
-            sensors: ``UltrasonicParameters``: period and order of firing, least range.
-            tick_s: Period of the controller, s.
+            sensors: ``UltrasonicParameters``. The block uses the firing period, the
+                firing order, and the least range.
+            tick_s: Control period, s.
         """
 
         inputs, outputs = _INPUTS, _OUTPUTS
@@ -295,16 +322,16 @@ def _slot_names(round_ticks: int) -> tuple[str, ...]:
 
 
 def _define(name: str, block_name: str, documentation: str, **fixed: Any) -> Any:
-    """Defines ``ImpedanceController_`` under another name with fixed arguments.
+    """Defines a variant of ``ImpedanceController_`` with fixed arguments.
 
     Args:
-        name: Name of the class.
+        name: Name of the new class.
         block_name: Name of the block in diagrams.
-        documentation: Docstring of the class.
-        fixed: Arguments of ``ImpedanceController`` that the class sets.
+        documentation: Docstring of the new class.
+        fixed: Arguments of ``ImpedanceController`` that the new class sets.
 
     Returns:
-        The template of the class for all scalar types.
+        Template of the new class for all scalar types.
     """
 
     @define_for_scalars(f"{name}_", __name__)

@@ -38,21 +38,27 @@ class Tuning:
     """How ``phonotaxis design`` derives the gains of a law from requirements."""
 
     rule: Literal["barrier", "matched"]
-    """How the gains follow from the requirements.
+    """Rule that derives the gains from the requirements.
 
-    ``barrier``: the first gain of ``Law.loop_gains`` follows from the required barrier.
-    The push must be proportional to this gain. The second gain follows from the energy
-    that the velocity term may return to the motion. ``matched``: the rule of the active
-    law of 2019. It suits laws that have the same gains."""
+    ``barrier`` determines the two gains in ``Law.loop_gains`` one after the other. The
+    first gain follows from the required barrier. The barrier is the kinetic energy that
+    the law must remove during an approach. The push must be proportional to the first
+    gain. The second gain follows from the energy that the velocity term may return to
+    the motion.
+
+    ``matched`` is the rule of the active law of 2019. This rule suits laws that have
+    the same gains as the active law."""
     stiffest: Callable[[Any, float], float]
-    """Function of the gains and the sensors' least range in m. It returns the largest
-    -df/dc for an obstacle at rest, N/m."""
+    """Function that returns the largest slope -df/dc of the force for an obstacle at
+    rest, N/m. The arguments of the function are the gains and the least range of the
+    sensors in m."""
     spring_speed: Callable[[Any], float] = _always_at_rest
-    """Function of the gains. It returns the speed s at which f(c, s) has only its
-    spring term, m/s."""
+    """Function of the gains that returns a speed s, m/s. At this speed, the force f(c,
+    s) has only its spring term."""
     sets_follow_distance: bool = False
     """Whether the design chooses a follow distance that allows for the push of the law.
-    For a law without a limit of reach this choice makes no sense, because the push acts
+
+    For a law without a limit of reach, the value is false. The push of such a law acts
     at every useful follow distance."""
 
 
@@ -69,25 +75,27 @@ class Law:
     equations: tuple[Equation, ...]
     """Equations for the model sheet."""
     force: Callable[..., Any] | None = None
-    """Function ``force(c, s, gains)``: push away from an obstacle, N.
+    """Function ``force(c, s, gains)`` that returns the push away from an obstacle, N.
 
-    The function takes a distance in m and a speed in m/s, floats or AutoDiffXd. Its
-    part f(c, 0) has a potential energy. None: the block of the law decides on a motion
-    instead of a force, so that the law has no linear model."""
+    The arguments are a distance c in m, a speed s in m/s, and the gains. c and s are
+    floats or AutoDiffXd. The part f(c, 0) of the push must have a potential energy. If
+    the field is None, the law commands a motion instead of a force. Then the law has no
+    linear model."""
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
     """Model of the gains. Every field has a default."""
     controller_name: str = ""
-    """Class name of the law's block in ``systems``. If it is empty,
-    ``RadialLawController`` runs the force."""
+    """Name of the class of the law's block in ``systems``. If the name is empty, the
+    block ``RadialLawController`` computes the force."""
     loop_gains: tuple[str, str] | None = None
     """Names of the gains of the distance term and the velocity term, for root loci."""
     tuning: Tuning | None = None
     """How the design chooses the gains. None: there are no gains to choose."""
     robot: RobotKind = "follower"
-    """Kind of the robot that runs the law. A ``follower`` follows a sound, a ``router``
-    drives to a goal on a planned route, and a searcher searches step by step."""
+    """Kind of the robot that runs the law. A ``follower`` follows a sound. A ``router``
+    drives to a goal on a planned route. An ``odor_searcher`` or a ``sound_searcher``
+    searches step by step."""
     guarded: bool = False
     """Whether the robot of this law always has the guard."""
     colour: str | None = None
@@ -95,28 +103,31 @@ class Law:
 
     @property
     def controller(self) -> type | None:
-        """Class of the law's block, or None if the law names none.
+        """Class of the law's block, or None if the law names no class.
 
-        The class may take the arguments ``gains``, ``velocity_term``, ``robot``,
-        ``attraction``, ``sensors``, ``tick_s``, ``guard`` (parameters of the map),
-        ``bodies`` (number of bodies), and ``seed``. This property imports the class
-        when it is read. Therefore the check of a scenario needs no Drake and no
-        compiled code.
+        The property imports the class only when the property is read. Therefore the
+        check of a scenario needs neither Drake nor compiled code.
+
+        The constructor of the class may take these arguments: ``gains``,
+        ``velocity_term``, ``robot``, ``attraction``, ``sensors``, ``tick_s``, ``guard``
+        (parameters of the guard and its map), ``bodies`` (number of bodies), and
+        ``seed``.
         """
         if not self.controller_name:
             return None
         return getattr(import_module("systems"), self.controller_name)
 
     def arguments(self, gains: Any, least_range_m: float) -> tuple[Any, ...]:
-        """Returns the arguments of ``force`` after c and s.
+        """Returns the arguments that the function ``force`` takes after c and s.
 
         Args:
             gains: Gains of the law, or None for the default gains.
             least_range_m: Least range of the sensors, m.
 
         Returns:
-            The gains, or None for a law without gains. If ``least_range`` is true, the
-            least range in m follows.
+            One or two arguments. The first argument is the gains, or None for a law
+            without gains. If the field ``least_range`` is true, the second argument is
+            the least range in m.
         """
         if gains is None and self.gains is not None:
             gains = self.gains()

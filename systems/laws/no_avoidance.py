@@ -1,4 +1,4 @@
-"""The law without avoidance, which is the lower bound of every comparison."""
+"""The law without avoidance, which serves as the lower bound in comparisons."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def no_force(c: Any, s: Any, gains: Any) -> Any:
         gains: Not used.
 
     Returns:
-        Zero, N, with the scalar type of c.
+        Zero force, N, with the scalar type of c.
     """
     return 0.0 * c
 

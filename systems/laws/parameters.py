@@ -1,4 +1,4 @@
-"""The attraction, and the definition of s that the laws share."""
+"""Parameters of the attraction, and the choice of the velocity term of the laws."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from systems.framework.parameters import (
     Parameters,
 )
 
-#: Definition of the speed s of an obstacle: ``printed`` is |dC/dt|, ``closing`` is the
-#: speed of approach only.
+#: Definition of the speed s of an obstacle. With ``printed``, s is |dC/dt|, the rate of
+#: change of the collision vector C. With ``closing``, s is the speed of approach.
 VelocityTerm = Literal["printed", "closing"]
 
 
@@ -22,8 +22,9 @@ class AttractionParameters(Parameters):
     stiffness_n_m: NonNegativeStiffness = 2.0
     """Stiffness K_r, N/m (printed without unit)."""
     damping_n_s_m: NonNegativeDamping = 1.0
-    """Damping D_r, N s/m (printed without unit). With K_r = 2 N/m the damping ratio
-    is 0.18."""
+    """Damping D_r, N s/m (printed without unit). With the stiffness K_r = 2 N/m and a
+    virtual mass of 3.94 kg, the damping ratio is 0.18."""
     follow_distance_m: NonNegativeLength = 1.2
-    """Distance d_f from the source at which the spring has no force, m (our choice).
-    With 0, as in the paper, the spring pulls P onto the source."""
+    """Follow distance d_f from the source, m (our choice). At this distance, the spring
+    has no force. The paper uses 0: the spring pulls the control point P onto the
+    source."""

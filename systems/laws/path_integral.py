@@ -13,17 +13,20 @@ from systems.laws.law import Equation, Law
 
 
 class PathIntegralParameters(Parameters):
-    """Spread and weights of the sequences. The cost terms are those of Nav2."""
+    """Gains of MPPI: spread of the sampled motions, and weights of the cost terms.
+
+    The cost terms are those of the controller in Nav2.
+    """
 
     clearance_m: NonNegativeLength = 0.08
     """Distance that the robot keeps from cells with echoes, m."""
     turn_spread_rad_s: Positive = 1.1
     """Standard deviation of the sampled yaw rates, rad/s."""
     temperature: Positive = 0.37
-    """Increase of the cost that divides the weight of a sequence by e (Nav2: 0.3)."""
+    """Temperature of the weights of sequences, exp(-cost/temperature) (Nav2: 0.3)."""
     angle_gain: NonNegative = 0.63
-    """Cost per radian between the heading and the direction of the wanted position
-    (Nav2's path angle critic: 2)."""
+    """Cost per radian of the angle between the heading and the direction of the wanted
+    position (Nav2's path angle critic: 2)."""
     obstacle_gain: NonNegative = 3.4
     """Cost of a position at the distance ``clearance_m`` from an obstacle (Nav2's cost
     critic: 3.81)."""

@@ -1,1 +1,1 @@
-"""Paths, evasion and velocity filters that use what a robot knows of the floor."""
+"""Routes, evasion, and velocity filters that use what the robot knows of the floor."""

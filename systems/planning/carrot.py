@@ -1,4 +1,4 @@
-"""The carrot: the farthest point of a path to which the robot may drive straight."""
+"""Choice of the carrot: the point of the route to which the robot drives straight."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import math
 from systems.framework.compiling import njit
 from systems.planning.way import STRAIGHT, Way, cell_at
 
-#: A straight line is accepted if it costs at most this multiple of the path to the same
-#: point.
+#: A straight line is accepted if it costs at most this multiple of the cost of the
+#: route to the same point.
 _DEARER = 1.1
-#: Points within this distance, m, are always accepted. The robot may stand beside the
-#: middle of its cell, so the comparison of costs is inexact.
+#: Points within this distance, m, are always accepted. Near the robot, the comparison
+#: of costs is inexact, because the robot may be beside the middle of its cell.
 _NEAREST_M = 0.4
 
 
@@ -19,21 +19,23 @@ _NEAREST_M = 0.4
 def find_carrot(
     way: Way, x: float, y: float, farthest_m: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Returns the farthest point of a path that a straight line reaches as cheaply.
+    """Finds the point of a route toward which the robot may drive straight.
 
-    The cost of the straight line is its length times the mean price of the cells under
-    it. The function compares this cost with the cost of the path to the same point. The
-    straight line may cost 10 % more.
+    The function chooses the farthest point that a straight line reaches at little extra
+    cost. The cost of the straight line is its length times the mean price of the cells
+    under the line. The function compares this cost with the cost of the route to the
+    same point. The straight line may cost 10 % more.
 
     Args:
-        way: From ``find_way``.
-        x: Position of the robot, m.
-        y: Position of the robot, m.
-        farthest_m: Distance from the robot, m. The search ends at the first point
-            beyond it.
+        way: Route from ``find_way``.
+        x: Position of the robot, x in the world frame W, m.
+        y: Position of the robot, y in W, m.
+        farthest_m: Distance from the robot, m. The search ends at the first point of
+            the route beyond this distance.
 
     Returns:
-        (x, y) of the point, m. Without a path, this is the position of the robot.
+        Position (x, y) of the point, m. If there is no route, the function returns the
+        position of the robot.
     """
     found, begin, cell = (x, y), 0, way.cell_m[0]
     for k in range(way.points[0]):

@@ -1,4 +1,8 @@
-"""Choice of a speed and heading that avoid moving bodies and keep them in view."""
+"""Choice of a speed and heading that avoid moving bodies and keep them in view.
+
+The position of a moving body is uncertain. Particles represent the possible positions
+and velocities of each body.
+"""
 
 from __future__ import annotations
 
@@ -14,51 +18,62 @@ from systems.planning.hazards import Sample
 from systems.planning.turning import turn_rate, wrapped
 from systems.safety.braking import SLOW_TURN_RAD_S
 
-#: Duration of the prediction of motions, s, and its time step, s.
+# ``_AHEAD_S``: duration of the prediction of motions, s.
+# ``_STEP_S``: time step of the prediction, s.
 _AHEAD_S, _STEP_S = 4.0, 0.2
-#: A particle nearer to the robot's body than the first distance, m, counts fully. Up to
-#: the second distance, m, it counts less.
+# ``_HIT_M``: a particle nearer to the robot's body than this distance counts fully, m.
+# ``_NEAR_M``: a particle farther away than this distance does not count, m.
 _HIT_M, _NEAR_M = 0.15, 0.43
 #: A contact at the end of the prediction counts less than a contact now, by this share.
 _LATER = 0.2
-#: A particle that comes nearer than the first distance, m, is a full threat. Up to the
-#: second distance, m, the threat decreases to zero. The third number is the duration of
-#: this prediction, s.
+# ``_THREAT_M``: a particle that comes nearer than this distance is a full threat, m.
+# ``_NO_THREAT_M``: a particle that stays beyond this distance is no threat, m.
+# ``_THREAT_S``: duration of the prediction of threats, s.
 _THREAT_M, _NO_THREAT_M, _THREAT_S = 0.8, 1.6, 4.0
-#: Factor for a threat that moves away.
+#: Factor that reduces the threat of a particle that moves away.
 _GOING = 0.25
-#: The need to look at a track is 1 after the first number, s, without an echo. The need
-#: is also 1 if the standard deviation of the track's velocity is 1.5 times the second
-#: number, m/s. The third number is the least need. The fourth number is the largest
-#: need of a track without echoes.
+# The need to watch a track of a body is a factor without unit.
+# ``_STALE_S``: the need is 1 after this time without an echo, s.
+# ``_UNSURE_M_S``: the need is 1 if the standard deviation of the track's velocity is
+#   1.5 times this value, m/s.
+# ``_LEAST_NEED``: least need.
+# ``_MOST_NEED``: largest need of a track without echoes.
 _STALE_S, _UNSURE_M_S, _LEAST_NEED, _MOST_NEED = 0.8, 0.1, 0.1, 2.0
-#: Angle off the heading within which a threat is in view, rad. Largest angle out of
-#: view that counts, rad.
+# ``_IN_VIEW_RAD``: largest angle between the heading and a threat in view, rad.
+# ``_OUT_OF_VIEW_RAD``: largest angle out of view that counts, rad.
 _IN_VIEW_RAD, _OUT_OF_VIEW_RAD = 0.55, 1.0
 #: Speeds that are tried in addition to the wanted speed, m/s.
 _SPEEDS = (-0.6, -0.4, -0.2, 0.0, 0.15, 0.3, 0.45, CRUISE_SPEED_M_S)
-#: Angles between the tried headings and the wanted heading, rad. Largest angle between
-#: the wanted heading and a heading towards a threat, rad.
+#: Angles between the tried headings and the wanted heading, rad.
 _ASIDE = (0.0, 0.5, -0.5, 1.0, -1.0)
+#: Largest angle between the wanted heading and a heading toward a threat, rad.
 _GAZE_RAD = 0.8
-#: A guard that allows for moving bodies checks the bodies beside the robot. A body is
-#: beside the robot if its gap to the rim is below ``_BESIDE_M``, m, plus the distance
-#: that the robot covers in ``_BESIDE_S``, s. A turn counts as ``_BESIDE_TURN_M`` of
-#: distance, m/rad. The guard then permits only motions that lead away from the body, by
-#: at least the share ``_WITHDRAWS`` of their speed.
+# The guard limits the motion of the robot if a moving body is beside the robot. A body
+# is beside the robot if its gap to the robot's disc is below ``_BESIDE_M`` plus a
+# distance. The robot covers this distance in ``_BESIDE_S``.
+# ``_BESIDE_M``: gap that counts as beside a robot at rest, m.
+# ``_BESIDE_S``: time over which the motion of the robot counts, s.
+# ``_BESIDE_TURN_M``: distance that a turn counts as, m/rad.
+# ``_WITHDRAWS``: least share of the robot's speed that must lead away from a body
+#   beside the robot.
 _BESIDE_M, _BESIDE_S, _BESIDE_TURN_M, _WITHDRAWS = 0.09, 0.4, 0.2, 0.2
 #: Total weight of particles that counts as a body.
 _BODY_SHARE = 0.3
-#: Prices, as a loss of wanted speed: a predicted contact with a body, m/s; a threat
-#: that is 1 rad out of view, m/s; and a deviation from the wanted heading, m/s per rad.
+# Prices are losses of wanted speed.
+# ``_RISK_PRICE``: price of a predicted contact with a body, m/s.
+# ``_WATCH_PRICE``: price of a threat that is 1 rad out of view, m/s.
+# ``_TURN_PRICE``: price of a deviation from the weaving heading, m/s per rad.
 _RISK_PRICE, _WATCH_PRICE, _TURN_PRICE = 8.0, 0.7, 0.1
-#: A speed that the guard has refused is not tried again at headings within this angle,
-#: rad, of the robot's heading.
+#: If the guard has refused a speed, the robot does not try this direction of motion
+#: again at headings within this angle of its own heading, rad.
 _HELD_RAD = 0.6
 
 
 class Threats(NamedTuple):
-    """Where the robot has to look, one entry per particle."""
+    """Directions in which the robot has to look, with one entry per particle.
+
+    A particle is one possible position and velocity of a moving body.
+    """
 
     bearing_rad: NDArray[np.float64]
     """Bearing of the particle in W, rad."""
@@ -78,10 +93,10 @@ def _between(
 def _is_held(
     bodies: Sample, pose: Any, motion: Any, time: float, half_size: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether the guard would refuse a motion because of bodies nearby.
+    """Checks whether the guard would refuse a motion because of bodies nearby.
 
     The function first moves the bodies on by ``time`` seconds. A body does not count if
-    the robot moves away from it fast enough.
+    the robot moves away from the body fast enough.
     """
     x, y, theta = pose
     speed, omega = motion
@@ -109,22 +124,23 @@ def risk_of(
     heading: float,
     half_size: tuple[float, float],
 ) -> float:  # pragma: no cover  (compiled)
-    """Predicts how many bodies come near the robot if it uses a speed and heading.
+    """Predicts how many bodies come near the robot at a given speed and heading.
 
-    The robot turns to the heading and keeps the speed for 4 s. The guard may refuse
-    this motion at some time. The function then also predicts the motion that the guard
-    permits, and returns the larger risk.
+    In the prediction, the robot turns to the heading and keeps the speed for 4 s. If
+    the guard would refuse this motion at some time, the function makes a second
+    prediction. The second prediction is for the motion that the guard permits. The
+    function then returns the larger of both risks.
 
     Args:
-        bodies: From ``pick_hazards``.
-        pose: (x, y, theta) now, m and rad.
+        bodies: Particles from ``pick_hazards``.
+        pose: Present pose (x, y, theta) of the robot, m and rad.
         speed: Forward speed, m/s.
         heading: Heading to which the robot turns, rad.
-        half_size: Half of the body's length and width, m.
+        half_size: Half of the body's length and half of its width, m.
 
     Returns:
-        Expected number of bodies. A body counts fully within 15 cm of the robot's
-        sides, and less up to 43 cm.
+        Expected number of bodies near the robot. A body within 15 cm of the robot's
+        sides counts fully. From 15 to 43 cm, the body counts less and less.
     """
     let, held = _risk_along(bodies, pose, speed, heading, half_size, np.inf)
     if held:
@@ -144,13 +160,19 @@ def _risk_along(
     half_size: tuple[float, float],
     held_rad_s: float,
 ) -> tuple[float, bool]:  # pragma: no cover  (compiled)
-    """Return the risk of a motion, and whether the guard would hold the robot.
+    """Predicts the risk of a motion, and whether the guard would hold the robot.
 
-    ``held_rad_s`` selects the prediction. If it is infinite, the robot moves as if
-    without a guard. Otherwise the robot stands wherever the guard holds it, and turns
-    at most at the rate ``held_rad_s``. In each step, the function moves the robot, and
-    then compares its rectangle with all particles. Each particle counts with its
-    nearest approach, and a later approach counts less.
+    If ``held_rad_s`` is infinite, the robot moves as if it had no guard. Otherwise, the
+    robot stands wherever the guard would hold it, and turns at most at the rate
+    ``held_rad_s``.
+
+    In each step, the function moves the robot and compares its rectangle with all
+    particles. A particle is one possible position of a body. Each particle counts with
+    its nearest approach. A later approach counts less.
+
+    Returns:
+        Expected number of bodies near the robot, and whether the guard would hold the
+        robot.
     """
     steps, total, held = math.ceil(_AHEAD_S / _STEP_S), 0.0, False
     x, y, theta = pose[0], pose[1], pose[2]
@@ -189,9 +211,16 @@ def _risk_along(
 def _least_distance(
     dx: float, dy: float, ux: float, uy: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Return the least distance, m, in the next 4 s, and the time until then, s.
+    """Computes the least distance of two moving points in the next 4 s.
 
-    ``(dx, dy)`` and ``(ux, uy)`` are the relative position and velocity.
+    Args:
+        dx: Present relative position, x, m.
+        dy: Present relative position, y, m.
+        ux: Relative velocity, x, m/s.
+        uy: Relative velocity, y, m/s.
+
+    Returns:
+        Least distance, m, and time until this distance is reached, s.
     """
     square, time = ux * ux + uy * uy, 0.0
     if square > 1e-6:
@@ -203,20 +232,21 @@ def _least_distance(
 def find_threats(
     bodies: Sample, pose: Any, wanted: Any
 ) -> Threats:  # pragma: no cover  (compiled)
-    """Finds how much the robot has to watch each particle, and in which direction.
+    """Computes how much the robot has to watch each particle, and in which direction.
 
-    A particle is a threat if it will come near the robot. The function predicts the
-    least distance for a robot that drives as wanted and for a robot at rest. It takes
-    the smaller of both. The robot has to watch a threat that it has not seen for a
-    while, or whose velocity is uncertain.
+    A particle is one possible position and velocity of a moving body. A particle is a
+    threat if it will come near the robot. The function predicts two distances to the
+    particle: for a robot that drives as wanted, and for a robot at rest. The smaller
+    distance counts. The robot has to watch a threat more if no sensor has seen the
+    threat for a while, or if the velocity of the threat is uncertain.
 
     Args:
-        bodies: From ``pick_hazards``.
-        pose: (x, y, theta) of the robot, m and rad.
-        wanted: Wanted speed, m/s, and heading, rad.
+        bodies: Particles from ``pick_hazards``.
+        pose: Pose (x, y, theta) of the robot, m and rad.
+        wanted: Wanted speed, m/s, and wanted heading, rad.
 
     Returns:
-        One threat per particle.
+        Direction and weight of each particle.
     """
     speed, heading = max(wanted[0], 0.0), wanted[1]
     vx, vy = speed * math.cos(heading), speed * math.sin(heading)
@@ -242,7 +272,7 @@ def watch_of(threats: Threats, heading: float) -> float:  # pragma: no cover  (c
     """Computes how much of the threats is out of view at a heading.
 
     Args:
-        threats: From ``find_threats``.
+        threats: Threats from ``find_threats``.
         heading: Heading of the robot, rad.
 
     Returns:
@@ -268,27 +298,28 @@ def choose_motion(
 
     The price of a motion is the sum of four terms:
 
-    * the difference between its velocity and the wanted velocity;
-    * the angle between its heading and the weaving heading, times a small price;
-    * the threats that are out of view at this heading, times a price;
-    * the bodies that come near within 4 s, times a price.
+    - the difference between its velocity and the wanted velocity.
+    - the angle between its heading and the weaving heading, times a small price.
+    - the threats that are out of view at this heading, times a price.
+    - the bodies that come near within 4 s, times a price.
 
-    The function tries all pairs of a heading and a speed. It uses nine headings: five
-    around the heading of the path, the current heading, the weaving heading, and two
-    towards the threats. The last term takes long to compute. The function skips it if
-    the other terms already exceed the lowest price.
+    The weaving heading oscillates around the heading of the route. The function tries
+    all pairs of a heading and a speed. There are nine headings: five around the heading
+    of the route, the present heading, the weaving heading, and two toward the threats.
+    The last term takes long to compute. If the other terms already exceed the lowest
+    price so far, the function skips the last term.
 
     Args:
-        bodies: From ``pick_hazards``.
-        pose: (x, y, theta) of the robot, m and rad.
-        wanted: Wanted speed, m/s; heading of the path, rad; and weaving heading, rad,
-            which oscillates around the heading of the path.
+        bodies: Particles from ``pick_hazards``.
+        pose: Pose (x, y, theta) of the robot, m and rad.
+        wanted: Wanted speed, m/s; heading of the route, rad; and weaving heading, rad.
         held: Speed that the guard has just refused, m/s, or 0.
-        half_size: Half of the body's length and width, m.
+        half_size: Half of the body's length and half of its width, m.
 
     Returns:
-        Speed, m/s; heading, rad; and the number of bodies to be watched. If the last
-        number is zero, there is no reason to deviate from the wanted motion.
+        Three numbers: speed, m/s; heading, rad; and number of bodies that the robot has
+        to watch. If the last number is 0, the robot has no reason to deviate from the
+        wanted motion.
     """
     threats = find_threats(bodies, pose, (wanted[0], wanted[1]))
     watched, cosine, sine = 0.0, 0.0, 0.0
@@ -307,7 +338,7 @@ def choose_motion(
     best, chosen = np.inf, (wanted[0], wanted[2])
     for heading in headings:
         weaving = abs(wrapped(heading - wanted[2]))
-        # The angle off the path, or off the weaving heading if this angle is smaller.
+        # The angle off the route or off the weaving heading, whichever is smaller.
         off = min(abs(wrapped(heading - wanted[1])), weaving)
         base = _TURN_PRICE * weaving
         base += _WATCH_PRICE * watch_of(threats, heading)

@@ -1,4 +1,4 @@
-"""How fast the robot should go to follow a target, and in which direction."""
+"""Computation of the speed and direction with which the robot follows a target."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from numba.extending import register_jitable
 
 from systems.planning.turning import TURN_RATE_RAD_S
 
-#: Largest wanted speed, and speed of backing off, m/s.
+# ``CRUISE_SPEED_M_S``: largest wanted speed, m/s.
+# ``BACK_SPEED_M_S``: largest speed of backing off, m/s.
 CRUISE_SPEED_M_S, BACK_SPEED_M_S = 0.62, 0.15
-#: Wanted speed per remaining distance, 1/s, and share of the target's speed that is
-#: added to the wanted speed.
+# ``APPROACH_GAIN``: wanted speed per remaining distance, 1/s.
+# ``SOURCE_SHARE``: share of the target's speed that is added to the wanted speed.
 APPROACH_GAIN, SOURCE_SHARE = 1.2, 0.8
-#: Least and largest speed, m/s, and largest yaw rate, rad/s, of laws that command
-#: motions instead of forces.
+#: Limits of laws that command motions instead of forces: least speed, m/s, largest
+#: speed, m/s, and largest yaw rate, rad/s.
 SPEED_LIMITS = -BACK_SPEED_M_S, CRUISE_SPEED_M_S, TURN_RATE_RAD_S
 
 
 class FollowNumbers(NamedTuple):
-    """Constants of following."""
+    """Constants for following a target."""
 
     distance_m: float
     """Distance that P should keep from the target, m."""
@@ -30,14 +31,14 @@ class FollowNumbers(NamedTuple):
 
 @register_jitable
 def wanted_speed(left: float, along: float) -> float:
-    """Computes the wanted speed.
+    """Computes the speed with which the robot should approach the target.
 
     Args:
         left: Distance from the target minus the follow distance, m.
         along: Speed of the target in the direction of travel, m/s.
 
     Returns:
-        Wanted speed, m/s. If it is negative, the robot backs off.
+        Wanted speed, m/s. A negative speed means that the robot backs off.
     """
     wanted = APPROACH_GAIN * left + SOURCE_SHARE * along
     return min(max(wanted, -BACK_SPEED_M_S), CRUISE_SPEED_M_S)
@@ -45,16 +46,18 @@ def wanted_speed(left: float, along: float) -> float:
 
 @register_jitable
 def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
-    """Computes the speed of a straight approach to the target, and its direction.
+    """Computes the speed and direction of a straight approach to the target.
 
     Args:
-        inputs: Position and velocity of the target, m and m/s; whether there is a
-            target; pose of the robot, m and rad. Further inputs are not read.
-        follow: Constants of following.
+        inputs: Values of the input ports. The function reads four values: position of
+            the target, m; velocity of the target, m/s; whether there is a target; and
+            pose of the robot, m and rad.
+        follow: Constants for following a target.
 
     Returns:
-        Wanted speed, m/s, and bearing of the target from the axle in W, rad. Without a
-        target, the speed is 0 and the bearing is the heading of the robot.
+        Wanted speed, m/s, and direction from the axle to the target in the world frame
+        W, rad. If there is no target, the speed is 0 and the direction is the heading
+        of the robot.
     """
     target, velocity, valid, pose = inputs[0], inputs[1], inputs[2][0], inputs[3]
     if valid < 0.5:

@@ -1,10 +1,15 @@
-"""One tick of the guarded law: where to drive, when to look, and how to evade bodies.
+"""Decisions of the guarded law in one control period.
 
-The robot is in one of five modes. It waits without a target. It drives along the path
-that `systems.planning.way` finds. It looks around before it moves for the first time,
-and it looks at a place that blocks it. It backs off after it has stayed in one place
-for too long. It gives up temporarily if all paths lead through occupied cells. In every
-mode, `systems.planning.evasion` may replace the motion to avoid moving bodies.
+The robot is in one of five modes:
+
+- waiting, if there is no target.
+- driving along the route that ``systems.planning.way`` finds.
+- looking around, before the first motion or at a place that blocks the robot.
+- backing off, after the robot has stayed in one place for too long.
+- giving up for a time, if all routes lead through occupied cells.
+
+In every mode, ``systems.planning.evasion`` may replace the motion to avoid moving
+bodies.
 """
 
 from __future__ import annotations
@@ -47,73 +52,81 @@ from systems.planning.way import (
 from systems.safety.braking import TURNED
 from systems.safety.free_space import FreeSpace, edge_cells
 
-#: Modes of the robot.
+#: Modes of the robot, see the docstring of the module.
 WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)
 
-#: Distance that paths keep between the disc around the body and occupied cells, m.
+#: Distance that routes keep between the disc around the body and occupied cells, m.
 CLEARANCE_M = 0.02
-#: Distance from the target within which echoes count as echoes of the target, m. The
+#: Echoes within this distance from the target count as echoes of the target, m. The
 #: robot expects no other body there.
 SOURCE_RADIUS_M = 0.35
-#: Distance from the target within which echoes do not block paths, m.
+#: Distance from the target within which echoes do not block routes, m.
 _SOURCE_CLEARANCE_M = 0.85
 #: Time from one plan to the next, s.
 _REPLAN_S = 0.5
-#: Greatest distance to the point of the path for which the robot heads, m.
+#: Greatest distance to the point of the route toward which the robot drives, m.
 _LOOK_AHEAD_M = 1.5
-#: A path is straight if its length is at most this multiple of the direct distance.
+#: A route is straight if its length is below this multiple of the direct distance.
 _DETOUR = 1.15
-#: The robot has arrived if the error of its distance from the target is below the first
-#: number, m, and the target is slower than the second number, m/s.
+# The robot has arrived if both of these values are below their limits.
+# ``_THERE_M``: limit of the error of the distance from the target, m.
+# ``_RESTS_M_S``: limit of the speed of the target, m/s.
 _THERE_M, _RESTS_M_S = 0.2, 0.1
 
-#: Amplitude of weaving to both sides, rad, and its period, s. Weaving sweeps the sensor
-#: cones.
+# The heading of the robot weaves, so that the sensor cones sweep over the floor.
+# ``_WEAVE_RAD``: amplitude of weaving to both sides, rad.
+# ``_WEAVE_S``: period of weaving, s.
 _WEAVE_RAD, _WEAVE_S = 0.3, 2.4
-#: The same while the target or another body moves.
+# ``_SEARCH_RAD``: amplitude of weaving while the target or another body moves, rad.
+# ``_SEARCH_S``: period of weaving while the target or another body moves, s.
 _SEARCH_RAD, _SEARCH_S = 1.0, 3.4
-#: Time after the detection of a moving body in which the robot weaves more widely, s.
+#: Time after the detection of a moving body during which the robot weaves widely, s.
 _MOVES_S = 5.0
-#: The robot weaves less if it lags behind the target. The reduction starts at the first
-#: lag, m. At the second lag, m, the amplitude is smaller by the share ``_LESS``.
+# If the robot lags behind the target, the robot weaves less.
+# ``_LITTLE_BEHIND_M``: lag at which the reduction of the amplitude starts, m.
+# ``_FAR_BEHIND_M``: lag at which the reduction is complete, m.
+# ``_LESS``: share by which the amplitude is then smaller.
 _LITTLE_BEHIND_M, _FAR_BEHIND_M, _LESS = 0.3, 0.9, 0.3
 
 #: Time for which the guard blocks the robot before the robot looks around, s.
 _PATIENCE_S = 0.3
-#: Half of the angle of a look, rad: for the first look, before the robot has moved; and
-#: for a look at a cell that blocks the robot.
+# A look turns the robot to both sides of a direction.
+# ``_FIRST_LOOK_RAD``: angle to each side in the first look, before the robot has moved,
+#   rad.
+# ``_LOOK_RAD``: angle to each side in a look at a cell that blocks the robot, rad.
 _FIRST_LOOK_RAD, _LOOK_RAD = 0.4, 0.6
-#: A heading of a look is done if the heading error is below the first number, rad. The
-#: second number is the yaw rate per heading error during a look, 1/s.
+# ``_LOOKED_RAD``: a heading of a look is done if the heading error is below this angle,
+#   rad.
+# ``_LOOK_GAIN``: yaw rate per heading error during a look, 1/s.
 _LOOKED_RAD, _LOOK_GAIN = 0.1, 4.0
-#: A look ends early if the distance of the disc from non-free space exceeds the
-#: required distance by this much, m.
+#: A look ends early if the body's disc is farther from non-free space than required.
+#: The distance must exceed the required distance by this amount, m.
 _ROOM_M = 0.03
-#: Largest number of cells that are compared to find the one that blocks the robot.
+#: Largest number of cells among which the robot searches the cell that blocks it.
 _MOST_CELLS = 1_000
-#: Time for which paths avoid a place that was marked as blocked, s.
+#: Time for which routes avoid a place that was marked as blocked, s.
 _MARK_S = 10.0
-#: A robot that has moved farther than the first number, m, does not stay in one place.
-#: After it has stayed for the second number, s, it marks the place ahead as blocked and
-#: backs off.
+# ``_STAYS_M``: the robot stays in one place until it has moved by more than this, m.
+# ``_GIVE_UP_S``: if the robot stays in one place for this time, it marks the place
+#   ahead as blocked and backs off, s.
 _STAYS_M, _GIVE_UP_S = 0.15, 5.5
 #: Duration of backing off, s.
 _BACKING_S = 2.0
-#: Time that the robot searches while all paths lead through occupied cells, s. After
-#: this time it reports that it gives up.
+#: If all routes lead through occupied cells, the robot searches for this time, s. After
+#: this time, the robot reports that it gives up.
 _SEARCH_WAY_S = 20.0
 
-#: Distance within which the robot evades bodies, m. If the need to watch bodies is
-#: below the second number, the robot does not evade.
+# ``_NEAR_M``: distance within which the robot evades bodies, m.
+# ``_WATCHED``: least number of bodies to be watched for which the robot evades.
 _NEAR_M, _WATCHED = 3.5, 0.05
-#: After the guard has refused a speed, the robot avoids it for this time, s.
+#: After the guard has refused a speed, the robot avoids this speed for this time, s.
 _HELD_S = 0.4
 
 
 class DriveMemory(NamedTuple):
-    """What the guarded law remembers.
+    """Memory of the guarded law.
 
-    Every array has one number, except for those with a form.
+    Every array has the shape (1,) unless its description states another shape.
     """
 
     speed: NDArray[np.float64]
@@ -121,21 +134,21 @@ class DriveMemory(NamedTuple):
     turn: NDArray[np.float64]
     """Wanted yaw rate, rad/s."""
     mode: NDArray[np.float64]
-    """``WAITING`` to ``GIVING_UP``."""
+    """Mode of the robot, ``WAITING`` to ``GIVING_UP``."""
     carrot: NDArray[np.float64]
-    """(2,) point of the path to which the robot heads, m."""
+    """(2,) point (x, y) of the route toward which the robot drives, m."""
     way_left_m: NDArray[np.float64]
-    """Remaining length of the path, m."""
+    """Remaining length of the route, m."""
     planned_s: NDArray[np.float64]
     """Time of the last plan, s."""
     passable_s: NDArray[np.float64]
-    """Time of the last path without occupied cells, s."""
+    """Time of the last route without occupied cells, s."""
     blocked_s: NDArray[np.float64]
-    """Last time when the guard let the robot go on, s."""
+    """Last time at which the guard did not block the robot, s."""
     stays_at: NDArray[np.float64]
     """(2,) position of the robot when it last moved on, m."""
     stays_s: NDArray[np.float64]
-    """Time when it last moved on, s."""
+    """Time when the robot last moved on, s."""
     has_looked: NDArray[np.float64]
     """1 after the first look around, else 0."""
     headings: NDArray[np.float64]
@@ -149,7 +162,7 @@ class DriveMemory(NamedTuple):
     held: NDArray[np.float64]
     """Speed that the guard last refused, m/s, or 0."""
     held_s: NDArray[np.float64]
-    """Time of this refusal, s."""
+    """Time when the guard last refused a speed, s."""
 
 
 class DriveState(NamedTuple):
@@ -161,7 +174,7 @@ class DriveState(NamedTuple):
 
 
 class DriveNumbers(NamedTuple):
-    """Constants of one tick."""
+    """Constants of the guarded law."""
 
     follow_distance_m: float
     control_point_m: float
@@ -170,19 +183,19 @@ class DriveNumbers(NamedTuple):
     half_size: tuple[float, float]
     """Half of the body's length and width, m."""
     radius_m: float
-    """Radius of the disc for which paths are planned, m."""
+    """Radius of the disc for which routes are planned, m."""
     tick_s: float
 
 
 def make_drive_state(cells: int, sensors: int) -> DriveState:
-    """Makes the state before the first tick.
+    """Makes the state before the first control period.
 
     Args:
         cells: Number of cells along a side of the map.
         sensors: Number of range sensors.
 
     Returns:
-        The state. The robot has no plan, and has not been anywhere.
+        State without a plan. The memory contains no earlier position of the robot.
     """
     pairs = "carrot", "stays_at", "headings", "block"
     memory = DriveMemory(
@@ -196,25 +209,28 @@ def make_drive_state(cells: int, sensors: int) -> DriveState:
 def drive_guarded(
     tick: int, state: DriveState, inputs: Any, numbers: DriveNumbers
 ) -> None:
-    """Decides which speed and yaw rate the robot wants in one tick.
+    """Decides which speed and yaw rate the robot wants in one control period.
 
-    The function writes ``speed`` and ``turn`` of the memory. It works in these steps:
+    The function writes the results to ``speed`` and ``turn`` of the memory. The
+    function works in these steps:
 
     1. Update the tracks of moving bodies with the new echoes.
-    2. Plan a path at regular intervals, and compute the wanted speed and heading error.
+    2. Plan a route at regular intervals. Compute the wanted speed and the heading
+       error.
     3. Update three timers: how long the robot has stayed in one place, how long the
-       guard has blocked the robot, and how long all paths have led through occupied
+       guard has blocked the robot, and how long all routes have led through occupied
        cells.
-    4. Change the mode if a timer has expired, and compute the motion of this mode.
-    5. Replace this motion if moving bodies are near (``_evade``).
+    4. If a timer has expired, change the mode. Compute the motion of the mode.
+    5. If moving bodies are near, replace the motion (``_evade``).
 
     Args:
-        tick: Number of the tick.
-        state: Modified in place.
-        inputs: Position and velocity of the target, m and m/s; whether there is a
-            target; pose of the robot, m and rad; report of the guard; ranges, echoes
-            and ages of the range sensors; free space.
-        numbers: Constants.
+        tick: Number of the control period.
+        state: State of the law. The function changes the state in place.
+        inputs: Values of the input ports, in this order: position of the target, m;
+            velocity of the target, m/s; whether there is a target; pose of the robot, m
+            and rad; report of the guard; ranges, echoes, and ages of the range sensors;
+            free space.
+        numbers: Constants of the law.
     """
     target, velocity, (valid,), pose, report, ranges, echo, ages, space = inputs
     m, time = state.memory, tick * numbers.tick_s
@@ -248,7 +264,7 @@ def drive_guarded(
     # command, or only slows the robot, does not block the robot.
     if report[0] < TURNED or there or wanted <= 0.0:
         m.blocked_s[0] = time
-    # Timer 3: how long all paths have led through occupied cells.
+    # Timer 3: how long all routes have led through occupied cells.
     if time - m.passable_s[0] > _SEARCH_WAY_S and not there:
         m.mode[0], m.blocked_s[0] = GIVING_UP, time
         _stays(m, pose, time)
@@ -261,7 +277,7 @@ def drive_guarded(
     if m.mode[0] == LOOKING:
         _look(time, pose, report, state)
     # The robot has stayed in one place for too long. It marks the place in front of it
-    # as blocked, backs off, and plans a new path.
+    # as blocked, backs off, and plans a new route.
     if m.mode[0] == DRIVING and time - m.stays_s[0] > _GIVE_UP_S:
         ahead, at = pose[2] + error, numbers.radius_m + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
@@ -281,7 +297,7 @@ def drive_guarded(
 def _remember_held(
     m: DriveMemory, report: Any, time: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Remember the speed that the guard has refused in the last tick."""
+    """Remembers the speed that the guard refused in the last control period."""
     if report[0] >= TURNED and m.speed[0] != 0.0:
         m.held[0], m.held_s[0] = m.speed[0], time
     elif time - m.held_s[0] > _HELD_S:
@@ -290,11 +306,11 @@ def _remember_held(
 
 @register_jitable
 def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untyped-def]
-    """Replace speed and turn if a moving body may come near.
+    """Replaces the wanted speed and yaw rate if a moving body may come near.
 
-    The function first computes the weaving heading from the current turn.
-    ``choose_motion`` compares other headings with this heading. A look at a blocked
-    place ends when the robot has to evade. The first look around continues.
+    The function first computes the weaving heading from the present yaw rate.
+    ``choose_motion`` compares other headings with the weaving heading. If the robot has
+    to evade, a look at a blocked place ends. The first look around continues.
     """
     m = state.memory
     bodies = pick_hazards(state.hazards, time, pose, _NEAR_M)
@@ -317,7 +333,7 @@ def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untype
 def _stays(
     m: DriveMemory, pose: Any, time: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Restart the timer that measures how long the robot stays in one place."""
+    """Restarts the timer that measures how long the robot stays in one place."""
     m.stays_at[0], m.stays_at[1], m.stays_s[0] = pose[0], pose[1], time
 
 
@@ -325,20 +341,25 @@ def _stays(
 def _find_heading(  # type: ignore[no-untyped-def]
     time, target, velocity, pose, state, space, numbers
 ):
-    """Return wanted speed, m/s, heading error, rad, and whether the robot has arrived.
+    """Computes the wanted speed, the heading error, and whether the robot has arrived.
 
     The function works in four steps:
 
-    1. Every ``_REPLAN_S`` it plans a new path. Echoes near the target and near tracked
-       bodies do not block the path.
-    2. It chooses the carrot: the farthest point of the path that a straight drive
-       reaches as cheaply (``find_carrot``). The heading error is the angle from the
-       robot's heading to the carrot.
-    3. It finds the distance that is left. This is the length of the path, or the direct
-       distance if the path is almost straight and avoids nothing. In the second case, a
-       robot close to the target heads for the target itself.
-    4. The wanted speed follows from this distance minus the follow distance, and from
-       the speed at which the target moves away (``wanted_speed``).
+    1. Every ``_REPLAN_S`` the function plans a new route. Echoes near the target and
+       near tracked bodies do not block the route.
+    2. The function chooses the carrot with ``find_carrot``. The carrot is the farthest
+       point of the route that a straight line reaches at little extra cost. The heading
+       error is the angle from the robot's heading to the carrot.
+    3. The function computes the remaining distance, which is normally the length of the
+       route. If the route is almost straight and avoids nothing, the remaining distance
+       is the direct distance. In this case, a robot close to the target drives toward
+       the target itself.
+    4. The wanted speed follows from two numbers (``wanted_speed``). The first is the
+       remaining distance minus the follow distance. The second is the speed at which
+       the target moves away.
+
+    Returns:
+        Wanted speed, m/s; heading error, rad; and whether the robot has arrived.
     """
     m, way, hazards = state.memory, state.way, state.hazards
     x, y, theta = pose[0], pose[1], pose[2]
@@ -359,7 +380,7 @@ def _find_heading(  # type: ignore[no-untyped-def]
     distance, length = math.hypot(dx, dy), way.length_m[0]
     direct = math.hypot(target[0] - x, target[1] - y)
     left = max(distance, length - offset)
-    # A path over cells is longer than the straight line, even without obstacles.
+    # A route over cells is longer than the straight line, even without obstacles.
     if way.dearest[0] <= TIGHT and length < _DETOUR * direct:
         left = distance
         if distance < follow + 3.0 * _THERE_M:
@@ -375,15 +396,17 @@ def _find_heading(  # type: ignore[no-untyped-def]
 
 @register_jitable
 def _begin_look(time, pose, ahead, m, space, numbers):  # type: ignore[no-untyped-def]
-    """Begin a look before the robot first moves, or when the guard blocks it.
+    """Begins a look before the robot first moves, or when the guard blocks the robot.
 
     A look turns the sensors to both sides of a direction, by the same angle. The nearer
-    side comes first. The direction of the first look is that of the path (``ahead``).
+    side comes first. For the first look, the direction is that of the route
+    (``ahead``).
 
     A later look begins after the guard has blocked the robot for ``_PATIENCE_S``. The
-    guard does not say which cell is in its way. The cell that is not free and lies
-    nearest to a point just ahead of the axle is taken for it (``_blocking``). The
-    direction of the look is that of this cell, as seen from P.
+    guard does not report which cell blocks the robot. The function assumes that the
+    blocking cell is the non-free cell nearest to a point just ahead of the axle
+    (``_blocking``). The direction of the look is the direction from the control point P
+    to this cell.
     """
     x, y, half = pose[0], pose[1], _FIRST_LOOK_RAD
     if m.has_looked[0] > 0.5:
@@ -403,12 +426,12 @@ def _begin_look(time, pose, ahead, m, space, numbers):  # type: ignore[no-untype
 
 @register_jitable
 def _look(time, pose, report, state):  # type: ignore[no-untyped-def]
-    """Turn to both sides of the blocking cell, until there is room.
+    """Turns the robot to both sides of the blocking cell until there is room.
 
-    The look ends as soon as the guard reports room. If the robot has turned to both
-    sides and there is no room, it marks the cell as blocked for ``_MARK_S``. Then it
-    plans a new path and drives. The first look around always turns to both sides and
-    marks nothing.
+    If the guard reports room, the look ends at once. If the robot has turned to both
+    sides and there is no room, the robot marks the cell as blocked for ``_MARK_S``.
+    Then the robot plans a new route and drives. The first look around always turns to
+    both sides and marks no cell.
     """
     m = state.memory
     first = m.has_looked[0] < 0.5
@@ -429,9 +452,11 @@ def _look(time, pose, report, state):  # type: ignore[no-untyped-def]
 def _blocking(
     space: FreeSpace, x: float, y: float, theta: float, radius: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Return the middle of the non-free cell nearest to a point ahead of the axle.
+    """Finds the non-free cell that is nearest to a point 0.1 m ahead of the axle.
 
-    The point is 0.1 m ahead. If all cells are free, the function returns this point.
+    Returns:
+        Middle (x, y) of the cell, m. If all cells are free, the function returns the
+        point ahead of the axle.
     """
     corners = np.empty((_MOST_CELLS, 2))
     count = edge_cells(space, x, y, radius + 0.3, space.rolled_m[0], corners)
@@ -449,14 +474,16 @@ def _blocking(
 def _drive(  # type: ignore[no-untyped-def]
     time, velocity, wanted, error, there, state, numbers
 ):
-    """Drive towards the carrot.
+    """Drives toward the carrot, the point of the route that the robot heads for.
 
     The heading weaves around the direction of the carrot, so that the range sensors
-    sweep the floor beside the path. The robot weaves more widely in two cases. In the
-    first case, the target moves and the path is not narrow. In the second case, a
-    moving body was detected within the last ``_MOVES_S``. In both cases, a robot that
-    lags behind the target weaves less. With a large heading error, the robot only
-    turns.
+    sweep the floor beside the route. The robot weaves more widely in two cases:
+
+    - The target moves, and the route is not narrow.
+    - A moving body was detected within the last ``_MOVES_S``.
+
+    In both cases, a robot that lags behind the target weaves less. If the heading error
+    is large, the robot only turns.
     """
     m = state.memory
     if there:

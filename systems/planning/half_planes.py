@@ -1,4 +1,7 @@
-"""The nearest velocity to a wanted one, within half planes and a top speed."""
+"""Search for the permitted velocity that is nearest to a wanted velocity.
+
+Half planes and a top speed limit the permitted velocities.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ _HALVINGS = 40
 def _obeys(
     planes: Any, x: float, y: float, top: float, slack: float, hard: int
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether a velocity obeys all planes, with the given slack."""
+    """Checks whether a velocity obeys all half planes, with the given slack."""
     if x * x + y * y > (top + _ROUNDING) ** 2:
         return False
     for k in range(len(planes)):
@@ -42,13 +45,18 @@ def _offset(
 def _nearest(
     planes: Any, wanted: Any, top: float, slack: float, hard: int
 ) -> tuple[float, float, bool]:  # pragma: no cover  (compiled)
-    """Return the permitted velocity nearest to the wanted one, and whether it exists.
+    """Finds the permitted velocity that is nearest to the wanted velocity.
 
-    The slack is given. The optimum of such a small problem is the wanted velocity, its
-    projection on a border, or the intersection of two borders. The function tries all
-    these candidates and keeps the nearest one that obeys all constraints. In the loops,
-    index -1 stands for no border, 0 to ``count - 1`` for the planes, and ``count`` for
-    the circle of the top speed.
+    The slack is given. The solution of such a small problem is one of three candidates:
+    the wanted velocity, its projection on a border, or the intersection of two borders.
+    The function tries all candidates. Among the candidates that obey all constraints,
+    the function keeps the nearest candidate.
+
+    In the loops, index -1 means no border. The indices 0 to ``count - 1`` are the half
+    planes. The index ``count`` is the circle of the top speed.
+
+    Returns:
+        Velocity x, m/s; velocity y, m/s; and whether there is a permitted velocity.
     """
     count = len(planes)
     found = 0.0, 0.0, False
@@ -105,21 +113,22 @@ def _nearest(
 def nearest_velocity(
     planes: Any, wanted: Any, top: float, hard: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Returns the velocity that obeys all half planes and is nearest to a wanted one.
+    """Finds the velocity in all half planes that is nearest to a wanted velocity.
 
-    If no velocity obeys all half planes, the function moves all soft planes back by the
-    same distance. Bisection finds the least distance that permits a velocity.
+    If no velocity lies in all half planes, the function moves all soft half planes back
+    by the same distance. Bisection finds the least distance that permits a velocity.
 
     Args:
-        planes: (k, 3) half planes n . v >= offset: unit normal n (x, y), and offset,
-            m/s.
-        wanted: (x, y) m/s.
+        planes: (k, 3) half planes n . v >= offset: x and y of the unit normal n, and
+            offset, m/s.
+        wanted: Wanted velocity (x, y), m/s.
         top: Largest speed, m/s.
-        hard: Number of hard planes. They are the last rows of ``planes`` and are never
-            moved. A robot at rest obeys them.
+        hard: Number of hard half planes. They are the last rows of ``planes``. The
+            function never moves hard half planes. The velocity zero obeys them.
 
     Returns:
-        Velocity (x, y), m/s, and the distance by which the soft planes were moved, m/s.
+        Three numbers: velocity x, m/s; velocity y, m/s; and the distance by which the
+        function moved the soft half planes, m/s.
     """
     x, y, obeys = _nearest(planes, wanted, top, 0.0, hard)
     if obeys:

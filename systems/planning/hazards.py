@@ -1,9 +1,10 @@
-"""Tracks of moving bodies: a particle filter per body, fed with range readings.
+"""Tracks of moving bodies: one particle filter per body, based on range readings.
 
-A range sensor measures the distance of a body, but not its direction within the
-aperture. Readings from several positions, and at the edges of apertures, exclude most
-of the positions and velocities that were possible at first. Each track therefore has
-200 particles. Each particle is one hypothesis about position and velocity.
+A range sensor measures the distance of a body, but not the direction of the body within
+the aperture. Several readings together exclude most positions and velocities that were
+possible at first. Readings from different positions and at the edges of apertures
+exclude the most. Each track of a body therefore has 200 particles. Each particle is one
+possible position and velocity of the body.
 """
 
 from __future__ import annotations
@@ -28,76 +29,85 @@ from systems.planning.looks import (
 )
 from systems.safety.free_space import FreeSpace
 
-#: Number of tracks; particles per track; particles per track that are used to choose a
-#: motion.
+# ``_TRACKS``: number of tracks.
+# ``_PARTICLES``: number of particles per track.
+# ``_PICKED``: number of particles per track that are used to choose a motion.
 _TRACKS, _PARTICLES, _PICKED = 8, 200, 25
 #: Greatest speed of the bodies that are tracked, m/s.
 TOP_SPEED_M_S = 0.6
-#: Distance of a particle behind the surface that echoes, m.
+#: Distance of a particle behind the surface that returns the echo, m.
 _BEYOND_M = 0.02
-#: A range does not fit a particle if it differs from the distance of the particle by
-#: more than this, m.
+#: A range fits a particle if the range differs from the distance of the particle by
+#: less than this, m.
 _GATE_M = 0.10
-#: A body may be in an aperture although its particle is up to this distance, m, outside
-#: the edge.
+#: Distance of a particle outside the edge of an aperture, m. Up to this distance, a
+#: part of the body may still be inside the aperture.
 _EDGE_M = 0.04
-#: Factor for the weight of a particle that should have been seen but was not. Factor
-#: for the weight of a particle that does not fit the echo of its track.
+# ``_UNSEEN``: factor for the weight of a particle that the sensor should have seen but
+#   has not seen.
+# ``_ELSEWHERE``: factor for the weight of a particle that does not fit the echo of its
+#   track.
 _UNSEEN, _ELSEWHERE = 0.1, 0.5
-#: Standard deviation of the range of a particle with the right velocity, m, in addition
-#: to the noise of the sensor. Least factor for the weight of a particle with a wrong
-#: range.
+# ``_FIT_M``: standard deviation of the range error of a particle with the right
+#   velocity, m. The noise of the sensor comes in addition.
+# ``_LEAST_FIT``: least factor for the weight of a particle with a wrong range.
 _FIT_M, _LEAST_FIT = 0.01, 0.5
-#: Share of a range error, per tick, that corrects the velocity.
+#: Share of the range error per tick that corrects the velocity of a particle.
 _TO_VELOCITY = 0.1
-#: Standard deviation of the first range rate of a track, m/s. It is large because the
-#: nearest visible point jumps between corners when a body enters an aperture.
+#: Standard deviation of the first range rate of a track, m/s. The value is large,
+#: because the nearest visible point jumps between corners when a body enters an
+#: aperture.
 _RATE_M_S = 0.2
-#: Noise that is added when particles are drawn again: share of the spread of the
-#: velocity; least noise of the velocity, m/s; noise of the position, m.
+# Noise is added to particles that are drawn again.
+# ``_JITTER``: noise of the velocity as a share of the spread of the velocity.
+# ``_JITTER_M_S``: least noise of the velocity, m/s.
+# ``_JITTER_M``: noise of the position, m.
 _JITTER, _JITTER_M_S, _JITTER_M = 0.5, 0.01, 0.005
 #: Share of bodies that stop per second.
 _STOPS_HZ = 0.04
-#: A track ends if its probability is below the first number. A track explains an echo
-#: only if its probability, times the share of its particles near the echo, exceeds the
-#: second number.
+# ``_LEAST_EXISTS``: a track ends if its probability is below this value.
+# ``_LEAST_SHARE``: a track explains an echo only if its probability, times the share of
+#   its particles near the echo, exceeds this value.
 _LEAST_EXISTS, _LEAST_SHARE = 0.03, 0.03
-#: Highest probability of a track. Share of the remaining doubt that one echo removes.
+# ``_CERTAIN``: highest probability of a track.
+# ``_SEEN_AGAIN``: share of the remaining doubt that one echo removes.
 _CERTAIN, _SEEN_AGAIN = 0.98, 0.2
-#: A track ends if it was not seen for this time, s, or is farther away than this, m.
+# ``_FORGET_S``: a track ends if no sensor has seen the body for this time, s.
+# ``_FAR_M``: a track ends if it is farther away than this distance, m.
 _FORGET_S, _FAR_M = 12.0, 5.0
-#: ``find_movers`` lists a track if its probability is at least the first number and it
-#: was seen within the second number, s. Echoes within the third number, m, of its
-#: position come from the body.
+# ``_LIKELY``: least probability of a track that ``find_movers`` lists.
+# ``_LATELY_S``: longest time since a sensor has seen the body of such a track, s.
+# ``_BODY_M``: distance from the track within which echoes come from the body, m.
 _LIKELY, _LATELY_S, _BODY_M = 0.3, 3.0, 0.5
-#: Largest number of draws for a particle that no sensor would have seen before.
+#: Largest number of draws of a new particle. The draw is repeated if a sensor would
+#: have seen the particle before.
 _TRIES = 12
-#: A look is not compared with a new particle if it is older than this multiple of the
-#: time between the last two looks.
+#: Largest age of a look (a reading of a sensor) that is compared with a new particle.
+#: The age is a multiple of the time between the last two looks.
 _TOO_OLD = 10.0
 
 
 class Particles(NamedTuple):
-    """Hypotheses about bodies.
+    """Possible positions and velocities of moving bodies.
 
-    In ``Hazards``, each array has the form (tracks, particles). Functions that work on
-    one track get its rows.
+    In ``Hazards``, each array has the shape (tracks, particles). A function that works
+    on one track gets the rows of this track, with the shape (particles,).
     """
 
     x: NDArray[np.float64]
-    """Position, m."""
+    """Position, x in the world frame W, m."""
     y: NDArray[np.float64]
-    """Position, m."""
+    """Position, y in W, m."""
     vx: NDArray[np.float64]
-    """Velocity, m/s."""
+    """Velocity, x in W, m/s."""
     vy: NDArray[np.float64]
-    """Velocity, m/s."""
+    """Velocity, y in W, m/s."""
     weight: NDArray[np.float64]
-    """Share of the track. The weights of a track add up to 1."""
+    """Share of the particle in its track. The weights of a track add up to 1."""
 
 
 class Hazards(NamedTuple):
-    """The tracks of moving bodies. All arrays change."""
+    """The tracks of all moving bodies. All arrays change."""
 
     exists: NDArray[np.float64]
     """(tracks,) probability that the body exists; 0 for an unused track."""
@@ -105,7 +115,7 @@ class Hazards(NamedTuple):
     """(tracks,) time at which the body was last seen, s."""
     particles: Particles
     looks: Look
-    """Last looks of all sensors."""
+    """Last readings of all sensors."""
     random: NDArray[np.int64]
     """(1,) state of the random generator."""
     moved_s: NDArray[np.float64]
@@ -113,18 +123,18 @@ class Hazards(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """Particles of several tracks that stand for all particles; arrays of (n,)."""
+    """Selected particles of several tracks. Each array has the shape (n,)."""
 
     x: NDArray[np.float64]
-    """Position, m."""
+    """Position, x in the world frame W, m."""
     y: NDArray[np.float64]
-    """Position, m."""
+    """Position, y in W, m."""
     vx: NDArray[np.float64]
-    """Velocity, m/s."""
+    """Velocity, x in W, m/s."""
     vy: NDArray[np.float64]
-    """Velocity, m/s."""
+    """Velocity, y in W, m/s."""
     weight: NDArray[np.float64]
-    """Expected number of bodies for which the particle stands."""
+    """Expected number of bodies that the particle represents."""
     age_s: NDArray[np.float64]
     """Time since the track was last seen, s."""
     spread_m_s: NDArray[np.float64]
@@ -132,13 +142,13 @@ class Sample(NamedTuple):
 
 
 def make_hazards(sensors: int) -> Hazards:
-    """Returns a memory without tracks.
+    """Makes a memory of moving bodies without any tracks.
 
     Args:
         sensors: Number of range sensors.
 
     Returns:
-        The empty memory.
+        Empty memory.
     """
     grid = _TRACKS, _PARTICLES
     return Hazards(
@@ -161,29 +171,31 @@ def track_hazards(
     target: Any,
     sensors: HazardSensors,
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the tracks by one tick, and weighs them with the new readings.
+    """Predicts the tracks of moving bodies by one control period and updates them.
 
-    Each new reading passes through these steps:
+    Each track has particles, which are possible positions and velocities of a body.
+    Each new reading of a sensor passes through these steps:
 
-    1. An echo near the target is attributed to the target, and not to a track.
-    2. Any other echo is attributed to the track that explains it best.
-    3. All tracks are weighed with the reading (``_weigh``). The track to which the echo
-       is attributed becomes more probable.
-    4. An echo that no track explains begins a new track on two conditions. The whole
-       arc of the echo was seen free before, so no obstacle at rest can be there. The
-       previous echo of the sensor fits the new one, so the range rate is known.
+    1. If the echo is near the target, the function attributes the echo to the target.
+    2. Any other echo belongs to the track that explains the echo best.
+    3. The function updates the weights of the particles of all tracks with the reading
+       (``_weigh``). The track to which the echo belongs becomes more probable.
+    4. An echo that no track explains begins a new track if two conditions hold. The
+       whole arc of the echo was seen free before, so no obstacle at rest can be there.
+       The previous echo of the sensor fits the new echo, so the range rate is known.
 
-    Finally, improbable tracks end. If only few particles of a track have weight, its
-    particles are drawn again.
+    Finally, the function ends improbable tracks. If only few particles of a track have
+    weight, the function draws the particles of this track again.
 
     Args:
-        hazards: Modified in place.
+        hazards: Tracks of moving bodies. The function changes the tracks in place.
         time: Current time, s.
-        pose: (x, y, theta) of the robot, m and rad.
-        readings: Ranges, m; echoes, 0 or 1; and ages of the readings, s.
+        pose: Pose (x, y, theta) of the robot, m and rad.
+        readings: Three values per sensor: range, m; echo, 0 or 1; and age of the
+            reading, s.
         space: Cells that were seen free.
-        target: (x, y, radius) of the followed target, m. Echoes near the target belong
-            to the target.
+        target: Position (x, y) and radius of the followed target, m. Echoes near the
+            target belong to the target.
         sensors: Properties of the sensors.
     """
     ages, tick_s = readings[2], sensors.tick_s
@@ -216,14 +228,14 @@ def track_hazards(
 def _particles_of(
     hazards: Hazards, t: int
 ) -> Particles:  # pragma: no cover  (compiled)
-    """Return the particles of a track; changes affect the track."""
+    """Returns the particles of a track. Changes of these particles change the track."""
     p = hazards.particles
     return Particles(p.x[t], p.y[t], p.vx[t], p.vy[t], p.weight[t])
 
 
 @njit(cache=True)
 def _move_on(hazards: Hazards, tick_s: float) -> None:  # pragma: no cover  (compiled)
-    """Move all particles by one tick with their velocities."""
+    """Moves all particles by one control period with their velocities."""
     for t in range(len(hazards.exists)):
         if hazards.exists[t] > 0.0:
             p = _particles_of(hazards, t)
@@ -241,7 +253,7 @@ def _move_on(hazards: Hazards, tick_s: float) -> None:  # pragma: no cover  (com
 def _best_track(
     hazards: Hazards, look: Look, half: float
 ) -> int:  # pragma: no cover  (compiled)
-    """Return the track that explains an echo best; -1 if no track explains it."""
+    """Returns the track that explains an echo best, or -1 if there is no such track."""
     best, most = -1, _LEAST_SHARE
     for t in range(len(hazards.exists)):
         exists = hazards.exists[t]
@@ -256,7 +268,7 @@ def _best_track(
 def _forget(
     hazards: Hazards, time: float, pose: Any
 ) -> None:  # pragma: no cover  (compiled)
-    """End improbable, old and distant tracks, and resample the others."""
+    """Ends improbable, old, and distant tracks, and resamples the other tracks."""
     for t in range(len(hazards.exists)):
         exists = hazards.exists[t]
         if exists <= 0.0:
@@ -271,14 +283,14 @@ def _forget(
 
 @njit(cache=True)
 def _chance(random: Any) -> float:  # pragma: no cover  (compiled)
-    """Return the next pseudorandom number from 0 to 1 (Park and Miller, 1988)."""
+    """Returns the next pseudorandom number from 0 to 1 (Park and Miller, 1988)."""
     random[0] = (48271 * random[0]) % 2147483647
     return random[0] / 2147483647.0
 
 
 @njit(cache=True)
 def _normal(random: Any) -> float:  # pragma: no cover  (compiled)
-    """Return a roughly normal random number from -3 to 3: mean 0, deviation 1."""
+    """Returns a roughly normal random number from -3 to 3 (mean 0, deviation 1)."""
     return 2.0 * (_chance(random) + _chance(random) + _chance(random) - 1.5)
 
 
@@ -286,7 +298,7 @@ def _normal(random: Any) -> float:  # pragma: no cover  (compiled)
 def _share_at(
     p: Particles, look: Look, half: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Return the share of a track's particles, by weight, that fit an echo."""
+    """Returns the share of a track's particles, by weight, that fit an echo."""
     share = 0.0
     for n in range(len(p.x)):
         distance, off = seen_from(look, p.x[n], p.y[n])
@@ -302,22 +314,25 @@ def _share_at(
 def _weigh(
     hazards: Hazards, t: int, k: int, best: int, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Weigh the particles of a track with the newest look of sensor ``k``.
+    """Updates the weights of the particles of a track with the newest look of a sensor.
 
-    ``best`` is the track to which the echo is attributed, or -1. If it is track ``t``,
-    the track has echoed. By Bayes' rule, each weight is multiplied by the likelihood of
-    the look if the body were at this particle. The likelihood depends on ``gap``, the
-    measured distance minus the distance of the particle. Without an echo, ``gap`` is
-    infinite for particles within the greatest range, and 0 for the others. There are
-    four cases:
+    A look is one reading of sensor ``k``. ``best`` is the number of the track to which
+    the echo belongs, or -1. If ``best`` is the number ``t`` of this track, the track
+    has echoed.
 
-    * The particle is outside the aperture. If its track has echoed, the particle loses
+    By Bayes' rule, the function multiplies each weight by the likelihood of the look.
+    The likelihood assumes that the body is at the position of the particle. The
+    likelihood depends on ``gap``, the measured distance minus the distance of the
+    particle. If there is no echo, ``gap`` is infinite for particles within the greatest
+    range, and 0 for the others. There are four cases:
+
+    - The particle is outside the aperture. If its track has echoed, the particle loses
       weight.
-    * The sensor has seen past the particle (large gap). The particle loses most of its
-      weight, unless it is near the edge of the aperture.
-    * The particle fits the echo of its track. Its weight depends on the gap, and the
-      particle moves to the measured range.
-    * The particle is behind the echo of its track. The particle loses weight.
+    - The gap is large: the sensor has seen past the particle. The particle loses most
+      of its weight, unless it is near the edge of the aperture.
+    - The particle fits the echo of its track. The factor of its weight depends on the
+      gap. The particle moves to the measured range.
+    - The particle is behind the echo of its track. The particle loses weight.
 
     Other particles keep their weight, because a nearer object may hide them. The sum of
     the new weights is the likelihood of the look if the body exists anywhere in its
@@ -362,7 +377,7 @@ def _weigh(
 def _pull(
     p: Particles, n: int, look: Look, distance: float, gap: float, tick_s: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Move particle ``n`` to the measured range.
+    """Moves particle ``n`` to the measured range.
 
     A part of the range error also corrects the velocity of the particle.
     """
@@ -383,18 +398,21 @@ def _pull(
 def _begin(
     hazards: Hazards, k: int, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Begin a track with the newest echo of sensor ``k``.
+    """Begins a track of a moving body with the newest echo of sensor ``k``.
 
-    The track replaces the least probable one. Each of its particles is drawn like this:
+    The new track replaces the least probable track. The function draws each particle of
+    the track in these steps:
 
     1. The direction is anywhere within the aperture, and the distance is the range.
     2. The radial speed is the range rate plus the sensor's own speed in this direction,
        with a random error.
-    3. The tangential speed is unknown. It is drawn uniformly from the values for which
-       the total speed does not exceed ``TOP_SPEED_M_S``.
-    4. A body that begins to echo was out of view shortly before. The draw is repeated,
-       up to 12 times, if a sensor would have seen the body in its oldest look
-       (``_was_visible``).
+    3. The tangential speed is unknown. The function draws the tangential speed
+       uniformly from the values for which the total speed does not exceed
+       ``TOP_SPEED_M_S``.
+    4. A body that begins to echo was out of view shortly before. The function therefore
+       checks the oldest look of each sensor (``_was_visible``). If a sensor would have
+       seen the body in this look, the function draws the particle again, up to 12
+       times.
     """
     random, top = hazards.random, TOP_SPEED_M_S
     look, then = look_of(hazards.looks, 0, k), look_of(hazards.looks, 1, k)
@@ -432,13 +450,16 @@ def _was_visible(
     oldest_s: float,
     sensors: HazardSensors,
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether the oldest looks of the sensors contradict particle ``n``.
+    """Checks whether the oldest looks of the sensors contradict particle ``n``.
 
-    The function moves the particle back to the time of each look. A look contradicts
-    the particle if two conditions hold. The particle was inside the aperture, at least
-    3 cm from the edge. It was also at least 3 cm nearer than the reading. The sensor
-    would have seen such a body, but did not. Looks older than ``oldest_s`` do not
-    count.
+    A look is one reading of a sensor. The function moves the particle back to the time
+    of each look. A look contradicts the particle if two conditions hold:
+
+    - The particle was inside the aperture, at least 3 cm from the edge.
+    - The particle was at least 3 cm nearer than the reading.
+
+    The sensor would have seen such a body, but did not. Looks older than ``oldest_s``
+    do not count.
     """
     for k in range(len(sensors.directions)):
         look, half = look_of(hazards.looks, 2, k), sensors.directions[k, 1]
@@ -455,12 +476,12 @@ def _was_visible(
 
 @njit(cache=True)
 def _draw_anew(p: Particles, random: Any) -> None:  # pragma: no cover  (compiled)
-    """Draw the particles of a track again in proportion to their weights.
+    """Draws the particles of a track again in proportion to their weights.
 
     The function draws only if the effective number of particles is at most half of
-    their number. The effective number is one over the sum of the squared weights. The
-    draw is systematic: it takes particles at equal steps of the cumulative weight.
-    Small noise then separates copies of the same particle.
+    their number. The effective number is one divided by the sum of the squared weights.
+    The draw is systematic: the function takes particles at equal steps of the
+    cumulative weight. Small noise then separates copies of the same particle.
     """
     count, squares = len(p.x), 0.0
     for n in range(count):
@@ -483,7 +504,7 @@ def _draw_anew(p: Particles, random: Any) -> None:  # pragma: no cover  (compile
 def _at_equal_steps(
     weight: Any, count: int
 ) -> NDArray[np.int64]:  # pragma: no cover  (compiled)
-    """Return the indices of ``count`` particles at equal steps of cumulative weight."""
+    """Returns the indices of particles at equal steps of the cumulative weight."""
     found = np.empty(count, dtype=np.int64)
     passed, m = weight[0], 0
     for n in range(count):
@@ -496,7 +517,7 @@ def _at_equal_steps(
 
 @njit(cache=True)
 def _spread(values: Any) -> float:  # pragma: no cover  (compiled)
-    """Return the unweighted standard deviation of one value over all particles."""
+    """Returns the unweighted standard deviation of one value over all particles."""
     mean, square = 0.0, 0.0
     for n in range(len(values)):
         mean += values[n] / len(values)
@@ -508,16 +529,17 @@ def _spread(values: Any) -> float:  # pragma: no cover  (compiled)
 def find_movers(
     hazards: Hazards, time: float, places: Any
 ) -> int:  # pragma: no cover  (compiled)
-    """Lists the positions of probable bodies that were seen recently.
+    """Lists the positions of probable moving bodies that were seen recently.
 
     Args:
-        hazards: The tracks.
+        hazards: Tracks of moving bodies.
         time: Current time, s.
-        places: (n, 3) array that the function fills: mean position of each track, m,
-            and radius within which echoes may come from the body, m.
+        places: (n, 3) array that the function fills. Each row has the mean position (x,
+            y) of a track, m, and the radius within which echoes may come from the body,
+            m.
 
     Returns:
-        Number of bodies.
+        Number of listed bodies.
     """
     count = 0
     for t in range(len(hazards.exists)):
@@ -536,19 +558,19 @@ def find_movers(
 def pick_hazards(
     hazards: Hazards, time: float, pose: Any, within_m: float
 ) -> Sample:  # pragma: no cover  (compiled)
-    """Picks a sample of the particles of all tracks near a robot.
+    """Picks a sample of the particles of all tracks near the robot.
 
     The function takes 25 particles of each track, at equal steps of the cumulative
     weight. Each picked particle gets an equal part of the probability of the track.
 
     Args:
-        hazards: The tracks.
+        hazards: Tracks of moving bodies.
         time: Current time, s.
-        pose: (x, y, theta) of the robot, m and rad.
-        within_m: Distance from the robot, m. Tracks beyond it are left out.
+        pose: Pose (x, y, theta) of the robot, m and rad.
+        within_m: Distance from the robot, m. Tracks beyond this distance do not count.
 
     Returns:
-        The picked particles; empty arrays without tracks nearby.
+        Picked particles. If no track is near, the arrays are empty.
     """
     picked, count = np.empty((7, len(hazards.exists) * _PICKED)), 0
     for t in range(len(hazards.exists)):

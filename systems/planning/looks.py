@@ -1,4 +1,4 @@
-"""Looks: readings of range sensors, with the place and direction of each sensor."""
+"""Looks: readings of range sensors, with the position and direction of the sensor."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from systems.safety.free_space import FreeSpace, cell_is_free
 
 #: Number of looks per sensor that are kept.
 _LOOKS = 3
-#: Spacing of the points at which an arc is checked, and how far behind the arc they
-#: reach, both in cells.
+# ``_ARC_STEP``: spacing of the points at which an arc is checked, cells.
+# ``_BEHIND``: distance behind the arc up to which the points reach, cells.
 _ARC_STEP, _BEHIND = 0.3, 0.6
-#: A range that changes faster than the first number, m/s, belongs to another body. A
-#: look that is older than the second number, ticks, is not compared with the next look.
+# ``_FASTEST_M_S``: a range that changes faster than this belongs to another body, m/s.
+# ``_OLDEST_TICKS``: a look that is older than this is not compared with the next look,
+#   ticks.
 _FASTEST_M_S, _OLDEST_TICKS = 2.0, 4.5
 
 
@@ -39,33 +40,33 @@ class HazardSensors(NamedTuple):
 
 
 class Look(NamedTuple):
-    """One reading of one sensor, as numbers.
+    """One reading of one sensor, with the position and direction of the sensor.
 
-    The memory of all sensors has arrays of (3, sensors) instead of the numbers, with
-    the most recent look first.
+    The fields of a single look are numbers. In the memory of all sensors, the fields
+    are arrays of the shape (3, sensors), most recent look first.
     """
 
     range_m: Any
     heard: Any
     """1 if there was an echo, else 0."""
     time_s: Any
-    """Minus infinity if there was no such look yet."""
+    """Time of the reading, s. Minus infinity means that there was no reading yet."""
     x: Any
-    """Position of the sensor, m."""
+    """Position of the sensor, x in the world frame W, m."""
     y: Any
-    """Position of the sensor, m."""
+    """Position of the sensor, y in W, m."""
     axis_rad: Any
-    """Direction of the sensor's axis, rad."""
+    """Direction of the sensor's axis in W, rad."""
 
 
 def make_looks(sensors: int) -> Look:
-    """Makes a memory without looks.
+    """Makes a memory for the readings of all sensors without any readings.
 
     Args:
         sensors: Number of range sensors.
 
     Returns:
-        The empty memory.
+        Empty memory.
     """
     looks = Look(*(np.zeros((_LOOKS, sensors)) for _ in Look._fields))
     looks.time_s[:] = -np.inf
@@ -74,15 +75,16 @@ def make_looks(sensors: int) -> Look:
 
 @njit(cache=True)
 def look_of(looks: Look, age: int, k: int) -> Look:  # pragma: no cover  (compiled)
-    """Reads one look.
+    """Reads one look from the memory.
 
     Args:
-        looks: The looks of all sensors.
-        age: 0 for the newest look, 1 for the one before, 2 for the oldest.
-        k: Number of the sensor.
+        looks: Looks of all sensors.
+        age: Index of the look: 0 is the newest look, 1 the look before, and 2 the
+            oldest look.
+        k: Index of the sensor.
 
     Returns:
-        The look, as numbers.
+        Look whose fields are numbers.
     """
     at = age, k
     return Look(
@@ -99,13 +101,14 @@ def look_of(looks: Look, age: int, k: int) -> Look:  # pragma: no cover  (compil
 def remember_looks(
     looks: Look, time: float, pose: Any, readings: Any, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Stores the readings of the sensors that have fired in this tick.
+    """Stores the readings of the sensors that have fired in this control period.
 
     Args:
-        looks: Modified in place.
+        looks: Looks of all sensors. The function changes the arrays in place.
         time: Current time, s.
-        pose: (x, y, theta) of the robot, m and rad.
-        readings: Ranges, m; echoes, 0 or 1; and ages of the readings, s.
+        pose: Pose (x, y, theta) of the robot, m and rad.
+        readings: Three values per sensor: range, m; echo, 0 or 1; and age of the
+            reading, s.
         sensors: Properties of the sensors.
     """
     ranges, echo, ages = readings
@@ -140,12 +143,12 @@ def is_target(
     """Checks whether an echo may come from the followed target.
 
     Args:
-        look: The look with the echo.
+        look: Look with the echo.
         half: Half of the sensor's aperture, rad.
-        target: (x, y, radius) of the target, m.
+        target: Position (x, y) and radius of the target, m.
 
     Returns:
-        Whether it may.
+        True if the echo may come from the target.
     """
     distance, off = seen_from(look, target[0], target[1])
     beside = off - half < target[2] / max(distance, target[2])
@@ -156,15 +159,17 @@ def is_target(
 def goes_on(
     look: Look, then: Look, tick_s: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether an echo fits the look before it, so that its rate is known.
+    """Checks whether an echo fits the previous look of the same sensor.
+
+    If the echo fits, the rate of the range is known.
 
     Args:
-        look: The newest look of a sensor.
-        then: The look before.
-        tick_s: Period of the controller, s.
+        look: Newest look of a sensor.
+        then: Previous look of the sensor.
+        tick_s: Control period, s.
 
     Returns:
-        Whether it fits.
+        True if the echo fits.
     """
     since = look.time_s - then.time_s
     if then.heard < 0.5 or since > _OLDEST_TICKS * tick_s:
@@ -178,18 +183,19 @@ def came_from_free(
 ) -> bool:  # pragma: no cover  (compiled)
     """Checks whether the whole arc of an echo was seen free before.
 
-    The function checks points along the arc, over the width of the aperture. In depth,
-    the points extend from the range minus its largest error to the range plus this
-    error and a part of a cell. The cells of all points must still count as free.
+    The arc contains all points from which the echo may come. The function checks points
+    along the arc, over the width of the aperture. The nearest points are at the range
+    minus the largest range error. The farthest points are at the range plus this error
+    and a part of a cell. The cells of all points must still count as free.
 
     Args:
         space: Cells that were seen free.
-        look: The look with the echo.
+        look: Look with the echo.
         half: Half of the sensor's aperture, rad.
         margin_m: Largest error of a range, m.
 
     Returns:
-        Whether all of it was seen free.
+        True if the whole arc was seen free.
     """
     cell = space.cell_m
     step_m = _ARC_STEP * cell

@@ -1,7 +1,7 @@
-"""Occupied cells: echoes came from them, and no sensor has seen them free since.
+"""List of the occupied cells of the map, for the baseline laws.
 
-This is the map of the baselines: an occupancy grid that does not distinguish unknown
-cells from free ones.
+A cell is occupied if echoes came from there and no sensor has seen the cell free since.
+This map is an occupancy grid that does not distinguish unknown cells from free cells.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.safety.free_space import FreeSpace, cells_within
 
-#: A cell with fewer hits than the first number is not occupied. More hits than the
-#: second number do not make it more certain.
+# ``_LEAST_HITS``: least number of hits of an occupied cell.
+# ``_MOST_HITS``: number of hits above which the certainty does not increase.
 _LEAST_HITS, _MOST_HITS = 1.0, 6.0
 
 
@@ -24,19 +24,19 @@ _LEAST_HITS, _MOST_HITS = 1.0, 6.0
 def list_occupied(
     space: FreeSpace, x: float, y: float, reach: float, clear: Any
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Lists the occupied cells around a place.
+    """Lists the occupied cells around a given position.
 
     Args:
-        space: Hits of the cells.
-        x: Position of the place, m.
-        y: Position of the place, m.
+        space: Map with the hits of the cells.
+        x: Position, x in the world frame W, m.
+        y: Position, y in W, m.
         reach: Half of the side of the square in which cells are listed, m.
-        clear: (x, y, radius) of the followed target, m. Cells within this radius are
-            not listed.
+        clear: Position (x, y) and radius of the followed target, m. Cells within this
+            radius are not listed.
 
     Returns:
-        (n, 3) middle (x, y) of each cell, m, and certainty from 0 to 1 that the cell is
-        occupied.
+        (n, 3) array with one row per cell: x and y of the middle, m, and the certainty
+        that the cell is occupied, 0 to 1.
     """
     cell, cells = space.cell_m, space.hits.shape[0]
     found, count = np.empty((64, 3)), 0

@@ -1,4 +1,7 @@
-"""A block that changes the velocity of P as little as possible to avoid objects."""
+"""A block that changes the velocity of P as little as possible to avoid objects.
+
+P is the control point of the robot, ahead of the axle.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +22,8 @@ from systems.framework.signals import TICK_S
 from systems.planning.velocity_filter import FilterNumbers, filtered_velocity
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Distance kept between objects and the disc about the axle that contains the body, m.
-#: The lag of the motors uses up to 1 cm of it. It is our choice.
+#: Distance between objects and the disc around the axle that contains the body, m (our
+#: choice). The lag of the motors uses up to 1 cm of this distance.
 _MARGIN_M = 0.05
 
 
@@ -36,9 +39,9 @@ class SafetyNumbers(NamedTuple):
 def safety_filter_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SafetyNumbers
 ) -> None:
-    """Computes wheel speeds, velocity of P, slack and action of the next tick.
+    """Computes the wheel speeds, the velocity of P, the slack, and the action.
 
-    These values are the state of the block.
+    These values are for the next control period. They are the state of the block.
     """
     acceleration, pose, objects = inputs
     robot, theta = numbers.robot, pose[2]
@@ -57,35 +60,39 @@ def safety_filter_step(
 
 
 def _publish(state: Any, outputs: Any, numbers: SafetyNumbers) -> None:
-    """Copy the state of ``safety_filter_step`` to the outputs."""
+    """Copies the state of ``safety_filter_step`` to the outputs."""
     for port in range(3):
         for k in range(2):
             outputs[port][k] = state[2 * port + k]
 
 
 class SafetyFilter(Block):
-    """Moves P as a law commands, except where the command leads into objects.
+    """Moves the control point P as a law commands, but keeps P away from objects.
 
     The block replaces ``WheelCommand``. The virtual mass moves with the velocity that
-    the filter returns. This prevents windup. The filter considers all velocities that
-    the wheels can produce and that lead into no object. Among these velocities, it
-    chooses the one nearest to the commanded velocity. If there is no such velocity, the
-    filter violates the constraints of moving objects by as little as possible. The
-    limits on the approach to objects at rest always hold. The first number of
-    ``filter_report`` is the slack: the amount by which constraints are violated, m/s.
-    The second number is 1 if the filter has changed the velocity, and 0 otherwise.
+    the filter returns. This prevents windup.
+
+    The filter considers all velocities that the wheels can produce and that lead into
+    no object. Among these velocities, the filter chooses the velocity nearest to the
+    commanded velocity. If there is no such velocity, the filter violates the
+    constraints of moving objects as little as possible. The limits on the approach to
+    objects at rest always hold.
+
+    The port ``filter_report`` has two numbers. The first is the slack, which is the
+    amount by which constraints are violated, m/s. The second is 1 if the filter has
+    changed the velocity, and 0 otherwise.
 
     The filter knows the objects that sensors have detected, but it does not know where
-    space is free. It therefore guarantees less than ``MotionGuard``.
+    space is free. The filter therefore guarantees less than ``MotionGuard``.
 
-    Discrete state, every tick: the outputs. Rate and latency are those of
-    ``WheelCommand``.
+    The discrete state has the outputs. The state is updated every control period. The
+    latency is that of ``WheelCommand``.
 
     Args:
         robot: Dimensions and top speed.
-        tick_s: Period of the command, s.
+        tick_s: Control period, s.
 
-    Reference: ours; half planes of van den Berg and others (2011). Eq. 6 of
+    Reference: our own work; half planes of van den Berg and others (2011). Eq. 6 of
     Engelbrecht, Steyn and Djouani (2021) only stops the robot. The parameter of this
     equation is ``TrajectoryImpedanceParameters.block_distance_m``.
     """

@@ -15,52 +15,55 @@ from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 #: Objects below this speed count as at rest, m/s.
 _RESTS_M_S = 0.02
-#: alpha, 1/s: P may approach an obstacle at rest at most at alpha times the remaining
-#: distance (our choice).
+#: Constant alpha, 1/s (our choice). P may approach an obstacle at rest at most at alpha
+#: times the remaining distance.
 _APPROACH_RATE = 1.0
-#: Duration of the prediction, s (our choice). In this time, a velocity must not lead
-#: into moving objects.
+#: Duration of the prediction, s (our choice). During this time, the velocity must not
+#: lead into a moving object.
 _HORIZON_S = 4.0
-#: Time, s, in which the robot moves out of the reach of a moving object that has come
-#: too near (our choice).
+#: Time within which the robot leaves a moving object that has come too near, s (our
+#: choice).
 _LEAVE_S = 0.1
 #: An object nearer to P than this distance, m, has no defined direction and is ignored.
 _TOUCHES_M = 1e-9
 
 
 class FilterNumbers(NamedTuple):
-    """Distances that P keeps, and limits of the wheels."""
+    """Distances that the control point P keeps, and limits of the wheels."""
 
     keep_m: float
-    """Distance that P keeps from objects, m. It is the sum of the radius of the body
-    about the axle, epsilon, and the margin."""
+    """Distance that P keeps from objects, m. The distance is the sum of three terms:
+    the radius of the body around the axle, the distance epsilon of P ahead of the axle,
+    and the margin."""
     top_speed: float
     """Top speed of each wheel's rim and of P, m/s."""
     turn_share: float
-    """L/(2 epsilon), with the wheel separation L."""
+    """Ratio L/(2 epsilon) of the wheel separation L and twice the distance epsilon of P
+    ahead of the axle."""
 
 
 @njit(cache=True)
 def disc_plane(
     center: Any, radius: float, velocity: Any, horizon_s: float, leave_s: float
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Returns the smallest change of a velocity that prevents contact with a disc.
+    """Computes the smallest change of a velocity that prevents contact with a disc.
 
-    The velocities that lead to contact form a cone with a round end. It is the velocity
-    obstacle of van den Berg and others. The function finds the point of the cone's
-    border that is nearest to the given velocity. This point is on the round end or on
-    one of the two legs of the cone.
+    The velocities that lead to contact form a cone with a round end. Van den Berg and
+    others call this cone the velocity obstacle. The function finds the point on the
+    border of the cone that is nearest to the given velocity. This point is on the round
+    end or on one of the two legs of the cone.
 
     Args:
-        center: (x, y) of the disc relative to P, m.
-        radius: Sum of both radii, m.
-        velocity: (x, y) of P relative to the disc, m/s.
+        center: Position (x, y) of the disc relative to the control point P, m.
+        radius: Sum of the radius of the disc and the radius of the robot, m.
+        velocity: Velocity (x, y) of P relative to the disc, m/s.
         horizon_s: Time after which contacts do not count, s.
-        leave_s: Time, s, within which the velocity has to end an overlap.
+        leave_s: Time within which the velocity has to end an overlap, s.
 
     Returns:
-        Outward normal x, y, and the depth of the velocity inside the cone, m/s. A
-        negative depth is the distance outside the cone.
+        Three numbers: x and y of the outward unit normal, and the depth of the velocity
+        inside the cone, m/s. If the velocity is outside the cone, the depth is
+        negative.
     """
     x, y = center[0], center[1]
     far = math.hypot(x, y)
@@ -87,14 +90,18 @@ def disc_plane(
 def wheel_planes(
     theta: float, numbers: FilterNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Returns |v_xB +- (L/2 epsilon) v_yB| <= top speed as half planes.
+    """Computes the half planes of the velocities that the wheels can produce.
+
+    The limits are |v_xB +- (L/2 epsilon) v_yB| <= top speed. v_xB and v_yB are the
+    velocity of the control point P in the axes of the body. L is the wheel separation.
+    epsilon is the distance of P ahead of the axle.
 
     Args:
-        theta: Heading, rad.
+        theta: Heading of the robot, rad.
         numbers: Limits of the wheels.
 
     Returns:
-        (4, 3) in the format of ``nearest_velocity``.
+        (4, 3) half planes in the format of ``nearest_velocity``.
     """
     planes = np.empty((4, 3))
     length = math.hypot(1.0, numbers.turn_share)
@@ -114,31 +121,33 @@ def filtered_velocity(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Changes a wanted velocity of P as little as possible to avoid objects.
 
-    Each object contributes one half plane:
+    P is the control point of the robot. Each object contributes one half plane of
+    permitted velocities:
 
-    * P may approach an object at rest, or with unknown motion, at alpha times the
-      remaining distance.
-    * P must not move at a velocity that leads into a moving object. ``disc_plane``
-      computes the smallest change of the present velocity that prevents this.
-    * If the object is another robot, P makes only half of this change, because the
+    - If the object is at rest or its motion is unknown, P may approach at most at alpha
+      times the remaining distance.
+    - If the object moves, P must not have a velocity that leads into the object.
+      ``disc_plane`` computes the smallest change of the present velocity that prevents
+      the contact.
+    - If the object is another robot, P makes only half of this change, because the
       other robot uses the same filter.
 
-    The constraints may contradict each other. Then the function relaxes two kinds of
-    constraints by the same slack. The first kind avoids moving objects. The second kind
-    moves P away from objects at rest that are too near. The limits on the approach to
-    objects at rest and the limits of the wheels are hard. A robot that stands still
-    satisfies them. If all constraints shared the slack, a fast object would push the
-    robot through walls.
+    The constraints may contradict each other. Then the function relaxes all soft
+    constraints by the same slack. Soft constraints avoid moving objects, or move P away
+    from objects at rest that are too near. The limits of the wheels and the limits on
+    the approach to objects at rest are hard. A robot that stands still satisfies the
+    hard constraints. If all constraints were soft, a fast object would push the robot
+    through walls.
 
     Args:
-        wanted: (x, y) m/s.
-        v_WP: (x, y) of P now, m/s.
-        theta: Heading, rad.
-        objects: In the format of the port ``objects_W``.
+        wanted: Wanted velocity (x, y), m/s.
+        v_WP: Present velocity (x, y) of P in the world frame W, m/s.
+        theta: Heading of the robot, rad.
+        objects: Objects in the format of the port ``objects_W``.
         numbers: Distances and limits.
 
     Returns:
-        Velocity (x, y), m/s, and slack, m/s.
+        Three numbers: velocity x, m/s; velocity y, m/s; and slack, m/s.
     """
     # Soft planes come first, then hard planes. A robot at rest obeys all hard planes.
     planes, used = np.empty((2 * OBJECT_SLOTS + 4, 3)), 0

@@ -1,4 +1,7 @@
-"""The cheapest path through seen and unknown space, on cells of double width."""
+"""Search for the cheapest route through free and unknown space.
+
+The cells of the search are twice as wide as those of the map of free space.
+"""
 
 from __future__ import annotations
 
@@ -11,69 +14,78 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.safety.free_space import NEVER, FreeSpace
 
-#: Prices of a cell that was seen free, and of an unknown cell. The other prices apply
-#: if the disc at this cell is near an occupied cell, very near an occupied cell, over a
-#: possibly occupied cell, or over an occupied cell.
+# Prices of a cell. The last four prices depend on the position of the body's disc if
+# its center is in the cell.
+# ``FREE``: the cell was seen free.
+# ``UNKNOWN``: the cell is unknown.
+# ``NEAR``: the disc is near an occupied cell.
+# ``TIGHT``: the disc is very near an occupied cell.
+# ``DOUBTFUL``: the disc is over a possibly occupied cell.
+# ``OCCUPIED``: the disc is over an occupied cell.
 FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
-#: Least number of hits of a possibly occupied cell, and of an occupied cell.
+# ``_DOUBTFUL_HITS``: least number of hits of a possibly occupied cell.
+# ``_OCCUPIED_HITS``: least number of hits of an occupied cell.
 _DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
-#: The price is ``TIGHT`` if the gap between the disc and an occupied cell is below the
-#: first number, m. It is ``NEAR`` if the gap is below the second number, m.
+# ``_TIGHT_M``: gap between the disc and an occupied cell below which the price is
+#   ``TIGHT``, m.
+# ``_NEAR_M``: gap between the disc and an occupied cell below which the price is
+#   ``NEAR``, m.
 _TIGHT_M, _NEAR_M = 0.07, 0.19
-#: Length of a straight and of a diagonal step. A step costs its length times the price
-#: of the cell that it enters.
+# A step costs its length times the price of the cell that the step enters.
+# ``STRAIGHT``: length of a straight step.
+# ``ACROSS``: length of a diagonal step.
 STRAIGHT, ACROSS = 10, 14
-#: Number of buckets: more than the cost of any step. ``_FAR``: cost of cells that the
-#: search has not reached.
+#: Number of buckets of the queue. This number exceeds the cost of any step.
 _BUCKETS = 2048
+#: Cost of cells that the search has not reached.
 _FAR = 2**31 - 1
 
 
 class Way(NamedTuple):
-    """A path through cells twice as wide as those of a ``FreeSpace``.
+    """A route through cells twice as wide as those of a ``FreeSpace``.
 
-    ``find_way`` changes all arrays except ``marks`` and ``marked``, which
-    ``mark_blocked`` changes. Cell (i, j) of the window has the number i m + j.
+    Cell (i, j) of the m x m window has the number i m + j. ``mark_blocked`` changes the
+    arrays ``marks`` and ``marked``. ``find_way`` changes all other arrays.
     """
 
     price: NDArray[np.int32]
     """(m, m) price of each cell, from ``FREE`` to ``OCCUPIED``."""
     cost: NDArray[np.int32]
-    """(m, m) cost of the cheapest path from each cell to the goal, for the cells that
-    the search has reached."""
+    """(m, m) cost of the cheapest route from each cell to the goal. Only the cells that
+    the search has reached have a valid cost."""
     towards: NDArray[np.int32]
-    """(m, m) number of the next cell on the path to the goal."""
+    """(m, m) number of the next cell on the route to the goal."""
     queue: NDArray[np.int32]
     """(k, 2) number of a cell, and index of the next entry in its bucket."""
     heads: NDArray[np.int32]
     """(buckets, 1) index of the first entry of each bucket."""
     path: NDArray[np.float64]
-    """(p, 2) middles of the cells of the path, from the robot to the goal, m."""
+    """(p, 2) middles of the cells of the route, from the robot to the goal, m."""
     points: NDArray[np.int64]
     """(1,) number of points of ``path``."""
     length_m: NDArray[np.float64]
-    """(1,) length of the path, m."""
+    """(1,) length of the route, m."""
     dearest: NDArray[np.int64]
-    """(1,) highest price of the cells of the path after the first."""
+    """(1,) highest price of the cells of the route after the first cell."""
     low: NDArray[np.int64]
     """(2,) numbers of the window's first cell on the floor, along x and y."""
     cell_m: NDArray[np.float64]
     """(1,) side of a cell, m."""
     marks: NDArray[np.float64]
-    """(q, 3) positions marked as blocked, m, and the time until which a mark counts,
-    s."""
+    """(q, 3) positions (x, y) marked as blocked, m, and the time until which each mark
+    counts, s."""
     marked: NDArray[np.int64]
     """(1,) number of marks so far; a new mark replaces the oldest."""
 
 
 def make_way(cells: int) -> Way:
-    """Allocates the arrays of a path.
+    """Allocates the arrays of a route.
 
     Args:
-        cells: Number of cells along a side of the window.
+        cells: Number of cells of the map along a side of the window.
 
     Returns:
-        A path without points.
+        Route without points.
     """
     size = cells // 2
     grid = size, size
@@ -104,22 +116,23 @@ def find_way(
     radius: float,
     clear: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Finds the cheapest path from a robot to a goal.
+    """Finds the cheapest route from the robot to a goal.
 
-    The function computes the prices of all cells, searches from the goal to the start,
-    and then follows the cheapest path from the start to the goal. It stores the points,
-    the length and the highest price of the path.
+    The function works in three stages. It computes the prices of all cells. It searches
+    from the goal to the start. Then it follows the cheapest route from the start to the
+    goal. The function stores the points, the length, and the highest price of the
+    route.
 
     Args:
-        way: Modified in place.
-        space: Cells that were seen free, and hits.
-        start: (x, y) of the axle, m.
-        goal: (x, y), m. If the goal is outside the window, the path leads to the
-            nearest cell of the window.
+        way: Route and memory of the search. The function changes the arrays in place.
+        space: Map with the cells that were seen free and the hits of the cells.
+        start: Position (x, y) of the axle, m.
+        goal: Position (x, y) of the goal, m. If the goal is outside the window, the
+            route leads to the nearest cell of the window.
         time: Current time, s.
         radius: Radius of the disc that has to pass, m.
-        clear: (n, 3) positions and radii, m. Hits within these radii do not block the
-            path, because they come from the target or a moving body.
+        clear: (n, 3) positions (x, y) and radii, m. Hits within these radii do not
+            block the route, because they come from the target or from a moving body.
     """
     size, cell, low = way.price.shape[0], 2.0 * space.cell_m, way.low
     way.cell_m[0] = cell
@@ -151,11 +164,11 @@ def find_way(
 def mark_blocked(
     way: Way, place: Any, until: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Marks a place as blocked, so that paths avoid it until a given time.
+    """Marks a position as blocked, so that routes avoid it for a given time.
 
     Args:
-        way: Modified in place.
-        place: (x, y), m.
+        way: Route and marks. The function changes the arrays in place.
+        place: Position (x, y), m.
         until: Time until which the mark counts, s.
     """
     k = way.marked[0] % len(way.marks)
@@ -167,15 +180,15 @@ def mark_blocked(
 def cell_at(
     way: Way, x: float, y: float
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Returns the cell of a place, or the nearest cell of the window.
+    """Returns the cell of a position, or the nearest cell of the window.
 
     Args:
-        way: From ``find_way``.
-        x: Position of the place, m.
-        y: Position of the place, m.
+        way: Route from ``find_way``.
+        x: Position, x in the world frame W, m.
+        y: Position, y in W, m.
 
     Returns:
-        Numbers of the cell within the window, along x and y.
+        Indices of the cell within the window, along x and y.
     """
     size, cell = way.price.shape[0], way.cell_m[0]
     i = math.floor(x / cell) - way.low[0]
@@ -187,12 +200,12 @@ def cell_at(
 def _set_prices(
     way: Way, space: FreeSpace, time: float, radius: float, clear: Any
 ) -> None:  # pragma: no cover  (compiled)
-    """Set the price of each cell. It depends on what was seen, on hits and on marks.
+    """Sets the price of each cell from free space, hits, and marks.
 
-    A wide cell is unknown if one of its four narrow cells was never seen free. Narrow
-    cells with enough hits raise the prices around them (``_keep_off``). Hits near the
-    places in ``clear`` do not count. Marked places count as occupied until their time
-    has passed.
+    A wide cell of the search has four narrow cells of the map. A wide cell is unknown
+    if one of its narrow cells was never seen free. Narrow cells with enough hits raise
+    the prices around them (``_keep_off``). Hits near the positions in ``clear`` do not
+    count. Marked positions count as occupied until their time has passed.
     """
     size, cells, cell = way.price.shape[0], space.free_until.shape[0], way.cell_m[0]
     low = way.low
@@ -219,7 +232,7 @@ def _set_prices(
 
 @njit(cache=True)
 def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (compiled)
-    """Return whether a point is within the radius of one of the clear places."""
+    """Checks whether a point is within the radius of a position in ``clear``."""
     for k in range(len(clear)):
         if math.hypot(x - clear[k, 0], y - clear[k, 1]) < clear[k, 2]:
             return True
@@ -230,11 +243,11 @@ def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (comp
 def _keep_off(
     way: Way, place: Any, radius: float, highest: int
 ) -> None:  # pragma: no cover  (compiled)
-    """Raise the prices of the cells near a narrow cell, according to their distance.
+    """Raises the prices of the cells near a narrow cell, according to their distance.
 
     The distance is from the middle of a wide cell to the nearest point of the narrow
-    cell. Within the radius of the disc the price is ``highest``. Farther away it is
-    ``TIGHT``, then ``NEAR``.
+    cell. Within the radius of the disc, the price is ``highest``. Farther away, the
+    price is first ``TIGHT`` and then ``NEAR``.
     """
     size, cell = way.price.shape[0], way.cell_m[0]
     x, y = place[0] / cell - way.low[0], place[1] / cell - way.low[1]
@@ -256,13 +269,13 @@ def _keep_off(
 
 @njit(cache=True)
 def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (compiled)
-    """Search with Dijkstra's algorithm from the goal, until the start is reached.
+    """Searches with Dijkstra's algorithm from the goal until the start is reached.
 
-    All costs are whole numbers, so a ring of buckets replaces the priority queue
-    (Dial). Bucket ``cost % _BUCKETS`` is a linked list of all waiting cells of that
-    cost. Every step costs less than the number of buckets, so a bucket never holds
-    cells with different costs. A cell that gets a lower cost enters the queue again;
-    its older entry is skipped.
+    All costs are whole numbers. Therefore a ring of buckets replaces the priority queue
+    (Dial's algorithm). Bucket ``cost % _BUCKETS`` is a linked list of all waiting cells
+    with this cost. Every step costs less than the number of buckets. Therefore all
+    cells in one bucket have the same cost. If a cell gets a lower cost, the cell enters
+    the queue again. The search skips the older entry of the cell.
     """
     size = way.price.shape[0]
     way.cost[:, :] = _FAR

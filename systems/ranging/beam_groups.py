@@ -1,4 +1,4 @@
-"""Grouping of the hits of single beams into surfaces."""
+"""Grouping of the hits of single beams into surfaces of objects."""
 
 from __future__ import annotations
 
@@ -11,20 +11,23 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.ranging.collision_vector import foot_on_segment
 
-#: Columns of a group. NEAR is the vector from P to the nearest point of the group, m.
-#: MIDDLE is the vector from P to the middle between its two outer hits, m. EXTENT is
-#: the distance between the outer hits, m. CHORD is the spacing of the beams at the
-#: nearest point, m. OPEN is 1 if the surface may continue beyond an outer hit,
-#: otherwise 0.
+# Columns of the row of a group of hits. Outer hits are the first and the last hit.
+# ``NEAR``: vector from P to the nearest point of the group, m.
+# ``MIDDLE``: vector from P to the middle between the outer hits, m.
+# ``EXTENT``: distance between the outer hits, m.
+# ``CHORD``: spacing of the beams at the nearest point, m.
+# ``OPEN``: 1 if the surface may continue beyond an outer hit, otherwise 0.
 NEAR_X, NEAR_Y, MIDDLE_X, MIDDLE_Y, EXTENT, CHORD, OPEN = range(7)
 GROUP_SIZE = 7
 
-#: Adjacent hits belong to one surface if their distance is below the sum of two parts.
-#: The first part is constant, m. The second part is the spacing of the beams on a
-#: surface whose normal is turned from the beam by 60 deg: the spacing times a factor.
+# Adjacent hits belong to one surface if their distance is below the sum of two terms.
+# ``_GAP_M``: first term, m.
+# ``_STRETCH``: second term as a multiple of the spacing of the beams. The factor is
+#   that of an oblique surface, whose normal is turned from the beam by 60 deg.
 _GAP_M, _STRETCH = 0.2, 1.0 / math.cos(math.radians(60.0))
-#: Rise of the distance from P that separates two objects, m. A surface is split where
-#: its distance from P exceeds the minima on both sides by more than this.
+#: Rise of the distance from P that separates two objects, m. A surface is split at a
+#: maximum of its distance from P if the maximum exceeds the minima on both sides by
+#: more than this rise.
 _DIP_M = 0.08
 
 
@@ -41,7 +44,7 @@ class BeamNumbers(NamedTuple):
 def _goes_on(
     hits: Any, ranges: Any, heard: Any, k: int, beams: BeamNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether beam k and its right neighbor hit the same surface."""
+    """Checks whether beam ``k`` and its right neighbor hit the same surface."""
     other = (k + 1) % len(ranges)
     apart = beams.apart_rad[k]
     if apart == 0.0 or heard[k] < 0.5 or heard[other] < 0.5:
@@ -55,20 +58,28 @@ def _goes_on(
 def _is_open(
     ranges: Any, heard: Any, own: int, other: int, apart: float, beams: BeamNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a surface may continue beyond its outer hit.
+    """Checks whether a surface may continue beyond its outer hit.
 
-    The beam beside the outer hit decides. If there is no such beam, the surface may
-    continue. If this beam has an echo, a nearer hit may hide the surface, and a farther
-    hit shows the end of the surface. If this beam has no echo, the surface may continue
-    if it would be out of range there.
+    The beam beside the outer hit decides:
+
+    - If there is no such beam, the surface may continue.
+    - If this beam has a nearer hit, a nearer object may hide the surface. The surface
+      may continue.
+    - If this beam has a farther hit, the surface ends.
+    - If this beam has no echo, the surface may continue if it would be out of range
+      there.
 
     Args:
         ranges: (n,) ranges of the beams, m.
-        heard: (n,) 1 where there is an echo, else 0.
-        own: Beam of the outer hit.
-        other: Beam beside it.
-        apart: Angle between the two beams, rad; 0 if there is no beam beside it.
-        beams: Range of the beams.
+        heard: (n,) 1 if the beam has an echo, otherwise 0.
+        own: Index of the beam of the outer hit.
+        other: Index of the beam beside the outer hit.
+        apart: Angle between the two beams, rad; 0 if there is no beam beside the outer
+            hit.
+        beams: Directions and ranges of the beams.
+
+    Returns:
+        True if the surface may continue.
     """
     if apart == 0.0:
         return True
@@ -82,17 +93,18 @@ def _is_open(
 def _describe(
     row: Any, hits: Any, ranges: Any, heard: Any, ends: Any, beams: BeamNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills the row of one group.
+    """Fills the row of one group of hits.
 
-    The nearest point is sought on the line segments between adjacent hits.
+    The function searches the nearest point on the line segments between adjacent hits.
 
     Args:
-        row: (GROUP_SIZE,) row to be filled.
-        hits: (n, 2) hits from P, m.
+        row: (GROUP_SIZE,) row that the function fills.
+        hits: (n, 2) vectors (x, y) from the control point P to the hits, m.
         ranges: (n,) ranges of the beams, m.
-        heard: (n,) 1 where there is an echo, else 0.
-        ends: First and last beam of the group; numbers of n or more wrap around.
-        beams: Directions and range of the beams.
+        heard: (n,) 1 if the beam has an echo, otherwise 0.
+        ends: Indices of the first and the last beam of the group. Indices of n or more
+            wrap around.
+        beams: Directions and ranges of the beams.
     """
     count = len(ranges)
     first, last = ends[0] % count, ends[1] % count
@@ -121,19 +133,20 @@ def group_beams(
     """Groups the hits of the beams into objects.
 
     The function visits the beams from left to right. Adjacent hits belong to one
-    surface if they are close enough. A surface can approach P twice, for example at the
-    two walls of a corner. The function splits such a hollow surface where it is
-    farthest from P, because the nearest point alone would not describe both sides. The
-    beam at the split belongs to both objects.
+    surface if they are close enough. A surface can approach the control point P twice,
+    for example at the two walls of a corner. The nearest point alone would not describe
+    both sides of such a hollow surface. Therefore the function splits the surface where
+    it is farthest from P. The beam at the split belongs to both objects.
 
     Args:
-        hits: (n, 2) hits from P, m, from left to right.
+        hits: (n, 2) vectors (x, y) from P to the hits, m, from left to right.
         ranges: (n,) ranges of the beams, m.
-        heard: (n,) 1 where there is an echo, else 0.
-        beams: Directions and range of the beams.
+        heard: (n,) 1 if the beam has an echo, otherwise 0.
+        beams: Directions and ranges of the beams.
 
     Returns:
-        (n, GROUP_SIZE) groups, and the number of groups.
+        Two values: (n, GROUP_SIZE) rows of groups, and the number of groups. The other
+        rows are not used.
     """
     count = len(ranges)
     rows, used = np.zeros((count, GROUP_SIZE)), 0

@@ -1,4 +1,4 @@
-"""From the ranges of the sensors to vectors that point at obstacles."""
+"""Computation of collision vectors, which point at obstacles, from sensor ranges."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from systems.framework.signals import TICK_S
 from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
-#: Largest number of collision vectors in one tick.
+#: Largest number of collision vectors in one tick (control period).
 SLOTS = 3
 #: Largest distance between two echoes of the same obstacle, m.
 PAIR_SEPARATION_M = 0.5
@@ -24,16 +24,19 @@ PAIR_SEPARATION_M = 0.5
 
 @register_jitable
 def echo_point(range_: Any, axis: Any, position: Any) -> Any:
-    """Position of an echo, which is assumed to lie on the axis of the sensor.
+    """Computes the position of an echo on the axis of the sensor.
+
+    The function assumes that the obstacle is on the axis of the sensor. Eq. 11 of Han
+    2019 prints a minus sign and mixes d with r. Eq. 13 swaps the axes.
 
     Args:
-        range_: Range r_i, m; float or AutoDiffXd.
-        axis: Direction phi_i of the sensor in B, rad.
-        position: Position p_PU_i of the sensor from P in B axes, m.
+        range_: Range r_i of sensor i, m; float or AutoDiffXd.
+        axis: Direction phi_i of the sensor in the axes of the body B, rad.
+        position: Position (x, y) of the sensor relative to the control point P, in the
+            axes of B, m.
 
     Returns:
-        (x, y) from P in B axes, m. Han 2019, eq. 11 prints a minus sign and mixes d
-        with r; eq. 13 swaps the axes.
+        Position (x, y) of the echo relative to P, in the axes of B, m.
     """
     return (
         position[0] + range_ * math.cos(axis),
@@ -42,15 +45,17 @@ def echo_point(range_: Any, axis: Any, position: Any) -> Any:
 
 
 def echo_points(ranges: Any, echo: Any, sensors: UltrasonicParameters) -> Any:
-    """Positions of the echoes of all sensors.
+    """Computes the positions of the echoes of all sensors.
 
     Args:
         ranges: (n,) ranges r_i, m; floats or AutoDiffXd.
-        echo: (n,) 1 where there is an echo, else 0.
+        echo: (n,) 1 if the sensor has an echo, otherwise 0.
         sensors: Directions and positions of the sensors.
 
     Returns:
-        One entry per sensor: (x, y) from P in B axes, m, or None without an echo.
+        List with one entry per sensor. An entry is the position (x, y) of the echo
+        relative to the control point P, in the axes of the body, m. Without an echo,
+        the entry is None.
     """
     return [
         echo_point(range_, axis, position) if heard > 0.5 else None
@@ -64,16 +69,17 @@ def echo_points(ranges: Any, echo: Any, sensors: UltrasonicParameters) -> Any:
 def carried_point(
     point: Any, pose_then: Any, pose_now: Any, control_point_m: Any
 ) -> Any:
-    """Present position of a point at rest that was seen from an earlier pose.
+    """Converts a point at rest from an earlier pose of the robot to the present pose.
 
     Args:
-        point: (x, y) from P in B axes at the earlier pose, m; floats or AutoDiffXd.
+        point: Position (x, y) relative to the control point P at the earlier pose, in
+            the axes of the body, m; floats or AutoDiffXd.
         pose_then: Earlier pose (x, y, theta) of the robot, m and rad.
-        pose_now: Present pose of the robot, m and rad.
+        pose_now: Present pose (x, y, theta) of the robot, m and rad.
         control_point_m: Distance of P ahead of the axle, m.
 
     Returns:
-        (x, y) from P in B axes at the present pose, m.
+        Position (x, y) relative to P at the present pose, in the axes of the body, m.
     """
     p_then = control_point(pose_then, control_point_m)
     p_now = control_point(pose_now, control_point_m)
@@ -84,16 +90,17 @@ def carried_point(
 
 @register_jitable
 def foot_on_segment(a: Any, b: Any) -> Any:
-    """Point of the segment a-b that is nearest to the origin.
+    """Computes the point of a line segment that is nearest to the origin.
+
+    Eq. 14 of Han 2019 has a wrong sign and a singular slope. The equation also does not
+    limit the point to the segment. A point outside the segment would be in empty space.
 
     Args:
-        a: (x, y) of one end, m; floats or AutoDiffXd.
-        b: (x, y) of the other end, m.
+        a: Position (x, y) of one end, m; floats or AutoDiffXd.
+        b: Position (x, y) of the other end, m.
 
     Returns:
-        (x, y), m. Han 2019, eq. 14 has a wrong sign and a singular slope. It also does
-        not limit the foot to the segment; a foot outside the segment points at empty
-        space.
+        Position (x, y) of the nearest point, m.
     """
     ex, ey = b[0] - a[0], b[1] - a[1]
     squared = ex * ex + ey * ey
@@ -110,22 +117,25 @@ def foot_on_segment(a: Any, b: Any) -> Any:
 def collision_vectors(
     points: Any, parameters: CollisionVectorParameters, neighbours: Any = None
 ) -> Any:
-    """Collision vectors from the positions of the echoes.
+    """Computes collision vectors from the positions of the echoes.
+
+    A collision vector points from the control point P to an obstacle. The feature of a
+    vector is a number that identifies the sensors of the vector. If the sensors change,
+    the feature changes, too. Therefore a law does not mistake the change of sensors for
+    a motion.
 
     Args:
-        points: One entry per sensor, from left to right: (x, y) from P, m, or None
-            without an echo.
-        parameters: The aggregation rule.
-        neighbours: Pairs of adjacent sensors, counted from 0, each with the left sensor
-            first (``UltrasonicParameters.neighbours``). None pairs each sensor with the
-            next one.
+        points: List with one entry per sensor, from left to right. An entry is the
+            position (x, y) of the echo relative to P, m, or None without an echo.
+        parameters: Aggregation rule.
+        neighbours: Pairs of adjacent sensors (``UltrasonicParameters.neighbours``). A
+            pair has two indices, counted from 0, with the left sensor first. If None,
+            each sensor is paired with the next sensor.
 
     Returns:
-        At most ``SLOTS`` entries (feature, x, y) with x and y from P, m. The feature
-        identifies the sensors of the vector, so that a change of the sensors is not
-        mistaken for a motion. Features 1 to n are single sensors (case I, Han 2019, eq.
-        12). Feature n + k is sensor k, counted from 1, with its right neighbor (case
-        II, eq. 14).
+        At most ``SLOTS`` entries (feature, x, y), with x and y of the vector from P, m.
+        Features 1 to n are single sensors (case I, Han 2019, eq. 12). Feature n + k is
+        the pair of sensor k, counted from 1, and its right neighbor (case II, eq. 14).
     """
     if neighbours is None:
         neighbours = pairwise(range(len(points)))
@@ -140,14 +150,20 @@ def collision_vectors(
 
 @register_jitable
 def _vectors(points, heard, neighbours, joined, every):
-    """Compiled form of ``collision_vectors``.
+    """Computes collision vectors from positions and flags, in a form that compiles.
+
+    The results are those of ``collision_vectors``.
 
     Args:
-        points: n positions (x, y) from P, m; arbitrary where there is no echo.
-        heard: n flags, true where there is an echo.
-        neighbours: Pairs of adjacent sensors, each with the left sensor first.
+        points: n positions (x, y) of echoes relative to the control point P, m. The
+            position of a sensor without an echo is arbitrary.
+        heard: n flags. A flag is true if the sensor has an echo.
+        neighbours: Pairs of indices of adjacent sensors, with the left sensor first.
         joined: Whether to join the nearest echo with its nearer neighbor.
         every: Whether to return one vector per pair and per single echo.
+
+    Returns:
+        List of entries (feature, x, y).
     """
     # Find the nearest echo.
     nearest = -1
@@ -205,7 +221,10 @@ def _pair(points, left, right):
 
 @register_jitable
 def _all_vectors(points, heard, pairs, vectors):
-    """Vectors of all pairs and unpaired echoes, but at most the nearest ``SLOTS``."""
+    """Returns the vectors of all pairs and unpaired echoes.
+
+    If there are more than ``SLOTS`` vectors, the function returns only the nearest.
+    """
     for left, right in pairs:
         vectors.append(_pair(points, left, right))
     for k in range(len(points)):
@@ -228,13 +247,15 @@ def _all_vectors(points, heard, pairs, vectors):
 
 @register_jitable
 def fill_slots(vectors: Any, outputs: Any) -> None:
-    """Writes vectors to the ports of vectors, mask and features.
+    """Writes collision vectors to the ports of vectors, mask, and features.
+
+    All elements of the ports are 0 before the call. Unused slots remain 0.
 
     Args:
-        vectors: At most three entries (feature, x, y) with x and y from P, m.
-        outputs: The three ports: vectors (6 elements), m; mask (3 elements), 0 or 1;
-            and features (3 elements). All elements are 0 before the call; unused slots
-            remain 0.
+        vectors: At most three entries (feature, x, y), with x and y of the vector from
+            the control point P, m.
+        outputs: Three ports: vectors (6 elements), m; mask (3 elements), 0 or 1; and
+            features (3 elements).
     """
     vectors_B, mask, features = outputs
     for k in range(len(vectors)):
@@ -267,7 +288,7 @@ COLLISION_PORTS = (
 
 
 class CollisionNumbers(NamedTuple):
-    """Parameters of ``collision_step``."""
+    """Constants of ``collision_step``."""
 
     joined: bool
     """Whether the nearest echo is joined with a neighboring echo."""
@@ -276,7 +297,7 @@ class CollisionNumbers(NamedTuple):
     axes: list[float]
     """Directions of the sensors in B, rad."""
     places: list[tuple[float, float]]
-    """Positions of the sensors from P in B axes, m."""
+    """Positions (x, y) of the sensors relative to P, in the axes of the body B, m."""
     neighbours: list[tuple[int, int]]
     """Pairs of adjacent sensors, counted from 0, each with the left sensor first."""
     control_point_m: float
@@ -287,12 +308,14 @@ class CollisionNumbers(NamedTuple):
 def collision_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Collision vectors of one tick; see ``systems.framework.block.Step``.
+    """Computes the collision vectors of one control period.
+
+    See ``systems.framework.block.Step`` for the arguments of all steps.
 
     Args:
         tick: Not used.
-        state: Poses at the previous ticks of a round, most recent first, m and rad;
-            empty if every sensor fires at every tick.
+        state: Poses of the previous control periods of a sensor round, most recent
+            first, m and rad. If every sensor fires in every period, the state is empty.
         inputs: Values of the input ports.
         outputs: Values of the output ports.
         numbers: ``CollisionNumbers``.
@@ -330,26 +353,34 @@ def collision_step(
 @define_for_scalars("CollisionVector_", __name__)
 def CollisionVector_(T):
     class Impl(Block_[T]):
-        """Turns echoes into collision vectors from P (cases I and II).
+        """Computes collision vectors from the echoes of the sensors (cases I and II).
 
-        The block fills the slots in order; only ``aggregation: sum`` fills more than
-        one. If all sensors fire at every tick, the output is a function of the present
-        ranges: there is no state and no latency, and the ports of age and pose are not
-        read. Otherwise the block assumes that a held range belongs to a point at rest
-        in W, and converts this point to the present pose. The motion of an obstacle
-        since the sensor fired remains as an error. The time since the sensor fired is
-        at most one round minus one tick.
+        A collision vector points from the control point P to an obstacle. The block
+        fills the slots of the output ports in order. Only ``aggregation: sum`` fills
+        more than one slot.
 
-        If ranges are held, the discrete state holds the poses at the previous ticks of
-        a round, and is updated every tick. Three sensors that fire one after the other,
-        one per tick, need two poses.
+        If all sensors fire in every control period, the output is a function of the
+        present ranges. In this case the block has no state and no latency, and does not
+        read the ports of age and pose.
+
+        Otherwise the sensors hold their ranges between two readings. The block assumes
+        that a held range belongs to a point at rest in the world frame W. The block
+        converts this point to the present pose of the robot. If the obstacle has moved
+        since the sensor fired, the motion remains as an error. The time since the
+        sensor fired is at most one sensor round minus one period. A sensor round is the
+        time in which every sensor fires once.
+
+        If ranges are held, the discrete state has the poses of the previous periods of
+        a round. The state is updated every period. For example, three sensors that fire
+        one after the other, one per period, need two poses.
 
         Args:
             parameters: Aggregation rule, ``CollisionVectorParameters``.
-            sensors: Positions, period and order of firing, ``UltrasonicParameters``.
-            robot: Position of P.
-            initial_pose: (x, y, theta) before time zero, m and rad.
-            tick_s: Control period of the robot, s.
+            sensors: Positions, firing period, and firing order of the sensors,
+                ``UltrasonicParameters``.
+            robot: Parameters of the robot, for the position of P.
+            initial_pose: Pose (x, y, theta) before time zero, m and rad.
+            tick_s: Control period, s.
 
         Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
         """
@@ -393,7 +424,7 @@ def CollisionVector_(T):
             )
 
         def step_for(self, run: RunFacts) -> Step:
-            """Step that starts from the initial pose of the run."""
+            """Returns the step with the initial pose of the run as its state."""
             past_poses = len(self.step.state) // 3
             return self.step._replace(state=[*run.initial_pose] * past_poses)
 

@@ -20,13 +20,13 @@ from systems.world.geometry import beyond_rectangle
 REACH_M = 0.01
 #: Number of test points on each half of the front edge, in addition to its middle.
 _POINTS = 8
-#: A touch within this distance of the middle closes both switches. The distance is a
-#: share of the width.
+#: A touch near the middle of the front edge closes both switches. The largest distance
+#: from the middle is this share of the width of the robot.
 _MIDDLE = 0.1
 
 
 class SwitchNumbers(NamedTuple):
-    """Parameters of ``contact_switches_step``."""
+    """Constants of ``contact_switches_step``."""
 
     points: NDArray[np.float64]
     """(n, 2) test points of the front edge in B, m, from left to right."""
@@ -44,13 +44,18 @@ class SwitchNumbers(NamedTuple):
 def _feel(
     pose: Any, body: Any, points: Any, middle: float
 ) -> tuple[bool, bool]:  # pragma: no cover  (compiled)
-    """Whether a body closes the left and the right switch.
+    """Checks whether a body closes the left and the right switch.
 
     Args:
-        pose: (x, y, theta) of the robot, m and rad.
-        body: x, y, theta, length and width of the body in W, m and rad.
-        points: (n, 2) test points of the front edge in B, m.
-        middle: A touch within this distance of the x axis closes both switches, m.
+        pose: Pose (x, y, theta) of the robot, m and rad.
+        body: Five numbers: pose (x, y, theta) of the body in the world frame W, m and
+            rad, and length and width of the body, m.
+        points: (n, 2) test points of the front edge in the axes of the robot, m.
+        middle: A touch within this distance of the robot's x axis closes both switches,
+            m.
+
+    Returns:
+        Two flags: whether the left switch closes, and whether the right switch closes.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     # Skip a body whose circumscribed circle no switch can reach. The first test point,
@@ -74,9 +79,9 @@ def _feel(
 def contact_switches_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SwitchNumbers
 ) -> None:
-    """Which switches are closed, and which body the robot touches.
+    """Determines which switches are closed and which body the robot touches.
 
-    If the robot touches several bodies, the last one is reported.
+    If the robot touches several bodies, the step reports the last of them.
     """
     pose, poses, sizes, followed = inputs
     bodies = len(poses) // 3
@@ -109,22 +114,25 @@ def contact_switches_step(
 
 
 class ContactSwitches(Block):
-    """Detects bodies at the front of the robot.
+    """Detects bodies that touch the front of the robot.
 
-    Each switch belongs to one half of the front edge. It closes when a body is within
-    ``REACH_M`` of this half. In the middle of the edge, both switches close. The flanks
-    and the rear of the robot have no switches. ``touched`` is the true number of the
-    touched body, counted from 0. The body at ``pose_WS`` has the last number. The
+    There are two switches. Each switch belongs to one half of the front edge. A switch
+    closes when a body is within ``REACH_M`` of its half. Near the middle of the edge,
+    both switches close. The flanks and the rear of the robot have no switches. The
     switches cannot distinguish a source from a wall.
 
-    The block has no state and no latency. It computes its outputs every tick.
+    The port ``touched`` has the true number of the touched body, counted from 0. The
+    body at ``pose_WS`` has the last number.
+
+    The block has no state and no latency. It computes its outputs in every control
+    period.
 
     Args:
-        faults: Faults of the robot; those of ``contact_switches`` apply.
+        faults: Faults of the robot. Only faults of ``contact_switches`` have an effect.
         robot: Size of the robot.
-        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        bodies: Number of bodies on the ports ``poses_WO`` and ``sizes``.
         source_size: Length and width of the body at ``pose_WS``, m.
-        tick_s: Control period of the robot, s.
+        tick_s: Control period, s.
 
     Reference: Song 2011, 2.1, 4.2.
     """

@@ -1,4 +1,4 @@
-"""Exact positions and velocities of the bodies around the robot."""
+"""A sensor that gives exact positions and velocities of the bodies around the robot."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from systems.world.geometry import (
     segment_clearance,
 )
 
-#: A moving body is a disc if its longer side is at most this many times its shorter
-#: side.
+#: A moving body counts as a disc if its longer side is at most this multiple of its
+#: shorter side.
 _LONG = 2.0
 #: A body whose speed is below this is at rest, m/s.
 _RESTS_M_S = 1e-9
@@ -45,7 +45,7 @@ _GRAZE_M = 1e-6
 
 
 class ObjectNumbers(NamedTuple):
-    """Parameters of ``ideal_object_step``."""
+    """Constants of ``ideal_object_step``."""
 
     maximum_range_m: float
     """Largest distance from P at which bodies are seen, m."""
@@ -71,14 +71,15 @@ def _see(
 ) -> None:  # pragma: no cover  (compiled)
     """Fills the slot of one body.
 
-    The function reports a body at rest as its nearest point, and a moving body as a
-    disc around its center. It reports a moving body as its nearest point if the body is
-    long or if the disc contains P.
+    The function reports a body at rest as its nearest point. The function reports a
+    moving body as a disc around its center. There are two exceptions: if the moving
+    body is long, or if the disc contains the control point P, the function reports the
+    nearest point of the body.
 
     Args:
-        slot: (OBJECT_SIZE,) zeros, to be filled.
-        p_WP: (x, y) of P in W, m.
-        before: (3,) pose of the body one tick ago, m and rad.
+        slot: (OBJECT_SIZE,) zeros that the function fills.
+        p_WP: Position (x, y) of P in the world frame W, m.
+        before: (3,) pose of the body one control period ago, m and rad.
         now: (3,) present pose of the body, m and rad.
         size: Length and width of the body, m.
         tick_s: Control period, s; 0 if the velocity is unknown.
@@ -111,17 +112,20 @@ def _see(
 def _is_hidden(
     number: int, p_WP: Any, slot: Any, poses: Any, sizes: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether other bodies hide a body from P.
+    """Checks whether other bodies hide a body from the control point P.
 
-    A body is hidden if the lines from P to its reported point and to all four corners
-    are blocked.
+    A body is hidden if five lines are blocked: the line from P to the reported point of
+    the body, and the lines from P to all four corners of the body.
 
     Args:
-        number: Number of the body.
-        p_WP: (x, y) of P in W, m.
+        number: Index of the body.
+        p_WP: Position (x, y) of P in the world frame W, m.
         slot: (OBJECT_SIZE,) slot of the body.
         poses: (3 n,) poses of all bodies, m and rad.
         sizes: (2 n,) lengths and widths of all bodies, m.
+
+    Returns:
+        True if the body is hidden.
     """
     x, y, theta = poses[3 * number], poses[3 * number + 1], poses[3 * number + 2]
     c, s = 0.5 * math.cos(theta), 0.5 * math.sin(theta)
@@ -142,7 +146,7 @@ def _is_hidden(
 def _is_blocked(
     number: int, p_WP: Any, end: Any, poses: Any, sizes: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a body other than ``number`` is on the line from P to a point."""
+    """Checks whether a body other than ``number`` is on the line from P to a point."""
     for k in range(len(sizes) // 2):
         x, y, theta = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
         box = x, y, theta, sizes[2 * k], sizes[2 * k + 1]
@@ -155,14 +159,14 @@ def _is_blocked(
 def _seen(
     state: Any, pose: Any, poses: Any, sizes: Any, numbers: ObjectNumbers
 ) -> Any:  # pragma: no cover  (compiled)
-    """Objects in range, nearest first, without noise and latency.
+    """Lists the objects in range without noise and latency.
 
-    The function also stores the present poses for the next tick.
+    The function also stores the present poses for the next control period.
 
     Args:
-        state: First element: 1 if poses are stored, else 0. Then the poses of one tick
-            ago.
-        pose: (x, y, theta) of the robot, m and rad.
+        state: State of the block. The first element is 1 if poses are stored, otherwise
+            0. The poses of one control period ago follow.
+        pose: Pose (x, y, theta) of the robot, m and rad.
         poses: (3 n,) poses of all bodies, m and rad.
         sizes: (2 n,) lengths and widths of all bodies, m.
         numbers: ``ObjectNumbers``.
@@ -190,11 +194,11 @@ def _seen(
 def ideal_object_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: ObjectNumbers
 ) -> None:
-    """Objects that the sensor reports.
+    """Computes the objects that the sensor reports in one control period.
 
-    The state holds a flag that is 1 after the first tick, then the poses of the bodies
-    one tick ago. With a latency, the objects that are not reported yet follow, oldest
-    first.
+    The state has three parts. The first part is a flag that is 1 after the first
+    period. The second part is the poses of the bodies one period ago. With a latency,
+    the third part is the objects that are not reported yet, oldest first.
     """
     pose, poses, sizes = inputs
     seen = _seen(state, pose, poses, sizes, numbers)
@@ -218,36 +222,41 @@ def ideal_object_step(
 
 
 class IdealObjectSensor(Block):
-    """Gives positions and velocities of the bodies around P, in all directions.
+    """Gives the positions and velocities of the bodies around P, in all directions.
 
-    The output holds the eight nearest bodies within the range. For a body at rest,
-    ``X`` and ``Y`` lead to the nearest point of its rectangle. The block reports a
-    moving body as a disc that contains the body and has the same center. ``X`` and
-    ``Y`` lead to the nearest point of the disc, and the velocity is that of the center.
-    The block reports a long moving body as its nearest point, with the velocity of this
-    point. Half of the width of this body is then ``RADIUS``. The same applies to a
-    moving body whose disc contains P. The block computes velocities from the present
-    and the previous poses. Velocities are known from the second tick on.
+    P is the control point of the robot. The output has the eight nearest bodies within
+    the range of the sensor. ``X`` and ``Y`` of a slot are the vector from P to a point
+    of the body. The block represents a body in one of these ways:
 
-    The discrete state holds the poses of the bodies at the previous tick. With
-    ``latency_s``, it also holds the objects that are not reported yet. Positions are
-    relative to P at the tick of the measurement. Without ``latency_s`` there is no
-    latency. Noise is drawn once per tick.
+    - A body at rest is its nearest point. The point is on the rectangle of the body.
+    - A moving body is a disc that contains the body and has the same center. ``X`` and
+      ``Y`` lead to the nearest point of the disc. The velocity is that of the center.
+    - A long moving body is its nearest point, with the velocity of this point.
+      ``RADIUS`` is then half of the width of the body. The same rule applies to a
+      moving body whose disc contains P.
+
+    The block computes velocities from the present and the previous poses. Therefore
+    velocities are known from the second control period on.
+
+    The discrete state has the poses of the bodies in the previous period. With
+    ``latency_s``, the state also has the objects that are not reported yet. Their
+    positions are relative to P at the time of the measurement. Without ``latency_s``
+    there is no latency. The block draws noise once per period.
 
     Args:
         parameters: Range and errors, ``ObjectSensorParameters``.
-        robot: Position of P.
-        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Numbers of the bodies that are robots.
+        robot: Parameters of the robot, for the position of P.
+        bodies: Number of bodies on the ports ``poses_WO`` and ``sizes``.
+        robots: Indices of the bodies that are robots.
         seed: Seed of the noise.
-        tick_s: Control period of the robot, s.
+        tick_s: Control period, s.
 
     Raises:
-        InputError: The latency is not a multiple of the tick.
+        InputError: The latency is not a multiple of the control period.
 
-    Reference: this block is our own. It replaces the scan of Engelbrecht, Steyn and
-    Djouani (2021). They print neither how beams become obstacles nor how they obtain
-    the velocities.
+    Reference: our own work. The block replaces the scan of Engelbrecht, Steyn and
+    Djouani (2021). Their paper prints neither how beams become obstacles nor how the
+    velocities are obtained.
     """
 
     part, stage = "objects", "obstacle sensing"

@@ -1,4 +1,4 @@
-"""Exact obstacle sensing, without the errors of range sensors."""
+"""A sensor that gives exact collision vectors, without the errors of range sensors."""
 
 from __future__ import annotations
 
@@ -25,18 +25,21 @@ from systems.world.geometry import control_point, nearest_point_on_rectangle, ro
 def nearest_vectors(
     pose_WB: Any, rectangles: Any, control_point_m: Any, maximum_range: Any, slots: Any
 ) -> Any:
-    """Vectors from P to the nearest points of the nearest bodies.
+    """Computes the vectors from P to the nearest points of the nearest bodies.
+
+    P is the control point of the robot.
 
     Args:
-        pose_WB: (x, y, theta) of the robot, m and rad; floats or AutoDiffXd.
-        rectangles: Rectangles (x, y, theta, length, width) in W, m and rad.
+        pose_WB: Pose (x, y, theta) of the robot, m and rad; floats or AutoDiffXd.
+        rectangles: Rectangles (x, y, theta, length, width) in the world frame W, m and
+            rad.
         control_point_m: Distance of P ahead of the axle, m.
         maximum_range: Largest distance from P at which bodies are seen, m.
         slots: Largest number of vectors.
 
     Returns:
-        Vectors (feature, x, y), nearest body first, with x and y in B axes, m. The
-        feature is the number of the body, counted from 1.
+        Vectors (feature, x, y), nearest body first. The feature is the number of the
+        body, counted from 1. x and y are in the axes of the robot, m.
     """
     p_WP = control_point(pose_WB, control_point_m)
     seen = []
@@ -58,7 +61,7 @@ def nearest_vectors(
 
 
 class ObstacleNumbers(NamedTuple):
-    """Parameters of ``ideal_obstacle_step``."""
+    """Constants of ``ideal_obstacle_step``."""
 
     control_point_m: float
     """Distance of P ahead of the axle, m."""
@@ -73,7 +76,9 @@ class ObstacleNumbers(NamedTuple):
 def ideal_obstacle_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Nearest points of one tick; see ``systems.framework.block.Step``.
+    """Computes the nearest points of one control period.
+
+    See ``systems.framework.block.Step`` for the arguments of all steps.
 
     Args:
         tick: Not used.
@@ -87,7 +92,7 @@ def ideal_obstacle_step(
     bodies = [(pose_WS[0], pose_WS[1], pose_WS[2], length, width)]
     for k in range(len(sizes) // 2):
         x, y, theta = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
-        # The leader stays the last one.
+        # The leader stays the last body.
         bodies.insert(k, (x, y, theta, sizes[2 * k], sizes[2 * k + 1]))
     vectors = nearest_vectors(
         pose_WB,
@@ -104,17 +109,18 @@ def IdealObstacleSensor_(T):
     class Impl(Block_[T]):
         """Gives the exact nearest points of the bodies, in all directions.
 
-        The block replaces ``UltrasonicArray`` and ``CollisionVector`` and has the same
-        outputs. The output is a function of the present input: there is no state, no
-        latency and no noise. It is differentiable wherever the nearest point is unique.
+        The block replaces ``UltrasonicArray`` and ``CollisionVector``, and has the same
+        outputs. The output is a function of the present input. There is no state, no
+        latency, and no noise. The output is differentiable wherever the nearest point
+        is unique.
 
         Args:
-            robot: Position of P.
+            robot: Parameters of the robot, for the position of the control point P.
             maximum_range_m: Largest distance from P at which bodies are seen, m.
             all_bodies: Whether to report up to three bodies (``aggregation: sum``)
-                instead of the nearest one.
+                instead of only the nearest body.
             source_size: Length and width of the leader, m.
-            obstacle_count: Number of boxes on the obstacle ports.
+            obstacle_count: Number of obstacles on the ports ``poses_WO`` and ``sizes``.
         """
 
         part, stage = "collision", "obstacle sensing"

@@ -1,4 +1,4 @@
-"""From the ranges of beams to objects with positions and velocities."""
+"""A block that detects objects, with positions and velocities, from beam ranges."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ from systems.ranging.objects import OBJECTS_PORT, OBJECTS_SIZE
 from systems.ranging.parameters import OBJECT_SIZE, UltrasonicParameters
 from systems.world.geometry import control_point
 
-#: State of one beam: its last hit in W, m, its range, m, and 1 if there was an echo.
+# State of one beam: x and y of its last hit in W, m; its range, m; and 1 if there was
+# an echo, otherwise 0.
 _HIT_X, _HIT_Y, _RANGE, _HEARD = range(4)
 _BEAM_SIZE = 4
 
 
 class DetectorNumbers(NamedTuple):
-    """Parameters of ``object_detector_step``."""
+    """Constants of ``object_detector_step``."""
 
     axes: NDArray[np.float64]
     """(n,) directions of the beams in B, rad."""
     places: NDArray[np.float64]
-    """(n, 2) origins of the beams from P in B, m."""
+    """(n, 2) origins of the beams relative to P, in the axes of B, m."""
     beams: BeamNumbers
     tracks: TrackNumbers
     control_point_m: float
@@ -48,17 +49,17 @@ class DetectorNumbers(NamedTuple):
 def _keep_hits(
     kept: Any, ranges: Any, echo: Any, ages: Any, pose: Any, numbers: DetectorNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Stores the new hits of the beams in W.
+    """Stores the new hits of the beams in the world frame W.
 
-    A beam without a new range keeps its last hit. A beam whose range is too old has no
-    echo.
+    A beam without a new range keeps its last hit. If the range of a beam is too old,
+    the beam has no echo.
 
     Args:
-        kept: (n, _BEAM_SIZE) state of the beams, changed.
+        kept: (n, _BEAM_SIZE) state of the beams, changed in place.
         ranges: (n,) ranges, m.
-        echo: (n,) 1 where there is an echo, else 0.
+        echo: (n,) 1 if the sensor has an echo, otherwise 0.
         ages: (n,) times since each sensor fired, s.
-        pose: (x, y, theta) of the robot, m and rad.
+        pose: Pose (x, y, theta) of the robot, m and rad.
         numbers: ``DetectorNumbers``.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -80,7 +81,7 @@ def _keep_hits(
 def _detect(
     state: Any, ranges: Any, echo: Any, ages: Any, pose: Any, numbers: DetectorNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Detects the objects of one tick, and updates the state.
+    """Detects the objects of one control period, and updates the state.
 
     Returns:
         (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
@@ -103,9 +104,9 @@ def _detect(
 def object_detector_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DetectorNumbers
 ) -> None:
-    """Objects that the beams hit.
+    """Computes the objects that the beams hit in one control period.
 
-    The state holds the last hit of each beam, then the tracks.
+    The state has the last hit of each beam, then the tracks.
     """
     ranges, echo, ages, pose = inputs
     found = _detect(state, ranges, echo, ages, pose, numbers)
@@ -114,43 +115,47 @@ def object_detector_step(
 
 
 class ObjectDetector(Block):
-    """Groups the hits of beams into objects, and tracks them for their velocities.
+    """Groups the hits of beams into objects and estimates the objects' velocities.
 
-    The block replaces ``IdealObjectSensor`` and has the same output port. Hits of
-    adjacent beams that are close enough are one object; a hollow surface is several
-    objects. For each object, the block gives three quantities:
+    The block replaces ``IdealObjectSensor`` and has the same output port. If hits of
+    adjacent beams are close enough, they belong to one object. A hollow surface counts
+    as several objects. For each object, the block gives three quantities:
 
-    - the vector to the nearest point of the present hits and of the lines between them;
-    - the filtered velocity, once the block has tracked the object for long enough;
+    - the vector from the control point P to the nearest point of the object. The block
+      searches this point among the present hits and the lines between them.
+    - the filtered velocity, after the block has tracked the object for long enough.
     - the radius, which is half of the width of the object, or 0 if the object is wide.
 
-    The block keeps an object for a while after it was last seen, because narrow beams
-    do not hit an object between them. The beams do not show whether an object is a
-    robot.
+    The block keeps an object for 0.5 s after its last hit, because narrow beams do not
+    hit an object between them. The beams do not show whether an object is a robot.
 
-    Beams detect only objects that they hit. With 7 beams, a disc 0.2 m wide is certain
-    to be seen only within 0.4 m of P. Motion along a surface is visible only at the
-    edges of the surface, with a resolution equal to the spacing of the beams. For
-    example, boxes cross at 0.15 to 0.3 m/s at a distance of 1 m. One second after they
-    come into view, the median error of their velocities is 25 % with 36 beams all
-    around. It is 15 % with 72 beams and 7 % with 360 beams. While the robot turns,
-    bodies at rest seem to move at up to 0.3 m/s with 36 beams, 0.12 m/s with 72 beams
-    and 0 m/s with 360 beams. No velocity is known where the spacing of the beams
-    exceeds 0.25 m. For the 7 beams, this is the case at distances above 0.48 m.
+    The accuracy has these limits:
 
-    The discrete state holds the hits and the tracks, and is updated every tick. The
-    output is a function of state and inputs. There is no latency, but the velocity
-    takes about 0.5 s to follow a change.
+    - Beams detect only objects that they hit. With 7 beams, a disc of 0.2 m width is
+      certain to be hit only within 0.4 m of P.
+    - A motion along a surface is visible only at the edges of the surface. The
+      resolution equals the spacing of the beams. For example, boxes cross at 0.15 to
+      0.3 m/s at a distance of 1 m. One second after the boxes come into view, the
+      median error of their velocities is 25 % with 36 beams all around, 15 % with 72
+      beams, and 7 % with 360 beams.
+    - While the robot turns, bodies at rest seem to move. Their apparent speed is up to
+      0.3 m/s with 36 beams, 0.12 m/s with 72 beams, and 0 m/s with 360 beams.
+    - If the spacing of the beams exceeds 0.25 m, no velocity is known. With the 7
+      beams, this is the case at distances above 0.48 m.
+
+    The discrete state has the hits and the tracks. The state is updated every control
+    period. The output is a function of the state and the inputs. There is no latency,
+    but the velocity takes about 0.5 s to follow a change.
 
     Args:
-        sensors: Positions, directions and rate of the beams.
-        robot: Position of P.
-        tick_s: Control period of the robot, s.
+        sensors: Positions, directions, and firing period of the beams.
+        robot: Parameters of the robot, for the position of P.
+        tick_s: Control period, s.
 
-    Reference: this block is our own. Engelbrecht, Steyn and Djouani (2021) print
-    neither how beams become obstacles nor how they obtain the velocities. If each beam
-    were an obstacle, the sum of their dampings would exceed the largest stable damping
-    at this tick.
+    Reference: our own work. Engelbrecht, Steyn and Djouani (2021) print neither how
+    beams become obstacles nor how the velocities are obtained. If each beam were an
+    obstacle, the sum of the dampings would exceed the largest stable damping for this
+    control period.
     """
 
     part, stage = "objects", "obstacle sensing"

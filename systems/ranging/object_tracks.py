@@ -1,4 +1,4 @@
-"""Tracking of objects, which yields their velocities."""
+"""Tracking of objects over several control periods, which yields their velocities."""
 
 from __future__ import annotations
 
@@ -23,47 +23,53 @@ from systems.ranging.parameters import OBJECT_SIZE
 
 #: Largest number of tracks.
 TRACKS = 12
-#: Largest distance between a group and the predicted position of its track, m. A group
-#: farther away is another object.
+#: Largest distance between a group of hits and the predicted position of its track, m.
+#: A group that is farther away is another object.
 _GATE_M = 0.3
 #: Width of an object above which its motion along its surface is not visible, m.
 _WIDE_M = 0.8
 #: Spacing of the beams above which motion is not visible, m.
 _COARSE_M = 0.25
-#: Standard deviation of the distance of an object in addition to the noise of the
-#: ranges, m. The beams hit different points of an object from tick to tick.
+#: Standard deviation of the distance of an object, m. This error comes in addition to
+#: the noise of the ranges, because the beams hit different points of an object from
+#: tick to tick.
 NOISE_M = 0.04
-#: Rate at which the variance of each velocity component grows, (m/s)^2/s: a velocity
-#: changes by 0.1 m/s within one second.
+#: Rate at which the variance of each velocity component grows, (m/s)^2/s. The standard
+#: deviation grows to 0.1 m/s within one second.
 _WALK = 0.1**2
-#: Time for which a motion must be visible without interruption before its velocity is
-#: known, s.
+#: The velocity of an object is known after its motion has been visible without
+#: interruption for this time, s.
 _CONFIRMATION_S = 0.5
 #: Time for which a track is kept after its object was last seen, s.
 _MEMORY_S = 0.5
 #: Speed below which an object counts as at rest, m/s.
 _RESTING_M_S = 0.05
 
-# Elements of a track. EXISTS is 1 or 0. SURE is the time for which the motion has been
-# visible without interruption, s. UNSEEN is the time since the object was last seen, s.
-# QX and QY are its nearest point in W, m. RADIUS is its radius, m. DEPTH is how far
-# the tracked position is behind the nearest point, as seen from P, m. STATE is position
-# and velocity in W, m and m/s. COVARIANCE is the 4 x 4 covariance of STATE, row by row.
+# Indices of the elements of a track.
+# ``EXISTS``: 1 if the track exists, otherwise 0.
+# ``SURE``: time for which the motion has been visible without interruption, s.
+# ``UNSEEN``: time since the object was last seen, s.
+# ``QX``, ``QY``: position of the nearest point of the object in W, m.
+# ``RADIUS``: radius of the object, m.
+# ``DEPTH``: distance from the nearest point to the tracked position, away from P, m.
+# ``STATE``: position and velocity of the object in W, m and m/s.
+# ``COVARIANCE``: 4 x 4 covariance of ``STATE``, row by row.
 _EXISTS, _SURE, _UNSEEN, _QX, _QY, _RADIUS, _DEPTH, _STATE = range(8)
 _COVARIANCE = _STATE + 4
 TRACK_SIZE = _COVARIANCE + 16
 
-# Standard deviations: of each component of an initial velocity, m/s, and of an unknown
-# position along a surface, m.
+# ``_FIRST_M_S``: standard deviation of each component of an initial velocity, m/s.
+# ``_ANYWHERE_M``: standard deviation of an unknown position along a surface, m.
 _FIRST_M_S, _ANYWHERE_M = 0.5, 10.0
 # Time constant with which the depth of a track follows the measured depth, s.
 _DEPTH_S = 4.0
-# Time constant with which a velocity along a surface decays if it is not visible, s.
+# Time constant with which a velocity along a surface decays if the motion along the
+# surface is not visible, s.
 _FORGET_S = 5.0
 
 
 class TrackNumbers(NamedTuple):
-    """Parameters of the tracking."""
+    """Constants of the tracking."""
 
     noise_m: float
     """Standard deviation of the distance of a group, m."""
@@ -72,9 +78,9 @@ class TrackNumbers(NamedTuple):
 
 @njit(cache=True)
 def _move_on(track: Any, own: TrackNumbers) -> None:  # pragma: no cover  (compiled)
-    """Predicts a track one tick ahead.
+    """Predicts a track one control period ahead.
 
-    The model is a constant velocity with white noise of acceleration.
+    The model has a constant velocity and white noise of the acceleration.
     """
     t = own.tick_s
     track[_UNSEEN] += t
@@ -104,9 +110,9 @@ def _correct(
     """Corrects a track by one scalar measurement of its position (Kalman update).
 
     Args:
-        track: (TRACK_SIZE,) the track, changed.
-        off: Measured minus predicted position along ``h``, m.
-        h: (x, y) unit vector of the measured direction in W.
+        track: (TRACK_SIZE,) track, changed in place.
+        off: Measured position minus predicted position along ``h``, m.
+        h: Unit vector (x, y) of the measured direction in the world frame W.
         variance: Variance of the measurement, m^2.
     """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
@@ -123,19 +129,19 @@ def _correct(
 def _turn_surface(
     track: Any, p_WP: Any, along: Any, own: TrackNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Rotates the position of a surface about P to its present nearest point.
+    """Moves the tracked position of a surface to the direction of its nearest point.
 
     The noise of the ranges moves the nearest point along the surface by more than the
-    spacing of the beams. Only the distance from P shows a motion. The function
-    therefore keeps this distance and rotates its variance to the new direction. The
-    position along the surface becomes unknown. The velocity along the surface is not
-    measured; it decays to zero.
+    spacing of the beams. Therefore only the distance from the control point P shows a
+    motion. The function keeps this distance and rotates its variance to the new
+    direction. The position along the surface becomes unknown. The sensors do not
+    measure the velocity along the surface, so this velocity decays to zero.
 
     Args:
-        track: (TRACK_SIZE,) the track, changed.
-        p_WP: (x, y) of P in W, m.
-        along: (x, y) unit vector from P to the present nearest point.
-        own: Parameters of the tracking.
+        track: (TRACK_SIZE,) track, changed in place.
+        p_WP: Position (x, y) of P in the world frame W, m.
+        along: Unit vector (x, y) from P to the present nearest point in W.
+        own: Constants of the tracking.
     """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     x, y = state[0] - p_WP[0], state[1] - p_WP[1]
@@ -170,7 +176,7 @@ def _turn_surface(
 def _hides_motion(
     group: Any, own: TrackNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether motion along the surface of a group is not visible."""
+    """Checks whether the motion of a group along its surface is not visible."""
     wide = group[OPEN] > 0.5 or group[EXTENT] > _WIDE_M
     return bool(wide or group[CHORD] > _COARSE_M)
 
@@ -179,20 +185,23 @@ def _hides_motion(
 def _take_in(
     track: Any, group: Any, p_WP: Any, own: TrackNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Corrects a track by its group, or starts the track.
+    """Corrects a track by its group of hits, or starts the track.
 
-    The measured position depends on the group. If motion along the surface is not
-    visible, the position is the nearest point, and only its distance from P is
-    measured. Otherwise the position is in the direction of the middle of the group. The
-    distance of the position is that of the nearest point plus the smoothed depth. Both
-    coordinates are then measured. The noise perpendicular to this direction is larger
-    by the spacing of the beams.
+    The measured position depends on the group:
+
+    - If motion along the surface is not visible, the position is the nearest point.
+      Only the distance of this point from the control point P is measured.
+    - Otherwise, the position is in the direction of the middle of the group. The
+      distance of the position from P is that of the nearest point plus the smoothed
+      depth. The depth is the distance of the middle minus the distance of the nearest
+      point. Both coordinates are measured. The noise perpendicular to the direction is
+      larger by the spacing of the beams.
 
     Args:
-        track: (TRACK_SIZE,) the track, changed.
+        track: (TRACK_SIZE,) track, changed in place.
         group: (GROUP_SIZE,) row of ``group_beams``.
-        p_WP: (x, y) of P in W, m.
-        own: Parameters of the tracking.
+        p_WP: Position (x, y) of P in the world frame W, m.
+        own: Constants of the tracking.
     """
     wide = _hides_motion(group, own)
     sure = group[CHORD] < _COARSE_M and (not wide or group[EXTENT] > 0.0)
@@ -242,14 +251,14 @@ def _take_in(
 def _tracks_of(
     tracks: Any, groups: Any, p_WP: Any, own: TrackNumbers
 ) -> NDArray[np.int64]:  # pragma: no cover  (compiled)
-    """Assigns groups to tracks.
+    """Assigns groups of hits to tracks.
 
-    The function first assigns the group and the track with the smallest distance from
-    each other. It then assigns the pair with the next distance, and so on up to
-    ``_GATE_M``. Each track gets at most one group.
+    The function first assigns the group and the track that are nearest to each other.
+    Then it assigns the next nearest pair, and so on up to the distance ``_GATE_M``.
+    Each track gets at most one group.
 
     Returns:
-        (n,) number of the track of each group; -1 if the group has no track.
+        (n,) index of the track of each group; -1 if the group has no track.
     """
     count = len(groups)
     away = np.full((count, TRACKS), np.inf)
@@ -277,28 +286,30 @@ def _tracks_of(
 def track_objects(
     tracks: Any, groups: Any, p_WP: Any, own: TrackNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Tracks the objects for one tick.
+    """Tracks the objects for one control period.
 
     Each track is a Kalman filter with constant velocity (Bar-Shalom, Li and
     Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, 6.2.2).
-    The filter works in W, so that the motion of the robot does not appear as a motion
-    of objects.
+    The filter works in the world frame W, so that the motion of the robot does not
+    appear as a motion of objects.
 
-    A beam measures a distance, but does not show where an object is between this beam
-    and its neighbors. A position is therefore accurate in the direction of P. In the
-    perpendicular direction, it is as coarse as the spacing of the beams. The motion of
-    a surface along itself is not visible if the surface is wide or may continue beyond
-    its hits. The filter then does not measure this velocity, which starts at zero.
+    A beam measures a distance. The beams do not show where an object is between two
+    beams. A position is therefore accurate in the direction of the control point P. In
+    the perpendicular direction, the position is as coarse as the spacing of the beams.
 
-    A beam on an oblique surface shows motion along the surface as motion towards P.
+    If a surface is wide or may continue beyond its hits, the motion of the surface
+    along itself is not visible. The filter then does not measure this velocity, which
+    starts at zero.
+
+    On an oblique surface, a beam shows a motion along the surface as a motion toward P.
     Therefore no velocity is known where the spacing of the beams is large. The same
-    applies to a single hit that may be part of a longer surface.
+    rule applies to a single hit that may be part of a longer surface.
 
     Args:
-        tracks: (TRACKS, TRACK_SIZE) the tracks, changed.
-        groups: (n, GROUP_SIZE) groups of ``group_beams``.
-        p_WP: (x, y) of P in W, m.
-        own: Parameters of the tracking.
+        tracks: (TRACKS, TRACK_SIZE) tracks, changed in place.
+        groups: (n, GROUP_SIZE) groups from ``group_beams``.
+        p_WP: Position (x, y) of P in W, m.
+        own: Constants of the tracking.
 
     Returns:
         (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.

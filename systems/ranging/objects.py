@@ -1,15 +1,16 @@
-"""The port ``objects_W``: the objects around a robot.
+"""Definition of the port ``objects_W``, which has the objects around a robot.
 
 The port has ``OBJECT_SLOTS`` slots of ``OBJECT_SIZE`` numbers, nearest object first.
-Empty slots are zero. A slot has these elements:
+Empty slots are zero. P is the control point of the robot, and W is the world frame. A
+slot has these elements:
 
-- THERE: 1, or 0 in an empty slot;
-- X, Y: vector from P to the nearest point of the object in W axes, m;
-- VX, VY: velocity of the object in W, m/s;
-- KNOWN: 1 if the velocity is known, else 0;
-- RADIUS: radius of the disc that represents the object and has the nearest point on its
-  edge, m; 0 for a point or a flat face;
-- ROBOT: 1 if the object is a robot, else 0.
+- THERE: 1 if the slot has an object, 0 if the slot is empty.
+- X, Y: vector from P to the nearest point of the object, in the axes of W, m.
+- VX, VY: velocity of the object in W, m/s.
+- KNOWN: 1 if the velocity is known, otherwise 0.
+- RADIUS: radius of the disc that represents the object, m. The nearest point is on the
+  edge of the disc. The radius is 0 for a point or a flat face.
+- ROBOT: 1 if the object is a robot, otherwise 0.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from systems.framework.compiling import njit
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 THERE, X, Y, VX, VY, KNOWN, RADIUS, ROBOT = range(8)
-#: Size of the port.
+#: Number of elements of the port.
 OBJECTS_SIZE = OBJECT_SLOTS * OBJECT_SIZE
 #: Output port of every block that senses objects.
 OBJECTS_PORT = Port(
@@ -35,13 +36,13 @@ OBJECTS_PORT = Port(
 
 @njit(cache=True)
 def nearest_objects(slots: Any) -> Any:  # pragma: no cover  (compiled)
-    """Selects the nearest objects, at most one per slot of the port.
+    """Selects the nearest objects, at most one object per slot of the port.
 
     Args:
         slots: (n, OBJECT_SIZE) objects and empty slots, in any order.
 
     Returns:
-        (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
+        (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first. Unused slots are zero.
     """
     chosen = np.zeros((OBJECT_SLOTS, OBJECT_SIZE))
     away = np.hypot(slots[:, X], slots[:, Y])

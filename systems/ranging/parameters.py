@@ -41,16 +41,18 @@ from systems.ranging.sensor_shorthand import (
     shortened_sensors,
 )
 
-#: Number of slots of a port with objects, and number of elements of each slot; see
-#: ``systems.ranging.objects``.
+# See ``systems.ranging.objects`` for the port with objects.
+# ``OBJECT_SLOTS``: number of slots of the port.
+# ``OBJECT_SIZE``: number of elements of a slot.
 OBJECT_SLOTS, OBJECT_SIZE = 8, 8
 
-#: The directions of neighboring sensors differ by at most this angle, deg.
+#: Two adjacent sensors are neighbors if their directions differ by at most this angle,
+#: deg.
 NEIGHBOURS_DEG = 90.0
 
 
 class RangeSensorParameters(Parameters):
-    """One range sensor with a cone: an SRF-05 (Han 2019, 4.2), or another one."""
+    """Parameters of one range sensor with a cone (default: SRF-05, Han 2019, 4.2)."""
 
     model_config = ConfigDict(json_schema_extra=mark_shared)
 
@@ -61,9 +63,9 @@ class RangeSensorParameters(Parameters):
     beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
     """Half of the opening angle of the cone, deg."""
     minimum_range_m: Length = 0.03
-    """Smallest reported range, m; nearer surfaces also give this range."""
+    """Smallest reported range, m. Nearer surfaces give this range, too."""
     maximum_range_m: Length = 3.0
-    """Largest range, m; farther surfaces give no echo."""
+    """Largest range, m. Farther surfaces give no echo."""
     noise_m: NonNegativeLength = 0.001
     """Standard deviation of a range, m."""
     dropout_probability: Fraction = 0.0
@@ -74,27 +76,29 @@ _THREE = tuple(RangeSensorParameters(axis_deg=axis) for axis in (30.0, 0.0, -30.
 
 
 class UltrasonicParameters(Parameters):
-    """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
+    """Parameters of all range sensors. The default is three SRF-05 (Han 2019, 4.2)."""
 
-    # After validation, each sensor has a complete record. The input may be shorter, see
-    # ``sensor_shorthand``.
+    # After validation, each sensor has a complete record. The input may be in a shorter
+    # form, see ``sensor_shorthand``.
     model_config = ConfigDict(
         json_schema_extra=lambda schema: add_shorthand(schema, RangeSensorParameters)
     )
 
     preset: SensorPreset = "three"
-    """Named set of sensors. It provides the defaults of the other fields; fields that
-    are set take precedence."""
+    """Named set of sensors. The set provides the defaults of the other fields. Values
+    that you set in the other fields take precedence."""
     sensors: Annotated[tuple[RangeSensorParameters, ...], Strict(False)] = _THREE
-    """The sensors, from left to right. Each has ``axis_deg``, and may have values of
-    its own of the fields from ``position_m`` to ``dropout_probability``. A number n
-    stands for n sensors with evenly spaced axes all around, of which the first one
+    """List of the sensors, from left to right.
+
+    Each sensor has the field ``axis_deg``. A sensor may also have its own values of the
+    fields from ``position_m`` to ``dropout_probability``. A number n instead of a list
+    defines n sensors with evenly spaced axes all around. The first of these sensors
     points backward."""
     period_s: Period = TICK_S
     """Time from one firing to the next, s."""
     firing: Literal["simultaneous", "sequential"] = "simultaneous"
-    """Whether all sensors fire at once, or one after the other with one period between
-    them."""
+    """Order in which the sensors fire. With ``simultaneous``, all sensors fire at once.
+    With ``sequential``, the sensors fire one after the other, one per ``period_s``."""
 
     @model_validator(mode="before")
     @classmethod
@@ -168,13 +172,14 @@ class UltrasonicParameters(Parameters):
         return tuple(sensor.position_m for sensor in self.sensors)
 
     def each(self, field: str) -> NDArray[np.float64]:
-        """Returns the values of a field of all sensors.
+        """Returns the values of one field for all sensors.
 
         Args:
             field: Name of a field of ``RangeSensorParameters``.
 
         Returns:
-            (n,) values; (n, 2) for ``position_m``.
+            (n,) array with one value per sensor. For ``position_m``, the shape is (n,
+            2).
         """
         return np.array([getattr(sensor, field) for sensor in self.sensors])
 
@@ -207,10 +212,16 @@ class UltrasonicParameters(Parameters):
         return np.array(self.axes), np.array(self.places), np.array(self.half_angles)
 
     def period_ticks(self, tick_s: float) -> int:
-        """Number of ticks from one firing to the next.
+        """Computes the number of control periods (ticks) from one firing to the next.
+
+        Args:
+            tick_s: Control period, s.
+
+        Returns:
+            Number of control periods.
 
         Raises:
-            InputError: The period is not a multiple of the tick.
+            InputError: The firing period is not a multiple of the control period.
         """
         ticks = self.period_s / tick_s
         if not whole(ticks):
@@ -222,7 +233,7 @@ class UltrasonicParameters(Parameters):
         return round(ticks)
 
     def round_ticks(self, tick_s: float) -> int:
-        """Number of ticks from one reading of a sensor to its next reading."""
+        """Returns the number of control periods between two readings of a sensor."""
         rounds = self.count if self.firing == "sequential" else 1
         return rounds * self.period_ticks(tick_s)
 
@@ -237,29 +248,34 @@ VelocityTerm = Literal["printed", "closing"]
 
 
 class CollisionVectorParameters(Parameters):
-    """Conversion of echoes to collision vectors."""
+    """Parameters of the conversion of echoes to collision vectors."""
 
     aggregation: Aggregation = "paper"
-    """``paper``: the nearest echo, joined with a neighboring echo that is close enough.
-    If both neighbors are close enough, the echo nearer to P is used. ``nearest``: only
-    the nearest echo. ``sum``: one vector per pair and per unpaired echo, but only the
-    nearest three vectors. The forces of the vectors are added."""
+    """Rule that combines echoes into collision vectors.
+
+    ``paper``: the block joins the nearest echo with a neighboring echo that is close
+    enough. If both neighbors are close enough, the block uses the neighbor that is
+    nearer to P. ``nearest``: the block uses only the nearest echo. ``sum``: the block
+    makes one vector per pair of close echoes and per unpaired echo, but only the
+    nearest three vectors count. The law adds the forces of these vectors."""
     velocity_term: VelocityTerm = "printed"
-    """Definition of the speed s of an obstacle in the laws: ``printed`` is |dC/dt|,
-    ``closing`` is the speed of approach only."""
+    """Definition of the speed s of an obstacle in the laws. With ``printed``, s is
+    |dC/dt|, the rate of change of the collision vector C. With ``closing``, s is the
+    speed of approach."""
 
 
 class ObjectSensorParameters(Parameters):
     """Range and errors of the object sensor."""
 
     maximum_range_m: Length = 2.0
-    """Range R of the scan, m (table 1); objects beyond it are not seen."""
+    """Range R of the scan, m (table 1). The sensor does not see objects beyond this
+    range."""
     noise_m: NonNegativeLength = 0.0
     """Standard deviation of each coordinate of a position, m."""
     velocity_noise_m_s: NonNegativeSpeed = 0.0
     """Standard deviation of each component of a velocity, m/s."""
     latency_s: Time = 0.0
-    """Age of the reported objects, s; a multiple of the tick."""
+    """Age of the reported objects, s. The age must be a multiple of the tick."""
     occlusion: bool = False
     """Whether bodies hide other bodies behind them. A body is hidden if its nearest
     point and all four corners are hidden."""

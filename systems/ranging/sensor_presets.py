@@ -7,7 +7,8 @@ from typing import Any, Literal
 
 SensorPreset = Literal["three", "six", "ring_8", "ring_12", "lidar", "scan_7"]
 
-#: A mast above the axle, from where the body of the robot does not block any sensor.
+#: Position of a mast above the axle. The body of the robot does not block the view of a
+#: sensor on the mast.
 _MAST = {"position_m": (-0.175, 0.0)}
 _FRONT = [{"axis_deg": axis} for axis in (30.0, 0.0, -30.0)]
 
@@ -35,8 +36,8 @@ SENSOR_PRESETS: Mapping[str, Mapping[str, Any]] = {
         "noise_m": 0.01,
     },
     # Engelbrecht, Steyn and Djouani 2021, table 1: beams over the front half plane, 30
-    # deg apart, R = 2 m. They do not print the width of a beam; the beams here are
-    # narrow.
+    # deg apart, R = 2 m. The paper does not print the width of a beam. The beams here
+    # are narrow.
     "scan_7": {
         "sensors": [{"axis_deg": 90.0 - 30.0 * k} for k in range(7)],
         "beam_half_angle_deg": 0.5,

@@ -1,12 +1,12 @@
-"""Short forms of the list of range sensors.
+"""Short forms of the list of range sensors in a scenario.
 
-These are the short forms of the group ``ultrasonic`` in a scenario:
+The group ``ultrasonic`` of a scenario accepts these short forms:
 
-- ``sensors: 8`` stands for 8 sensors with evenly spaced axes all around.
-- ``sensors: {1: {noise_m: 0.05}}`` changes sensor 1, counted from 0, of the preset.
+- ``sensors: 8`` defines 8 sensors with evenly spaced axes all around.
+- ``sensors: {1: {noise_m: 0.05}}`` changes sensor 1 of the preset, counted from 0.
 - ``noise_m: 0.01`` beside ``sensors`` applies to all sensors whose record does not have
-  this field. Without a list of sensors, it applies to all sensors of the preset. The
-  same is true for the other ``SHARED_FIELDS``.
+  this field. Without a list of sensors, the value applies to all sensors of the preset.
+  The other ``SHARED_FIELDS`` work in the same way.
 - ``axes_deg`` and ``positions_m`` are the fields of earlier versions.
 """
 
@@ -22,7 +22,7 @@ from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
 from systems.ranging.sensor_presets import SENSOR_PRESETS
 
-#: Fields of a sensor that may be given once for all sensors.
+#: Fields of a sensor that a scenario may set once for all sensors.
 SHARED_FIELDS = (
     "position_m",
     "beam_half_angle_deg",
@@ -38,14 +38,14 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
     """Replaces the short forms by one record per sensor.
 
     Args:
-        data: Input of the group ``ultrasonic``. Its values may be invalid.
+        data: Input of the group ``ultrasonic``. The values may be invalid.
 
     Returns:
-        The input with all records in ``sensors`` and without short forms. Records of
-        the wrong type stay as they are.
+        Input with all records in ``sensors`` and without short forms. Records of the
+        wrong type do not change.
 
     Raises:
-        InputError: A number of sensors, or the number of a sensor, is out of range.
+        InputError: The number of sensors, or the index of a sensor, is out of range.
     """
     given = dict(data)
     places = _replace_former_fields(given)
@@ -78,7 +78,12 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _replace_former_fields(given: dict[str, Any]) -> Sequence[Any]:
-    """Replaces ``axes_deg`` and ``positions_m``; returns several positions."""
+    """Replaces the former fields ``axes_deg`` and ``positions_m`` in place.
+
+    Returns:
+        Positions of the sensors, if ``positions_m`` had several positions. Otherwise
+        the result is empty.
+    """
     if "axes_deg" in given:
         axes = given.pop("axes_deg")
         listed = isinstance(axes, list | tuple)
@@ -94,7 +99,11 @@ def _replace_former_fields(given: dict[str, Any]) -> Sequence[Any]:
 
 
 def _ring_or_list(group: Mapping[str, Any]) -> Sequence[Any]:
-    """The list of sensors of a group, or as many sensors all around as it says."""
+    """Returns the list of sensors of a group.
+
+    If the group has a number of sensors instead of a list, the function makes sensors
+    with evenly spaced axes all around.
+    """
     sensors = group["sensors"]
     number = sensors if isinstance(sensors, int) else len(sensors)
     if not 1 <= number <= _MOST_SENSORS:
@@ -124,7 +133,9 @@ def _plain(record: Any) -> Any:
 
 
 def check_shared(data: Mapping[str, Any], model: type[Parameters]) -> None:
-    """Checks the fields that are given for all sensors, so that errors name them.
+    """Checks the fields that a scenario sets for all sensors.
+
+    Because of this early check, error messages name these fields.
 
     Args:
         data: Input of the group ``ultrasonic``.
@@ -149,14 +160,14 @@ def check_shared(data: Mapping[str, Any], model: type[Parameters]) -> None:
 def shortened_sensors(dumped: dict[str, Any]) -> dict[str, Any]:
     """Moves the most frequent value of each shared field into the group.
 
-    A later change of such a value in the group thus applies to all sensors that have
-    this value.
+    If a user later changes such a value in the group, the change applies to all sensors
+    that have this value.
 
     Args:
         dumped: All fields of ``UltrasonicParameters`` as plain values.
 
     Returns:
-        The short form, which ``expanded`` replaces by the same records.
+        Short form. ``expanded`` converts the short form back to the same records.
     """
     if "sensors" not in dumped:  # only some of the fields are wanted
         return dumped
@@ -170,7 +181,7 @@ def shortened_sensors(dumped: dict[str, Any]) -> dict[str, Any]:
 
 
 def mark_shared(schema: dict[str, Any]) -> None:
-    """Marks the shared fields in the JSON Schema of a sensor, which is changed."""
+    """Marks the shared fields in the JSON Schema of a sensor, in place."""
     for key in SHARED_FIELDS:
         schema["properties"][key]["shared"] = True
 
@@ -179,7 +190,7 @@ def add_shorthand(schema: dict[str, Any], model: type[Parameters]) -> None:
     """Adds the short forms to the JSON Schema of ``UltrasonicParameters``.
 
     Args:
-        schema: Changed in place.
+        schema: JSON Schema, changed in place.
         model: Model of a sensor.
     """
     properties, told = schema["properties"], meanings(model)

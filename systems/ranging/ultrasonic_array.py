@@ -1,4 +1,4 @@
-"""Ultrasonic range finders: the three sensors of the papers, or any others."""
+"""Ultrasonic range sensors: the three sensors of the papers, or any other set."""
 
 from __future__ import annotations
 
@@ -38,15 +38,16 @@ _NOISY_M = 0.3
 def body_rectangles(
     poses_WO: NDArray[np.float64], sizes: NDArray[np.float64], more: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Rectangles of the bodies, with further rows for other bodies.
+    """Collects the rectangles of the bodies, with further rows for other bodies.
 
     Args:
-        poses_WO: (3 n,) x, y, theta of each body, m and rad.
-        sizes: (2 n,) length and width of each body, m.
+        poses_WO: (3 n,) poses (x, y, theta) of the bodies in the world frame W, m and
+            rad.
+        sizes: (2 n,) lengths and widths of the bodies, m.
         more: Number of further rows, which the caller fills.
 
     Returns:
-        (n + more, 5) x, y, theta, length, width in W, m and rad.
+        (n + more, 5) rectangles: x, y, theta in W, m and rad, and length and width, m.
     """
     count = len(sizes) // 2
     rectangles = np.empty((count + more, 5))
@@ -67,16 +68,17 @@ def world_rectangles(
     pose_WS: NDArray[np.float64] | tuple[float, float, float],
     source_size: tuple[float, float],
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Rectangles of all bodies; the leader is the last one.
+    """Collects the rectangles of all bodies, with the leader as the last body.
 
     Args:
-        poses_WO: (3 n,) x, y, theta of each obstacle, m and rad.
-        sizes: (2 n,) length and width of each obstacle, m.
-        pose_WS: (3,) x, y, theta of the leader, m and rad.
+        poses_WO: (3 n,) poses (x, y, theta) of the obstacles in the world frame W, m
+            and rad.
+        sizes: (2 n,) lengths and widths of the obstacles, m.
+        pose_WS: (3,) pose (x, y, theta) of the leader in W, m and rad.
         source_size: Length and width of the leader, m.
 
     Returns:
-        (n + 1, 5) x, y, theta, length, width in W, m and rad.
+        (n + 1, 5) rectangles: x, y, theta in W, m and rad, and length and width, m.
     """
     rectangles = body_rectangles(poses_WO, sizes, 1)
     count = len(rectangles) - 1
@@ -92,16 +94,16 @@ def cone_ranges(
     parameters: UltrasonicParameters,
     control_point_m: float,
 ) -> NDArray[np.float64]:
-    """True distance to the nearest surface in each cone.
+    """Computes the true distance to the nearest surface in each cone.
 
     Args:
-        pose_WB: (x, y, theta) of the robot, m and rad.
-        rectangles: (n, 5) bodies in W.
+        pose_WB: Pose (x, y, theta) of the robot, m and rad.
+        rectangles: (n, 5) rectangles of the bodies in the world frame W.
         parameters: Positions and directions of the k sensors.
-        control_point_m: Distance of P ahead of the axle, m.
+        control_point_m: Distance of the control point P ahead of the axle, m.
 
     Returns:
-        (k,) distances, m; infinite where a cone is empty.
+        (k,) distances, m. If a cone is empty, its distance is infinite.
     """
     pose = np.asarray(pose_WB, dtype=np.float64)
     return fan_ranges(pose, rectangles, *parameters.beams, control_point_m)
@@ -111,11 +113,12 @@ class RangeErrors(NamedTuple):
     """Errors and limits of the ranges."""
 
     stretch: float
-    """Factor of all ranges, due to the assumed speed of sound."""
+    """Factor of all ranges, due to an error of the assumed speed of sound."""
     noise_m: NDArray[np.float64]
     """(n,) standard deviation of the noise of each sensor, m."""
     least_luck: NDArray[np.float64]
-    """(n,) an echo is lost if its standard normal number is below this."""
+    """(n,) limits for the loss of echoes. An echo is lost if a standard normal random
+    number is below the limit of the sensor."""
     low_m: NDArray[np.float64]
     """(n,) smallest range of each sensor, m."""
     high_m: NDArray[np.float64]
@@ -123,14 +126,14 @@ class RangeErrors(NamedTuple):
 
 
 def range_errors(parameters: UltrasonicParameters, stretch: float = 1.0) -> RangeErrors:
-    """Collects the errors of all sensors.
+    """Collects the errors and limits of all sensors.
 
     Args:
-        parameters: The sensors.
-        stretch: Assumed divided by true speed of sound.
+        parameters: Parameters of the sensors.
+        stretch: Ratio of the assumed speed of sound to the true speed of sound.
 
     Returns:
-        The errors, one element per sensor.
+        Errors and limits, with one element per sensor.
     """
     from scipy.special import ndtri  # takes longer to load than all parameters
 
@@ -149,17 +152,17 @@ def measured_ranges(
     numbers: NDArray[np.floating],
     errors: RangeErrors,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Ranges that the sensors report.
+    """Computes the ranges that the sensors report.
 
     Args:
         true_ranges: (n,) true ranges, m; infinite where a cone is empty.
-        numbers: (2, n) standard normal numbers. The first row is the noise. The second
-            row decides about dropouts.
+        numbers: (2, n) standard normal random numbers. The first row is the noise. The
+            second row decides whether echoes are lost.
         errors: Errors and limits of the n sensors.
 
     Returns:
-        (n,) ranges within the limits of each sensor, m, and (n,) echoes, 0 or 1.
-        Without an echo, the range is the largest one and has no meaning.
+        Two arrays: (n,) ranges within the limits of each sensor, m, and (n,) echoes, 0
+        or 1. Without an echo, the range is the largest range and has no meaning.
     """
     count = len(true_ranges)
     ranges, echo = np.copy(errors.high_m), np.zeros(count)
@@ -173,12 +176,12 @@ def measured_ranges(
 
 
 class UltrasonicNumbers(NamedTuple):
-    """Parameters of ``ultrasonic_step``."""
+    """Constants of ``ultrasonic_step``."""
 
     axes: NDArray[np.float64]
     """(n,) directions of the cones in B, rad."""
     places: NDArray[np.float64]
-    """(n, 2) positions of the sensors from P in B axes, m."""
+    """(n, 2) positions of the sensors relative to P, in the axes of B, m."""
     half_angles: NDArray[np.float64]
     """(n,) halves of the opening angles of the cones, rad."""
     control_point_m: float
@@ -199,11 +202,12 @@ class UltrasonicNumbers(NamedTuple):
 def ultrasonic_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
 ) -> None:
-    """Ranges of one tick; see ``systems.framework.block.Step``.
+    """Computes the ranges of one control period; see ``systems.framework.block.Step``.
 
     Args:
-        tick: Number of the tick.
-        state: Last readings: ranges, m, then echoes, 0 or 1.
+        tick: Number of the control period.
+        state: Last readings: ranges of all sensors, m, then echoes of all sensors, 0 or
+            1.
         inputs: Values of the input ports.
         outputs: Values of the output ports.
         numbers: ``UltrasonicNumbers``.
@@ -216,11 +220,14 @@ def ultrasonic_step(
 def sourceless_ultrasonic_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
 ) -> None:
-    """``ultrasonic_step`` without a leader.
+    """Computes the ranges of one control period in a scenario without a leader.
+
+    Otherwise the step does the same as ``ultrasonic_step``.
 
     Args:
-        tick: Number of the tick.
-        state: Last readings: ranges, m, then echoes, 0 or 1.
+        tick: Number of the control period.
+        state: Last readings: ranges of all sensors, m, then echoes of all sensors, 0 or
+            1.
         inputs: Values of the input ports.
         outputs: Values of the output ports.
         numbers: ``UltrasonicNumbers``.
@@ -241,8 +248,9 @@ def _read_ranges(
 ) -> None:
     """Measures all ranges, applies the faults, and updates the sensors that fire.
 
-    All sensors are measured at every tick. A sensor stores its new reading only at the
-    ticks at which it fires. The outputs are the stored readings and their ages.
+    The function measures all sensors in every control period. A sensor stores its new
+    reading only in the periods in which it fires. The outputs are the stored readings
+    and their ages.
     """
     ranges, echo, ages = outputs
     beams = numbers.axes, numbers.places, numbers.half_angles
@@ -270,40 +278,42 @@ def _read_ranges(
 
 
 class UltrasonicArray(Block):
-    """Measures the ranges of the nearest surfaces in cones.
+    """Measures the distance to the nearest surface in the cone of each sensor.
 
-    Each sensor has its own position, cone, range and errors, so that sensors of
-    different kinds can work together.
+    Each sensor has its own position, cone, range, and errors. Therefore sensors of
+    different kinds can work together. A sensor reports a range, but no direction within
+    its cone.
 
-    The leader is a body like the obstacles; without a leader there is no port
+    The leader is a body like the obstacles. Without a leader, there is no port
     ``pose_WS``. Surfaces beyond the maximum range give no echo. Surfaces nearer than
-    the minimum range give the minimum range: without an echo at contact, the law would
-    not push the robot away. A cone reports a range, not a direction.
-
-    The state holds the last range and echo of each sensor. The output is a function of
-    state and present poses; there is no latency. The noise is drawn once per tick.
+    the minimum range give the minimum range. If these surfaces gave no echo, the law
+    would not push the robot away at contact.
 
     All sensors fire at multiples of ``period_s``, and hold their readings between these
     times. With ``firing: sequential``, one sensor fires per period, from left to right,
-    and the other sensors hold their readings. For example, with three sensors and
-    periods of 25 ms the ranges are 0, 25 and 50 ms old. A sensor then fires again after
-    a round of 75 ms.
+    and the other sensors hold their readings. For example, three sensors with periods
+    of 25 ms have ranges that are 0, 25, and 50 ms old. Each sensor fires again after a
+    round of 75 ms.
+
+    The state has the last range and the last echo of each sensor. The output is a
+    function of the state and the present poses. There is no latency. The block draws
+    noise once per control period.
 
     Args:
-        parameters: The sensors, and the times at which they fire.
-        faults: Faults of the robot; those of ``ultrasonic`` apply.
-        robot: Position of P.
+        parameters: Parameters of the sensors, and the times at which they fire.
+        faults: Faults of the robot. Only faults of ``ultrasonic`` have an effect.
+        robot: Parameters of the robot, for the position of the control point P.
         sound_speed_m_s: True speed of sound, m/s.
         assumed_sound_speed_m_s: Speed of sound with which the sensors convert time to
-            range, m/s; None: the true speed.
-        source_size: Length and width of the leader, m; None if there is no leader.
-        obstacle_count: Number of boxes on the obstacle ports.
+            range, m/s. None: the true speed.
+        source_size: Length and width of the leader, m. None: there is no leader.
+        obstacle_count: Number of obstacles on the ports ``poses_WO`` and ``sizes``.
         seed: Seed of the noise.
-        tick_s: Control period of the robot, s.
+        tick_s: Control period, s.
 
     Raises:
-        InputError: The period of the sensors is not a multiple of the tick, or a fault
-            is that of a missing sensor.
+        InputError: The firing period is not a multiple of the control period, or a
+            fault belongs to a sensor that does not exist.
     """
 
     part, stage = "ultrasonic", "obstacle sensing"

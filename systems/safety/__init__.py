@@ -1,1 +1,1 @@
-"""The memory of free space, and the guard that keeps the robot there."""
+"""The memory of free space, and the guard that keeps the robot in free space."""

@@ -19,28 +19,30 @@ from systems.safety.free_space import (
 )
 from systems.safety.views import IN_PLACE_M, REST_M
 
-#: Actions of the guard.
+#: Numbers of the actions of the guard.
 PASSED, SLOWED, TURNED, BRAKED, HALTED = range(5)
 #: Shares of the wanted wheel speeds that are tried, the largest first.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 
-#: A robot that turns on the spot no faster than this counts as at rest, rad/s.
+#: A robot that turns on the spot counts as at rest if its yaw rate is at most this
+#: value, rad/s.
 SLOW_TURN_RAD_S = 0.3
 #: A robot turns on the spot if two conditions hold. The commanded speed of the axle is
-#: below this number, m/s. The way that the axle still moves due to the lag of the
+#: below this number, m/s. The distance that the axle still moves due to the lag of the
 #: motors is below ``IN_PLACE_M``.
 _IN_PLACE_M_S = 1e-6
-#: The robot withdraws from obstacles in view if at least this share of its motion leads
-#: away from them. With a larger share, the robot could not drive on if an obstacle
+#: Least share of the robot's motion that leads away from obstacles in view while the
+#: robot withdraws. With a larger share, the robot could not drive on if an obstacle
 #: approached from behind.
 _WITHDRAWS = 0.2
-#: A robot between ``least_m`` and ``keep_m`` may come nearer to space that is not free
-#: by this much per tick, m. The robot can then drive along the edge of that space.
+#: A robot between ``least_m`` and ``keep_m`` from non-free space may come nearer to
+#: this space by this distance per tick, m. The robot can then drive along the edge of
+#: the free space.
 _SLACK_M = 5e-4
 
 
 class BrakingNumbers(NamedTuple):
-    """How the robot moves and brakes, and which distances it keeps."""
+    """Model of the robot's motion and braking, and distances that the robot keeps."""
 
     wheel_radius_m: float
     wheel_separation_m: float
@@ -50,26 +52,30 @@ class BrakingNumbers(NamedTuple):
     """Deceleration of the commanded speed of the faster rim, m/s^2."""
     tick_s: float
     parts: int
-    """Number of parts of a tick. The guard compares the position with cells at the end
-    of each part."""
+    """Number of parts of a control period. The guard checks the position of the robot
+    against the cells at the end of each part."""
     part: LaggedMotion
     """Motion of the wheels in one part."""
     top_wheel_speed: float
     """Top speed of a wheel, rad/s."""
     keep_m: float
-    """Distance that the axle has to keep from space that is not free, m. It is the sum
-    of the radius of the body and the margins."""
+    """Distance that the axle has to keep from non-free space, m. The distance is the
+    sum of the radius of the body and the margins."""
     least_m: float
-    """Smaller distance for a robot that has come nearer than ``keep_m``, m."""
+    """Smaller distance, m, that applies to a robot nearer than ``keep_m``."""
     obstacle_speed_m_s: float
     """Largest speed of obstacles in view, m/s. With 0, all obstacles are at rest."""
 
 
 class Danger(NamedTuple):
-    """Cells and views that a robot has to avoid, at one tick."""
+    """Non-free cells and ends of sensor views that the robot has to avoid.
+
+    The view of a sensor is the region in which the sensor has seen free floor. The data
+    are for one control period.
+    """
 
     corners: NDArray[np.float64]
-    """(m, 2) corners of cells that are not free, from ``edge_cells``, m."""
+    """(m, 2) corners of non-free cells from ``edge_cells``, m."""
     corner_count: int
     """Number of cells in ``corners``."""
     cell_m: float
@@ -85,12 +91,13 @@ class Danger(NamedTuple):
 
 @register_jitable
 def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, float]:
-    """Computes the wheel speeds after a period with a constant command.
+    """Computes the wheel speeds after a time with a constant command.
 
     Args:
         speeds: Speeds of the left and right wheel at the start, rad/s.
-        commanded: Commanded speeds, rad/s.
-        kept: Share of the difference between both speeds that is left at the end.
+        commanded: Commanded speeds of the left and right wheel, rad/s.
+        kept: Share of the difference between actual and commanded speed that remains at
+            the end.
 
     Returns:
         Speeds of the left and right wheel at the end, rad/s.
@@ -104,16 +111,20 @@ def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, floa
 def roll_on(
     pose: Any, speeds: Any, commanded: Any, numbers: BrakingNumbers
 ) -> tuple[Any, Any]:  # pragma: no cover  (compiled)
-    """Computes pose and wheel speeds after a part of a tick, without slip.
+    """Computes the pose and the wheel speeds after one part of a control period.
+
+    The wheels roll without slip.
 
     Args:
-        pose: (x, y, theta), m and rad.
-        speeds: Speeds of the left and right wheel, rad/s.
-        commanded: Commanded speeds, rad/s, constant in this part.
+        pose: Pose (x, y, theta) at the start, m and rad.
+        speeds: Speeds of the left and right wheel at the start, rad/s.
+        commanded: Commanded speeds of the left and right wheel, rad/s. They are
+            constant during the part.
         numbers: Model of the robot.
 
     Returns:
-        (x, y, theta), m and rad, and speeds of the left and right wheel, rad/s.
+        Two values: the pose (x, y, theta) at the end, m and rad, and the speeds of the
+        left and right wheel at the end, rad/s.
     """
     part = numbers.part
     duration, lagged = part.duration_s, part.lagged_s
@@ -138,14 +149,14 @@ def roll_on(
 def braked(
     commanded: Any, numbers: BrakingNumbers
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the next command when braking: slower, along the same curve.
+    """Computes the next command of a robot that brakes along the same curve.
 
     Args:
-        commanded: Speeds of the left and right wheel, rad/s.
-        numbers: Deceleration.
+        commanded: Present commanded speeds of the left and right wheel, rad/s.
+        numbers: Model of the robot, for the deceleration.
 
     Returns:
-        Speeds of the left and right wheel, rad/s.
+        Next commanded speeds of the left and right wheel, rad/s.
     """
     fastest = max(abs(commanded[0]), abs(commanded[1])) * numbers.wheel_radius_m
     less = numbers.braking_m_s2 * numbers.tick_s
@@ -159,10 +170,11 @@ def braked(
 def _nearest_view(
     danger: Danger, x: float, y: float, ahead_s: float, speed: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Return the distance, m, of a place from the nearest end of a view.
+    """Computes the distance from a position to the nearest end of a sensor view, m.
 
-    The function subtracts the way that an obstacle covers at ``speed`` from the time of
-    the reading until ``ahead_s`` from now.
+    The function assumes that an obstacle moves from the end of the view at ``speed``.
+    The obstacle moves from the time of the reading until ``ahead_s`` from now. The
+    function subtracts the distance that the obstacle covers.
     """
     nearest = np.inf
     for sensor in range(danger.arcs.shape[0]):
@@ -181,37 +193,41 @@ def _nearest_view(
 def can_be_braked(
     pose: Any, speeds: Any, commanded: Any, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether the robot may obey a command for a tick.
+    """Checks whether the robot may obey a command for one control period.
 
-    The function predicts this motion: the robot obeys the command for one tick, and
-    then brakes to rest. It checks the position of the axle after each part of a tick.
-    The required distance of the axle from cells that are not free depends on its
-    present distance from them:
+    The function predicts this motion: the robot obeys the command for one period, and
+    then brakes to rest. The function checks the position of the axle after each part of
+    a period. The required distance from the axle to non-free cells depends on the
+    present distance:
 
-    * At least ``keep_m`` plus ``_SLACK_M``: the axle has to keep ``keep_m``.
-    * Smaller, but not below ``least_m``: the axle may come nearer by at most
-      ``_SLACK_M``, and never nearer than ``least_m``.
-    * Below ``least_m``, for example because nearby cells were forgotten: the axle must
-      not come nearer, and has to end farther away. In addition, it must not come nearer
-      to any point of a cell within ``least_m``.
+    - If the present distance is at least ``keep_m`` plus ``_SLACK_M``, the axle has to
+      keep the distance ``keep_m``.
+    - If the present distance is smaller, but not below ``least_m``, the axle may come
+      nearer by at most ``_SLACK_M``. The axle must not come nearer than ``least_m``.
+    - If the present distance is below ``least_m``, the axle must not come nearer and
+      has to end farther away. The axle also must not come nearer to any point of a cell
+      within ``least_m``. The distance can be this small because the map has forgotten
+      nearby cells.
 
-    A turn on the spot does not move the disc, so these limits do not apply to it.
+    A turn on the spot does not move the disc that contains the body. These limits
+    therefore do not apply to a turn on the spot.
 
     If obstacles may move, the function assumes an obstacle that starts at the end of a
-    view at the time of the reading, and moves at ``obstacle_speed_m_s``. The axle then
-    also has to keep ``keep_m`` from all points that such an obstacle may reach. As an
-    alternative, the robot may withdraw from the end of the view. A slow turn on the
-    spot counts as rest, so the function does not check it against moving obstacles.
+    sensor's view at the time of the reading. The obstacle moves at
+    ``obstacle_speed_m_s``. The axle then has to meet one of two conditions. It keeps
+    the distance ``keep_m`` from all points that such an obstacle may reach. Or the
+    robot withdraws from the end of the view. A slow turn on the spot counts as rest, so
+    the function does not check this turn against moving obstacles.
 
     Args:
-        pose: (x, y, theta) now, m and rad.
-        speeds: Speeds of the left and right wheel now, rad/s.
-        commanded: The command, rad/s.
-        danger: Cells and views to avoid.
+        pose: Present pose (x, y, theta), m and rad.
+        speeds: Present speeds of the left and right wheel, rad/s.
+        commanded: Commanded speeds of the left and right wheel, rad/s.
+        danger: Cells and ends of views to avoid.
         numbers: Model of the robot.
 
     Returns:
-        Whether the robot may obey the command.
+        True if the robot may obey the command.
     """
     radius, lag = numbers.wheel_radius_m, numbers.motor_lag_s
     now, keep, least = danger.distance_m, numbers.keep_m, numbers.least_m
@@ -241,7 +257,8 @@ def can_be_braked(
             reached < need or (near and _enters(begin, pose, danger, least))
         ):
             return False
-        # Way of the axle, or way of the disc's rim in the turn if this is longer.
+        # Distance that the axle moves, or distance that the disc's rim moves in the
+        # turn, whichever is longer.
         moved = max(way, keep * abs(pose[2] - begin[2]))
         if moving and not _keeps_off_moving(
             (x, y), parts * part_s, moved, danger, numbers
@@ -260,20 +277,22 @@ def can_be_braked(
 def _enters(
     begin: Any, pose: Any, danger: Danger, radius: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether a disc has come nearer to a point of a cell that is not free.
+    """Checks whether the robot's disc has come nearer to a point of a non-free cell.
 
-    The function compares the disc at the start with the disc now. The disc at the start
-    contains no obstacle, whatever the memory says about its cells. Some points of the
-    disc now are nearer to the middle at the start than to the middle now. These points
-    were also in the disc at the start, so no obstacle is there. They lie on one side of
-    the perpendicular bisector between both middles. A cell lies on this side if all its
-    corners do.
+    The disc at the start contains no obstacle, whatever the map states about its cells.
+    Some points of the present disc are nearer to the middle at the start than to the
+    present middle. These points were also in the disc at the start, so there is no
+    obstacle at these points. They lie on one side of the perpendicular bisector between
+    both middles. A cell lies on this side if all its corners do.
 
     Args:
-        begin: (x, y) of the middle at the start, m.
-        pose: (x, y, theta) now, m and rad.
-        danger: The cells that are not free.
+        begin: Middle (x, y) of the disc at the start, m.
+        pose: Present pose (x, y, theta), m and rad.
+        danger: Non-free cells.
         radius: Radius of the disc, m.
+
+    Returns:
+        True if a point of a non-free cell may have entered the disc.
     """
     x, y, cell = pose[0], pose[1], danger.cell_m
     back_x, back_y = begin[0] - x, begin[1] - y
@@ -300,10 +319,13 @@ def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (c
 def _keeps_off_moving(
     place: Any, ahead_s: float, moved: float, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether the robot keeps away from obstacles in view that may move.
+    """Checks whether the robot keeps away from obstacles in view that may move.
 
-    This holds if no such obstacle can be within ``keep_m`` of ``place`` after
-    ``ahead_s``. It also holds if the robot withdraws.
+    The result is true in two cases:
+
+    - No such obstacle can be within ``keep_m`` of the position ``place`` after
+      ``ahead_s``.
+    - The robot withdraws from the end of the sensors' view.
     """
     x, y = place
     speed = numbers.obstacle_speed_m_s
@@ -317,18 +339,19 @@ def _keeps_off_moving(
 def danger_of(
     space: FreeSpace, time: float, pose: Any, reach: Any, numbers: BrakingNumbers
 ) -> Danger:  # pragma: no cover  (compiled)
-    """Collects the cells and views that a robot has to avoid.
+    """Collects the cells and ends of sensor views that the robot has to avoid.
 
     Args:
-        space: Memory of free space.
+        space: Map of free space.
         time: Current time, s.
-        pose: (x, y, theta) now, m and rad.
-        reach: Distance from the axle within which cells are collected, m, and rolled
-            way for which free cells have to stay free, m.
+        pose: Present pose (x, y, theta), m and rad.
+        reach: Two distances, m. The first is the distance from the axle within which
+            cells are collected. The second is the rolled distance of the wheels during
+            which free cells have to stay free.
         numbers: Model of the robot.
 
     Returns:
-        The cells and views, as input of ``can_be_braked``.
+        Cells and ends of views, as input of ``can_be_braked``.
     """
     # The square contains at most this number of cells.
     corners = np.empty((int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
@@ -359,27 +382,28 @@ def chosen(
     danger: Danger,
     numbers: BrakingNumbers,
 ) -> tuple[int, tuple[float, float]]:  # pragma: no cover  (compiled)
-    """Chooses the first of several commands from which the robot can brake to rest.
+    """Chooses a command from which the robot can brake to rest.
 
-    The function tries these commands in order (``can_be_braked``):
+    The function tries these commands in order, and returns the first command that
+    ``can_be_braked`` permits:
 
-    1. the wanted wheel speeds, and smaller shares of them along the same curve;
-    2. the wanted turn, while the forward motion brakes;
-    3. the same turn, but slow enough to count as rest;
-    4. braking along the current curve. The check in the previous tick included this
-       motion, so it is not checked again.
+    1. the wanted wheel speeds, then smaller shares of them along the same curve.
+    2. the wanted turn, while the forward motion brakes.
+    3. the same turn, but slow enough to count as rest.
+    4. braking along the present curve. The check in the previous control period
+       included this motion. Therefore the function does not check this motion again.
 
     Args:
-        pose: (x, y, theta) now, m and rad.
-        speeds: Speeds of the left and right wheel now, rad/s.
+        pose: Present pose (x, y, theta), m and rad.
+        speeds: Present speeds of the left and right wheel, rad/s.
         wish: Wanted speeds of the left and right wheel, rad/s.
-        commanded: The last command, rad/s.
-        danger: Cells and views to avoid.
+        commanded: Last command for the left and right wheel, rad/s.
+        danger: Cells and ends of views to avoid.
         numbers: Model of the robot.
 
     Returns:
-        Action, from ``PASSED`` to ``BRAKED``, and speeds of the left and right wheel,
-        rad/s.
+        Two values: the action, ``PASSED`` to ``BRAKED``, and the commanded speeds of
+        the left and right wheel, rad/s.
     """
     for number in range(len(_SHARES)):
         share = _SHARES[number]
@@ -388,15 +412,15 @@ def chosen(
             return PASSED if number == 0 else SLOWED, part
     slower = braked(commanded, numbers)
     ahead, turn = 0.5 * (slower[0] + slower[1]), 0.5 * (wish[1] - wish[0])
-    # Limit the turn to the wheels' top speed: otherwise the robot would turn less than
-    # predicted.
+    # Limit the turn to the top speed of the wheels. Otherwise the robot would turn less
+    # than predicted.
     most = numbers.top_wheel_speed - abs(ahead)
     turn = min(max(turn, -most), most)
     part = ahead - turn, ahead + turn
     if can_be_braked(pose, speeds, part, danger, numbers):
         return TURNED, part
-    # A turn slow enough to count as rest is always permitted on the spot: otherwise the
-    # robot could never get away from a nearby obstacle.
+    # On the spot, a turn that is slow enough to count as rest is always permitted.
+    # Otherwise the robot could never get away from a nearby obstacle.
     slow = SLOW_TURN_RAD_S * numbers.wheel_separation_m
     slow *= 0.5 / numbers.wheel_radius_m
     turn = min(max(turn, -slow), slow)

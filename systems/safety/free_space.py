@@ -1,4 +1,4 @@
-"""Square cells of the floor around a robot that range sensors have seen free."""
+"""The map of free space: cells of the floor that range sensors have seen free."""
 
 from __future__ import annotations
 
@@ -16,43 +16,46 @@ register_jitable(lasting)
 
 #: Value of a cell that was never seen free.
 NEVER = -1.0
-#: The window moves when its middle is farther from the robot than the first number,
-#: cells. In a small window, the limit is the side of the window divided by the second
-#: number.
+#: The window moves when its middle is farther from the robot than this number of cells.
 _SLACK = 20
+#: In a small window, this limit is the side of the window divided by this number.
 _SLACK_SHARE = 8
-#: Each reading updates one of this many rows; the other rows follow with later
-#: readings.
+#: A reading updates only one row of cells out of this number of rows. Later readings
+#: update the other rows.
 _ROWS = 4
-#: Echoes within this distance, m, count fully. Farther echoes count less, because their
-#: arcs are longer.
+#: Echoes within this distance count as a full hit, m. Farther echoes count less,
+#: because their arcs are longer.
 _FULL_HIT_M = 0.6
 
 
 class FreeSpace(NamedTuple):
-    """A square window of n x n cells of the floor that moves along with a robot.
+    """Map of a square window of n x n cells of the floor, which moves with the robot.
 
     Cell (i, j) of the floor covers x from i to i + 1 and y from j to j + 1, in cells,
-    in the frame of the odometry. The values of this cell are stored at [i % n, j % n].
+    in the frame of the odometry. The arrays store the values of this cell at the index
+    [i % n, j % n].
+
+    The rolled distance is the mean distance that the rims of both wheels have rolled
+    since the start.
     """
 
     free_until: NDArray[np.float64]
-    """(n, n) rolled way up to which a cell counts as free, m. After this way, the
-    position of the cell is too uncertain. The value is ``NEVER`` if the cell was not
-    seen free."""
+    """(n, n) rolled distance up to which a cell counts as free, m. After this distance,
+    the position of the cell is too uncertain. The value is ``NEVER`` if the cell was
+    not seen free."""
     seen_s: NDArray[np.float64]
     """(n, n) time at which a cell was last seen free, s, or ``NEVER``."""
     hits: NDArray[np.float64]
-    """(n, n) weighted number of echoes from the place of a cell since it was last seen
+    """(n, n) weighted number of echoes from each cell since the cell was last seen
     free."""
     first: NDArray[np.int64]
     """(2,) i and j of the first cell of the window."""
     rolled_m: NDArray[np.float64]
-    """(1,) rolled way, m."""
+    """(1,) rolled distance, m."""
     arcs: NDArray[np.float64]
-    """(sensors, points, 2) points of the arc at which the view of each sensor ends, m,
-    in order from the right to the left edge of its aperture. The arc follows from the
-    last reading of the sensor."""
+    """(sensors, points, 2) arc of points (x, y) at which the view of each sensor ends,
+    m. The points are in order from the right to the left edge of the aperture. The arc
+    follows from the last reading of the sensor."""
     arcs_s: NDArray[np.float64]
     """(sensors, 1) time of the last reading of each sensor, s, or ``NEVER``."""
     cell_m: float
@@ -62,16 +65,16 @@ class FreeSpace(NamedTuple):
 def make_free_space(
     cells: int, cell_m: float, sensors: int, arc_points: int
 ) -> FreeSpace:
-    """Makes a window without any free cells.
+    """Makes a map without any free cells.
 
     Args:
         cells: Number of cells along each side.
         cell_m: Side of a cell, m.
         sensors: Number of sensors.
-        arc_points: Number of points of each sensor's arc.
+        arc_points: Number of points of the arc of each sensor.
 
     Returns:
-        The window, with the origin of the floor in its middle.
+        Map with the origin of the floor in its middle.
     """
     return FreeSpace(
         np.full((cells, cells), NEVER),
@@ -89,16 +92,18 @@ def make_free_space(
 def cell_is_free(
     space: FreeSpace, i: int, j: int, until: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether a cell counts as free.
+    """Checks whether a cell counts as free.
 
     Args:
-        space: The window.
-        i: Number of the cell on the floor along x.
-        j: Number of the cell on the floor along y.
-        until: Rolled way up to which the cell has to count as free, m.
+        space: Map of free space.
+        i: Index of the cell on the floor along x.
+        j: Index of the cell on the floor along y.
+        until: Rolled distance of the wheels up to which the cell has to count as free,
+            m.
 
     Returns:
-        Whether the cell counts as free. Cells outside the window do not.
+        True if the cell counts as free. A cell outside the window does not count as
+        free.
     """
     cells = space.free_until.shape[0]
     di, dj = i - space.first[0], j - space.first[1]
@@ -114,15 +119,15 @@ def cells_within(
     """Finds the cells of the window that a rectangle meets.
 
     Args:
-        space: The window.
+        space: Map of free space.
         low_x: Least x of the rectangle, m.
-        low_y: Least y, m.
-        high_x: Greatest x, m.
-        high_y: Greatest y, m.
+        low_y: Least y of the rectangle, m.
+        high_x: Greatest x of the rectangle, m.
+        high_y: Greatest y of the rectangle, m.
 
     Returns:
-        Least i and j, and greatest i and j, of these cells. A least number above the
-        greatest means that there are none.
+        Four indices of cells: least i, least j, greatest i, and greatest j. If a least
+        index exceeds the greatest index, the rectangle meets no cells.
     """
     cell, cells, (first_i, first_j) = space.cell_m, len(space.hits), space.first
     return (
@@ -137,12 +142,12 @@ def cells_within(
 def move_window(
     space: FreeSpace, x: float, y: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the window along with the robot, and forgets the cells that leave it.
+    """Moves the window with the robot and forgets the cells that leave the window.
 
     Args:
-        space: Modified in place.
-        x: Position of the robot, m.
-        y: Position of the robot, m.
+        space: Map of free space. The function changes the map in place.
+        x: Position of the robot, x in the frame of the odometry, m.
+        y: Position of the robot, y, m.
     """
     cells = space.free_until.shape[0]
     slack = min(_SLACK, cells // _SLACK_SHARE)
@@ -170,11 +175,11 @@ def clear_disc(
     """Marks the cells that lie entirely within a disc as free.
 
     Args:
-        space: Modified in place.
-        x: Position of the center, m.
-        y: Position of the center, m.
+        space: Map of free space. The function changes the map in place.
+        x: Center of the disc, x in the frame of the odometry, m.
+        y: Center of the disc, y, m.
         radius: Radius of the disc, m.
-        until: Rolled way up to which the cells count as free, m.
+        until: Rolled distance of the wheels up to which the cells count as free, m.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
     low_i, low_j, high_i, high_j = cells_within(
@@ -193,23 +198,23 @@ def clear_disc(
 def edge_cells(
     space: FreeSpace, x: float, y: float, reach: float, until: float, out: Any
 ) -> int:  # pragma: no cover  (compiled)
-    """Lists the cells of a square that are not free, but are next to a free cell.
+    """Lists the non-free cells of a square that are next to a free cell.
 
-    These cells are the edge of the space that is not free. For any place in free space,
-    the nearest cell that is not free belongs to this edge.
+    These cells are the edge of the non-free space. For any point in free space, the
+    nearest non-free cell belongs to this edge.
 
     Args:
-        space: The window.
-        x: Position of the middle of the square, m.
-        y: Position of the middle of the square, m.
+        space: Map of free space.
+        x: Middle of the square, x in the frame of the odometry, m.
+        y: Middle of the square, y, m.
         reach: Half of the side of the square, m.
-        until: Rolled way up to which cells have to be free, m.
-        out: (m, 2) array that the function fills: corner of least x and y of each cell,
-            m.
+        until: Rolled distance of the wheels up to which cells have to be free, m.
+        out: (m, 2) array that the function fills: the corner of least x and y of each
+            cell, m.
 
     Returns:
-        Number of listed cells. If this number exceeds m, ``out`` contains only m of
-        them.
+        Number of cells on the edge. If this number exceeds m, ``out`` contains only m
+        cells.
     """
     cell, count = space.cell_m, 0
     low_i, low_j = math.floor((x - reach) / cell), math.floor((y - reach) / cell)
@@ -232,7 +237,7 @@ def edge_cells(
 def _free_cells(
     space: FreeSpace, low_i: int, low_j: int, high_i: int, high_j: int, until: float
 ) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
-    """Return ``cell_is_free`` for all cells of a rectangle."""
+    """Returns ``cell_is_free`` for all cells of a rectangle."""
     cells = space.free_until.shape[0]
     first_i, first_j = space.first
     free = np.zeros((high_i - low_i + 1, high_j - low_j + 1), dtype=np.bool_)
@@ -252,17 +257,17 @@ def _free_cells(
 def nearest_cell(
     corners: Any, count: int, cell: float, x: float, y: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Returns the distance of a place from the nearest of several cells.
+    """Computes the distance from a position to the nearest of several cells.
 
     Args:
         corners: (m, 2) corners of least x and y of the cells, m.
         count: Number of cells in this array.
         cell: Side of a cell, m.
-        x: Position of the place, m.
-        y: Position of the place, m.
+        x: Position, x in the frame of the odometry, m.
+        y: Position, y, m.
 
     Returns:
-        Distance, m. It is infinite without cells.
+        Distance, m. If there are no cells, the distance is infinite.
     """
     best = np.inf
     for k in range(count):
@@ -282,25 +287,29 @@ def see(
     readings: Any,
     error: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Enters the newest readings of the sensors into the cells.
+    """Enters the newest readings of the sensors into the map of free space.
 
-    Sensors at one place form a group. For each group, the function visits the cells in
-    the sectors of the group, up to the greatest distance that the group has seen. As
-    seen from the group, the circle around a cell covers an angle. If the group has seen
-    free floor in this whole angle up to the far side of the circle, the cell becomes
-    free. It then loses all hits. Otherwise, the cell gets a hit if an echo comes from
-    the direction of its middle and from about its distance.
+    Sensors at the same position form a group. For each group, the function visits the
+    cells in the sectors of the group. The greatest distance that the group has seen
+    limits these cells. As seen from the group, the circle around a cell covers an
+    angle. The reading affects a cell in one of these ways:
+
+    - If the group has seen free floor in this whole angle up to the far side of the
+      circle, the cell becomes free. The cell then loses all hits.
+    - Otherwise, the cell gets a hit if an echo comes from the direction of its middle
+      and from about its distance.
 
     Args:
-        space: Modified in place.
+        space: Map of free space. The function changes the map in place.
         time: Current time, s.
-        turn: Number that selects the rows: only every fourth row of cells is updated.
-        pose: (x, y, theta) of the robot by its odometry, m and rad.
+        turn: Number that selects the rows of cells. Only every fourth row is updated.
+        pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
-        readings: (sensors, 2) distance up to which each sensor has seen free floor, m,
-            and distance of its echo, m. The first distance is 0 without a new reading.
-            The second is infinite without an echo.
-        error: ``PlaceError``.
+        readings: (sensors, 2) array with two distances per sensor, m. The first is the
+            distance up to which the sensor has seen free floor, or 0 without a new
+            reading. The second is the distance of the echo, or infinity without an
+            echo.
+        error: Errors that limit how long a cell stays free.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
     # Radius of the circle around a cell.
@@ -346,11 +355,12 @@ def see(
 def _of_sectors(
     sectors: Sectors, readings: Any
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Combine the readings of the sensors that see each sector.
+    """Combines the readings of the sensors that see each sector.
 
     Returns:
-        (sectors, 3) distance seen free, distance of the nearest echo, and the greater
-        of both, m. Without an echo, the third number equals the first.
+        (sectors, 3) array with three distances per sector, m: the distance seen free,
+        the distance of the nearest echo, and the greater of both. Without an echo, the
+        third distance equals the first.
     """
     seen = np.empty((len(sectors.right), 3))
     for k in range(len(seen)):
@@ -368,21 +378,25 @@ def _of_sectors(
 def _in_direction(
     bearing: float, hides: float, sectors: Sectors, seen: Any, begin: int, end: int
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Return the distance seen free towards a cell, and the distance of an echo, m.
+    """Returns how far a group of sensors has seen toward a cell.
 
     As seen from the group, the circle around the cell covers an angle. The distance
-    seen free is the least one of all sectors that overlap this angle. It is 0 if a part
-    of the angle is outside the sectors of the group. The echo is the echo of the sector
-    that contains the middle of the cell.
+    seen free is the least distance of all sectors that overlap this angle. If a part of
+    the angle is outside the sectors of the group, the distance seen free is 0. The echo
+    is that of the sector that contains the middle of the cell.
 
     Args:
         bearing: Bearing of the cell from the right edge of the group, rad, from 0 to a
             full turn.
         hides: Half of the angle that the circle around the cell covers, rad.
         sectors: Sectors of all groups.
-        seen: From ``_of_sectors``.
-        begin: First sector of the group.
-        end: One after the last sector of the group.
+        seen: Result of ``_of_sectors``.
+        begin: Index of the first sector of the group.
+        end: Index of the last sector of the group, plus 1.
+
+    Returns:
+        Distance seen free, m, and distance of the echo, m. Without an echo, the second
+        distance is infinite.
     """
     right = sectors.right[begin, 0]
     span = sectors.left[end - 1, 0] - right
@@ -415,12 +429,14 @@ def end_view(
     """Stores the arc at which the view of a sensor ends.
 
     Args:
-        space: Modified in place.
-        sensor: Number of the sensor.
+        space: Map of free space. The function changes the map in place.
+        sensor: Index of the sensor.
         time: Current time, s.
-        pose: (x, y, theta) of the robot by its odometry, m and rad.
-        place: (x, y) of the sensor relative to the axle in B, m.
-        direction: Direction of the sensor's axis in B, and half of its aperture, rad.
+        pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
+        place: Position (x, y) of the sensor relative to the axle, in the axes of the
+            body, m.
+        direction: Direction of the sensor's axis in the axes of the body, and half of
+            the aperture, rad.
         reach: Distance up to which the sensor has seen free floor, m.
     """
     axis, half_angle = direction
@@ -438,10 +454,13 @@ def end_view(
 def _sector_box(
     x: float, y: float, right: float, left: float, reach: float
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Return the least and greatest x and y of a sector of a disc, m.
+    """Computes the rectangle that encloses a sector of a disc.
 
-    The extremes are at the center, at the two ends of the arc, or where the arc crosses
-    the direction of a coordinate axis.
+    The extremes of the sector are at three kinds of points: the center, the two ends of
+    the arc, and the points at which the arc crosses the direction of a coordinate axis.
+
+    Returns:
+        Least x, least y, greatest x, and greatest y, m.
     """
     low_x, low_y, high_x, high_y = x, y, x, y
     quarter = math.ceil(right / (math.pi / 2.0))

@@ -1,4 +1,4 @@
-"""The memory of space: where range sensors have seen free floor or received echoes."""
+"""The block that remembers where range sensors have seen free floor or got echoes."""
 
 from __future__ import annotations
 
@@ -45,20 +45,21 @@ class MapNumbers(NamedTuple):
     places: NDArray[np.float64]
     """(sensors, 2) position relative to the axle in B, m."""
     limits: NDArray[np.float64]
-    """(sensors, 3) least and greatest range, and largest amount by which a range is too
-    long, m."""
+    """(sensors, 3) three distances per sensor, m: least range, greatest range, and the
+    largest amount by which a range is too long."""
     error: PlaceError
     """Quantities that determine the position error of a cell due to odometry."""
     least_way: float
-    """Least way of each rim that counts for a tick, m per rad/s of the faster wheel's
-    command. It is 0 without pulses."""
+    """Least rolled distance of each rim that counts for one control period, m per rad/s
+    of the faster wheel's command. The value is 0 if the angles of the encoders are not
+    rounded."""
     radius: float
     """Radius of the disc that contains the body, m."""
     bubble: float
     """Radius of the disc that is assumed to be free at the start, m."""
     tick_s: float
     round_ticks: int
-    """Number of ticks between two readings of a sensor."""
+    """Number of control periods between two readings of a sensor."""
 
 
 class MapState(NamedTuple):
@@ -66,16 +67,17 @@ class MapState(NamedTuple):
 
     free_space: FreeSpace
     was_at: NDArray[np.float64]
-    """(3,) pose in the last tick, m and rad; NaN before the first tick."""
+    """(3,) pose in the last control period, m and rad. The values are NaN before the
+    first period."""
 
 
 def map_step(
     tick: int, state: MapState, inputs: Any, outputs: Any, numbers: MapNumbers
 ) -> None:
-    """Updates the memory in one tick; see ``systems.framework.block.Step``.
+    """Updates the map in one control period; see ``systems.framework.block.Step``.
 
     Args:
-        tick: Number of the tick.
+        tick: Number of the control period.
         state: ``MapState``.
         inputs: Values of the input ports.
         outputs: Not used.
@@ -85,8 +87,8 @@ def map_step(
     space, was_at, error = state.free_space, state.was_at, numbers.error
     time = tick * numbers.tick_s
     move_window(space, pose[0], pose[1])
-    # The first tick clears the bubble. Each later tick adds the way rolled since the
-    # tick before.
+    # The first tick clears the start bubble. Each later tick adds the distance rolled
+    # since the previous tick.
     if math.isnan(was_at[0]):
         clear_disc(
             space,
@@ -131,21 +133,24 @@ def map_step(
 
 @register_jitable
 def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float:
-    """Computes the mean way of both rims in a tick, as ``place_error`` counts it.
+    """Computes the mean distance that both wheel rims roll in one control period.
+
+    The function counts the distance in the same way as ``place_error``.
 
     Args:
-        was_at: Pose in the tick before, m and rad.
-        pose: Pose now, m and rad.
-        least: Least way that counts for each wheel, m, because a wheel may have moved
-            back and forth.
-        error: Contains the wheel separation and the pulse.
+        was_at: Pose one control period ago, m and rad.
+        pose: Present pose, m and rad.
+        least: Least distance that counts for each wheel, m. A wheel may have moved back
+            and forth without a change of the pose.
+        error: Errors of the odometry, with the wheel separation and the pulse of the
+            encoders.
 
     Returns:
-        Mean way, m. It includes half a pulse, because the true way may exceed the count
-        of the encoders by this amount.
+        Mean rolled distance, m. The distance includes half a pulse, because the true
+        distance may exceed the count of the encoders by this amount.
     """
     turn = pose[2] - was_at[2]
-    # The way is longer than its chord by at most the factor 1/cos(turn/2). The factor
+    # The path is longer than its chord by at most the factor 1/cos(turn/2). The factor
     # used here is larger.
     chord = math.hypot(pose[0] - was_at[0], pose[1] - was_at[1])
     way = chord * (1.0 + 0.25 * turn * turn)
@@ -157,33 +162,36 @@ def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float
 class FreeSpaceMap(Block):
     """Remembers which cells range sensors have seen free, and where echoes came from.
 
-    The sensors at one place see a cell free if two conditions hold. The circle around
-    the cell lies within the apertures of these sensors. The whole circle is nearer than
-    their readings minus a margin. The cell stays free as long as its position relative
-    to the robot is known to ``place_error_m``. The position becomes uncertain because
-    encoders count whole pulses, and because the travel of each wheel has the relative
-    error ``wheel_error``. The block enters each reading in the tick in which the sensor
-    fires.
+    The floor around the robot is divided into square cells. The sensors at one position
+    see a cell free if two conditions hold:
 
-    At the start, a disc with the radius ``start_bubble_m`` counts as free. The disc
-    that contains the body counts as free in every tick, because ``MotionGuard`` keeps
-    it free.
+    - The circle around the cell lies within the apertures of these sensors.
+    - The whole circle is nearer than their readings minus a margin.
 
-    Abstract state: ``FreeSpace``, and the pose in the last tick.
-    Rate and latency: a function of state and present inputs, in every tick; no latency.
+    The cell stays free as long as the error of its position relative to the robot is at
+    most ``place_error_m``. The error grows for two reasons. Encoders count whole
+    pulses. The travel of each wheel has the relative error ``wheel_error``. The block
+    enters each reading in the control period in which the sensor fires.
+
+    At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
+    free. The disc that contains the body counts as free in every period, because
+    ``MotionGuard`` keeps this disc free.
+
+    The abstract state has ``FreeSpace`` and the pose of the last period. The output is
+    a function of the state and the present inputs in every period. There is no latency.
 
     Args:
         parameters: Cells, start bubble, and errors of positions.
-        sensors: Places, apertures, ranges and noise of the sensors.
-        robot: Body, and position of P.
+        sensors: Positions, apertures, ranges, and noise of the sensors.
+        robot: Body, and position of the control point P.
         odometry: Pulses of the encoders.
         plant: Lag of the motors.
-        tick_s: Period of the robot, s.
+        tick_s: Control period, s.
 
     Raises:
         InputError: The start bubble is too small for the robot.
 
-    Reference: ours; docs/guard.md has the theorem that depends on this block.
+    Reference: our own work; docs/guard.md has the theorem that depends on this block.
     """
 
     part, stage = "free_space", "obstacle sensing"

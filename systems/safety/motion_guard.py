@@ -29,8 +29,8 @@ from systems.safety.braking import (
 from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
 from systems.safety.views import stopping_way, tick_parts
 
-#: Sizes of the parts of the state: velocity of P, wheel speeds, report, and modeled
-#: wheel speeds.
+#: Sizes of the four parts of the state: velocity of P, wheel speeds, report, and
+#: modeled wheel speeds.
 _SIZES = 2, 2, 4, 2
 
 
@@ -42,23 +42,27 @@ class GuardNumbers(NamedTuple):
     robot: RobotParameters
     braking: BrakingNumbers
     kept: float
-    """Share of the difference between commanded and actual wheel speed that is left
-    after a tick."""
+    """Share of the difference between actual and commanded wheel speed that remains
+    after one control period."""
     reach: tuple[float, float]
-    """Distance from the axle within which cells are checked, m, and rolled way for
-    which free cells have to stay free, m."""
+    """Two distances, m. The first is the distance from the axle within which the guard
+    checks cells. The second is the rolled distance of the wheels during which free
+    cells have to stay free."""
 
 
 def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Computes the wheel speeds of one tick; see ``systems.framework.block.Step``.
+    """Computes the wheel speeds of one control period.
+
+    See ``systems.framework.block.Step`` for the arguments of all steps.
 
     Args:
-        tick: Number of the tick.
-        state: Velocity of P, m/s, x and y; wheel speeds, rad/s, left and right; report,
-            four numbers; modeled wheel speeds, rad/s, left and right.
-        inputs: Command of the law, pose by the odometry, fault of the sensing, and free
-            space.
-        outputs: Not used: the outputs are state.
+        tick: Number of the control period.
+        state: Ten numbers: velocity of the control point P, m/s, x and y; commanded
+            wheel speeds, rad/s, left and right; report, four numbers; and modeled wheel
+            speeds, rad/s, left and right.
+        inputs: Four values: command of the law, pose by the odometry, fault of the
+            sensing, and map of free space.
+        outputs: Not used, because the outputs are part of the state.
         numbers: ``GuardNumbers``.
     """
     command, pose, fault, space = inputs
@@ -90,7 +94,8 @@ def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
     seen = min(danger.distance_m, numbers.reach[0])
     viewed = min(danger.view_distance_m, numbers.reach[0])
     state[4], state[5] = done, seen - braking.keep_m
-    # Stopping distance: braking, and the way during the motor lag and one tick.
+    # Stopping distance: the braking distance, and the distance covered during the motor
+    # lag and one tick.
     state[6] = fastest * fastest / (2.0 * braking.braking_m_s2)
     state[6] += fastest * (braking.motor_lag_s + tick_s)
     state[7] = viewed - braking.keep_m
@@ -98,7 +103,7 @@ def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
 
 
 def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
-    """Copy the state of ``guard_step`` to the outputs."""
+    """Copies the state of ``guard_step`` to the outputs."""
     wheel_speeds, v_WP, report = outputs
     for k in range(2):
         v_WP[k], wheel_speeds[k] = state[k], state[2 + k]
@@ -109,30 +114,38 @@ def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
 class MotionGuard(Block):
     """Passes the commands of a law as far as the robot can brake to rest in free space.
 
-    The block replaces ``WheelCommand``: it has the same input and does the same work.
-    It passes the resulting wheel speeds for one tick if the robot can brake to rest
-    after this tick. A disc around the axle contains the body. Until the robot is at
-    rest, this disc has to stay ``margin_m`` away from all cells that are not known to
-    be free. Otherwise the block passes lower speeds along the same curve, or the turn
-    alone, or it brakes. The virtual mass moves with the command that the guard passes.
+    The block replaces ``WheelCommand``. It has the same input and converts the command
+    of the law to wheel speeds. The block passes these wheel speeds for one control
+    period if the robot can brake to rest after this period. A disc around the axle
+    contains the body. Until the robot is at rest, this disc has to stay ``margin_m``
+    away from all cells that are not known to be free.
 
-    If ``obstacle_speed_m_s`` is above zero, obstacles in the sensors' view may come
-    nearer at this speed. The disc then also has to stay ``margin_m`` away from all
-    points that such obstacles may reach, unless the robot withdraws from the obstacles.
+    If this condition does not hold, the block passes lower speeds along the same curve.
+    If these speeds are not possible either, the block passes the turn alone, or it
+    brakes. The virtual mass moves with the command that the guard passes.
 
-    During a fault of the sensing, the guard brakes the robot to rest, whatever the law
+    If ``obstacle_speed_m_s`` is above zero, the block assumes that obstacles in the
+    sensors' view come nearer at this speed. The disc then also has to stay ``margin_m``
+    away from all points that such obstacles may reach. This second condition does not
+    apply while the robot withdraws from the obstacles.
+
+    If the sensing has a fault, the guard brakes the robot to rest, whatever the law
     commands.
 
-    ``guard_report`` has four numbers. The first is the action: 0 passed, 1 slowed, 2
-    turned, 3 braked, 4 halted because of a fault of the sensing. The second is the
-    distance of the disc from space that is not free, minus the distance that the disc
-    has to keep. The third is the stopping distance. The fourth is the distance of the
-    disc from the end of the sensors' view, minus the distance that the disc has to
-    keep.
+    The port ``guard_report`` has four numbers:
 
-    Discrete state, every tick: velocity of P, wheel speeds, report, and modeled wheel
-    speeds, which follow the commanded ones with the lag of the motors. Rate and latency
-    are those of ``WheelCommand``.
+    - the action: 0 passed, 1 slowed, 2 turned, 3 braked, 4 halted because of a fault of
+      the sensing.
+    - the distance of the disc from non-free space, minus the distance that the disc has
+      to keep, m.
+    - the stopping distance, m.
+    - the distance of the disc from the end of the sensors' view, minus the distance
+      that the disc has to keep, m.
+
+    The discrete state has the velocity of P, the wheel speeds, the report, and the
+    modeled wheel speeds. P is the control point ahead of the axle. The modeled wheel
+    speeds follow the commanded wheel speeds with the lag of the motors. The state is
+    updated every control period. The latency is that of ``WheelCommand``.
 
     Args:
         parameters: ``GuardParameters``.
@@ -140,11 +153,11 @@ class MotionGuard(Block):
         plant: Lag of the motors.
         command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or
             ``twist_B``.
-        tick_s: Period of the command, s.
+        tick_s: Control period, s.
 
-    Reference: ours; docs/guard.md has theorem and proof. The concept of passive safety
-    is from Bouraine, Fraichard and Salhi (2012). The concept of passive orientation
-    safety is from Mitsch, Ghorbal, Vogelbacher and Platzer (2017).
+    Reference: our own work; docs/guard.md has theorem and proof. The concept of passive
+    safety is from Bouraine, Fraichard and Salhi (2012). The concept of passive
+    orientation safety is from Mitsch, Ghorbal, Vogelbacher and Platzer (2017).
     """
 
     part = "command"

@@ -16,36 +16,36 @@ from systems.framework.parameters import (
     Parameters,
 )
 
-#: Smaller margin, m, for a robot that has come nearer than ``margin_m`` because a model
-#: was wrong.
+#: Smaller margin, m, that applies to a robot nearer than ``margin_m``. A robot can come
+#: this near if a model is wrong.
 LEAST_MARGIN_M = 0.003
 #: Side of the square that the map remembers, m. The square moves along with the robot.
 WINDOW_M = 12.8
 
 
 class GuardParameters(Parameters):
-    """How the guard keeps a robot in free space, and how it remembers this space."""
+    """Parameters of the guard, which keeps the robot in free space, and of its map."""
 
     obstacle_speed_m_s: NonNegativeSpeed | None = None
-    """Largest speed, m/s, that the guard assumes for obstacles in view. With 0, it
-    assumes that all obstacles are at rest. null: 0.6 m/s with the law ``guarded``, and
-    0 with other laws."""
+    """Largest speed that the guard assumes for obstacles in view, m/s. With 0, the
+    guard assumes that all obstacles are at rest. With null, the speed is 0.6 m/s for
+    the law ``guarded`` and 0 for other laws."""
     braking_m_s2: Acceleration = 1.5
     """Deceleration of the faster wheel's rim when the guard brakes, m/s^2."""
     margin_m: float = Field(default=0.006, ge=LEAST_MARGIN_M, le=100.0)
-    """Distance, m, that the guard keeps between the disc around the body and space that
-    is not free, in addition to ``place_error_m``."""
+    """Distance that the guard keeps between the disc around the body and non-free
+    space, m. The guard keeps this distance in addition to ``place_error_m``."""
     cell_m: float = Field(default=0.05, ge=0.005, le=0.25)
     """Side of a cell of the map, m."""
     start_bubble_m: float = Field(default=1.0, gt=0.0, le=WINDOW_M / 4.0)
-    """Radius about the axle that is assumed to be free at the start, m."""
+    """Radius of the disc around the axle that counts as free at the start, m."""
     wheel_error: Fraction = 0.0
-    """Relative error of each wheel's travel, in addition to the pulses of its
-    encoder."""
+    """Relative error of the travel of each wheel. The error due to the pulses of the
+    encoders comes in addition."""
     place_error_m: NonNegativeLength = 0.006
-    """Largest position error, m, of a cell that counts as free. The error is due to the
-    encoders and ``wheel_error``. The guard keeps this distance in addition to its
-    margin."""
+    """Largest position error of a cell that counts as free, m. The encoders and
+    ``wheel_error`` cause this error. The guard keeps this distance in addition to
+    ``margin_m``."""
 
     @property
     def cells(self) -> int:
@@ -53,13 +53,13 @@ class GuardParameters(Parameters):
         return math.ceil(WINDOW_M / self.cell_m - 1e-9)
 
     def check(self, robot: RobotParameters) -> None:
-        """Checks that the start bubble holds a robot.
+        """Checks that the start bubble is large enough for a robot.
 
         Args:
-            robot: Dimensions of its body.
+            robot: Dimensions of the robot's body.
 
         Raises:
-            InputError: The bubble is too small.
+            InputError: The start bubble is too small.
         """
         radius = body_radius(robot)
         if self.start_bubble_m < radius + 2.0 * self.cell_m:

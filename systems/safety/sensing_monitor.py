@@ -1,4 +1,4 @@
-"""A monitor that finds faults of range sensors and odometry for the guard."""
+"""A block that detects faults of the range sensors and the odometry for the guard."""
 
 from __future__ import annotations
 
@@ -18,23 +18,31 @@ from systems.ranging.parameters import UltrasonicParameters
 SENSING_FAULTS = "none", "odometry lost", "silent", "frozen", "noisy"
 _NONE, _LOST, _SILENT, _FROZEN, _NOISY = range(5)
 
-#: The odometry is lost if the pose moves in one tick by more than this multiple of the
-#: largest motion that the wheels can cause.
+#: The odometry is lost if the pose changes too much in one tick. The limit is this
+#: multiple of the largest motion that the wheels can cause.
 _FASTER = 2.0
-#: A sensor is silent if it has not fired for this number of rounds, and for at least
-#: this time, s.
+# A sensor is silent if it has not fired for both of these times.
+# ``_ROUNDS``: number of rounds. In a round, every sensor fires once.
+# ``_SILENT_S``: time, s.
 _ROUNDS, _SILENT_S = 3, 0.2
-#: A sensor with noise is frozen after this number of consecutive equal echoes. Any
-#: sensor is frozen if its echoes stay equal during a turn by its aperture plus the
-#: second number, rad.
+# ``_MOST_EQUAL``: number of consecutive equal echoes after which a sensor with noise is
+#   frozen.
+# ``_BESIDE_RAD``: any sensor is frozen if its echoes stay equal while the robot turns
+#   by the aperture of the sensor plus this angle, rad.
 _MOST_EQUAL, _BESIDE_RAD = 12, 0.1
-#: Largest second difference of a range that motion and noise can cause: a constant, m;
-#: a part by acceleration, m/s^2; and a multiple of the noise's standard deviation.
+# Motion and noise can cause a second difference of a range up to the sum of three
+# terms.
+# ``_STEP_M``: first term, m.
+# ``_STEP_M_S2``: acceleration in the second term, m/s^2. The factor is the squared time
+#   of a round.
+# ``_SIGMAS``: third term as a number of standard deviations of the noise.
 _STEP_M, _STEP_M_S2, _SIGMAS = 0.03, 2.0, 15.0
-#: Weight of one reading in the mean share, and the share above which a sensor is noisy.
+# A strange reading is a reading that motion and noise cannot explain.
+# ``_PART``: weight of one reading in the mean share of strange readings.
+# ``_MOST_STRANGE``: mean share above which a sensor is noisy.
 _PART, _MOST_STRANGE = 0.1, 0.5
-#: Largest yaw rate at which ranges are checked for noise, rad/s. In a faster turn,
-#: edges of apertures move along surfaces.
+#: Largest yaw rate at which ranges are checked for noise, rad/s. In a faster turn, the
+#: edges of apertures move along surfaces, so that the ranges change quickly.
 _SLOW_RAD_S = 0.3
 #: Time for which a fault of a sensor still counts after its last detection, s.
 _KEPT_S = 2.0
@@ -46,13 +54,13 @@ class MonitorNumbers(NamedTuple):
     limits: tuple[float, float]
     """Largest motion of the axle, m, and of the heading, rad, in one tick."""
     ranges: NDArray[np.float64]
-    """(n, 2) least and greatest range of each sensor, m. Only ranges between these
-    limits are checked for equal echoes."""
+    """(n, 2) least and greatest range of each sensor, m. The block compares echoes only
+    if the range is between these limits."""
     silent_s: float
     """A sensor is silent if its range is older than this, s."""
     equal: NDArray[np.float64]
-    """(n,) a sensor is frozen after this number of equal echoes. The number is infinite
-    without noise."""
+    """(n,) number of equal echoes after which each sensor is frozen. The number is
+    infinite for a sensor without noise."""
     turn_rad: NDArray[np.float64]
     """(n,) largest turn during which echoes may stay equal, rad."""
     step_m: NDArray[np.float64]
@@ -61,9 +69,9 @@ class MonitorNumbers(NamedTuple):
 
 
 class MonitorState(NamedTuple):
-    """State of ``SensingMonitor``.
+    """State of ``SensingMonitor``. All arrays change.
 
-    All arrays change. Those without a form have one entry per sensor.
+    An array has one entry per sensor, unless its description states another shape.
     """
 
     pose: NDArray[np.float64]
@@ -90,11 +98,15 @@ class MonitorState(NamedTuple):
 
 @register_jitable
 def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untyped-def]
-    """Judge a new echo of sensor ``k``; return the fault.
+    """Checks a new echo of sensor ``k`` for faults.
 
-    The function counts equal echoes, and remembers the heading at which they began.
-    While the robot turns slowly, it checks the second difference of the last three
-    ranges, and updates the mean share of strange readings.
+    The function counts equal echoes and remembers the heading at which the equal echoes
+    began. While the robot turns slowly, the function computes the second difference of
+    the last three ranges. If the second difference is too large, the reading is
+    strange. The function updates the mean share of strange readings.
+
+    Returns:
+        Number of the fault, 0 if there is none.
     """
     last, heard, (low, high) = state.last[k], state.heard[k], numbers.ranges[k]
     if heard > 0.5 and range_ == last and low < range_ < high:
@@ -116,7 +128,7 @@ def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untype
 def monitor_step(
     tick: int, state: MonitorState, inputs: Any, outputs: Any, numbers: MonitorNumbers
 ) -> None:
-    """Finds the fault of one tick; see ``systems.framework.block.Step``."""
+    """Detects faults in one control period; see ``systems.framework.block.Step``."""
     pose, ranges, echo, ages = inputs
     turned = pose[2] - state.pose[2]
     if tick > 0:
@@ -147,34 +159,36 @@ def monitor_step(
 
 
 class SensingMonitor(Block):
-    """Finds faults of range sensors and odometry, so that a guard stops the robot.
+    """Detects faults of range sensors and odometry, so that the guard stops the robot.
 
     These are the faults with their numbers (``SENSING_FAULTS``):
 
-    1. In one tick, the pose of the odometry has moved by more than twice the largest
-       motion that the wheels can cause. This fault stays for the rest of the run.
-    2. A sensor has not fired for three rounds, and for at least 0.2 s.
-    3. The echoes of a sensor stay equal. For a sensor with noise, 12 equal echoes are a
-       fault. For any sensor, equal echoes are a fault if the robot meanwhile turns by
-       more than the sensor's aperture.
-    4. More than half of the recent ranges of a sensor have changed by more than motion
-       and the specified noise can cause. The block checks ranges in this way only while
-       the robot turns slowly.
+    1. The odometry is lost: in one control period, the pose has changed by more than
+       twice the largest motion that the wheels can cause. This fault remains for the
+       rest of the run.
+    2. A sensor is silent: the sensor has not fired for three rounds, and for at least
+       0.2 s. A round is the time in which every sensor fires once.
+    3. A sensor is frozen: the echoes of the sensor stay equal. For a sensor with noise,
+       12 equal echoes are a fault. For any sensor, equal echoes are a fault if the
+       robot meanwhile turns by 0.1 rad more than the sensor's aperture.
+    4. A sensor is noisy: more than half of the recent ranges have changed by more than
+       motion and the specified noise can cause. The block checks ranges in this way
+       only while the robot turns slowly.
 
     Faults 2 to 4 still count for 2 s after their last detection.
 
-    The monitor cannot distinguish a sensor that never reports an echo from one that
-    points at empty space.
+    The block cannot distinguish two cases: a sensor that never reports an echo because
+    of a fault, and a sensor that points at empty space.
 
-    The abstract state is ``MonitorState``. The output is a function of state and inputs
-    at every tick: no latency.
+    The abstract state is ``MonitorState``. The output is a function of the state and
+    the inputs in every control period. There is no latency.
 
     Args:
-        sensors: The range sensors.
-        robot: Top speed of its wheels.
-        tick_s: Period of control, s.
+        sensors: Parameters of the range sensors.
+        robot: Parameters of the robot, for the top speed of the wheels.
+        tick_s: Control period, s.
 
-    Reference: ours; docs/guard.md.
+    Reference: our own work; docs/guard.md.
     """
 
     part, stage = "sensing_monitor", "obstacle sensing"

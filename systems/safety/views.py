@@ -1,4 +1,4 @@
-"""What range sensors see, how long it stays known, and how far a stop takes."""
+"""Views of range sensors, errors of remembered positions, and stopping distances."""
 
 from __future__ import annotations
 
@@ -15,30 +15,32 @@ from systems.base.robot import RobotParameters, body_radius
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import GuardParameters
 
-#: The rims of the wheels count as at rest if they will move by less than this, m, due
-#: to the lag.
+#: The rims of the wheels count as at rest if the lag of the motors will move them by
+#: less than this distance, m.
 REST_M = 2e-4
-#: A robot turns on the spot if its axle will move by less than this, m, due to the lag.
+#: A robot turns on the spot if the lag of the motors will move its axle by less than
+#: this distance, m.
 IN_PLACE_M = 5e-5
-#: Largest amount, m, by which a range without noise is too long, and number of standard
-#: deviations that bounds the noise of a range.
+# ``RANGE_MARGIN_M``: largest amount by which a range without noise is too long, m.
+# ``_SIGMAS``: number of standard deviations that bounds the noise of a range.
 RANGE_MARGIN_M, _SIGMAS = 0.002, 5.0
-#: Longest time between two positions that the guard compares with cells, s.
+#: Longest time between two positions that the guard checks against cells, s.
 _PART_S = 0.025
 
 
 class Sectors(NamedTuple):
-    """Apertures of range sensors, cut into sectors where they overlap.
+    """Sectors into which the apertures of range sensors are cut where they overlap.
 
-    A group consists of all sensors at one place. Its sectors are adjacent and in
-    counterclockwise order. No sensor sees a sector between two apertures.
+    A group consists of all sensors at the same position. The sectors of a group are
+    adjacent and in counterclockwise order. If there is a gap between two apertures, no
+    sensor sees the sector of the gap.
     """
 
     places: NDArray[np.float64]
     """(groups, 2) position relative to the axle in B, m."""
     first: NDArray[np.int64]
-    """(groups + 1,) index of the first sector of each group, then the number of
-    sectors."""
+    """(groups + 1,) index of the first sector of each group. The last element is the
+    number of all sectors."""
     right: NDArray[np.float64]
     """(sectors, 1) direction in B at which a sector begins, rad."""
     left: NDArray[np.float64]
@@ -50,13 +52,14 @@ class Sectors(NamedTuple):
 class PlaceError(NamedTuple):
     """Quantities that determine the position error of a remembered cell.
 
-    The position of the cell is relative to the robot.
+    The error is that of the position of the cell relative to the robot.
     """
 
     wheel_error: float
     """Relative error of each wheel's travel."""
     pulse_m: float
-    """Way of the rim per pulse of the encoder, m. It is 0 if angles are not rounded."""
+    """Distance that the rim rolls per pulse of the encoder, m; 0 if angles are not
+    rounded."""
     wheel_separation_m: float
     allowed_m: float
     """Largest position error of a cell that counts as free, m."""
@@ -68,7 +71,7 @@ class PlaceError(NamedTuple):
         robot: RobotParameters,
         odometry: OdometryParameters,
     ) -> PlaceError:
-        """Collects the values from the parameters.
+        """Collects the quantities from the parameters.
 
         Args:
             guard: Wheel error, and allowed position error.
@@ -76,7 +79,7 @@ class PlaceError(NamedTuple):
             odometry: Pulses of the encoders.
 
         Returns:
-            The collected values.
+            Collected quantities.
         """
         pulse_m = 0.0
         if odometry.rounding:
@@ -88,17 +91,17 @@ class PlaceError(NamedTuple):
 
 
 def place_error(distance: float, way: float, error: PlaceError) -> float:
-    """Computes the largest position error of a cell relative to the robot, m.
+    """Computes the largest position error of a remembered cell relative to the robot.
 
     Args:
-        distance: Distance d of the cell from the axle when it was seen, m.
-        way: Mean way s of both rims since then, m.
+        distance: Distance d from the axle to the cell when a sensor saw the cell, m.
+        way: Mean distance s that the rims of both wheels have rolled since then, m.
         error: Errors of wheels and encoders.
 
     Returns:
-        The sum of two errors, m. Wheels with relative error e cause e s + 2 e s/L (d +
-        s). Pulses of length q at the rim cause q (s + d)/L + q. L is the wheel
-        separation (docs/guard.md).
+        Sum of two errors, m. Wheels with the relative error e cause the error e s + 2 e
+        s/L (d + s). Pulses of the length q at the rim cause the error q (s + d)/L + q.
+        L is the wheel separation (docs/guard.md).
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     by_wheels = e * way + 2.0 * e * way / separation * (distance + way)
@@ -106,17 +109,19 @@ def place_error(distance: float, way: float, error: PlaceError) -> float:
 
 
 def lasting(distance: float, error: PlaceError) -> float:
-    """Computes the mean way of both rims after which a cell is forgotten, m.
+    """Computes the rolled distance after which a cell is forgotten.
+
+    The rolled distance is the mean distance that the rims of both wheels roll.
 
     Args:
-        distance: Distance of the cell from the axle when it was seen, m, or an upper
-            bound of this distance.
+        distance: Distance from the axle to the cell when a sensor saw the cell, m. An
+            upper bound of this distance is possible, too.
         error: Errors of wheels and encoders.
 
     Returns:
-        The way at which ``place_error`` reaches the allowed error, m. The way is
-        infinite if the error does not grow. It is minus infinity if the error is too
-        large from the start.
+        Rolled distance at which ``place_error`` reaches the allowed error, m. If the
+        error does not grow, the result is infinite. If the error is too large from the
+        start, the result is minus infinity.
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     a = 2.0 * e / separation
@@ -132,7 +137,14 @@ def lasting(distance: float, error: PlaceError) -> float:
 
 
 def range_errors(sensors: UltrasonicParameters) -> NDArray[np.float64]:
-    """(n,) largest amounts by which the ranges of each sensor are too long, m."""
+    """Computes the largest amounts by which the ranges of each sensor are too long.
+
+    Args:
+        sensors: Parameters of the range sensors.
+
+    Returns:
+        (sensors,) largest range errors, m.
+    """
     return RANGE_MARGIN_M + _SIGMAS * sensors.each("noise_m")
 
 
@@ -140,11 +152,11 @@ def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sec
     """Divides the view of range sensors into sectors.
 
     Args:
-        sensors: The range sensors.
-        control_point_m: Distance of P ahead of the axle, m.
+        sensors: Parameters of the range sensors.
+        control_point_m: Distance of the control point P ahead of the axle, m.
 
     Returns:
-        The sectors.
+        Sectors of all groups of sensors.
     """
     axes, halves = sensors.axes, sensors.half_angles
     places: dict[tuple[float, float], list[int]] = {}
@@ -170,9 +182,10 @@ def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sec
 def _between(
     spans: Sequence[tuple[float, float]],
 ) -> list[tuple[float, float]]:
-    """Return the sectors between neighboring edges, from right to left.
+    """Returns the sectors between neighboring edges of apertures, from right to left.
 
-    Edges that span more than a full turn are wrapped into one turn.
+    If the edges span more than a full turn, the function first wraps the edges into one
+    turn.
     """
     edges = sorted(edge for span in spans for edge in span)
     if edges[-1] - edges[0] >= math.tau - 1e-9:
@@ -185,18 +198,18 @@ def _between(
 def stopping_way(
     own: GuardParameters, robot: RobotParameters, plant: PlantParameters, tick_s: float
 ) -> float:
-    """Computes an upper bound of the way of the faster wheel until it is at rest.
+    """Computes an upper bound of the stopping distance of the faster wheel.
 
-    The wheel begins at top speed, and brakes after one tick.
+    The wheel starts at top speed, and brakes after one control period.
 
     Args:
-        own: Braking.
-        robot: Top speed.
+        own: Parameters of the guard, for the deceleration.
+        robot: Parameters of the robot, for the top speed.
         plant: Lag of the motors.
-        tick_s: Period of the command, s.
+        tick_s: Control period, s.
 
     Returns:
-        m.
+        Distance that the rim of the wheel covers until the wheel is at rest, m.
     """
     top = robot.top_speed_m_s
     delayed = plant.motor_lag_s + 2.0 * tick_s
@@ -204,14 +217,15 @@ def stopping_way(
 
 
 def tick_parts(tick_s: float) -> int:
-    """Computes the number of parts into which the guard divides a tick.
+    """Computes the number of parts into which the guard divides a control period.
+
+    The guard checks the position of the robot at the end of each part.
 
     Args:
-        tick_s: Period of the command, s.
+        tick_s: Control period, s.
 
     Returns:
-        Number of parts. A part lasts at most 25 ms. The guard checks the position at
-        the end of each part.
+        Number of parts. A part lasts at most 25 ms.
     """
     return math.ceil(tick_s / _PART_S - 1e-9)
 
@@ -219,27 +233,28 @@ def tick_parts(tick_s: float) -> int:
 def unseen_approach(
     robot: RobotParameters, plant: PlantParameters, tick_s: float
 ) -> float:
-    """Computes by how much the axle may come nearer to a cell than the guard sees, m.
+    """Computes how much nearer to a cell the axle may come than the guard detects, m.
 
-    The guard compares the position of the axle with cells at the end of each part of a
-    tick, until the rims will move by less than ``REST_M``. Between and after these
-    checks, four effects may bring the axle nearer to a cell:
+    The guard checks the position of the axle against the cells at the end of each part
+    of a control period. The checks end when the rims will move by less than ``REST_M``.
+    Between and after these checks, four effects may bring the axle nearer to a cell:
 
-    * The axle passes a corner of a cell. Both ends of the chord of its path are at the
+    - The axle passes a corner of a cell. Both ends of the chord of its path are at the
       radius of the body from the corner, but the middle of the chord is nearer.
-    * The path deviates from the chord by a quarter of the chord's length times the
+    - The path deviates from the chord by a quarter of the chord's length times the
       turn.
-    * The axle goes on and comes back if the wheels reverse within the part.
-    * The axle coasts after the last check. It may also coast in a turn on the spot.
+    - If the wheels reverse within the part, the axle goes on and comes back.
+    - The axle coasts after the last check. The axle may also coast in a turn on the
+      spot.
 
     Args:
-        robot: Body, wheels and top speed.
+        robot: Body, wheels, and top speed.
         plant: Lag of the motors.
-        tick_s: Period of the command, s.
+        tick_s: Control period, s.
 
     Returns:
-        Sum of the four effects, m. It is 1.6 mm with all defaults. ``LEAST_MARGIN_M``
-        has to be at least as large as this sum.
+        Sum of the four effects, m. The sum is 1.6 mm with all defaults.
+        ``LEAST_MARGIN_M`` has to be at least as large as this sum.
     """
     top, lag, part_s = (
         robot.top_speed_m_s,
@@ -248,8 +263,8 @@ def unseen_approach(
     )
     radius, half = body_radius(robot), min(0.5 * top * part_s, body_radius(robot))
     corner = radius - math.sqrt(radius * radius - half * half)
-    # The largest deviation of the path from its chord. It occurs if half of the rim's
-    # top speed drives the axle forward, and the other half turns the robot.
+    # The path deviates most from its chord if half of the rim's top speed drives the
+    # axle forward, and the other half turns the robot.
     bow = 0.25 * (0.5 * top * part_s) * (top * part_s / robot.wheel_separation_m)
     # Speed at the start of the part, if the command reverses to full speed and the axle
     # is back at its starting point at the end of the part.

@@ -1,4 +1,4 @@
-"""The ports of all baselines, and the echoes that those with a map avoid."""
+"""The ports of all baseline laws, and the occupied cells that some baselines avoid."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SOURCE_CLEARANCE_M = 0.5
 
 
 class BaselineController(Block):
-    """The ports of every baseline: target and pose as inputs, a twist as output."""
+    """Declares the ports of every baseline: target and pose in, twist out."""
 
     inputs: Sequence[Port] = (
         Port("p_WS_estimated", 2, "m"),
@@ -30,21 +30,26 @@ class BaselineController(Block):
 
 
 class MapController(BaselineController):
-    """A baseline that avoids cells of the map from which echoes came."""
+    """Adds the map of free space to the inputs of a baseline law."""
 
     inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
 
 
 @register_jitable
 def occupied_around(inputs: Any, reach_m: float) -> NDArray[np.float64]:
-    """Lists the occupied cells around the robot, without those of the target.
+    """Lists the occupied cells around the robot, except the cells near the target.
+
+    A cell of the map is occupied if echoes came from there and no sensor has seen the
+    cell free since.
 
     Args:
         inputs: Values of the input ports of a ``MapController``.
-        reach_m: Half of the side of the square in which cells are listed, m.
+        reach_m: Half of the side of the square around the robot in which cells are
+            listed, m.
 
     Returns:
-        (n, 3) cells, see ``list_occupied``.
+        (n, 3) cells in the format of ``list_occupied``: x and y of the middle in the
+        world frame W, m, and the certainty, 0 to 1.
     """
     target, pose = inputs[0], inputs[3]
     clear = target[0], target[1], SOURCE_CLEARANCE_M

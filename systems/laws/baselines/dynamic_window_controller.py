@@ -23,11 +23,12 @@ from systems.laws.parameters import AttractionParameters
 from systems.planning.following import SPEED_LIMITS, FollowNumbers, approach
 from systems.planning.turning import wrapped
 
-#: Numbers of speeds and of yaw rates in the grid over a window.
+# ``_SPEEDS``: number of speeds in the grid over a window.
+# ``_TURNS``: number of yaw rates in the grid over a window.
 _SPEEDS, _TURNS = 9, 17
 #: Half side of the square around the robot in which cells count, m.
 _REACH_M = 2.5
-#: Acceleration that limits the window, and braking deceleration, m/s^2.
+#: Acceleration that limits the window, and deceleration of a robot that brakes, m/s^2.
 _ACCELERATION_M_S2 = 1.0
 #: Time from one choice to the next, s.
 _PERIOD_S = 0.1
@@ -58,20 +59,21 @@ class DynamicWindowNumbers(NamedTuple):
 def time_to_contact(
     places: Any, motion: tuple[float, float], half: tuple[float, float]
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes when a body that continues on its arc first covers a point.
+    """Computes when a body that continues on its arc first covers a given point.
 
-    The computation is in the frame of the body. In this frame the points move: straight
-    back if the yaw rate is zero, otherwise on circles around the center of the arc. The
-    function skips circles that do not meet the rectangle of the body.
+    The computation uses the body frame B. In this frame the points move. If the yaw
+    rate is zero, the points move straight back. Otherwise the points move on circles
+    around the center of the arc. The function skips circles that do not meet the
+    rectangle of the body.
 
     Args:
         places: (n, 2) points that the body must not cover, in B, m.
         motion: Speed, m/s, and yaw rate, rad/s.
-        half: Half of the body's length and width, m.
+        half: Half of the body's length and half of its width, m.
 
     Returns:
-        Time, s; infinite if there is no contact. Points that the body already covers
-        do not count.
+        Time until the first contact, s. The time is infinite if there is no contact.
+        Points that the body already covers do not count.
     """
     v, w = motion
     a, b = half
@@ -101,9 +103,10 @@ def _angle_to_contact(
 ) -> float:  # pragma: no cover  (compiled)
     """Computes the angle by which a point turns about (0, 0) until it meets the body.
 
-    The body is a rectangle around (0, -turn). The function intersects the circle of
-    radius ``far`` with all four sides, and takes the first crossing. The point turns
-    counterclockwise if ``sign`` is positive, else clockwise.
+    The point starts at (x, y) and moves on the circle of radius ``far``. The body is a
+    rectangle with the center (0, -turn). The function intersects the circle with all
+    four sides of the rectangle, and takes the first crossing. If ``sign`` is positive,
+    the point turns counterclockwise, otherwise clockwise.
     """
     a, b = half
     begin, best = math.atan2(y, x), np.inf
@@ -153,24 +156,25 @@ def choose_in_window(
     bearing: float,
     numbers: WindowNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Chooses the admissible motion with the largest objective (eqs 13-15).
+    """Chooses the admissible motion with the largest objective (Fox 1997, eq. 13-15).
 
     The window contains the speeds and yaw rates that the robot can reach in one period.
     The function tries a grid of motions in the window. A motion is admissible if the
-    robot can brake to rest before it covers a cell with echoes. The function then
-    maximizes a weighted sum of heading, distance, and speed.
+    robot can brake to rest before it covers an occupied cell. The objective is a
+    weighted sum of three terms: heading, distance, and speed.
 
     Args:
-        places: (n, 3) cells that the body must not cover: x and y in W, m; certainty.
-        pose: (x, y, theta) of the axle in W, m and rad.
-        now: Present speed, m/s, and yaw rate, rad/s.
-        wanted: Wanted speed towards the target, m/s.
+        places: (n, 3) cells that the body must not cover: x and y in the world frame W,
+            m, and the certainty, 0 to 1.
+        pose: Pose (x, y, theta) of the axle in W, m and rad.
+        now: Present speed, m/s, and present yaw rate, rad/s.
+        wanted: Wanted speed toward the target, m/s.
         bearing: Direction of the target in W, rad.
         numbers: Weights and limits.
 
     Returns:
-        Speed, m/s, and yaw rate, rad/s. If no motion is admissible, these are the
-        lowest speed of the window and the yaw rate nearest to zero.
+        Speed, m/s, and yaw rate, rad/s. If no motion is admissible, the function
+        returns the lowest speed of the window and the yaw rate nearest to zero.
     """
     # The window.
     heading_gain, distance_gain, speed_gain = numbers.gains
@@ -217,7 +221,10 @@ def choose_in_window(
 def dynamic_window_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DynamicWindowNumbers
 ) -> None:
-    """Computes the twist. The state is the last choice of speed and yaw rate."""
+    """Computes the twist (speed and yaw rate) of the robot in one control period.
+
+    The state is the last choice of speed, m/s, and yaw rate, rad/s.
+    """
     pose = inputs[3]
     if tick % numbers.period_ticks == 0:
         wanted, bearing = approach(inputs, numbers.follow)
@@ -230,24 +237,27 @@ def dynamic_window_step(
 
 
 class DynamicWindowController(MapController):
-    """Chooses a motion that the robot can reach, and from which it can stop in time.
+    """Chooses a motion that the robot can reach and from which it can stop in time.
 
     Ten times per second, the block considers the speeds and yaw rates that the robot
-    can reach with its accelerations. It keeps the motions from which the robot can
-    brake before its rectangle covers a cell with echoes. From these motions it chooses
-    the one with the largest weighted sum of heading, distance, and speed.
+    can reach with its accelerations. The block keeps a motion if the robot can then
+    brake before its rectangle covers an occupied cell. Among these motions, the block
+    chooses the motion with the largest weighted sum of heading, distance, and speed.
 
-    The block differs from the paper in two points. The speed term rewards speeds near
-    the wanted speed, because a follower must not arrive at full speed. The obstacles
-    are not lines, but cells that gave echoes and that no sensor has seen free since.
+    The block differs from the paper in two points:
+
+    - The speed term rewards speeds near the wanted speed, because a follower must not
+      arrive at full speed.
+    - The obstacles are cells instead of lines. A cell is occupied if echoes came from
+      there and no sensor has seen the cell free since.
 
     The discrete state has the last motion. There is no latency.
 
     Args:
-        robot: Size of the body, and position of P.
-        attraction: ``AttractionParameters``; uses the follow distance.
+        robot: Size of the body, and position of the control point P ahead of the axle.
+        attraction: ``AttractionParameters``. Only the follow distance is used.
         gains: ``DynamicWindowParameters``.
-        tick_s: Period of the controller, s.
+        tick_s: Control period, s.
 
     Reference: Fox, Burgard and Thrun, The dynamic window approach to collision
     avoidance, IEEE Robotics and Automation Magazine 4 (1), 1997.

@@ -35,15 +35,16 @@ from systems.safety.parameters import GuardParameters
 
 #: Half side of the window of the distance field, m. A sequence stays within it.
 _WINDOW_M = 2.5
-#: Number of plans after which the random numbers repeat, number of motion sequences
-#: that each plan tries, and number of steps of a sequence.
+# ``_ROUNDS``: number of plans after which the random numbers repeat.
+# ``_SAMPLES``: number of sequences of motions that each plan tries.
+# ``_STEPS``: number of steps of a sequence.
 _ROUNDS, _SAMPLES, _STEPS = 16, 500, 25
-#: Length of a step, and time from one plan to the next, s.
+#: Duration of a step of a sequence, s. This time is also the time between two plans.
 _STEP_S = 0.1
 #: Standard deviation of the sampled speeds, m/s (Nav2: 0.2).
 _SPEED_SPREAD_M_S = 0.2
-#: Cost gamma of a deviation from the last plan (Nav2: 0.015). It is a sum over the
-#: steps of a sequence, and all other costs are means.
+#: Weight gamma of the cost of a deviation from the last plan (Nav2: 0.015). This cost
+#: is a sum over the steps of a sequence. All other costs are means over the steps.
 _CONTROL_GAIN = 0.015
 #: Cost per meter of distance from the wanted position (Nav2's goal critic: 5).
 _GOAL_GAIN = 5.0
@@ -53,9 +54,10 @@ _FORWARD_GAIN = 0.81
 _COLLISION_COST = 1_000.0
 #: Number of discs that cover the body from side to side.
 _DISCS = 3
-#: A route is a detour if it is longer than the straight line by more than the factor
-#: ``_DETOUR``. On a detour the robot heads for a point of the route, which is at most
-#: ``_LOOK_AHEAD_M`` away, m.
+# ``_DETOUR``: a route is a detour if its length exceeds the straight distance times
+#   this factor.
+# ``_LOOK_AHEAD_M``: on a detour, the robot drives toward a point of the route. The
+#   point is at most this far away, m.
 _DETOUR, _LOOK_AHEAD_M = 1.15, 1.5
 #: Length of a step to a diagonal neighbor, in cells.
 _ACROSS = math.sqrt(2.0)
@@ -70,8 +72,9 @@ class RollNumbers(NamedTuple):
     obstacle_gain: float
     inflation_m: float
     discs: tuple[float, float]
-    """Distance of the outer discs from the middle of the axle, and radius of all discs
-    including the clearance, m."""
+    """Two numbers about the discs that cover the body, m. The first is the distance of
+    the outer discs from the middle of the axle. The second is the radius of all discs,
+    including the clearance."""
     control_point_m: float
 
 
@@ -102,20 +105,21 @@ def distance_field(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the distance of each cell in a window from the nearest occupied cell.
 
-    The function sweeps the window twice, forward and backward. Each sweep passes the
-    distance on to the four neighbors that come later in its order.
+    The function sweeps over the window twice, forward and backward. Each sweep passes
+    the distance on to the four neighbors that come later in the order of the sweep.
 
     Args:
-        places: (n, 3) occupied cells: x and y of the center in W, m; certainty.
+        places: (n, 3) occupied cells: x and y of the middle in the world frame W, m,
+            and the certainty, 0 to 1.
         x: Center of the window, x in W, m.
         y: Center of the window, y in W, m.
-        half: Half side of the window, m.
+        half: Half of the side of the window, m.
         cell: Side of a cell, m.
 
     Returns:
-        (m, m) distances along steps between neighboring cells, m. Such a distance is at
-        most 8 % longer than the straight line. Without occupied cells all distances are
-        1e6.
+        (m, m) distances, m, measured along steps between neighboring cells. These
+        distances are at most 8 % longer than straight lines. If there are no occupied
+        cells, all distances are 1e6.
     """
     size = 2 * math.ceil(half / cell) + 1
     field = np.full((size, size), 1e6)
@@ -156,11 +160,13 @@ def roll_out(
     The weight of a noisy sequence is exp(-cost/temperature).
 
     Args:
-        controls: (steps, 2) speed, m/s, and yaw rate, rad/s. The function changes it.
+        controls: (steps, 2) speed, m/s, and yaw rate, rad/s. The function changes the
+            array in place.
         noise: (samples, steps, 2) normal random numbers of standard deviation 1.
-        pose: (x, y, theta) of the axle in W, m and rad.
-        goal: (x, y, vx, vy): moving position in W that P should reach, m and m/s.
-        field: Result of ``distance_field`` around the axle, m.
+        pose: Pose (x, y, theta) of the axle in the world frame W, m and rad.
+        goal: Position (x, y), m, and velocity (vx, vy), m/s, of a moving goal in W. The
+            control point P should reach the goal.
+        field: (m, m) result of ``distance_field`` around the axle, m.
         cell: Side of a cell of the field, m.
         numbers: Spreads, limits, and costs.
     """
@@ -192,13 +198,19 @@ def _cost(
     cell: float,
     numbers: RollNumbers,
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes one noisy sequence (``tried``) and returns its cost.
+    """Computes one noisy sequence of motions and returns the cost of the sequence.
 
-    Each step adds noise to the planned motion, limits the sum, and integrates the pose.
-    A step costs more if the robot drives backward, if a disc of the body is near an
-    occupied cell, if P is far from the moving goal, or if the robot does not point to
-    the goal. The total also has the control cost of the deviation from the plan.
-    Positions x and y are relative to the axle at the start, in the axes of W.
+    The function writes the noisy sequence to ``tried``. In each step, the function adds
+    noise to the planned motion, limits the sum, and integrates the pose. A step costs
+    more in each of these cases:
+
+    - The robot drives backward.
+    - A disc of the body is near an occupied cell.
+    - The control point P is far from the moving goal.
+    - The robot does not point to the goal.
+
+    The total also contains the cost of the deviation from the plan. The positions x and
+    y are relative to the initial position of the axle, in the axes of W.
     """
     least, most, turn = SPEED_LIMITS
     spread, turn_spread = _SPEED_SPREAD_M_S, numbers.turn_spread_rad_s
@@ -252,7 +264,10 @@ def path_integral_step(
     outputs: Any,
     numbers: PathIntegralNumbers,
 ) -> None:
-    """Computes the twist, and a new plan every ``period_ticks``."""
+    """Computes the twist of one control period, and sometimes a new plan.
+
+    A new plan is due every ``period_ticks`` control periods.
+    """
     target, velocity, pose = inputs[0], inputs[1], inputs[3]
     plan, space, twist = state.plan, inputs[4], outputs[0]
     steps = len(plan)
@@ -277,11 +292,16 @@ def path_integral_step(
 
 @register_jitable
 def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-untyped-def]
-    """Computes the wanted position of P, m, and its velocity, m/s, both in W.
+    """Computes the goal that the control point P should reach.
 
-    The function plans a route to the target. The goal lies in the direction of the
-    target, or of a point of the route if the route is a detour. The function chooses
-    distance and speed of the goal so that P approaches with the wanted speed.
+    The function plans a route to the target. If the route is a detour, the goal lies in
+    the direction of a point of the route. Otherwise the goal lies in the direction of
+    the target. The function chooses the distance and the velocity of the goal so that P
+    approaches with the wanted speed.
+
+    Returns:
+        Position (x, y), m, and velocity (vx, vy), m/s, of the goal in the world frame
+        W.
     """
     ahead = numbers.follow.control_point_m
     px, py = at[0] + ahead * math.cos(at[2]), at[1] + ahead * math.sin(at[2])
@@ -308,30 +328,32 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
 
 
 class PathIntegralController(MapController):
-    """Tries many motion sequences and drives their mean, weighted by cost.
+    """Tries many sequences of motions and drives the mean of these sequences.
 
-    Ten times per second, the block makes a new plan:
+    Ten times per second, the block makes a new plan in three stages:
 
-    1. It plans a route to the target on the map with ``find_way``, like the guarded
-       law. In the direction of the route it places a goal that moves with the target.
-    2. It draws 500 sequences of 2.5 s around the last plan. The cost of a sequence
-       depends on the distance and angle to the goal, on driving backward, and on
-       occupied cells near the body. Three discs cover the body.
-    3. The new plan is the mean of the sequences with weights exp(-cost/temperature).
+    1. The block plans a route to the target on the map with ``find_way``, like the
+       guarded law. In the direction of the route, the block places a goal that moves
+       with the target.
+    2. The block draws 500 random sequences of 2.5 s around the last plan. The cost of a
+       sequence depends on the distance and angle to the goal, on driving backward, and
+       on occupied cells near the body. Three discs cover the body.
+    3. The new plan is the weighted mean of the sequences. The weights are
+       exp(-cost/temperature).
 
-    The state has the plan, and the memory for the route. There is no latency.
+    The state has the plan and the memory for the route. There is no latency.
 
     Args:
-        robot: Size of the body, and position of P.
-        attraction: ``AttractionParameters``; uses the follow distance.
+        robot: Size of the body, and position of the control point P ahead of the axle.
+        attraction: ``AttractionParameters``. Only the follow distance is used.
         gains: ``PathIntegralParameters``.
         guard: Parameters of the map.
         seed: Seed of the random sequences.
-        tick_s: Period of the controller, s.
+        tick_s: Control period, s.
 
     Reference: Williams et al., Information theoretic model predictive control, IEEE
-    Trans. on Robotics 34 (6), 2018. The cost terms are those of Nav2's MPPI controller
-    (its critics).
+    Trans. on Robotics 34 (6), 2018. The cost terms are those of Nav2's MPPI controller,
+    where they are called critics.
     """
 
     def __init__(

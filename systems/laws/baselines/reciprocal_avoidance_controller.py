@@ -20,13 +20,13 @@ from systems.planning.following import CRUISE_SPEED_M_S, FollowNumbers, approach
 from systems.planning.half_planes import nearest_velocity
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
-#: Distance that the robot keeps from all bodies, and distance beyond which bodies do
-#: not count, m.
+# ``_CLEARANCE_M``: distance that the robot keeps from all bodies, m.
+# ``_FARTHEST_M``: distance beyond which bodies do not count, m.
 _CLEARANCE_M, _FARTHEST_M = 0.02, 5.0
 #: Time within which the robot must leave a contact, s.
 _OUT_S = 0.1
-#: Speed below which the robot is at rest, and difference below which two velocities
-#: are equal, m/s.
+# ``_RESTS_M_S``: speed below which the robot is at rest, m/s.
+# ``_UNCHANGED_M_S``: difference below which two velocities are equal, m/s.
 _RESTS_M_S, _UNCHANGED_M_S = 0.05, 1e-6
 
 
@@ -55,24 +55,27 @@ def avoid_body(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Computes the half plane of velocities that ORCA permits (van den Berg, eq. 3).
 
-    The velocity obstacle is the set of relative velocities with which the disc touches
-    the rectangle within the horizon. This set is a cone with two legs and without a
-    tip. In place of the tip there is the cut-off: the rectangle, rounded by the radius
-    of the disc, divided by the horizon. The function finds the point of the border of
-    the set that is nearest to the present relative velocity. The tangent at this point
-    is the border of the half plane.
+    The robot is a disc, and the other body is a rectangle. The velocity obstacle is the
+    set of relative velocities with which the disc touches the rectangle within the
+    horizon. This set is a cone with two legs and without a tip. Instead of a tip, the
+    cone has a rounded end, called the cut-off. The cut-off is the rectangle, enlarged
+    and rounded by the radius of the disc, and divided by the horizon.
+
+    The function finds the point on the border of the velocity obstacle that is nearest
+    to the present relative velocity. The tangent at this point is the border of the
+    half plane.
 
     Args:
-        relative: (x, y, theta). (x, y) is the position of the body relative to the
-            center of the disc, m. theta is the heading of the body, rad.
-        half: Half of the body's length and width, m.
+        relative: Position (x, y) of the body relative to the center of the disc, m, and
+            heading theta of the body, rad.
+        half: Half of the body's length and half of its width, m.
         radius: Radius of the disc, m.
         velocity: Velocity of the disc relative to the body, m/s.
         horizon: Time for which contacts are avoided, s.
 
     Returns:
-        x and y of the unit normal n, and the offset, m/s. A relative velocity v is
-        permitted if n . v >= offset.
+        Three numbers: x and y of the unit normal n, and an offset, m/s. A relative
+        velocity v is permitted if n . v >= offset.
     """
     # In the axes of the rectangle. Its center is at (px, py), the disc at (0, 0).
     c, s = math.cos(relative[2]), math.sin(relative[2])
@@ -115,14 +118,16 @@ def _legs(
     horizon: float,
     front: tuple[float, float, float],
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Finds the part of the border that is nearest to a velocity.
+    """Finds the nearest part of the border of a velocity obstacle to a velocity.
 
-    The parts are the cut-off (``front``) and both legs of the cone. A leg counts only
-    for velocities beyond its point of contact with the cut-off.
+    A velocity obstacle is the set of relative velocities that lead to a contact. The
+    border has three parts: the cut-off (``front``), which is the rounded end of the
+    cone, and both legs of the cone. A leg counts only for velocities beyond the point
+    where the leg touches the cut-off.
 
     Returns:
-        Signed distance from the border, m/s, and x and y of the unit normal. The
-        distance is negative inside the velocity obstacle.
+        Three numbers: the signed distance of the velocity from the border, m/s, and x
+        and y of the unit normal. The distance is negative inside the velocity obstacle.
     """
     (px, py), (vx, vy) = place, velocity
     middle = math.atan2(py, px)
@@ -161,13 +166,18 @@ def _legs(
 def reciprocal_avoidance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: AvoidanceNumbers
 ) -> None:
-    """Computes the twist.
+    """Computes the twist (speed and yaw rate) of the robot in one control period.
 
-    The state has the velocity in W, m/s, of the point ``offset_m`` ahead of the axle,
-    and the poses of the bodies one tick ago. The step estimates the velocity of each
-    body from its last two poses. It makes one half plane for each near body. From the
-    velocities that lie in all half planes, it chooses the velocity nearest to the
-    preferred velocity. Then it converts this velocity of the point to a twist.
+    The state has two parts. The first part is the velocity of the point ``offset_m``
+    ahead of the axle, in the world frame W, m/s. The second part is the pose of each
+    body one period ago.
+
+    The step works in four stages:
+
+    1. Estimate the velocity of each body from its last two poses.
+    2. Make one half plane of permitted velocities for each near body.
+    3. Choose the velocity in all half planes that is nearest to the preferred velocity.
+    4. Convert this velocity of the point to a twist.
     """
     own, pose, poses, sizes = numbers.own, inputs[4], inputs[5], inputs[6]
     twist, count = outputs[0], len(inputs[6]) // 2
@@ -206,9 +216,9 @@ def reciprocal_avoidance_step(
     turn = (c * vy - s * vx) / own.offset_m
     limit = TURN_RATE_RAD_S
     twist[0], twist[1] = c * vx + s * vy, min(max(turn, -limit), limit)
-    # The robot turns to the target if it is at rest, or if it backs off freely. While
-    # it backs off, the twist above would turn it away from the target. At rest it would
-    # turn back, and so on.
+    # The robot turns to the target if it is at rest, or if it backs off without an
+    # obstacle. While the robot backs off, the twist above would turn the robot away
+    # from the target. At rest, the robot would turn back, and the motion would repeat.
     changed = math.hypot(vx - preferred[0], vy - preferred[1])
     backs = wanted < 0.0 and changed < _UNCHANGED_M_S
     if inputs[2][0] > 0.5 and (backs or math.hypot(vx, vy) < _RESTS_M_S):
@@ -216,28 +226,32 @@ def reciprocal_avoidance_step(
 
 
 class ReciprocalAvoidanceController(BaselineController):
-    """Changes the wanted velocity only as much as needed to avoid contacts for a time.
+    """Changes the wanted velocity as little as possible to avoid contacts for a time.
 
-    The block knows the positions, sizes, and velocities of all bodies except the body
-    of the target. The block shows how well a robot drives if it knows all bodies but
-    does not plan a route. Bodies are rectangles. They do not avoid the robot, so the
-    robot makes the whole change of velocity (the paper's non-cooperative agents). The
-    velocity is that of a point ahead of the axle. A disc around this point contains the
-    body. If no velocity obeys all constraints, the block takes the velocity with the
-    least violation.
+    The block knows the positions, sizes, and velocities of all bodies, except the body
+    of the target. The block therefore shows how well a robot drives with perfect
+    knowledge of the bodies but without a planned route.
+
+    Bodies are rectangles. The bodies do not avoid the robot, so the robot makes the
+    whole change of velocity. The paper calls such bodies non-cooperative agents.
+
+    The block controls the velocity of a point ahead of the axle. A disc around this
+    point contains the body of the robot. If no velocity obeys all constraints, the
+    block takes the velocity with the least violation.
 
     The discrete state has the velocity of the point, and the poses of the bodies one
-    tick ago. There is no latency.
+    control period ago. There is no latency.
 
     Args:
-        robot: Size of the body, and position of P.
-        attraction: ``AttractionParameters``; uses the follow distance.
+        robot: Size of the body, and position of the control point P ahead of the axle.
+        attraction: ``AttractionParameters``. Only the follow distance is used.
         gains: ``ReciprocalAvoidanceParameters``.
         bodies: Number of bodies.
-        tick_s: Period of the controller, s.
+        tick_s: Control period, s.
 
     Reference: van den Berg, Guy, Lin and Manocha, Reciprocal n-body collision
-    avoidance, Robotics Research, 2011; for differential drives Snape et al., IROS 2010.
+    avoidance, Robotics Research, 2011. For differential drives: Snape et al., IROS
+    2010.
     """
 
     inputs = (

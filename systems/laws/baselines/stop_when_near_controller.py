@@ -28,7 +28,7 @@ class StopNumbers(NamedTuple):
 def stop_when_near_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: StopNumbers
 ) -> None:
-    """Computes the twist. An echo nearer than ``stop_m`` prevents driving forward."""
+    """Computes the twist of the robot: forward motion only without near echoes."""
     own, twist = numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
     ranges, echo = inputs[4], inputs[5]
@@ -41,16 +41,16 @@ def stop_when_near_step(
 class StopWhenNearController(BaselineController):
     """Drives to the target, but does not drive forward while an echo is near.
 
-    This is the simplest law. It has no state and no latency.
+    This law is the simplest law. The block has no state and no latency.
 
     Args:
-        robot: Robot, for the position of P.
-        attraction: ``AttractionParameters``; uses the follow distance.
+        robot: Parameters of the robot, for the position of the control point P.
+        attraction: ``AttractionParameters``. Only the follow distance is used.
         gains: ``StopWhenNearParameters``.
-        sensors: Range sensors; uses their number.
-        tick_s: Period of the controller, s.
+        sensors: Range sensors. Only the number of sensors is used.
+        tick_s: Control period, s.
 
-    Reference: ours; docs/results_laws.md.
+    Reference: our own work; docs/results_laws.md.
     """
 
     inputs = (

@@ -19,11 +19,12 @@ from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
-#: Number of sectors (5 deg each, as in the paper), and largest number of sectors of a
-#: narrow valley.
+# ``_SECTORS``: number of sectors of the histogram (5 deg each, as in the paper).
+# ``_WIDE``: largest number of sectors of a narrow valley.
 _SECTORS, _WIDE = 72, 16
-#: Weight mu_1 of the target's direction, and weight mu_2 of the robot's heading (as in
-#: the paper).
+# ``_TARGET_GAIN``: weight mu_1 of the angle to the target's direction (as in the
+#   paper).
+# ``_HEADING_GAIN``: weight mu_2 of the angle to the robot's heading (as in the paper).
 _TARGET_GAIN, _HEADING_GAIN = 5.0, 2.0
 #: Ratio of the high threshold of the density to the low threshold.
 _THRESHOLDS_RATIO = 2.0
@@ -60,14 +61,16 @@ def _apart(one: float, other: float) -> float:  # pragma: no cover  (compiled)
 def polar_histogram(
     places: Any, x: float, y: float, numbers: HistogramNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the primary polar histogram, the obstacle density (eqs 1-6).
+    """Computes the density of obstacles in each direction (VFH+, eq. 1-6).
 
-    The function enlarges each occupied cell by the radius of the robot. The enlarged
-    cell adds its magnitude to all sectors that it covers. The magnitude is larger if
-    the cell is nearer or more certain to be occupied.
+    The paper calls this density the primary polar histogram. The function enlarges each
+    occupied cell by the radius of the robot. The enlarged cell adds its magnitude to
+    all sectors that it covers. The magnitude of a cell is larger if the cell is nearer,
+    or if the cell is more certainly occupied.
 
     Args:
-        places: (n, 3) occupied cells: x and y in W, m; certainty from 0 to 1.
+        places: (n, 3) occupied cells: x and y in the world frame W, m, and the
+            certainty, 0 to 1.
         x: Position of the robot, x in W, m.
         y: Position of the robot, y in W, m.
         numbers: Window and radius.
@@ -100,11 +103,11 @@ def polar_histogram(
 def _mask(
     blocked: Any, places: Any, pose: Any, circle: float, numbers: HistogramNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Blocks the directions to which the robot cannot turn while it moves (eqs 8-13).
+    """Blocks the directions to which the robot cannot turn while it moves (eq. 8-13).
 
-    At its speed the robot can turn on two circles of radius ``circle``, one on each
-    side. If an enlarged cell meets the circle of a side, it blocks all directions
-    beyond the cell on this side.
+    At its present speed, the robot can turn left or right on a circle of radius
+    ``circle``. If an enlarged cell meets the left circle, the function blocks all
+    directions to the left of this cell. The same rule applies to the right side.
     """
     x, y, theta = pose
     left = right = math.pi
@@ -136,22 +139,25 @@ def choose_direction(
     previous: float,
     previous_gain: float,
 ) -> float:  # pragma: no cover  (compiled)
-    """Chooses the candidate direction of least cost (eqs 14-18).
+    """Chooses the candidate direction of least cost (VFH+, eq. 14-18).
 
-    A valley is a run of free sectors. A narrow valley has one candidate, its middle. A
-    wide valley has one candidate near each edge. If the target direction lies between
-    these two, it is a third candidate. Without blocked sectors the target direction is
-    the only candidate.
+    A valley is a run of free sectors. The candidates are:
+
+    - in a narrow valley: the middle of the valley.
+    - in a wide valley: a direction near each edge. If the direction of the target lies
+      between these two, the direction of the target is a third candidate.
+    - without any blocked sectors: only the direction of the target.
 
     Args:
         blocked: (72,) whether each sector is blocked.
         target: Direction of the target, sectors.
         heading: Heading of the robot, sectors.
-        previous: Previously chosen direction, sectors; negative if there is none.
+        previous: Previously chosen direction, sectors. The value is negative if there
+            is none.
         previous_gain: Weight mu_3 of the angle to the previous direction.
 
     Returns:
-        Chosen direction, sectors; negative if all sectors are blocked.
+        Chosen direction, sectors. The value is negative if all sectors are blocked.
     """
     anywhere = not blocked.any()
     begin = 0
@@ -202,10 +208,15 @@ def _steer(
     circle: float,
     numbers: HistogramNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Returns the chosen direction, rad in W, and its density.
+    """Chooses a direction and updates the state.
 
-    The direction is NaN if all sectors are blocked. The function also updates the
-    state: which sectors are blocked according to the thresholds, and the direction.
+    The state has one number for each sector, 1 if the thresholds block the sector, and
+    the last direction.
+
+    Returns:
+        Chosen direction in the world frame W, rad, and density of obstacles in this
+        direction. If all sectors are blocked, the direction is NaN and the density is
+        0.
     """
     density = polar_histogram(places, pose[0], pose[1], numbers)
     blocked = np.empty(_SECTORS, dtype=np.bool_)
@@ -234,10 +245,10 @@ def vector_field_histogram_step(
     outputs: Any,
     numbers: VectorFieldHistogramNumbers,
 ) -> None:
-    """Computes the twist.
+    """Computes the twist (speed and yaw rate) of the robot in one control period.
 
-    The state has one number for each sector (1 if it is blocked, else 0), the last
-    direction in sectors, and the last speed in m/s.
+    The state has one number for each sector (1 if the sector is blocked, otherwise 0),
+    the last direction in sectors, and the last speed in m/s.
     """
     pose, own, twist = inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
@@ -263,17 +274,19 @@ def vector_field_histogram_step(
 class VectorFieldHistogramController(MapController):
     """Steers into the best valley of a polar histogram of obstacles.
 
-    The obstacles are cells that gave echoes and that no sensor has seen free since. At
-    every tick the block follows the stages of the paper:
+    The histogram has the density of obstacles in each direction, and a valley is a run
+    of free directions. The obstacles are occupied cells of the map. A cell is occupied
+    if echoes came from there and no sensor has seen the cell free since. In every
+    control period, the block follows the stages of the paper:
 
     1. The primary histogram has the density of obstacles in each direction. The block
        enlarges each cell by the radius of the robot.
-    2. The binary histogram marks blocked directions by two thresholds.
+    2. The binary histogram marks blocked directions by two thresholds of the density.
     3. The masked histogram also blocks directions to which the robot cannot turn at its
-       speed.
+       present speed.
     4. The block chooses the candidate direction of least cost.
 
-    The speed is lower if the density in this direction is higher, as in the first paper
+    A higher density in the chosen direction reduces the speed, as in an earlier paper
     (Borenstein and Koren 1991). If all directions are blocked, the robot does not drive
     forward, and turns to the target.
 
@@ -281,10 +294,10 @@ class VectorFieldHistogramController(MapController):
     There is no latency.
 
     Args:
-        robot: Size of the body, and position of P.
-        attraction: ``AttractionParameters``; uses the follow distance.
+        robot: Size of the body, and position of the control point P ahead of the axle.
+        attraction: ``AttractionParameters``. Only the follow distance is used.
         gains: ``VectorFieldHistogramParameters``.
-        tick_s: Period of the controller, s.
+        tick_s: Control period, s.
 
     Reference: Ulrich and Borenstein, VFH+: reliable obstacle avoidance for fast mobile
     robots, IEEE Int. Conf. on Robotics and Automation, 1998.

@@ -1,4 +1,4 @@
-"""Adaptation of stiffness and damping so that P moves like a reference model."""
+"""Adaptation of the gains of a route law, so that the motion follows a reference."""
 
 from __future__ import annotations
 
@@ -23,14 +23,17 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
-#: First indices in the state: the three gains, and four sensitivities for each gain.
+# ``_GAINS``: index in the state of the first of the three gains.
+# ``_SENSITIVITIES``: index in the state of the first sensitivity. There are four
+#   sensitivities for each gain.
 _GAINS, _SENSITIVITIES = 0, 3
 #: Names of the gains that adapt.
 _ADAPTED = "stiffness", "damping", "contact_stiffness"
-#: Weight tau_v^2 of velocity errors, s^2: an error of 1 m/s counts as an error of 0.5
-#: m. All constants are our choice.
+#: Weight tau_v^2 of velocity errors, s^2 (our choice, like all constants here). A
+#: velocity error of 1 m/s counts as much as a position error of 0.5 m.
 _VELOCITY_WEIGHT_S2 = 0.5**2
-#: Least and greatest K and D of gains with limits, N/m and N s/m.
+# ``STIFFNESS_BOX_N_M``: least and greatest K of gains with limits, N/m.
+# ``DAMPING_BOX_N_S_M``: least and greatest D of gains with limits, N s/m.
 STIFFNESS_BOX_N_M, DAMPING_BOX_N_S_M = (0.5, 6.0), (3.0, 8.0)
 #: Least and greatest K_e of gains with limits, N/m.
 _CONTACT_BOX_N_M = (0.5, 24.0)
@@ -65,14 +68,16 @@ class AdaptationNumbers(NamedTuple):
 def adaptation_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: AdaptationNumbers
 ) -> None:
-    """Adapts K, D, and K_e by one tick.
+    """Adapts the gains K, D, and K_e by one control period.
 
-    The state begins with K, D, and K_e. For each of these gains q, the sensitivities
-    dp/dq and dv/dq (x and y each) follow.
+    K is the stiffness to the target, D is the damping, and K_e is the stiffness of
+    contacts. The state begins with K, D, and K_e. For each of these gains q, four
+    sensitivities follow: x and y of dp/dq, then x and y of dv/dq.
 
-    For each gain the step computes the gradient of the error, either by the Lyapunov
-    rule or from the sensitivities. Then it moves the gain against the gradient and
-    limits it. The output has the gains from before this change.
+    For each gain, the step computes the gradient of the error. The gradient follows
+    from the Lyapunov rule or from the sensitivities. Then the step moves the gain
+    against the gradient and limits the gain. The output has the gains from before this
+    change.
     """
     target, reference, pose, v_WP, objects = inputs
     for k in range(3):
@@ -81,8 +86,8 @@ def adaptation_step(
     found = contacts_of_objects(objects, v_WP, numbers.contacts)
     sources = sensitivity_sources(p_WP, v_WP, target, found, numbers.mass)
     gains = state[0], state[1], state[2]
-    # Errors against the reference, and gradient of the safety term. Its distance
-    # d_sec is S.
+    # Errors against the reference, and gradient of the safety term. The distance d_sec
+    # of the safety term is S.
     ex, ey = p_WP[0] - reference[0], p_WP[1] - reference[1]
     evx, evy = v_WP[0] - reference[2], v_WP[1] - reference[3]
     gx, gy = penalty_gradient(found, numbers.contacts.begins_m, numbers.penalty)
@@ -106,26 +111,32 @@ def adaptation_step(
 class ImpedanceAdaptation(Block):
     """Adapts the stiffness and damping of a robot on a route.
 
-    There are two rules. The rule ``lyapunov`` is K' = (gamma/M) e_v . (p - p_d) and
-    D' = (gamma/M) e_v . (v - v_d) with e_v = v - v_ref. The printed eq. 40 to 42 amount
-    to this rule. Without contacts, this rule makes a Lyapunov function fall.
+    K is the stiffness to the target, D is the damping, and K_e is the stiffness of
+    contacts. p and v are the position and velocity of the control point P. p_d and v_d
+    belong to the target. p_ref and v_ref belong to a reference model. gamma is the rate
+    of the adaptation, and M is the virtual mass.
 
-    The rule ``sensitivity`` is q' = -gamma dJ/dq for each gain q. J is the cost of eq.
-    27 with two changes: the weight tau_v multiplies velocities, and a hinge function
-    replaces the penalty. The sensitivities are the solution of eq. 34, if its left side
-    is a time derivative.
+    The block has two rules:
 
-    The discrete state has K, D, K_e, and four sensitivities of each gain. It is updated
-    every tick. The output ``impedance`` is part of the state, so it shows a change of
-    the gains from the next tick on.
+    - The rule ``lyapunov`` is K' = (gamma/M) e_v . (p - p_d) and D' = (gamma/M) e_v .
+      (v - v_d), with e_v = v - v_ref. The printed eq. 40 to 42 are equivalent to this
+      rule. Without contacts, a Lyapunov function falls under this rule.
+    - The rule ``sensitivity`` is q' = -gamma dJ/dq for each gain q. J is the cost of
+      eq. 27 with two changes: the weight tau_v multiplies velocities, and a hinge
+      function replaces the penalty. The sensitivities solve eq. 34, in which the left
+      side is read as a time derivative.
+
+    The discrete state has K, D, K_e, and four sensitivities of each gain. The state is
+    updated every control period. The output ``impedance`` is part of the state. A
+    change of the gains therefore appears at the output one period later.
 
     Args:
         parameters: ``AdaptiveTrajectoryParameters``.
-        robot: Mass, and position of P.
-        tick_s: Period, s.
+        robot: Virtual mass, and position of P.
+        tick_s: Control period, s.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 27 to 42; docs/routes.md
-    has the errata.
+    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 27 to 42; docs/routes.md has
+    the errata.
     """
 
     part = "adaptation"
@@ -165,15 +176,15 @@ class ImpedanceAdaptation(Block):
 def adaptation_numbers(
     own: AdaptiveTrajectoryParameters, robot: RobotParameters, tick_s: float
 ) -> AdaptationNumbers:
-    """Computes the constants of the step.
+    """Computes the constants that ``adaptation_step`` uses.
 
     Args:
         own: Rule, rates, initial gains, and contacts.
-        robot: Mass, and position of P.
-        tick_s: Period, s.
+        robot: Virtual mass, and position of the control point P.
+        tick_s: Control period, s.
 
     Returns:
-        The constants.
+        Constants of the step.
     """
     boxes = STIFFNESS_BOX_N_M, DAMPING_BOX_N_S_M, _CONTACT_BOX_N_M
     low, high = zip(*(box if own.projected else _WIDE for box in boxes), strict=True)

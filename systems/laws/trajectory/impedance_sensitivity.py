@@ -1,4 +1,9 @@
-"""Sensitivities of the motion of P to the gains K, D, and K_e (eq. 28 to 41)."""
+"""Sensitivities of the motion of P to the gains K, D, and K_e (eq. 28 to 41).
+
+The equations are those of Engelbrecht, Steyn and Djouani (2021). P is the control point
+of the robot. K is the stiffness to the target, D is the damping, and K_e is the
+stiffness of contacts.
+"""
 
 from __future__ import annotations
 
@@ -21,17 +26,22 @@ def sensitivity_sources(
 ) -> Any:
     """Computes the source terms dA/dq X + dB/dq u of eq. 34 for the gains q.
 
-    Eq. 35 to 41 are these terms for q = K, D, and K_e.
+    Eq. 35 to 41 are these terms for the stiffness K, the damping D, and the contact
+    stiffness K_e.
 
     Args:
-        p_WP: Position (x, y) of P in W, m.
-        v_WP: Velocity (x, y) of P in W, m/s.
-        target: p_d and v_d, four numbers in W, m and m/s.
+        p_WP: Position p (x, y) of the control point P in the world frame W, m.
+        v_WP: Velocity v (x, y) of P in W, m/s.
+        target: Position p_d (x, y), m, and velocity v_d (x, y), m/s, of the target in
+            W.
         contacts: Result of ``contacts_of_objects``.
         mass: Virtual mass M, kg.
 
     Returns:
-        ``Sensitivities``: -(p - p_d)/M, -(v - v_d)/M, and the sum of (S - d) n/M.
+        ``Sensitivities`` with three terms. The term for K is -(p - p_d)/M. The term for
+        D is -(v - v_d)/M. The term for K_e is the sum of (S - d) n/M over all contacts.
+        S - d is the overlap of a contact, and n is the unit vector from the object to
+        P.
     """
     ex = ey = 0.0
     for contact in contacts:
@@ -48,24 +58,29 @@ def sensitivity_sources(
 def advance_sensitivity(
     state: Any, begin: Any, source: Any, contacts: Any, gains: Any, numbers: Any
 ) -> None:
-    """Advances the sensitivities by one tick of d/dt X_q = A X_q + source.
+    """Advances the sensitivities X_q to one gain q by one control period.
 
-    This is eq. 34 with two corrections: the left side is a time derivative, and the
-    right side contains the term A X_q. X_q has dp/dq and dv/dq of one gain q. A is the
-    exact linearization of the loop. A contact with a point has the stiffness K_e along
-    n and the stiffness -K_e (S - d)/d across n. Its damping fades with the distance d,
-    so the function adds the matrix -(D_e/S) (v - v_j) n^T to this stiffness.
+    The equation is d/dt X_q = A X_q + source. X_q consists of dp/dq and dv/dq, where p
+    and v are the position and velocity of the control point P. The equation is eq. 34
+    with two corrections: the left side is a time derivative, and the right side
+    contains the term A X_q.
+
+    A is the exact linearization of the loop. S is the distance at which a contact
+    begins, and d is the present distance. A contact has the stiffness K_e along the
+    unit vector n, and the stiffness -K_e (S - d)/d across n. The damping D_e of a
+    contact fades with d. Therefore the matrix -(D_e/S) (v - v_j) n^T is added to the
+    stiffness, where v_j is the velocity of the object.
 
     The function updates the velocity first, and then the position with the new
     velocity. The virtual mass moves in the same order.
 
     Args:
-        state: State of the block. The function changes four numbers from ``begin`` on:
-            dp/dq (x and y) and dv/dq (x and y).
+        state: State of the block. The function changes four numbers: dp/dq (x and y)
+            and dv/dq (x and y).
         begin: Index in the state of the first of these four numbers.
-        source: (x, y) of ``sensitivity_sources``.
+        source: Source term (x, y) from ``sensitivity_sources``.
         contacts: Result of ``contacts_of_objects`` for damping that fades.
-        gains: K, N/m, D, N s/m, and K_e, N/m.
+        gains: Stiffness K, N/m, damping D, N s/m, and contact stiffness K_e, N/m.
         numbers: ``AdaptationNumbers``.
     """
     tick_s = numbers.tick_s
@@ -96,18 +111,21 @@ def advance_sensitivity(
 
 @register_jitable
 def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
-    """Computes the gradient of the penalty lambda/2 h(d)^2 with h = max(0, d_sec - d).
+    """Computes the gradient of the penalty for small distances from objects.
 
-    The gradient is the sum of -lambda h(d) n over all contacts. The hinge h replaces
-    the safety term of eq. 27, lambda/2 (d_sec^2 - d^2).
+    The penalty is lambda/2 h(d)^2 with the hinge h = max(0, d_sec - d) for the distance
+    d. The gradient is the sum of -lambda h(d) n over all contacts, where n is the unit
+    vector from the object to the control point P. The penalty replaces the safety term
+    of eq. 27, lambda/2 (d_sec^2 - d^2).
 
     Args:
         contacts: Result of ``contacts_of_objects``.
-        security_m: Distance d_sec, m; in the adaptation it is S.
+        security_m: Distance d_sec, m. The adaptation uses the distance S at which
+            contacts begin.
         penalty: Weight lambda.
 
     Returns:
-        (x, y): derivative of the penalty with respect to the position of P, m.
+        Derivatives (x, y) of the penalty with respect to the position of P, m.
     """
     gx = gy = 0.0
     for contact in contacts:

@@ -1,4 +1,4 @@
-"""The reference motion of the adaptation: a second-order model follows the target."""
+"""The reference motion of the adaptation: a second-order model with the same target."""
 
 from __future__ import annotations
 
@@ -27,15 +27,17 @@ class ReferenceNumbers(NamedTuple):
 
 @lru_cache(maxsize=64)
 def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNumbers:
-    """Computes the exact discretization of eq. 20 to 26 for a target held over a tick.
+    """Computes the exact discretization of eq. 20 to 26 for one axis.
+
+    The target is constant during each control period.
 
     Args:
         frequency: Natural frequency w_n, rad/s.
         ratio: Damping ratio xi.
-        tick_s: Period, s.
+        tick_s: Control period, s.
 
     Returns:
-        The matrices A and B.
+        Matrices A and B of x+ = A x + B u.
     """
     stiff, damp = frequency**2, 2.0 * ratio * frequency
     whole = np.zeros((4, 4))
@@ -47,7 +49,9 @@ def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNum
 
 
 def nominal_poles(mass: float, stiffness: float, damping: float) -> tuple[float, float]:
-    """Returns the poles of a mass on a spring and a damper.
+    """Computes the natural frequency and damping ratio of a mass, spring, and damper.
+
+    The paper prints neither of these numbers.
 
     Args:
         mass: Virtual mass M, kg.
@@ -55,7 +59,7 @@ def nominal_poles(mass: float, stiffness: float, damping: float) -> tuple[float,
         damping: Damping D, N s/m.
 
     Returns:
-        Natural frequency w_n, rad/s, and damping ratio xi. The paper prints neither.
+        Natural frequency w_n, rad/s, and damping ratio xi.
     """
     return math.sqrt(stiffness / mass), damping / (2.0 * math.sqrt(stiffness * mass))
 
@@ -79,22 +83,23 @@ def reference_step(
 
 
 class ReferenceModel(Block):
-    """Computes the motion with which P should follow the target.
+    """Computes the motion with which the control point P should follow the target.
 
-    At the first tick the model starts at the target. The model has no contacts.
-    Therefore the motion of P away from an obstacle counts as an error.
+    The model is a second-order system. In the first control period, the model starts at
+    the target. The model has no contacts with obstacles. Therefore a motion of P away
+    from an obstacle counts as an error.
 
-    The discrete state has position and velocity. It is updated every tick. The update
-    is exact if the target stays constant during the tick. A new target changes the
-    output from the next tick on.
+    The discrete state has position and velocity. The state is updated every control
+    period. The update is exact if the target is constant during the period. A new
+    target changes the output one period later.
 
     Args:
-        parameters: K and D, ``TrajectoryImpedanceParameters``.
+        parameters: Stiffness K and damping D, ``TrajectoryImpedanceParameters``.
         robot: Virtual mass M. M, K, and D determine the poles of the model.
-        tick_s: Period, s.
+        tick_s: Control period, s.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 19 to 26, with the dots of eq.
-    19 in their correct places.
+    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 19 to 26. The dots of eq. 19,
+    which mark derivatives, are moved to their correct places.
     """
 
     part = "reference_model"

@@ -13,14 +13,16 @@ from systems.laws.trajectory.trajectory_conventional import (
     TrajectoryImpedanceParameters,
 )
 
-#: Bounds of gamma (a T/M)^2 by rule, where a is the amplitude of P's target, m. Below
-#: the bound K and D do not run away. The values are rounded down from the results of
-#: ``critical_rate`` in ``analysis.trajectory.adaptation_stability`` for ticks of 25 to
+#: Bounds of the number gamma (a T/M)^2, by rule of the adaptation. gamma is the rate
+#: of the adaptation, and a is the amplitude of P's target, m. T is the control
+#: period, s, and M is the virtual mass, kg. Below the bound, K and D do not run away.
+#: The values are rounded down from the results of ``critical_rate`` in
+#: ``analysis.trajectory.adaptation_stability``. These results are for periods of 25 to
 #: 100 ms and a reference with the nominal gains. Other references have lower bounds.
 RATE_BOUNDS = {"lyapunov": 1.0, "sensitivity": 0.5}
 #: Largest stiffness in the search for the bound, N/m.
 _STIFFEST_N_M = 1e7
-#: Number of bisections.
+#: Number of bisections in the search for the bound.
 _HALVINGS = 60
 
 
@@ -39,23 +41,27 @@ class SampledMass(NamedTuple):
 def sampled_matrix(
     stiffness: float, damping: float, of: SampledMass
 ) -> NDArray[np.float64]:
-    """Computes the matrix A that advances one axis by one tick, x+ = A x.
+    """Computes the matrix A that advances one axis of the robot by one control period.
 
-    A spring K to a fixed point and a damper D act on the virtual mass. The damper acts
-    without delay. With ``late_ticks``, the spring uses an earlier position instead of
-    p. The velocity v of the virtual mass commands the wheels. The wheel speed w moves
-    P::
+    A spring with the stiffness K to a fixed point and a damper D act on the virtual
+    mass M. The velocity v of the virtual mass commands the wheels. The wheel speed w
+    follows v with the time constant lag. w moves the control point P to the position
+    p::
 
         v+ = v - T/M (K p + D v),  w+ = a w + (1 - a) v+,  a = exp(-T/lag)
         p+ = p + lag (1 - a) w + (T - lag (1 - a)) v+
 
+    The damper acts without delay. If ``late_ticks`` is above 0, the spring uses an
+    earlier position instead of p.
+
     Args:
-        stiffness: Sum of all springs, N/m.
+        stiffness: Sum of the stiffnesses of all springs, N/m.
         damping: Sum of all dampers, N s/m.
-        of: Mass, lag, and tick.
+        of: Mass, lag, and control period T.
 
     Returns:
-        (3 + late_ticks, 3 + late_ticks) matrix. The states are p, w, v, then earlier p.
+        (3 + late_ticks, 3 + late_ticks) matrix A of x+ = A x. The state x has p, w, v,
+        then earlier values of p.
     """
     size, tick_s = 3 + of.late_ticks, of.tick_s
     kept = math.exp(-tick_s / of.motor_lag_s)
@@ -77,16 +83,17 @@ def sampled_matrix(
 
 @lru_cache(maxsize=64)
 def stiffness_bound(damping: float, of: SampledMass) -> float:
-    """Computes by bisection the stiffness above which an axis is unstable.
+    """Computes by bisection the stiffness above which one axis is unstable.
 
-    The cache serves the runs of a sweep, which use the same arguments.
+    The function caches its results, because the runs of a sweep use the same arguments.
 
     Args:
         damping: Sum of all dampers, N s/m.
-        of: Mass, lag, and tick.
+        of: Mass, lag, and control period.
 
     Returns:
-        Stiffness, N/m; 0 if every stiffness is unstable with this damping.
+        Stiffness, N/m. The result is 0 if every stiffness is unstable with this
+        damping.
     """
 
     def rests(stiffness: float) -> bool:
@@ -105,43 +112,43 @@ def stiffness_bound(damping: float, of: SampledMass) -> float:
 
 
 def damping_bound(of: SampledMass) -> float:
-    """Returns the largest stable damping 2 M/T, N s/m.
+    """Computes the largest stable damping 2 M/T of a virtual mass M with the period T.
 
-    With more damping, the velocity changes sign at every tick and grows.
+    With more damping, the velocity changes sign in every control period and grows.
 
     Args:
-        of: Mass and tick.
+        of: Mass and control period.
 
     Returns:
-        Damping, N s/m.
+        Largest stable damping, N s/m.
     """
     return 2.0 * of.mass_kg / of.tick_s
 
 
 def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
-    """Computes the lag of P at which its target pulls P through a contact.
+    """Computes the lag at which the target pulls the control point P through a contact.
 
     Args:
         own: Parameters of the law.
 
     Returns:
-        Lag K_e S/K of P behind its target, m; 1 m if K_e is 0.
+        Lag K_e S/K of P behind the target, m. If K_e is 0, the result is 1 m.
     """
     lag = own.contact_stiffness_n_m * own.security_zone_m / own.stiffness_n_m
     return lag or 1.0
 
 
 def rate_bound(rule: str, amplitude_m: float, of: SampledMass) -> float:
-    """Computes the rate gamma above which K and D may run away.
+    """Computes the adaptation rate gamma above which the gains K and D may run away.
 
-    The bound applies to adaptation without limits of the gains.
+    The bound applies to an adaptation without limits of the gains.
 
     Args:
         rule: ``lyapunov`` or ``sensitivity``.
-        amplitude_m: Amplitude a of the target, or its lead over P, m.
-        of: Mass and tick.
+        amplitude_m: Amplitude a of the target, or its lead over the control point P, m.
+        of: Mass and control period.
 
     Returns:
-        Rate, (N/m)^2/(m^2 s), proportional to 1/a^2.
+        Rate, (N/m)^2/(m^2 s). The rate is proportional to 1/a^2.
     """
     return RATE_BOUNDS[rule] * (of.mass_kg / (amplitude_m * of.tick_s)) ** 2

@@ -13,27 +13,34 @@ from systems.laws.trajectory.trajectory_conventional import (
 
 
 class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
-    """The conventional law, whose gains adapt; the paper prints no rates and limits."""
+    """Parameters of the adaptive law. The paper prints no rates and no limits."""
 
     rule: Literal["lyapunov", "sensitivity"] = "lyapunov"
-    """Rule of the adaptation. ``lyapunov``: eq. 40 to 42 as printed, which are a
-    Lyapunov rule. ``sensitivity``: gradient of eq. 27 with the sensitivities that eq.
-    34 intends. With this rule, the damping of a contact is 0 at the edge of the zone
-    and grows toward the object, because sensitivities need a force that does not
-    jump."""
+    """Rule that adapts the gains.
+
+    ``lyapunov`` uses eq. 40 to 42 as printed, which are a Lyapunov rule.
+    ``sensitivity`` uses the gradient of eq. 27 with the sensitivities that eq. 34
+    intends.
+
+    With ``sensitivity``, the damping of a contact is 0 at the edge of the zone and
+    grows toward the object. The reason is that sensitivities need a force without
+    jumps."""
     rate: NonNegative = 10.0
     """Rate gamma = eta/T of K and D, (N/m)^2/(m^2 s)."""
     contact_rate: NonNegative = 0.0
     """Rate gamma of K_e, (N/m)^2/(m^2 s). With 0, K_e is fixed."""
     penalty: NonNegative = 0.0
-    """Weight lambda of the safety term of eq. 27. With 0 the term is off. Eq. 27 prints
-    lambda/2 (d_sec^2 - d^2) for each object. Here the term is lambda/2 max(0, S - d)^2,
-    so lambda has no unit, and the gradient is -lambda (S - d) n. The term has an effect
-    only with ``rule: sensitivity``. Without the term, a robot that adapts its gains
-    collides more often than a robot with fixed gains."""
+    """Weight lambda of the safety term of eq. 27, without unit. With 0 the term is off.
+
+    Eq. 27 prints lambda/2 (d_sec^2 - d^2) for each object. Here the term is lambda/2
+    max(0, S - d)^2. d is the distance of the object, and S is ``security_zone_m``. The
+    gradient of the term is -lambda (S - d) n, where n points from the object to P.
+
+    The term has an effect only with ``rule: sensitivity``. Without the term, a robot
+    with adaptive gains collides more often than a robot with fixed gains."""
     projected: bool = False
-    """Whether K stays between 0.5 and 6 N/m, D between 3 and 8 N s/m, and K_e between
-    0.5 and 24 N/m."""
+    """Whether the gains have limits: K from 0.5 to 6 N/m, D from 3 to 8 N s/m, and K_e
+    from 0.5 to 24 N/m."""
     safety_filter: bool = False
     """Whether ``SafetyFilter`` keeps P away from objects, whatever the gains."""
 

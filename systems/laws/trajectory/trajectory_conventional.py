@@ -14,10 +14,11 @@ from systems.laws.law import Equation, Law
 
 
 class TrajectoryImpedanceParameters(Parameters):
-    """Springs and dampers to the target and to contacts.
+    """Springs and dampers that act from the target and from contacts.
 
-    K, D, and S are those of tables 1 and 2 of Engelbrecht, Steyn and Djouani (2021),
-    which print one K and one D. Here K_e = K and D_e = D.
+    K, D, and S have the values of tables 1 and 2 of Engelbrecht, Steyn and Djouani
+    (2021). The paper prints only one stiffness K and one damping D. Contacts have the
+    same values by default: K_e = K and D_e = D.
     """
 
     stiffness_n_m: Stiffness = 3.0
@@ -31,17 +32,20 @@ class TrajectoryImpedanceParameters(Parameters):
     security_zone_m: Length = 1.0
     """Distance S from P at which contacts begin, m (1 m in tables 1 and 2)."""
     block_distance_m: Length | None = None
-    """Distance L_block of eq. 6, m. P stops if its next step would end within this
-    distance of an object and would not lead away from the object. null: eq. 6 is off.
-    The paper prints no value. 0.2 m is enough for ``turtlebot3_burger``, whose rear
-    corners are 0.174 m from P."""
+    """Distance L_block of eq. 6, m. With null, eq. 6 is off.
+
+    The control point P stops if two conditions hold. The next step of P would end
+    within this distance of an object. The step would not lead away from the object.
+
+    The paper prints no value. A distance of 0.2 m is enough for ``turtlebot3_burger``,
+    whose rear corners are 0.174 m from P."""
 
     @property
     def damping_fades(self) -> bool:
         """Whether the damping of a contact is 0 at the edge of the zone.
 
-        It then grows toward the object. Otherwise the full damping acts in the whole
-        zone, as printed.
+        If true, the damping grows from the edge toward the object. If false, the full
+        damping acts in the whole zone, as printed.
         """
         return False
 
@@ -56,14 +60,14 @@ def trajectory_law(
     """Makes the record of a law whose block is ``TrajectoryImpedanceController``.
 
     Args:
-        name: See ``Law``.
-        title: See ``Law``.
-        label: See ``Law``.
+        name: Name of the law in scenarios.
+        title: Heading in reports.
+        label: Label in the legends of pictures.
         gains: Model of the gains.
         *more: Equations that follow the equation of motion.
 
     Returns:
-        The record.
+        Record of the law.
     """
     motion = Equation(
         "Impedance to the target and to contacts",

@@ -1,4 +1,4 @@
-"""This project's variant: a narrower and stiffer zone, and a safety filter."""
+"""Our variant of the route law: a narrower and stiffer zone, and a safety filter."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class FilteredTrajectoryParameters(TrajectoryImpedanceParameters):
     contact_stiffness_n_m: NonNegativeStiffness = 8.0
     """Stiffness K_e to robots and obstacles, N/m (our choice)."""
     security_zone_m: Length = 0.8
-    """Distance S from P at which contacts begin, m (our choice; 1 m in tables 1 and
-    2)."""
+    """Distance S from the control point P at which contacts begin, m (our choice).
+    Tables 1 and 2 of the paper have 1 m."""
 
     @property
     def damping_fades(self) -> bool:

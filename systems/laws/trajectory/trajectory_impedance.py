@@ -1,4 +1,4 @@
-"""Impedance of P to a moving target and to objects near P."""
+"""Forces on the control point P from a moving target and from objects near P."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from systems.world.geometry import safe_norm
 class ContactNumbers(NamedTuple):
     """Constants of the contact force.
 
-    The laws of the package set both distances to S. Other values are other readings of
-    the paper, see docs/errata.md.
+    The laws of the package set both distances to S, the width of the security zone.
+    Different values correspond to other readings of the paper, see docs/errata.md.
     """
 
     begins_m: float
@@ -31,7 +31,10 @@ class ContactNumbers(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """An object that pushes P at one instant. Vectors have the axes of W."""
+    """An object that pushes P at one instant.
+
+    P is the control point of the robot. All vectors have the axes of the world frame W.
+    """
 
     n: tuple[Any, Any]
     """Unit vector from the object to P."""
@@ -46,13 +49,13 @@ class Contact(NamedTuple):
 
 
 def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
-    """Computes the constants of the contact force from the parameters.
+    """Computes the constants of the contact force from the parameters of a law.
 
     Args:
         own: Parameters of the law.
 
     Returns:
-        The constants.
+        Constants of the contact force.
     """
     zone_m = own.security_zone_m
     return ContactNumbers(zone_m, zone_m, own.damping_fades)
@@ -62,17 +65,19 @@ def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
 def target_force(
     p_WP: Any, v_WP: Any, target: Any, stiffness: Any, damping: Any
 ) -> Any:
-    """Computes the force to the target, U = -K (p - p_d) - D (v - v_d) (eq. 2).
+    """Computes the force toward the target, U = -K (p - p_d) - D (v - v_d) (eq. 2).
 
     Args:
-        p_WP: Position (x, y) of P in W, m; floats or AutoDiffXd.
-        v_WP: Velocity (x, y) of P in W, m/s.
-        target: p_d and v_d, four numbers in W, m and m/s.
+        p_WP: Position p (x, y) of the control point P in the world frame W, m; floats
+            or AutoDiffXd.
+        v_WP: Velocity v (x, y) of P in W, m/s.
+        target: Position p_d (x, y), m, and velocity v_d (x, y), m/s, of the target in
+            W.
         stiffness: Stiffness K, N/m.
         damping: Damping D, N s/m.
 
     Returns:
-        (Ux, Uy) in W, N.
+        Force (Ux, Uy) in W, N.
     """
     return (
         stiffness * (target[0] - p_WP[0]) + damping * (target[2] - v_WP[0]),
@@ -82,11 +87,13 @@ def target_force(
 
 @register_jitable
 def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
-    """Lists the contacts, which are the objects whose zone contains P.
+    """Lists the contacts: the objects that are nearer to P than the limit ``begins_m``.
+
+    P is the control point of the robot.
 
     Args:
         objects: Vector of the port ``objects_W``. Positions are relative to P.
-        v_WP: Velocity (x, y) of P in W, m/s; floats or AutoDiffXd.
+        v_WP: Velocity (x, y) of P in the world frame W, m/s; floats or AutoDiffXd.
         numbers: ``ContactNumbers``.
 
     Returns:
@@ -113,17 +120,19 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
 
 @register_jitable
 def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
-    """Computes the force of all contacts, V = sum of K_e overlap n - D_e (v - v_j).
+    """Computes the force of all contacts (eq. 4 and 5 with restored signs).
 
-    This is the force of eq. 4 and 5 with restored signs.
+    Each contact has a spring and a damper. The force V is the sum of K_e overlap n -
+    D_e (v - v_j) over all contacts. n is the unit vector from the object to the control
+    point P. v - v_j is the velocity of P relative to the object.
 
     Args:
         contacts: Result of ``contacts_of_objects``.
-        stiffness: Stiffness K_e, N/m.
-        damping: Damping D_e, N s/m.
+        stiffness: Contact stiffness K_e, N/m.
+        damping: Contact damping D_e, N s/m.
 
     Returns:
-        (Vx, Vy) in W, N.
+        Force (Vx, Vy) in the world frame W, N.
     """
     fx = fy = 0.0
     for contact in contacts:
@@ -136,21 +145,24 @@ def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
 
 @register_jitable
 def step_is_blocked(objects: Any, step: Any, block_m: Any) -> Any:
-    """Returns whether eq. 6 refuses a step of P.
+    """Checks whether eq. 6 forbids a step of the control point P.
 
     Eq. 6 allows a new position if its distance from every object is greater than
-    L_block. Otherwise the robot stays at its position. This function also allows a step
-    that ends within L_block but leads away from the object. A robot with momentum comes
-    to rest up to v (T + motor lag) farther on, so it may rest within L_block. Without
-    the exception it could never leave such a position.
+    L_block. Otherwise the robot stays at its position.
+
+    This function allows a further kind of step: a step that ends within L_block but
+    leads away from the object. Without this exception, a robot within L_block could
+    never leave. A robot can come to rest there, because a robot with the speed v moves
+    on by up to v (T + motor lag). T is the control period.
 
     Args:
         objects: Vector of the port ``objects_W``, with the present positions.
-        step: Vector (x, y) from P to its next position in W, m; floats or AutoDiffXd.
+        step: Vector (x, y) from P to its next position in the world frame W, m; floats
+            or AutoDiffXd.
         block_m: Distance L_block, m.
 
     Returns:
-        True if the step is refused.
+        True if the step is forbidden.
     """
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE

@@ -1,4 +1,4 @@
-"""The law of a robot on a route: impedance to its target and to near objects."""
+"""The controller of a robot on a route: impedance to the target and to near objects."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ from systems.world.geometry import control_point
 
 #: Largest acceleration of the virtual mass, m/s^2 (our choice).
 ACCELERATION_LIMIT_M_S2 = 2.5
-#: Speed in m/s. If a target moves straight back faster, its velocity turns aside.
+#: If a target moves straight back faster than this speed, m/s, the law turns the
+#: velocity of the target aside.
 _BACK_M_S = 0.05
 
 
@@ -57,15 +58,15 @@ class TrajectoryNumbers(NamedTuple):
 def trajectory_numbers(
     own: TrajectoryImpedanceParameters, robot: RobotParameters, tick_s: float
 ) -> TrajectoryNumbers:
-    """Computes the constants of the step.
+    """Computes the constants of the step from the parameters.
 
     Args:
         own: Parameters of the law.
-        robot: Mass, top speed, and position of P.
-        tick_s: Period, s.
+        robot: Virtual mass, top speed, and position of the control point P.
+        tick_s: Control period, s.
 
     Returns:
-        The constants.
+        Constants of the step.
     """
     return TrajectoryNumbers(
         (own.stiffness_n_m, own.damping_n_s_m, own.contact_stiffness_n_m),
@@ -126,16 +127,22 @@ def TrajectoryImpedanceController_(T):
     class Impl(Block_[T]):
         """Pulls P to a moving target and pushes it away from robots and obstacles.
 
-        The law is M p'' = -K (p - p_d) - D (v - v_d) + V. V is the sum over all
-        contacts of K_e (S - d) n - D_e (v - v_j). The contacts are the objects j whose
-        distance d from P is below S. n is the unit vector from object j to P. With
-        ``adapts`` there is an input port ``impedance``. Its K, D, and K_e replace those
-        of the parameters. The outputs are functions of the present input. There is no
-        state and no latency.
+        P is the control point of the robot. The law is M p'' = -K (p - p_d) - D (v -
+        v_d) + V. p and v are the position and velocity of P. p_d and v_d are the
+        position and velocity of the target. V is the force of all contacts.
 
-        ``block_distance_m`` switches eq. 6 on. Eq. 6 applies if the next step would end
-        within this distance of an object and would not lead away from the object. Then
-        the acceleration is -v/T, which stops the virtual mass at once.
+        A contact is an object j whose distance d from P is below S. The force V is the
+        sum of K_e (S - d) n - D_e (v - v_j) over all contacts. n is the unit vector
+        from object j to P, and v_j is the velocity of the object.
+
+        If ``adapts`` is true, there is an input port ``impedance``. The values K, D,
+        and K_e of this port replace the values of the parameters. The outputs are
+        functions of the present input. There is no state and no latency.
+
+        ``block_distance_m`` switches eq. 6 on. Eq. 6 applies if two conditions hold.
+        The next step would end within this distance of an object. The step would not
+        lead away from the object. In this case the acceleration is -v/T, which stops
+        the virtual mass within one control period T.
 
         At most eight objects count. The sampled loop is unstable if the sum of D_e over
         all contacts exceeds 2M/T (80 N s/m for 1 kg). Therefore another block first
@@ -143,9 +150,9 @@ def TrajectoryImpedanceController_(T):
 
         Args:
             parameters: ``TrajectoryImpedanceParameters``.
-            robot: Mass, top speed, and position of P.
+            robot: Virtual mass, top speed, and position of P.
             adapts: Whether there is an input port ``impedance``.
-            tick_s: Period, s.
+            tick_s: Control period, s.
 
         Reference: Engelbrecht, Steyn and Djouani (2021), eq. 1 to 6, with the signs
         that the text of the paper requires. docs/errata.md lists the differences.
