@@ -10,9 +10,9 @@ from systems.framework.parameters import Acceleration, Parameters, Point
 
 
 class RouteParameters(Parameters):
-    """Where the robot goes, how its route is planned, and how the target moves.
+    """Fields of a route: goal, clearance, and motion of the target along the route.
 
-    All values are our choice. Engelbrecht, Steyn and Djouani (2021) give none.
+    All values are our choice. Engelbrecht, Steyn and Djouani (2021) give no values.
     """
 
     speed_m_s: float = Field(default=0.15, ge=0.02, le=100.0)
