@@ -16,15 +16,16 @@ from systems.framework.input_error import InputError, shortened
 
 
 def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
-    """Wraps a law so that an invalid result raises an error that names the law.
+    """Wraps a user's law so that an invalid result raises an error that names the law.
 
     Args:
         name: Name of the law, for messages.
-        law: ``law(c, s, laws)``; returns a force, N.
+        law: Function ``law(c, s, laws)`` that returns a force, N. c is a distance, m,
+            and s is a speed, m/s.
 
     Returns:
-        A function with the same arguments. It returns a finite force, N, as a float or
-        AutoDiffXd, or raises InputError.
+        A function with the same arguments. The function returns a finite force, N, as a
+        float or AutoDiffXd. Otherwise it raises an InputError.
     """
 
     @functools.wraps(law)
@@ -60,13 +61,13 @@ def try_law(
     """Calls a law at several distances and speeds, as a test before the run.
 
     Args:
-        law: A function from ``checked_law``.
+        law: A function from ``checked_law``. It raises an error if a result is invalid.
         laws: Gains of all laws.
         range_m: Largest tested distance, m.
         top_speed_m_s: Largest tested speed, m/s.
 
     Raises:
-        InputError: The law does not always return a force.
+        InputError: The law does not return a finite force at one of the tested points.
     """
     for share in (1e-3, 0.1, 0.5, 1.0):
         for s in (0.0, 0.5 * top_speed_m_s, top_speed_m_s):

@@ -29,6 +29,8 @@ from systems.world.geometry import beyond_rectangle, segment_clearance
 
 #: Largest number of points of a route.
 ROUTE_POINTS = 200
+#: Number of values of the port ``route``: the number of points, the spacing of the
+#: points, and x and y of each point.
 ROUTE_SIZE = 2 + 2 * ROUTE_POINTS
 #: Units of the values of the port ``route``.
 ROUTE_UNIT = "number of points, then in m their spacing, and x and y of each"
