@@ -35,10 +35,10 @@ BETWEEN_TICKS, _PART_M = 5, 0.02
 
 
 class Referee:
-    """Judges all robots of a run at every tick.
+    """Judges all robots of a run at every tick (control period).
 
-    There is one step per robot. Both engines call these steps at every tick, before any
-    block changes its state.
+    The referee has one step function per robot. Both engines call these functions at
+    every tick, before any block changes its state.
 
     Args:
         scenario: The scenario to run.
@@ -80,9 +80,11 @@ class Referee:
     def decisive(self) -> str:
         """Name of the robot whose cause is the cause of the whole run.
 
-        It is the first robot that collided or diverged. If there is none, it is the
-        first robot that was neither successful nor interrupted. If there is no such
-        robot either, it is the first robot.
+        The first robot in this order decides:
+
+        1. a robot that collided or diverged;
+        2. a robot that was neither successful nor interrupted;
+        3. any other robot.
         """
 
         def rank(name: str) -> int:
@@ -94,13 +96,13 @@ class Referee:
         return min(self.steps, key=rank)
 
     def cause_of(self, name: str) -> str:
-        """Returns the cause of a robot after the run.
+        """Returns the cause for which the run of a robot has ended.
 
         Args:
             name: Name of the robot.
 
         Returns:
-            A cause, see ``RunResult.cause``.
+            One of the causes that ``RunResult.cause`` lists.
         """
         found = self.steps[name].state.found[0]
         if found:
@@ -122,27 +124,30 @@ class Referee:
         return "unsettled" if been_in_goal else "timeout"
 
     def ended(self, name: str) -> float:
-        """Returns how a robot's search ended.
+        """Returns how the search of a robot ended.
 
         Args:
             name: Name of the robot.
 
         Returns:
-            Number of the ending, see ``systems.search.search_ending``; 0 without one.
+            Number of the ending, see ``systems.search.search_ending``. It is 0 if the
+            search has not ended, or if the robot does not search.
         """
         return float(self.steps[name].state.ended[0])
 
     def collision(self, name: str) -> Collision | None:
-        """Returns the collision of a robot after the run.
+        """Returns the collision of a robot after the run, and who is at fault.
 
-        The robot is at fault if its own motion since the last tick brings it nearer to
-        the body than the motion of the body alone would.
+        The function compares two motions since the last tick (control period): the
+        motion of the robot alone, and the motion of the body alone. If the robot's
+        motion brings the two at least as near to each other as the body's motion, the
+        robot is at fault.
 
         Args:
             name: Name of the robot.
 
         Returns:
-            The collision; None if the robot has not collided.
+            The collision, or None if the robot has not collided.
         """
         state, tick_s = self.steps[name].state, self.scenario.tick_s
         body, part, tick = state.contact.tolist()
@@ -195,10 +200,11 @@ def _numbers_of(scenario: Scenario, name: str) -> RefereeNumbers:
 def _table_of(
     bodies: Mapping[str, Body], own: Scenario, robots: list[str], *, touchable: int
 ) -> BodyTable:
-    """Tabulates bodies; those after the first ``touchable`` ones cannot be touched.
+    """Tabulates the poses and sizes of bodies that a robot could touch.
 
-    If a body is fast, ticks have more parts, so that the body moves at most ``_PART_M``
-    per part.
+    Only the first ``touchable`` bodies can be touched. Each tick (control period) has
+    equal parts, at whose ends contacts are checked. If a body is fast, ticks have more
+    parts, so that the body moves at most ``_PART_M`` per part.
     """
     ticks = int(own.duration_s / own.tick_s + 1e-9)
     times: NDArray[np.float64] = own.tick_s * np.arange(ticks + 1.0)
@@ -244,11 +250,11 @@ def _instants(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
     """Returns the instants at which contacts are checked.
 
     Args:
-        times: (n + 1,) times of the ticks, s.
-        parts: Number of parts per tick.
+        times: (n + 1,) times of the ticks (control periods), s.
+        parts: Number of equal parts per tick.
 
     Returns:
-        (n * parts + 1,) instants, s, including the ticks.
+        (n * parts + 1,) instants, s. They include the ticks themselves.
     """
     shares = np.arange(1, parts + 1) / parts
     between = times[:-1, None] + shares * np.diff(times)[:, None]

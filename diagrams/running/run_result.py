@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a robot did at every tick, and why its run ended.
+    """Describes what a robot did at every tick (control period), and why its run ended.
 
-    For a run of several robots, ``robots`` has one result per robot. Column names then
-    begin with the name of the robot and a dot. ``cause`` is then the cause of one
-    robot, see ``Referee.decisive``.
+    If the run has several robots, the field ``several`` has one result per robot. In
+    the result of the whole run, each column name then begins with the name of the robot
+    and a dot. The field ``cause`` is then the cause of one robot, see
+    ``Referee.decisive``.
     """
 
     scenario: Scenario
@@ -141,18 +142,18 @@ def gather_result(
     engine: Engine = "drake",
     world: dict[str, NDArray[np.float64]] | None = None,
 ) -> RunResult:
-    """Collects the result of a run that has ended.
+    """Makes the result of a run that has ended.
 
     Args:
-        referee: The referee of the run.
-        logs: The columns of each robot, with the time t.
-        wall_s: Duration of the simulation, s.
+        referee: The referee, which has judged the robots during the run.
+        logs: Columns of each robot, including the time t.
+        wall_s: Computing time of the simulation, s.
         engine: The engine that simulated the run.
         world: Columns of the blocks that all robots share.
 
     Returns:
-        The result of the only robot. If there are several robots, one result for all
-        robots together; its field ``several`` contains the result of each robot.
+        The result of the run. If there are several robots, the field ``several`` of
+        this result contains the result of each robot.
     """
     scenario = referee.scenario
     paths = {
@@ -217,15 +218,15 @@ _POSE = ("p_WB_x", "p_WB_y", "theta_WB")
 def logged_columns(
     parts: Parts, times: NDArray[np.float64], rows: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """Returns the columns of a robot's log, and the time.
+    """Returns the columns of a robot's log, including the time of each row.
 
     Args:
-        parts: Parts of the robot.
+        parts: Blocks of the robot, and names of its columns.
         times: (n,) times of the rows, s.
         rows: (columns, n) logged values.
 
     Returns:
-        (n,) arrays, by name.
+        (n,) array of each column, by name of the column.
     """
     names = [name for columns in parts.logged.values() for name in columns]
     return {"t": times, **dict(zip(names, rows, strict=True))}
@@ -234,10 +235,10 @@ def logged_columns(
 def _completed(
     columns: dict[str, NDArray[np.float64]], scenario: Scenario, around: Surroundings
 ) -> dict[str, NDArray[np.float64]]:
-    """Adds columns that follow from the log.
+    """Adds columns that follow from the logged columns.
 
-    They contain the position of P, the true pose of the source, and the true and
-    measured range and bearing of the source.
+    The added columns are the position of the control point P, the true pose of the
+    source, and the true and measured range and bearing of the source.
     """
     offset, theta = scenario.only.robot.control_point_m, columns["theta_WB"]
     c, s = np.cos(theta), np.sin(theta)

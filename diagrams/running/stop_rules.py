@@ -1,7 +1,8 @@
-"""The stop rules: they decide at every tick whether a run ends, and for which cause.
+"""Decides at every tick whether a run ends, and for which cause.
 
-``judge_robot`` is the step of a referee (``diagrams.running.referee``), which both
-engines call.
+A tick is a control period. ``judge_robot`` applies these stop rules to one robot at one
+tick. Both engines call ``judge_robot`` through the referee
+(``diagrams.running.referee``).
 """
 
 from __future__ import annotations
@@ -137,23 +138,25 @@ def judge_tick(
     gives_up: bool,  # noqa: FBT001
     numbers: RuleNumbers,
 ) -> int:
-    """Decides whether a run ends at a tick, and why, apart from contacts.
+    """Decides whether the run of a robot ends at a tick (control period), and why.
 
-    The rules apply in this order: diverged, reached, lost, stuck or no way found.
+    The function applies all stop rules except the rule for contacts. The rules apply in
+    this order: diverged, reached, lost, and stuck or no way found.
+
     ``state`` holds the start time of each condition that must last for some time. It
-    also counts the ticks since the first detection, and among them the ticks in which P
-    follows the target. If the run reaches its time limit, ``Referee.cause_of``
-    evaluates these counts.
+    also counts the ticks since the first detection of the target. Among these ticks, it
+    counts those in which the control point P follows the target. If the run reaches its
+    time limit, ``Referee.cause_of`` evaluates these two counts.
 
     Args:
         time: Time of the tick, s.
-        state: State of the rules, as ``UNJUDGED``; changed in place.
-        pose: (x, y, theta) of the robot in W, m and rad.
+        state: State of the rules, initially ``UNJUDGED``; changed in place.
+        pose: (x, y, theta) of the robot in the world frame W, m and rad.
         velocity: (vx, vy, omega) of the robot in W, m/s and rad/s.
-        p_WS: Position of the target in W, m.
-        valid: Whether the robot has a target.
+        p_WS: (x, y) of the target in W, m.
+        valid: Whether the robot has a valid estimate of a target.
         gives_up: Whether the law reports that no route leads to the target.
-        numbers: Numbers that the rules use.
+        numbers: Constants of the rules.
 
     Returns:
         Index of the cause in ``FOUND``; 0 if the run continues.
@@ -198,17 +201,21 @@ def judge_tick(
 
 @register_jitable
 def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> int:
-    """Decides whether the run of a search ends at a tick, and why, apart from contacts.
+    """Decides whether the run of a searching robot ends at a control period, and why.
 
-    A search that ended successfully counts as found if it ended near the source. A
-    search for an odor must also end with the source ahead. Otherwise it counts as a
-    false find. A search that was given up counts as lost.
+    The function applies all stop rules of a search except the rule for contacts:
+
+    - The robot is too far from the source: the run ends as diverged.
+    - The search succeeded, and the robot is near the source: the run ends as found. In
+      a search for an odor, the source must also be ahead of the robot.
+    - The search succeeded elsewhere: the run ends as a false find.
+    - The robot gave up the search: the run ends as lost.
 
     Args:
         ended: Number of the ending, see ``systems.search.search_ending``.
-        pose: (x, y, theta) of the robot in W, m and rad.
-        p_WS: Position of the source in W, m.
-        numbers: Numbers that the rules use.
+        pose: (x, y, theta) of the robot in the world frame W, m and rad.
+        p_WS: (x, y) of the source in W, m.
+        numbers: Constants of the rules.
 
     Returns:
         Index of the cause in ``FOUND``; 0 if the run continues.
@@ -291,20 +298,24 @@ class RefereeState(NamedTuple):
 def judge_robot(
     tick: int, state: RefereeState, inputs: Any, outputs: Any, numbers: RefereeNumbers
 ) -> None:
-    """Applies the stop rules to one robot at a tick.
+    """Applies the stop rules to one robot at a tick (control period).
 
-    The function first looks for a contact, unless a contact switch of the robot is
-    closed because it touches a body: such a contact is intended. If there is no
-    contact and the robot has no cause yet, ``judge_search`` or ``judge_tick`` judges
-    the robot. A robot keeps its cause while other robots continue. However, it can
-    still collide; its cause is then collision.
+    The function first looks for a contact between the robot and a body. If a contact
+    switch of the robot is closed because the robot touches a body, the contact is
+    intended and does not count. If there is no contact and the robot has no cause yet,
+    ``judge_search`` or ``judge_tick`` judges the robot.
+
+    A robot with a cause keeps this cause while the run of the other robots continues.
+    Only if the robot collides later, its cause changes to collision.
 
     Args:
         tick: Number of the tick.
-        state: Changed in place.
-        inputs: (robots, 3) poses of all robots in W, and the values of ``READ_PORTS``.
-        outputs: Empty; ``state.found`` is the result.
-        numbers: The constants.
+        state: State of the rules for this robot, changed in place. ``state.found`` is
+            the result.
+        inputs: (robots, 3) poses of all robots in the world frame W, m and rad; then
+            the values of ``READ_PORTS``.
+        outputs: Empty.
+        numbers: Constants of the rules for this robot.
     """
     poses, velocity, valid, gives_up, report, switches, body = inputs
     for k in range(len(poses)):
@@ -349,13 +360,14 @@ def _pose_of_body(
 def _first_touched(
     tick: int, state: RefereeState, numbers: RefereeNumbers
 ) -> tuple[int, float]:
-    """Returns the first body that a robot has touched since the last tick.
+    """Returns the first body that a robot has touched in the last control period.
 
-    The function skips a body if its center is too far away for a contact. This is so if
-    the distance of the centers exceeds the reach plus the motions of the robot and the
-    body since the last tick. ``first_overlap`` checks all other bodies at the ends of
-    the parts of the tick. The poses of other robots are interpolated; those of other
-    bodies are known in advance.
+    A tick is a control period. If a body is too far away for a contact, the function
+    skips the body. This is the case if the distance of the centers exceeds a bound. The
+    bound is the reach plus the motions of the robot and the body since the last tick.
+    ``first_overlap`` checks all other bodies at several instants within the tick. The
+    poses of other robots are interpolated. The poses of all other bodies are known in
+    advance.
 
     Returns:
         Number of the body (-1 for none), and the elapsed part of the tick (0 to 1).
@@ -392,11 +404,12 @@ def _first_touched(
 def run_is_over(found: Any) -> bool:
     """Returns whether the run of all robots is over.
 
-    The run ends when every robot has a cause, or when a robot collides or diverges. A
+    The run ends when every robot has a cause, or when one robot collides or diverges. A
     robot with any other cause keeps moving until the run ends.
 
     Args:
-        found: (robots,) index of the cause of each robot in ``FOUND``.
+        found: (robots,) index of the cause of each robot in ``FOUND``; 0 without a
+            cause.
 
     Returns:
         True if the run is over.
