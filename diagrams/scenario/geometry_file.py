@@ -19,14 +19,16 @@ _DECIMALS = 9
 def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
     """Returns the YAML text that describes the microphones of a recording.
 
+    Comments in the text describe the recording and the errors of the microphones.
+
     Args:
         scenario: The scenario that is run.
-        robot: Name of the robot.
+        robot: Name of the robot that records.
         file: Name of the recording.
 
     Returns:
-        Nominal positions of the microphones in B, m, and the speed of sound. Comments
-        describe the recording and the errors of the array.
+        YAML text with the nominal positions of the microphones in the body frame B, m,
+        and with the speed of sound, m/s.
     """
     own = scenario.robots[robot]
     assert isinstance(own, HasMicrophones)

@@ -1,6 +1,7 @@
-"""The fields of each robot and of each source in a scenario.
+"""Defines the fields of each robot and of each source in a scenario.
 
-The law of a robot decides its kind, and each kind has only the fields that it uses.
+The law of a robot determines the kind of the robot. Each kind has only the fields that
+it uses.
 """
 
 from __future__ import annotations
@@ -345,12 +346,14 @@ KINDS: Mapping[str, type[Robot]] = {
 def kind_of(robot: Any) -> str:
     """Returns the kind of a robot, which follows from its law.
 
+    If the law is a user's own law and the fields contain a route, the robot is a
+    router, which drives on a route.
+
     Args:
-        robot: The fields of a robot, as a model or as plain values. A user's own law
-            is the law of a router if the fields contain a route.
+        robot: The fields of a robot, as a model or as plain values.
 
     Returns:
-        A key of ``KINDS``.
+        Name of the kind, a key of ``KINDS``.
     """
     if isinstance(robot, Robot):
         return robot.kind

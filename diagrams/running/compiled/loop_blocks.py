@@ -122,7 +122,9 @@ class LoopBlocks:
         return {part: found[part] for part in self.blocks}, carried
 
     def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
-        """Returns the order in which the blocks compute their steps in a control period.
+        """Returns the order in which the blocks compute their steps in a tick.
+
+        A tick is a control period.
 
         Args:
             steps: Step of each block, by part.

@@ -131,7 +131,7 @@ class LoopPlan:
         return self._add(part, lines)
 
     def surround(self, name: str, around: Surroundings) -> None:
-        """Adds parts that fill the inputs of a robot with poses and sizes of other bodies.
+        """Adds parts that fill a robot's inputs with poses and sizes of other bodies.
 
         The method tabulates the poses of bodies on known paths for all ticks (control
         periods). At every tick, the loop copies the poses of other robots from their

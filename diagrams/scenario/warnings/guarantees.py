@@ -1,6 +1,7 @@
-"""Which theorem of the guard holds in a scenario, and with which margins.
+"""Finds which theorem about the guard holds in a scenario, and with which margins.
 
-The stability report and the warnings of a run use the same list of assumptions.
+The guard is the block that keeps a robot in free space. The stability report and the
+warnings of a run use the same list of assumptions.
 """
 
 from __future__ import annotations
@@ -117,18 +118,22 @@ class Guarantees:
 
 
 def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
-    """Returns the clear distance ahead of the axle that the guard needs for a speed.
+    """Returns the free distance ahead of the axle that the guard needs for a speed.
 
-    The distance is a sum. It contains the body radius, the margin of the guard, the
-    place error and the range error. It also contains the motion of the robot during two
-    ticks, the motor lag and braking. If all bodies are at rest, the sum also contains
-    the diagonal of a cell and the motion of the robot during four rounds of readings.
-    Otherwise it contains the approach of the bodies until the robot has stopped.
+    The distance is the sum of these parts:
+
+    - body radius, margin of the guard, place error, and range error;
+    - motion of the robot during two control periods, during the motor lag, and while it
+      brakes;
+    - if all bodies are at rest: the diagonal of a map cell, and the motion of the robot
+      during four rounds of sensor readings;
+    - if bodies move: their motion during one round of sensor readings, and until the
+      robot has stopped.
 
     Args:
-        scenario: Scenario of one robot; its guard defines braking and margin.
+        scenario: Scenario of one robot. Its guard defines braking and margin.
         speed: Speed of the robot, m/s.
-        body_speed: Greatest speed of bodies, m/s; 0: bodies are at rest.
+        body_speed: Greatest speed of bodies, m/s. 0: all bodies are at rest.
 
     Returns:
         The distance, m.
@@ -158,11 +163,11 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
 
 
 def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> float:
-    """Returns the total angle that range sensors see.
+    """Returns the total angle around a robot that its range sensors see.
 
     Args:
         sensors: The range sensors.
-        control_point_m: Distance of P ahead of the axle, m.
+        control_point_m: Distance of the control point P ahead of the axle, m.
 
     Returns:
         The angle, deg, 0 to 360.
@@ -178,7 +183,7 @@ def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> flo
 
 
 def guarantees(scenario: Scenario) -> Guarantees:
-    """Returns the guarantees of the guard of a scenario's only robot.
+    """Returns the guarantees that the guard of a scenario's only robot gives.
 
     Args:
         scenario: Scenario of one robot.
@@ -203,11 +208,11 @@ def guarantees(scenario: Scenario) -> Guarantees:
 
 
 def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
-    """Returns the assumptions of the theorems about a robot's guard.
+    """Returns the assumptions of the theorems about the guard of a robot.
 
     Args:
         scenario: Any scenario.
-        robot: Name of a robot in it.
+        robot: Name of a robot in the scenario.
 
     Returns:
         All assumptions, whether they hold or not.
@@ -266,10 +271,10 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A2: no body is nearer than a range reading minus the margin.
+    """Returns assumption A2: no body is nearer than a range reading minus the margin.
 
-    Of the sensors, the one that misses most echoes and the one that sees farthest
-    count.
+    The calculation uses the worst values of all sensors. These are the greatest share
+    of missed echoes, and the greatest maximum range.
     """
     sensors = scenario.follower.ultrasonic
     stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s
