@@ -1,4 +1,4 @@
-"""Accepts fields of the previous version, and tells users what has replaced them.
+"""Accepts fields of the previous version, and states what has replaced them.
 
 The file ``former_fields.tsv`` lists the fields of the previous version. For a renamed
 field, the file states the new path. Some fields have become constants. For such a

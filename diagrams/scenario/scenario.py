@@ -48,7 +48,13 @@ from diagrams.scenario.participants import (
 )
 from diagrams.scenario.run_parameters import RunParameters
 from diagrams.scenario.settings import apply_settings, plain_settings
-from diagrams.scenario.shorthand import SOURCE, as_written, file_form, resolved
+from diagrams.scenario.shorthand import (
+    SOURCE,
+    as_written,
+    field_in,
+    file_form,
+    resolved,
+)
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
@@ -159,13 +165,14 @@ class Scenario(RunParameters):
 
     @property
     def source(self) -> SourceParameters:
-        """The sound source that the only robot follows.
+        """The sound source that the first robot follows.
 
         Raises:
-            InputError: The robot does not follow a source, or there are several robots.
+            InputError: The first robot does not follow a source.
         """
-        if (target := self.target(next(iter(self.robots)))) not in self.sources:
-            raise InputError("source", "there is none: no robot follows a source")
+        first = next(iter(self.robots))
+        if (target := self.target(first)) not in self.sources:
+            raise InputError("source", f"robot {first!r} does not follow a source")
         return self.sources[target]
 
     def sounds(self) -> dict[str, SoundParameters]:
@@ -180,6 +187,11 @@ class Scenario(RunParameters):
     def longest_frame_s(self) -> float:
         """Longest audio frame of all robots with microphones, s; 0 without any."""
         return max(map(frame_of, self.robots.values()))
+
+    @property
+    def law_names(self) -> str:
+        """The laws of all robots, each once, separated by commas."""
+        return ", ".join(dict.fromkeys(robot.law for robot in self.robots.values()))
 
     def target(self, robot: str) -> str:
         """Name of the target of a robot: a source, a leader, its goal, or the odor."""
@@ -428,11 +440,12 @@ class Scenario(RunParameters):
             field = f"robots.{name}.follows"
             target = self.target(name)
             if target not in played or target == name:
-                can = [each for each in played if each != name]
+                can = ", ".join(each for each in played if each != name)
+                remedy = f"use {can}" if can else "add a source, or a loudspeaker"
                 raise InputError(
                     field,
                     f"{target!r} is neither a source nor another robot with a "
-                    f"loudspeaker; use {', '.join(can)}",
+                    f"loudspeaker; {remedy}",
                 )
             if target in sources and not sources[target].body:
                 raise InputError(
@@ -550,7 +563,7 @@ class Scenario(RunParameters):
                         field,
                         f"{name!r} is on the robot's start at "
                         f"{self.robots[robot].start.position_m}; move its first "
-                        f"waypoint or start.position_m of the robot",
+                        f"waypoint, or {field_in('robots', robot, 'start.position_m')}",
                     )
 
     def _check_guards(self) -> None:

@@ -103,7 +103,10 @@ def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
     base = joined({"sound": sound}, source)
     sources = run.get("sources") or {}
     if isinstance(robots, Mapping) and not sources:
-        follows = any(_follows_a_source(each, robots) for each in robots.values())
+        follows = any(
+            _follows_a_source(each, [other for other in robots if other != name])
+            for name, each in robots.items()
+        )
         sources = {SOURCE: {}} if follows else {}
     if isinstance(sources, Mapping):
         run["sources"] = {
@@ -157,11 +160,11 @@ def _robots(
     return found
 
 
-def _follows_a_source(robot: Any, robots: Mapping[str, Any]) -> bool:
+def _follows_a_source(robot: Any, others: Sequence[str]) -> bool:
     if KINDS[kind_of(robot)].has_goal:
         return False
     follows = robot.get("follows") if isinstance(robot, Mapping) else robot.follows
-    return follows not in robots
+    return follows not in others
 
 
 def as_written(place: Sequence[str], data: Mapping[str, Any]) -> list[str]:
@@ -262,11 +265,28 @@ def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
         else:
             continue
         named = _group(data.get(group))
-        if below and named and all(_has(own, below) for own in named.values()):
+        leaves = [[*below, *leaf] for leaf in _leaves(data, place)]
+        if (
+            below
+            and named
+            and all(_has(own, leaf) for own in named.values() for leaf in leaves)
+        ):
             names = ", ".join(f"{group}.{name}.{'.'.join(below)}" for name in named)
             raise InputError(
                 field, f"has no effect, because {names} are set; set these instead"
             )
+
+
+def _leaves(tree: Any, place: Sequence[str]) -> Iterator[list[str]]:
+    """Paths of the leaves below a place of a tree, relative to this place."""
+    if place:
+        below = tree.get(place[0]) if isinstance(tree, Mapping) else None
+        yield from _leaves(below, place[1:])
+    elif isinstance(tree, Mapping) and tree:
+        for key, value in tree.items():
+            yield from ([key, *leaf] for leaf in _leaves(value, []))
+    else:
+        yield []
 
 
 def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:

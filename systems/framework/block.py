@@ -184,7 +184,7 @@ class _Declared:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        if {"inputs", "outputs"}.intersection(vars(cls)):
+        if cls.inputs or cls.outputs:
             cls.__doc__ = _with_port_table(cls)
 
     def declare_ports(
@@ -312,7 +312,7 @@ class _Declared:
                 self.DeclarePeriodicDiscreteUpdateEvent(
                     period_sec=tick_s, offset_sec=0.0, update=self.__replace_published
                 )
-        elif len(step.state):
+        elif len(step.state) or step.publish is not None:
             self.DeclareDiscreteState([self._scalar(x) for x in step.state])
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=tick_s, offset_sec=0.0, update=self.__replace_state

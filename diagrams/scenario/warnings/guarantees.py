@@ -227,7 +227,7 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
     needed = clear_way(alone, body.top_speed_m_s, speed)
     axes, places, half_angles = sensors.beams
     forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angles
-    # Of the sensors that look ahead, the one that sees farthest counts.
+    # Only sensors that look ahead count. The sensor that sees farthest is decisive.
     reach = body.control_point_m + places[:, 0] + sensors.each("maximum_range_m")
     seen = float(np.max(reach[forward], initial=-np.inf))
     return (
@@ -271,10 +271,11 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
-    """Returns assumption A2: no body is nearer than a range reading minus the margin.
+    """Returns the conditions of assumption A2 for a robot with a guard.
 
-    The calculation uses the worst values of all sensors. These are the greatest share
-    of missed echoes, and the greatest maximum range.
+    A2 states that no body is nearer than a range reading minus the margin. The
+    conditions limit the share of missed echoes, the number of blind sensors, and the
+    error of ranges due to the assumed speed of sound.
     """
     sensors = scenario.follower.ultrasonic
     stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s
