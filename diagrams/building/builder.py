@@ -36,15 +36,15 @@ class SoundFollower:
     diagram: Diagram
     scenario: Scenario
     robots: Mapping[str, Parts]
-    """Blocks of each robot. A robot that follows a sound has plant, odometry, hearing,
-    tracker, collision, controller and command. Robots that hear audio also have
-    microphones. Robots with ultrasonic sensing also have ultrasonic. Robots with a
-    loudspeaker also have emitter."""
+    """Blocks of each robot, by name of the robot. A robot that follows a sound has the
+    parts plant, odometry, hearing, tracker, collision, controller and command. If the
+    robot hears audio, it also has the part microphones. With ultrasonic sensing, it has
+    ultrasonic. With a loudspeaker, it has emitter."""
     sources: Mapping[str, Parts]
     """Blocks of each source: source, and with audio also emitter."""
     obstacles: Obstacles
     world: Parts | None = None
-    """Blocks that all robots share: wind, plume, radio and sink; None if no robot
+    """Blocks that all robots share: wind, plume, radio and sink. None if no robot
     searches."""
 
     @cached_property

@@ -28,9 +28,9 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.block import Step
 from systems.world.geometry import rectangle_clearance
 
-#: The rules check for contacts at the ends of equal parts of a tick. These are the
-#: least number of parts, and the greatest distance that a body on its own path may move
-#: in one part, m. If a body is faster, ticks have more parts.
+#: The rules check for contacts at the ends of equal parts of a tick. ``BETWEEN_TICKS``:
+#: least number of parts. ``_PART_M``: greatest distance that a body may move in one
+#: part, m. If a body is faster, ticks have more parts.
 BETWEEN_TICKS, _PART_M = 5, 0.02
 
 
@@ -48,8 +48,8 @@ class Referee:
         robots = [*scenario.robots]
         self.scenario = scenario
         self.poses = np.zeros((len(robots), 3))
-        """(robots, 3) poses of all robots in W at the present tick, m and rad; the
-        engine fills them, and passes them to each step."""
+        """(robots, 3) poses of all robots in W at the present tick, m and rad. The
+        engine fills this array, and passes it to each step."""
         self.found = np.zeros(len(robots), dtype=np.int64)
         """(robots,) index of the cause of each robot in ``FOUND``."""
         self.steps = {

@@ -39,16 +39,16 @@ class RunResult:
     """The scenario that was run. In the result of one of several robots, it is the
     scenario of that robot alone (``Scenario.of_robot``)."""
     cause: str
-    """One of reached, completed, found, unsettled, timeout, astray, collision, stuck,
-    no way found, false find, lost, diverged, interrupted; docs/model.md defines
-    them."""
+    """Cause for which the run ended: reached, completed, found, unsettled, timeout,
+    astray, collision, stuck, no way found, false find, lost, diverged, or interrupted.
+    docs/model.md defines these causes."""
     collision: Collision | None
     """The collision, if the cause is collision."""
     columns: dict[str, NDArray[np.float64]]
     """Columns of ``trajectory``."""
     wall_s: float
-    """Duration of the simulation, s. It excludes building the diagram, and compiling or
-    loading code with numba."""
+    """Computing time of the simulation, s. It excludes the time to build the diagram,
+    and the time to compile or load code with numba."""
     name: str = ROBOT
     """Name of the robot."""
     engine: Engine = "drake"
@@ -62,9 +62,9 @@ class RunResult:
     ended: float = 0.0
     """Number of the ending of a search, see ``systems.search.search_ending``."""
     world: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """Columns with the data that the sink of a search heard from each robot. The
-    results of each robot contain these data, too: ``robot.frames`` in ``world`` is the
-    same as ``sink_frames`` in ``columns`` of ``robot``."""
+    """Columns with the data that the sink received from each searching robot. The sink
+    is the computer of the operator. The result of each robot contains these data, too:
+    ``robot.frames`` in ``world`` equals ``sink_frames`` in ``columns`` of ``robot``."""
 
     @property
     def full_scenario(self) -> Scenario:

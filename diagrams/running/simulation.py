@@ -22,8 +22,8 @@ from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import WORLD, Scenario
 from systems.framework.input_error import InputError
 
-# After this time, s, a robot has heard a source that sounds from the start, and
-# follows it.
+# Time after which a robot has heard a source that sounds from the start, s. The robot
+# then follows this source.
 _FIRST_TICKS_S = 0.15
 # Kinds of scenarios whose compiled code this process has loaded.
 _LOADED: set[tuple[object, ...]] = set()

@@ -29,25 +29,26 @@ ENDING = ("collision", "diverged")
 #: Cause of a robot whose run ends early because the run of all robots ends.
 INTERRUPTED = "interrupted"
 
-#: Tolerance for rounded tick times, s: a rest of exactly ``stop.rest_time_s`` counts.
+#: Tolerance for rounded tick times, s. With this tolerance, a rest of exactly
+#: ``stop.rest_time_s`` counts.
 ROUNDING_S = 1e-9
 
 #: Speed below which P is at rest, m/s.
 REST_SPEED_M_S = 0.05
-#: Least share of the time since the first detection in which P must follow, so that the
-#: run counts as completed.
+#: Least share of the time since the first detection. If P follows the target for at
+#: least this share, the run counts as completed.
 FOLLOWING_SHARE = 0.5
-#: Greatest distance that P can move and still count as in one place, m.
+#: If P stays within this distance of a position, m, P counts as in one place.
 _STUCK_RADIUS_M = 0.1
-#: At the end of a search for an odor that counts as found: greatest distance of the
-#: source from the origin of B, m, and greatest angle between the heading and the
-#: direction to the source, deg.
+#: Limits at the end of a search for an odor. If both limits hold, the run counts as
+#: found. ``ODOR_WITHIN_M``: distance of the source from the origin of B, m.
+#: ``_ODOR_AHEAD_DEG``: angle between the heading and the direction to the source, deg.
 ODOR_WITHIN_M, _ODOR_AHEAD_DEG = 0.22, 75.0
 
-#: Ports of a robot that the stop rules read, with their sizes. A port that a robot
-#: lacks reads 0. ``gives_up``: a law reports that no route leads to the target;
-#: ``search_report``: a search reports how it ended; ``contact`` and ``touched``: the
-#: contact switches of a searching robot, and the body that they touch.
+#: Ports of a robot that the stop rules read, with their sizes. If a robot lacks a port,
+#: its values are 0. ``gives_up``: whether the law has found that no route leads to the
+#: target. ``search_report``: how a search ended. ``contact``: the contact switches of a
+#: searching robot. ``touched``: the body that these switches touch.
 READ_PORTS = {
     "velocity_WB": 3,
     "target_valid": 1,
@@ -65,8 +66,8 @@ class Collision:
     object: str
     """Name of the body that the robot touched."""
     fault: str
-    """Which one is at fault, ``robot`` or ``obstacle``. The rule compares the motion of
-    the robot alone since the last tick with that of the body alone. The motion that
+    """Who is at fault, ``robot`` or ``obstacle``. The rule compares two motions since
+    the last tick: that of the robot alone, and that of the body alone. The motion that
     brings the two nearer to each other decides. Turning counts as motion. A body at
     rest is never at fault."""
     time: float
@@ -107,7 +108,7 @@ class _StatePlaces(NamedTuple):
 
     stays: int
     """Time at which P began to stay in its present place, s. The next two elements are
-    the position of P at this time in W, m."""
+    x and y of P at this time in W, m."""
     x: int
     y: int
     seen: int
@@ -243,21 +244,21 @@ class BodyTable(NamedTuple):
     sizes: NDArray[np.float64]
     """(n, 2) lengths and widths, m."""
     reach: NDArray[np.float64]
-    """(n,) distances of the centers, m, beyond which the robot and the body cannot
-    touch; -inf for a goal, which has no body."""
+    """(n,) distances between the centers of robot and body, m. Beyond this distance,
+    they cannot touch. The value is -inf for a goal, which has no body."""
     steps: NDArray[np.float64]
-    """(n,) upper bounds of the distances that the bodies move in a tick on their own
-    paths, m; 0 for robots."""
+    """(n,) upper bounds of the distances that the bodies move in a tick, m. The value
+    is 0 for robots."""
     robots: NDArray[np.int64]
     """(n,) number of the robot if the body is a robot; otherwise -1."""
     parts: int
     """Number of equal parts of a tick. Contacts are checked at the end of each part."""
     rows: NDArray[np.int64]
-    """(n, 2) row in ``poses`` of the first tick, and number of rows per tick; 0 rows
-    per tick for a body at rest."""
+    """(n, 2) two numbers for each body: the row in ``poses`` of the first tick, and the
+    number of rows per tick. A body at rest has 0 rows per tick."""
     poses: NDArray[np.float64]
-    """(m, 3) x, y, theta in W of the bodies that are not robots, m and rad, at the ends
-    of all parts of the ticks."""
+    """(m, 3) poses (x, y, theta) in W of the bodies that are not robots, m and rad. The
+    rows belong to the ends of all parts of the ticks."""
 
 
 class RefereeNumbers(NamedTuple):
@@ -280,8 +281,8 @@ class RefereeState(NamedTuple):
     rules: NDArray[np.float64]
     """(8,) state of ``judge_tick``."""
     before: NDArray[np.float64]
-    """(robots, 3) poses of all robots at the previous tick, m and rad; at the first
-    tick the present poses."""
+    """(robots, 3) poses of all robots at the previous tick, m and rad. At the first
+    tick, these are the present poses."""
     now: NDArray[np.float64]
     """(robots, 3) poses of all robots at the last tick."""
     valid: NDArray[np.float64]
@@ -289,8 +290,8 @@ class RefereeState(NamedTuple):
     ended: NDArray[np.float64]
     """(1,) number of the ending of a search; 0 while the search continues."""
     contact: NDArray[np.float64]
-    """(3,) number of the touched body (-1: none), elapsed part of the tick at the
-    contact (0 to 1), and number of the tick."""
+    """(3,) data of the contact: number of the touched body (-1: none), elapsed part of
+    the tick (0 to 1), and number of the tick."""
     found: NDArray[np.int64]
     """(1,) index of the cause in ``FOUND``; 0 while the run continues."""
 

@@ -74,8 +74,8 @@ class Surroundings:
     """The bodies that one robot can hit, and its target."""
 
     bodies: Mapping[str, Body]
-    """Bodies by name: obstacles, other robots, other sources, and finally the target
-    unless it is a goal."""
+    """Bodies by name, in this order: obstacles, other robots, other sources, and the
+    target. A goal is not a body."""
     target: str
     """Name of the target: the source, the leader, or the goal."""
     goal: Path | None = None

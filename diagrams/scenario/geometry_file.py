@@ -10,7 +10,8 @@ from diagrams.scenario.yaml_text import dump_yaml
 from systems.base.robot import microphones_B
 from systems.framework.input_error import shortened
 
-#: Least standard deviations in the file: of the positions, and of the speed of sound.
+#: Least standard deviations in the file: the first of the positions, and the second of
+#: the speed of sound.
 _LEAST_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
 #: Positions are rounded to a nanometer, which removes the rounding errors of sums.
 _DECIMALS = 9

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: Packages of the project.
 OURS = ("analysis", "diagrams", "phonotaxis", "systems")
 
-#: Loaded modules of users and the SHA-256 of their files, by name of the module.
+#: Loaded modules of the user, with the SHA-256 of their files, by name of the module.
 _LOADED: dict[str, tuple[ModuleType, str]] = {}
 #: Whether loaded modules remain in use after a change, see ``code_of_sweep``.
 _KEEPS = False

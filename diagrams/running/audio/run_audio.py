@@ -26,8 +26,8 @@ from systems.sound.wav_writer import (
     pcm_of_pressure,
 )
 
-#: Port by which a block reports whether the robot listens. A robot without such a port
-#: always listens.
+#: Name of the port by which a block reports whether the robot listens. A robot without
+#: this port always listens.
 LISTENING = "listening"
 
 

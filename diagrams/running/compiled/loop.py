@@ -56,7 +56,7 @@ class CompiledLoop:
     """A run in compiled code that advances tick by tick."""
 
     log: NDArray[np.float64]
-    """(ticks + 1, columns) logged values of all robots; rows from ``done`` on are not
+    """(ticks + 1, columns) logged values of all robots. Rows from ``done`` on are not
     yet filled."""
     tick_s: float
     referee: Referee

@@ -19,8 +19,8 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step
 from systems.framework.input_error import InputError
 
-#: Fields of a scenario that do not affect how blocks are made. ``RunFacts`` provides
-#: the values of a run that blocks need.
+#: Fields of a scenario that do not affect how blocks are made. If the step of a block
+#: needs such a value, ``RunFacts`` provides it.
 _NO_BLOCKS = {
     "name",
     "description",
@@ -35,12 +35,13 @@ _NO_BLOCKS = {
     "wind",
     "odor",
 }
-#: Shared blocks by the values that they were made from, most recently used last.
+#: Shared blocks, by a text of the values from which they were made. The most recently
+#: used blocks are last.
 _SHARED: dict[str, LoopBlocks] = {}
 _MOST_SHARED = 64
 
-#: A port: the part of its block, and its name. The part of an input of the whole
-#: diagram is empty.
+#: Key of a port: the part of its block, and the name of the port. For an input of the
+#: whole diagram, the part is empty.
 PortKey = tuple[str, str]
 
 

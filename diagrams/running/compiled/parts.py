@@ -29,7 +29,7 @@ from systems.framework.compiling import njit
 # The type stubs of numba lack carray.
 carray: Any = numba.carray  # type: ignore[attr-defined]
 
-#: A part that is called with this value as the tick publishes its state outputs.
+#: Value of the tick with which a part publishes its state outputs.
 PUBLISH = -1
 
 

@@ -35,7 +35,7 @@ from systems.world.plane import beyond_rectangle
 _LAGS = 6.0
 #: Spacing of the directions that sample the view, deg.
 _STEP_DEG = 0.25
-#: Greatest gap, deg, with which a view still counts as a view in all directions.
+#: Greatest gap in a view that still counts as a view in all directions, deg.
 _GAP_DEG = 1.0
 #: Tolerance for rounding errors, in the units of the values.
 _ROUNDING = 1e-9
@@ -51,8 +51,8 @@ class Assumption:
     """The value in words."""
     value: float
     limit: float
-    """Greatest value with which the assumption holds. If ``at_least`` is set, the least
-    such value."""
+    """Greatest value at which the assumption holds. If ``at_least`` is set, it is the
+    least value at which the assumption holds."""
     unit: str
     at_least: bool = False
     field: str = "guard"

@@ -25,8 +25,8 @@ from systems.laws.trajectory.trajectory_conventional import (
 from systems.ranging.parameters import OBJECT_SLOTS
 from systems.world.plane import beyond_rectangle, rotate
 
-#: Greatest number of steps toward the equilibrium, and the step length that ends
-#: the iteration, m.
+#: ``_STEPS``: greatest number of steps toward the equilibrium. ``_STEP_M``: length of
+#: a step that ends the iteration, m.
 _STEPS, _STEP_M = 2_000, 1e-6
 
 
