@@ -85,7 +85,8 @@ class SoundFollower:
         """Returns an output port of the only robot, of its source or of the obstacles.
 
         Args:
-            part: Name of a block's part, a key of ``blocks``.
+            part: Part of the block (its role, for example ``plant``), a key of
+                ``blocks``.
             name: Name of the port.
 
         Returns:
@@ -106,7 +107,7 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
         log: Whether each robot logs the columns of its blocks.
 
     Returns:
-        The diagram, with its blocks by robot, source and part.
+        The diagram, with the blocks of each robot and source.
 
     Raises:
         InputError: The law is not known.

@@ -30,7 +30,7 @@ _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
 
 
 def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> Any:
-    """Builds the controller block for the law that ``scenario.law`` names.
+    """Builds the controller block for the control law that ``scenario.law`` names.
 
     A user can write a law. The name of the user's law is ``package.module:Name`` or
     ``path/to/file.py:Name``. Python also searches the working directory. The law is a

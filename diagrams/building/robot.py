@@ -57,7 +57,8 @@ class Parts:
         """Returns an output port of a block.
 
         Args:
-            part: Name of the block's part, a key of ``blocks``.
+            part: Part of the block (its role, for example ``plant``), a key of
+                ``blocks``.
             name: Name of the port.
 
         Returns:
@@ -80,13 +81,13 @@ def parts_of(diagram: Diagram) -> Parts:
 
 
 def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ...]]:
-    """Returns the columns in the log of a robot, in order.
+    """Returns the names of the columns in the log of a robot, in order.
 
     Args:
-        blocks: Blocks of the robot, by part.
+        blocks: Blocks of the robot, by part (role of the block, for example ``plant``).
 
     Returns:
-        Names of columns. The keys are pairs of a part and a port.
+        Names of the columns of each output port. The keys are (part, name of the port).
     """
     return {
         (part, port): names
@@ -178,7 +179,8 @@ def robot_blocks(
         others: Names of the sources and loudspeakers that the robot does not follow.
 
     Returns:
-        Blocks by part. They are not yet in a diagram.
+        Blocks by part (role of the block, for example ``plant``). They are not yet in a
+        diagram.
 
     Raises:
         InputError: The law is not known, or a block cannot be made.

@@ -31,14 +31,15 @@ def world_blocks(scenario: Scenario, seeds: Mapping[str, int]) -> dict[str, Any]
     """Makes the blocks that all robots share: wind, odor plume, radio and sink.
 
     If no robot needs these blocks, the function makes none. The sink is the computer of
-    the operator.
+    the operator, which receives radio frames.
 
     Args:
         scenario: The scenario that is run.
         seeds: Random seeds of the blocks, by name of the block.
 
     Returns:
-        Blocks by part. They are not yet in a diagram.
+        Blocks by part (role of the block, for example ``radio``). They are not yet in a
+        diagram.
     """
     blocks: dict[str, Any] = {}
     nodes, tick_s = radio_nodes(scenario), scenario.tick_s

@@ -80,11 +80,12 @@ class Referee:
     def decisive(self) -> str:
         """Name of the robot whose cause is the cause of the whole run.
 
-        The first robot in this order decides:
+        The cause of a robot is the reason why its run ended. The first robot of the
+        first group that is not empty decides:
 
-        1. a robot that collided or diverged;
-        2. a robot that was neither successful nor interrupted;
-        3. any other robot.
+        1. robots that collided or diverged;
+        2. robots that were neither successful nor interrupted;
+        3. all other robots.
         """
 
         def rank(name: str) -> int:

@@ -301,13 +301,14 @@ def judge_robot(
 ) -> None:
     """Applies the stop rules to one robot at a tick (control period).
 
-    The function first looks for a contact between the robot and a body. If a contact
-    switch of the robot is closed because the robot touches a body, the contact is
-    intended and does not count. If there is no contact and the robot has no cause yet,
-    ``judge_search`` or ``judge_tick`` judges the robot.
+    The result is a cause, the reason why the run of the robot ends. The function first
+    looks for a contact between the robot and a body. If a contact switch of the robot
+    is closed because the robot touches a body, the contact is intended and does not
+    count. If there is no contact and the robot has no cause yet, ``judge_search`` or
+    ``judge_tick`` judges the robot.
 
     A robot with a cause keeps this cause while the run of the other robots continues.
-    Only if the robot collides later, its cause changes to collision.
+    However, if the robot collides later, its cause becomes collision.
 
     Args:
         tick: Number of the tick.
@@ -363,15 +364,16 @@ def _first_touched(
 ) -> tuple[int, float]:
     """Returns the first body that a robot has touched in the last control period.
 
-    A tick is a control period. If a body is too far away for a contact, the function
-    skips the body. This is the case if the distance of the centers exceeds a bound. The
-    bound is the reach plus the motions of the robot and the body since the last tick.
-    ``first_overlap`` checks all other bodies at several instants within the tick. The
-    poses of other robots are interpolated. The poses of all other bodies are known in
-    advance.
+    A tick is a control period. The function skips a body that is too far away for a
+    contact. A body is too far away if the distance of the centers exceeds the sum of
+    these lengths: half the diagonals of robot and body, and their motions since the
+    last tick. ``first_overlap`` checks all other bodies at several instants within the
+    tick. The poses of other robots are interpolated. The poses of all other bodies are
+    known in advance.
 
     Returns:
-        Number of the body (-1 for none), and the elapsed part of the tick (0 to 1).
+        Two values: the number of the body (-1 for none), and the elapsed part of the
+        tick (0 to 1).
     """
     bodies, parts = numbers.bodies, numbers.bodies.parts
     pose, before = state.now[numbers.robot], state.before[numbers.robot]
@@ -405,8 +407,9 @@ def _first_touched(
 def run_is_over(found: Any) -> bool:
     """Returns whether the run of all robots is over.
 
-    The run ends when every robot has a cause, or when one robot collides or diverges. A
-    robot with any other cause keeps moving until the run ends.
+    The cause of a robot is the reason why its run ends. The run of all robots ends when
+    every robot has a cause, or when one robot collides or diverges. A robot with any
+    other cause keeps moving until the run ends.
 
     Args:
         found: (robots,) index of the cause of each robot in ``FOUND``; 0 without a

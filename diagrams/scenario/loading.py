@@ -60,12 +60,15 @@ def load_scenario(
 def written_fields(source: str | Path) -> dict[str, Any]:
     """Reads the fields that the file of a scenario sets.
 
+    Names of fields from the previous version are replaced by the present names. Paths
+    of sound files become absolute. If the file states no name of the scenario, the
+    function adds a name.
+
     Args:
         source: A name from the library, or the path of a file.
 
     Returns:
-        Plain values of the fields. Fields have their present names. The mapping
-        contains the name of the scenario. Paths of sound files are absolute.
+        Plain values of the fields.
 
     Raises:
         InputError: The name is unknown, or the file is unreadable.
@@ -85,8 +88,8 @@ def dump_scenario(scenario: Scenario) -> str:
 def write_scenario(scenario: Scenario, directory: Path) -> None:
     """Writes a whole scenario and a copy of its JSON Schema to a directory.
 
-    Editors of text use the schema to check and complete fields. With the copy, they
-    find the schema even if the directory is moved to another place or machine.
+    Text editors use the schema to check and complete fields. With the copy, they find
+    the schema even if the directory is moved to another place or machine.
 
     Args:
         scenario: The scenario, written to ``scenario.yaml``.

@@ -1,7 +1,7 @@
 """Defines the fields of each robot and of each source in a scenario.
 
-The law of a robot determines the kind of the robot. Each kind has only the fields that
-it uses.
+The control law of a robot determines the kind of the robot. Each kind has only the
+fields that it uses.
 """
 
 from __future__ import annotations
@@ -344,7 +344,7 @@ KINDS: Mapping[str, type[Robot]] = {
 
 
 def kind_of(robot: Any) -> str:
-    """Returns the kind of a robot, which follows from its law.
+    """Returns the kind of a robot, which follows from its control law.
 
     If the law is a user's own law and the fields contain a route, the robot is a
     router, which drives on a route.

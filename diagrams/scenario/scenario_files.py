@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def check_files(scenario: Scenario) -> None:
     """Raises an error if a scenario names files that a run cannot use.
 
-    The check is done before the simulation is loaded.
+    Such files are sound files and a user's own code.
 
     Args:
         scenario: The scenario to check.

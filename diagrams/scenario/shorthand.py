@@ -77,7 +77,10 @@ def _plain(value: Any) -> Any:
 
 
 def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Expands the shorthand of a scenario to complete robots and sources.
+    """Expands the shorthand of a scenario file to complete robots and sources.
+
+    In a file, a field at the top level applies to all robots or sources (shorthand).
+    The function copies such fields to each robot and source.
 
     Args:
         data: Fields of a scenario, as in a file.
@@ -247,14 +250,17 @@ def field_in(group: str, name: str, field: str) -> str:
 
 
 def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
-    """Refuses shorthand that every robot or every source overrides.
+    """Raises an error if a field that a user has set has no effect.
+
+    A field at the top level applies to all robots or sources that do not set this
+    field. It has no effect if all robots or all sources set the field themselves.
 
     Args:
         data: Fields of a scenario, as in a file.
-        fields: Dotted paths that a user has set.
+        fields: Dotted paths of the fields that the user has set.
 
     Raises:
-        InputError: A path has no effect.
+        InputError: A field has no effect.
     """
     for field in fields:
         place = field.split(".")
@@ -292,7 +298,7 @@ def _leaves(tree: Any, place: Sequence[str]) -> Iterator[list[str]]:
 def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:
     """Returns a scenario in the shortest form that a file can have.
 
-    Fields that are equal in all robots are at the top level.
+    In this form, fields that are equal in all robots or sources are at the top level.
 
     Args:
         dump: Plain values of all fields of a scenario.

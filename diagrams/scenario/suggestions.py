@@ -27,7 +27,7 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
 
 
 def unknown_law(name: str, known: Collection[str]) -> InputError:
-    """Returns the error for a law whose name is unknown.
+    """Returns the error for a control law whose name is unknown.
 
     Args:
         name: The unknown name.

@@ -122,8 +122,8 @@ def release_rate(ratio_at_2_m: float) -> float:
         ratio_at_2_m: Mean ratio Rs/R0 of the sensor in a wind of 1 m/s.
 
     Returns:
-        Release rate Q, m^3/s. The amount of odor is in units of C1, the constant of the
-        gas sensors that has the unit of a concentration.
+        Release rate Q divided by C1, m^3/s. C1 is a constant of the gas sensors, and
+        has the unit of a concentration.
     """
     wanted = ratio_at_2_m ** (-1.0 / GAS_EXPONENT) - 1.0
     return wanted / float(_mean_concentration(2.0, 0.0, 1.0, 1.0))

@@ -61,10 +61,13 @@ def wind_velocity(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Computes the velocity of the wind at a point of the floor.
 
-    A jet blows from an outlet. Upwind of the outlet, there is no wind. Downwind, the
-    speed on the axis is constant along ``_CORE`` diameters of the outlet. Farther
-    downwind, the speed falls with the distance. Across the jet, the speed is a Gaussian
-    function of the distance from the axis.
+    If the wind is not a jet, its velocity is the same everywhere. If the wind is the
+    jet of a fan, the velocity depends on the point:
+
+    - Upwind of the outlet of the fan, there is no wind.
+    - On the axis of the jet, the speed is constant along ``_CORE`` diameters of the
+      outlet. Farther downwind, the speed falls with the distance.
+    - Across the jet, the speed is a Gaussian function of the distance from the axis.
 
     Args:
         wind: (WIND_SIZE,) value of the port ``wind``.

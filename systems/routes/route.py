@@ -294,10 +294,10 @@ def _way_out(
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
     """Return the nearest free grid cell that a safe straight segment joins to ``end``.
 
-    ``end`` is the start or the goal of a route, and may be too near to obstacles. On
-    the segment, the distance from obstacles may be smaller than at ``end`` by only a
-    small allowance. If ``end`` has more than the clearance, the segment only has to
-    keep the clearance minus this allowance.
+    ``end`` is the start or the goal of a route. A segment is safe if it keeps a least
+    distance from obstacles. If ``end`` is nearer to an obstacle than the clearance, the
+    least distance is the distance of ``end``, minus a small allowance. Otherwise, the
+    least distance is the clearance, minus this allowance.
 
     Returns:
         (i, j), indices of the cell along x and y. They are (-1, -1) if there is no such

@@ -121,10 +121,11 @@ def _sense(state: Any, gas: Any, airflow: Any) -> None:
 
 @register_jitable
 def _average(state: Any) -> int:
-    """Computes the mean readings of a stop, and detects dead gas sensors.
+    """Computes the mean readings of a stop, in which the robot rests and measures.
 
-    Each mean excludes the largest and the smallest reading. If a gas sensor is dead,
-    the function replaces its mean by the mean of the other gas sensors.
+    Each mean excludes the largest and the smallest reading. The function also detects
+    dead gas sensors. It replaces the mean of a dead gas sensor by the mean of the other
+    gas sensors.
 
     Returns:
         Number of gas sensors that work.

@@ -46,7 +46,10 @@ PortKey = tuple[str, str]
 
 
 class LoopBlocks:
-    """Contains the blocks of a diagram by part, and the connections of their ports.
+    """Contains the blocks of a diagram, and the connections of their ports.
+
+    The key of each block is its part, the role of the block in the diagram, for example
+    ``plant``.
 
     Args:
         diagram: Diagram of a robot, a source or the world.
@@ -103,9 +106,9 @@ class LoopBlocks:
             run: Facts about the run, such as seed and initial pose.
 
         Returns:
-            Two mappings. The first contains the step of each block, by part. The second
-            contains one function for each port that carries an object. This function
-            returns the object at a tick (control period).
+            Two mappings. The first contains the step of each block, by part (role of
+            the block). The second contains one function for each port that carries an
+            object. This function returns the object at a tick (control period).
 
         Raises:
             InputError: A user's own block has no step.
@@ -125,15 +128,17 @@ class LoopBlocks:
     def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
         """Returns the order in which the blocks compute their steps in a tick.
 
-        A tick is a control period.
+        A tick is a control period. A part is the role of a block, for example
+        ``plant``.
 
         Args:
             steps: Step of each block, by part.
 
         Returns:
             Two lists of parts. The first list has the blocks whose outputs depend on
-            present inputs; each block comes after the blocks whose outputs it reads.
-            The second list has the blocks whose outputs are parts of their state.
+            present inputs. Each block in this list comes after the blocks whose outputs
+            it reads. The second list has the blocks whose outputs are parts of their
+            state.
         """
         late = [part for part, step in steps.items() if step.publish is not None]
         early = [part for part in self.blocks if part not in late]
@@ -209,8 +214,9 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
     """Returns the blocks of all robots for a compiled loop.
 
     The function reuses the blocks of an earlier scenario if both scenarios differ only
-    in fields that do not affect the blocks. Examples of such fields are layout, start
-    and seed. Reuse matters because Drake never frees blocks written in Python.
+    in fields that do not affect the blocks. Examples of such fields are the arrangement
+    of the obstacles, the start pose and the seed. Reuse matters because Drake never
+    frees blocks written in Python.
 
     Args:
         scenario: The scenario to run.

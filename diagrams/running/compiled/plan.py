@@ -47,10 +47,13 @@ class LoopPlan:
         self._plants: list[int] = []
 
     def add(self, diagram: LoopDiagram) -> None:
-        """Adds the blocks of a robot or of the world to the plan.
+        """Adds the blocks of a robot, or the blocks that all robots share, to the plan.
 
         Blocks of loudspeakers come first in a tick (control period), because several
         robots hear their sound.
+
+        Args:
+            diagram: The blocks, with their steps and port values.
         """
         made, values = diagram.made, diagram.values
         early, late = made.order(diagram.steps)
@@ -170,9 +173,10 @@ class LoopPlan:
         self._filled.append(self._add(part, [line]))
 
     def judge(self, referee: Referee) -> None:
-        """Adds the steps of the referee, and the part that ends the run.
+        """Adds the steps of the referee to the plan, and the part that ends the run.
 
-        The referee applies the stop rules to all robots.
+        A part is a compiled function that the loop calls. The referee applies the stop
+        rules to all robots.
 
         Args:
             referee: Referee of the run.

@@ -43,7 +43,9 @@ class Field:
 
 
 def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
-    """Lists all fields of a scenario; each group comes before its own fields.
+    """Lists all fields of a scenario, in the order of the schema.
+
+    Some fields are groups of further fields. Each group comes before its own fields.
 
     Args:
         schema: JSON Schema of a scenario.
@@ -55,7 +57,7 @@ def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
 
 
 def fields_of_law(fields: Iterable[Field], law: str, kind: str) -> list[Field]:
-    """Returns the fields of a robot that runs a certain law.
+    """Returns the fields of a robot that runs a certain control law.
 
     Args:
         fields: The fields to select from.

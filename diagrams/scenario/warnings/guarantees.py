@@ -185,6 +185,9 @@ def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> flo
 def guarantees(scenario: Scenario) -> Guarantees:
     """Returns the guarantees that the guard of a scenario's only robot gives.
 
+    The guard is the block that limits all commands so that the robot stays in free
+    space.
+
     Args:
         scenario: Scenario of one robot.
 
@@ -209,6 +212,9 @@ def guarantees(scenario: Scenario) -> Guarantees:
 
 def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
     """Returns the assumptions of the theorems about the guard of a robot.
+
+    The guard is the block that limits all commands so that the robot stays in free
+    space.
 
     Args:
         scenario: Any scenario.
