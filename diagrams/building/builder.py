@@ -143,7 +143,7 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
 
 
 def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
-    """Returns the sounds that a robot of a scenario hears as waves.
+    """Returns the sounds of a scenario, if a robot hears them as waves.
 
     Args:
         scenario: The scenario that is run.

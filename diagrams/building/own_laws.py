@@ -61,7 +61,7 @@ def try_law(
     range_m: float,
     top_speed_m_s: float,
 ) -> None:
-    """Calls a user's control law at several distances and speeds, as a test before the run.
+    """Tests a user's control law at several distances and speeds, before the run.
 
     Args:
         law: A function from ``checked_law``. It raises an error if a result is invalid.

@@ -245,9 +245,9 @@ def make_robot(
 ) -> Diagram:
     """Builds the diagram of a robot.
 
-    The function builds detailed and ideal robots. The fields ``hearing`` and
-    ``obstacle_sensing`` select blocks that have the same ports. If both fields are
-    ``ideal`` and ``odometry.rounding`` is off, Drake can convert the diagram to
+    The robot can have simulated sensors or ideal sensors, as the fields ``hearing`` and
+    ``obstacle_sensing`` state. Both kinds of blocks have the same ports. If both fields
+    are ``ideal`` and ``odometry.rounding`` is off, Drake can convert the diagram to
     AutoDiffXd. Each input of a block connects to the only output with the same name
     (see docs/model.md).
 
@@ -274,7 +274,7 @@ def make_robot(
             period).
 
     Returns:
-        The diagram. ``parts_of`` returns its blocks by part.
+        The diagram. ``parts_of`` returns its blocks by part (role of the block).
 
     Raises:
         InputError: The law is not known, or a sound file cannot be played.

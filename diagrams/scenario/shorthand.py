@@ -33,14 +33,14 @@ def begins_anew(changes: Mapping[str, Any]) -> bool:
     """Returns whether changes to a group of fields select a preset for this group.
 
     A preset selects defaults for a group. A new preset clears the other fields of the
-    group.
+    group. However, ``preset`` can also be the name of a robot or source. The value of
+    ``preset`` is then a mapping.
 
     Args:
         changes: New plain values, by name of the field.
 
     Returns:
-        True if the value of ``preset`` is a text. ``preset`` may also be the name of a
-        robot or source. Its value is then a mapping, and the result is False.
+        True if the value of ``preset`` is a text.
     """
     return isinstance(changes.get("preset"), str)
 

@@ -37,7 +37,7 @@ class OccupancyGrid(NamedTuple):
 def map_grid(
     points: ArrayLike, rectangles: ArrayLike, clearance_m: float
 ) -> OccupancyGrid:
-    """Makes the grid of a map and blocks the cells near the known obstacles.
+    """Makes the grid of a map, in which cells near known obstacles are blocked.
 
     Args:
         points: (n, 2) start and goal in the world frame W, m.
@@ -145,7 +145,7 @@ def _span(
 def block_rectangles(
     grid: OccupancyGrid, rectangles: Any, radius: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Blocks the cells whose middles are nearer to a rectangle than a given distance.
+    """Marks cells as blocked if their middles are too near to a rectangle.
 
     The function computes exact distances. A distance transform would be unsuitable for
     two reasons:
@@ -182,7 +182,7 @@ def block_rectangles(
 def block_discs(
     grid: OccupancyGrid, discs: Discs, radius: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Blocks the cells whose middles are nearer to a disc than a given distance.
+    """Marks cells as blocked if their middles are too near to a disc.
 
     Args:
         grid: The grid, modified in place.

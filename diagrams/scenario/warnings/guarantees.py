@@ -1,7 +1,7 @@
 """Finds which theorem about the guard holds in a scenario, and with which margins.
 
-The guard is the block that keeps a robot in free space. The stability report and the
-warnings of a run use the same list of assumptions.
+The guard is the block that keeps a robot in free space (docs/guard.md). The stability
+report and the warnings of a run use the same list of assumptions.
 """
 
 from __future__ import annotations
