@@ -113,15 +113,16 @@ class Robot(Parameters):
     """Whether the target is silent: the goal of a route, or an odor source."""
 
     law: str = Field(default=DEFAULT_LAW, min_length=1)
-    """Name of a law in the list of ``phonotaxis laws``; or a user's own law, as
-    ``package.module:Name`` or ``path/to/file.py:Name``. The law decides the kind of the
-    robot."""
+    """Name of the control law. ``phonotaxis laws`` lists the names. The name of a user's
+    own law is ``package.module:Name`` or ``path/to/file.py:Name``. The law determines
+    the kind of the robot."""
     blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
-    """A user's own blocks, as ``package.module:Name`` or ``path/to/file.py:Name``. Each
-    replaces the robot's block with the same part; a block with a new part is added."""
+    """Names of a user's own blocks, as ``package.module:Name`` or
+    ``path/to/file.py:Name``. Each block replaces the robot's block with the same part
+    (role). A block with a new part is added."""
     loudspeaker: SoundParameters | None = None
     """Sound that the robot itself plays at the origin of B, so that other robots can
-    follow it. Its fields are those of ``sound``, which also has the defaults."""
+    follow the robot. Its fields and defaults are those of ``sound``."""
     start: StartParameters = StartParameters()
     assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed of sound that hearing and range sensors assume, m/s; null: the true speed
@@ -199,8 +200,8 @@ class Follower(Robot):
     attraction: AttractionParameters = AttractionParameters()
     laws: LawGains = LawGains()
     guard: GuardParameters | None = None
-    """The guard works with any law and keeps the robot in space that its sensors have
-    seen as free; null: no guard, unless the law is ``guarded``."""
+    """The guard limits the commands of any law, so that the robot stays in space that
+    its sensors have seen as free. null: no guard, unless the law is ``guarded``."""
 
     @model_validator(mode="after")
     def _check_channels(self) -> Follower:

@@ -84,12 +84,12 @@ class Scenario(RunParameters):
     """
 
     robots: Annotated[dict[Name, AnyRobot], Field(min_length=1, max_length=16)]
-    """Robots by name. In a file, each has the fields that differ from those of the
-    scenario; empty: one robot, named ``robot``."""
+    """Robots by name. In a file, each robot has only the fields that differ from those
+    at the top level. Empty: one robot, named ``robot``."""
     sources: Annotated[dict[Name, SourceParameters], Field(max_length=16)]
-    """Sources by name. In a file, each has the fields that differ from ``source`` and
-    ``sound``; empty: one source, named ``source``, if a robot follows it. A source that
-    no robot follows is an interferer."""
+    """Sources by name. In a file, each source has only the fields that differ from
+    ``source`` and ``sound``. Empty: if a robot follows a source, there is one source,
+    named ``source``. A source that no robot follows is an interferer."""
 
     def __init__(self, **fields: Any) -> None:
         super().__init__(**fields)

@@ -53,8 +53,8 @@ class _Places(NamedTuple):
     readings: int
     """Number of readings in this stop."""
     smelt: int
-    """Lowest gas ratio among the means of the last two stops and the readings since
-    then."""
+    """Lowest gas ratio. It is the minimum over the mean ratios of the last two stops
+    and over all readings since the last stop."""
     before: int
     """Lowest mean gas ratio at the last stop."""
     sum: int

@@ -56,8 +56,8 @@ class _Places(NamedTuple):
     called: int
     """Report of the caller: 1 found, -1 found nothing, 0 none yet."""
     arrived: int
-    """Whether the robot that goes first has reported a result, or ``HOLD_S`` are over,
-    0 or 1."""
+    """0 or 1. 1: the robot that goes first has reported a result, or ``HOLD_S`` are
+    over."""
     bearing: int
     """Bearing of the source, CCW, deg."""
     distance: int
