@@ -113,9 +113,9 @@ class Robot(Parameters):
     """Whether the target is silent: the goal of a route, or an odor source."""
 
     law: str = Field(default=DEFAULT_LAW, min_length=1)
-    """Name of the control law. ``phonotaxis laws`` lists the names. The name of a user's
-    own law is ``package.module:Name`` or ``path/to/file.py:Name``. The law determines
-    the kind of the robot."""
+    """Name of the control law. ``phonotaxis laws`` lists the names. The name of a
+    user's own law is ``package.module:Name`` or ``path/to/file.py:Name``. The law
+    determines the kind of the robot."""
     blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
     """Names of a user's own blocks, as ``package.module:Name`` or
     ``path/to/file.py:Name``. Each block replaces the robot's block with the same part

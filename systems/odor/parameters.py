@@ -74,9 +74,9 @@ class GasSensorParameters(Parameters):
     noise: float = Field(default=0.003, ge=0.0, le=1.0)
     """Standard deviation of a reading, divided by the reading."""
     mismatch: float = Field(default=0.01, ge=0.0, le=0.05)
-    """Relative standard deviation of R0 between sensors. The relative standard deviation
-    of the power law's exponent is three times as large. Each sensor has constant
-    values."""
+    """Relative standard deviation of R0 between sensors. The relative standard
+    deviation of the power law's exponent is three times as large. Each sensor has
+    constant values."""
 
 
 class AirflowParameters(Parameters):

@@ -32,9 +32,9 @@ class SoundSearchParameters(Parameters):
     """Radio addresses, and end of the search by sound."""
 
     await_call: bool = True
-    """Whether the robot waits for a call before it starts. The call is the report of the
-    robot with the radio address 1 that it has found the odor source. Off: the robot
-    starts at once."""
+    """Whether the robot waits for a call before it starts. The robot with the radio
+    address 1 calls when it has found the odor source. Off: the robot starts at
+    once."""
     address: int = Field(default=2, ge=1, le=3)
     """Address of this robot in its radio frames."""
     waits_for: int = Field(default=0, ge=0, le=3)
