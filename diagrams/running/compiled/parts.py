@@ -157,8 +157,8 @@ def run_parts(
     """Runs ticks (control periods) of a compiled loop.
 
     A part is a compiled function, for example the step of one block. At the start of
-    the run, the function publishes the outputs that are parts of a state. In each tick,
-    it calls the following parts:
+    the run, the function publishes the outputs that are parts of a block's state. In
+    each tick, it calls the following parts:
 
     1. the first parts, which compute steps;
     2. the judge, which decides whether the run is over;
@@ -173,11 +173,12 @@ def run_parts(
         log: (ticks, columns) rows to fill.
         logged: (n, 2) address and number of elements of each logged array.
         parts: (m, 2) address of each part, and address of the words of this part.
-        plan: Five entries. The first three are the indices of the parts that publish at
-            the start of the run, the indices of the first parts of a tick, and the
-            index of the judge. The last two are tables for the parts before and after
-            the log. Each row of a table is the index of a part, and a number: 1 if the
-            part publishes its outputs, 0 if it computes its step.
+        plan: Tuple (begins, first, judge, before, after) with indices of parts.
+            ``begins`` lists the parts that publish at the start of the run. ``first``
+            lists the first parts of a tick. ``judge`` is one index. ``before`` and
+            ``after`` are tables of the parts before and after the log. In each row of a
+            table, the first number is the index of a part. The second number is 1 if
+            the part publishes its outputs, and 0 if it computes its step.
 
     Returns:
         Two values: the tick after the last logged tick, and whether the run is over.
