@@ -253,7 +253,7 @@ class _World:
         return self.builder.GetSubsystemByName(name).get_output_port()
 
     def _joined(self, name: str, port: str, more: list[Any]) -> Any:
-        """Returns the obstacles' port, joined with further ports if there are any."""
+        """Returns the port of the obstacles, joined with any further ports."""
         first = self.obstacles.GetOutputPort(port)
         ports = [each for each in (first, *more) if each.size()]
         if len(ports) < 2:

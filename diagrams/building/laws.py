@@ -105,7 +105,7 @@ def _radial(law: Any, parts: dict[str, Any]) -> Any:
 
 
 def _gains_of_base(block: type, laws: LawGains) -> Any:
-    """Returns the gains of the law of the package whose block is a base of a class."""
+    """Returns the gains of a law of the package, if its block is a base of a class."""
     for name, law in LAWS.items():
         if law.controller is not None and issubclass(block, law.controller):
             return getattr(laws, name, None)

@@ -83,7 +83,7 @@ class RunResult:
 
     @cached_property
     def surroundings(self) -> Surroundings:
-        """The bodies that the robot could hit, and its target."""
+        """The bodies that the robot could hit, and the target of the robot."""
         return self.others or self.scenario.surroundings()
 
     @property
@@ -203,7 +203,7 @@ def gather_result(
 def _heard_by_sink(
     world: Mapping[str, NDArray[np.float64]], robot: str
 ) -> dict[str, NDArray[np.float64]]:
-    """What the sink of a search knows about one robot, as columns of that robot."""
+    """Returns what the sink has received from one robot, as columns of this robot."""
     begin = f"{robot}."
     return {
         f"sink_{key.removeprefix(begin)}": values

@@ -239,7 +239,7 @@ def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> in
 
 
 class BodyTable(NamedTuple):
-    """The bodies that a robot can touch, and its target."""
+    """The bodies that a robot can touch, and the target of this robot."""
 
     sizes: NDArray[np.float64]
     """(n, 2) lengths and widths, m."""

@@ -71,7 +71,7 @@ class Body(NamedTuple):
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The bodies that one robot can hit, and its target."""
+    """The bodies that one robot can hit, and the target of this robot."""
 
     bodies: Mapping[str, Body]
     """Bodies by name, in this order: obstacles, other robots, other sources, and the
@@ -83,7 +83,7 @@ class Surroundings:
 
     @property
     def followed(self) -> Body:
-        """The target; a goal has no extent and cannot be hit."""
+        """The target. If the target is a goal, it has no extent and cannot be hit."""
         if self.goal is not None:
             return Body(self.goal, (0.0, 0.0))
         return self.bodies[self.target]

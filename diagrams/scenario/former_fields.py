@@ -159,7 +159,7 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
 
 
 def _renew_safety_filter(fields: Mapping[str, Any]) -> None:
-    """Makes the filter of the adaptive law true or false; it was a group or null."""
+    """Replaces a group or null by true or false, for the filter of the adaptive law."""
     for laws in (fields.get("repulsion"), fields.get("laws")):
         adaptive = laws.get("trajectory_adaptive") if isinstance(laws, dict) else None
         if isinstance(adaptive, dict) and "safety_filter" in adaptive:
@@ -199,7 +199,7 @@ def _fault(group: str, kind: str, fault: Any) -> Any:
 
 
 def _taken(fields: dict[str, Any], path: list[str]) -> Any:
-    """Removes a field and the groups that this leaves empty; returns its value."""
+    """Removes a field and all groups that become empty; returns the field's value."""
     first, *rest = path
     if first not in fields:
         return _MISSING

@@ -21,7 +21,7 @@ _LIBRARY = Path(__file__).parents[1] / "scenarios"
 
 
 def library_scenarios() -> dict[str, Path]:
-    """Names and files of the scenarios in the package."""
+    """Returns the file of each scenario in the package, by name of the scenario."""
     return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
 
 

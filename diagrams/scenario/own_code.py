@@ -110,7 +110,7 @@ def _module_of(name: str) -> ModuleType:
 
 
 def _has_changed(module: ModuleType) -> bool:
-    """Whether a module's file has changed since loading; records a new module."""
+    """Whether a module's file has changed since loading. Records a new module."""
     digest = _digest(Path(_file_of(module)))
     known, loaded = _LOADED.get(module.__name__, (None, ""))
     if known is not module:
@@ -128,7 +128,7 @@ def _digest(file: Path) -> str:
 
 
 def _forget(changed: Sequence[ModuleType]) -> None:
-    """Unloads changed modules of a user, and the modules that use them."""
+    """Unloads the user's changed modules, and the modules that use them."""
     gone = {
         name: module
         for name, (module, _) in _LOADED.items()
@@ -374,7 +374,7 @@ def is_interrupt(error: BaseException) -> bool:
 
 
 def why(error: BaseException) -> str:
-    """Kind, text and line of an error in a user's code."""
+    """Returns the kind, text and line of an error in a user's code."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = Path(__file__).resolve().parents[1]
     own = [f for f in frames if ours not in Path(f.filename).resolve().parents]

@@ -73,7 +73,7 @@ class StartParameters(Parameters):
 class _LawGains(Parameters):
     @model_serializer(mode="wrap")
     def _dump(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leaves out the laws whose gains nobody has set or uses."""
+        """Leaves out the gains of laws that are neither set nor used."""
         return {k: v for k, v in dump(self).items() if k in self.model_fields_set}
 
 
@@ -161,7 +161,7 @@ class Robot(Parameters):
 
     @property
     def own_guard(self) -> GuardParameters | None:
-        """The guard of the robot, or None."""
+        """The guard of the robot; None without a guard."""
         return None
 
     @property
@@ -218,7 +218,7 @@ class Follower(Robot):
 
     @property
     def gains(self) -> Any:
-        """Gains of the robot's law; None for a law without gains."""
+        """Gains of the robot's control law; None for a law without gains."""
         return getattr(self.laws, self.law, None)
 
     @property
@@ -279,7 +279,7 @@ class Router(Robot):
 
     @property
     def gains(self) -> Any:
-        """Gains of the robot's law; None for a law without gains."""
+        """Gains of the robot's control law; None for a law without gains."""
         return getattr(self.laws, self.law, None)
 
 
@@ -376,7 +376,7 @@ AnyRobot = Annotated[
 
 
 class SourceParameters(SourceRobotParameters):
-    """One source: the leader that carries it, and its sound."""
+    """One source: the leader that carries the source, and the sound of the source."""
 
     sound: SoundParameters = SoundParameters()
     """The sound of the source."""

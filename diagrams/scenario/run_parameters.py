@@ -29,7 +29,7 @@ MANY_RUNS = 100
 
 
 class StopParameters(Parameters):
-    """When a run ends, and what counts as following."""
+    """Conditions that end a run, and limits within which a robot follows."""
 
     goal_margin_m: Length = 0.3
     """Margin of the goal at a source at rest, m. P is in the goal if its distance from

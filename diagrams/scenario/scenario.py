@@ -600,7 +600,7 @@ def _periods(robot: Robot) -> Iterator[tuple[str, float]]:
 def _check_schedule(
     field: str, target: str, played: Mapping[str, SoundParameters]
 ) -> None:
-    """Refuses ``schedule_known`` for a target that sounds without a pause."""
+    """Raises an error if ``schedule_known`` is set, but the target never pauses."""
     sound = played[target]
     if sound.on_s >= sound.period_s:
         raise InputError(

@@ -284,7 +284,7 @@ def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
 
 
 def _leaves(tree: Any, place: Sequence[str]) -> Iterator[list[str]]:
-    """Paths of the leaves below a place of a tree, relative to this place."""
+    """Yields the paths of the leaves below a place, relative to this place."""
     if place:
         below = tree.get(place[0]) if isinstance(tree, Mapping) else None
         yield from _leaves(below, place[1:])
@@ -324,7 +324,7 @@ def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:
 def _hoisted(
     trees: Mapping[str, Mapping[str, Any]],
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """Separates what all trees have in common from the rest of each tree."""
+    """Separates the values that all trees share from the rest of each tree."""
     shared = _common(list(trees.values()))
     return shared, {name: _without(tree, shared) for name, tree in trees.items()}
 

@@ -1,4 +1,4 @@
-"""Reads YAML from any origin within limits, and writes YAML."""
+"""Reads YAML texts within limits, because users write them, and writes YAML."""
 
 from __future__ import annotations
 

@@ -157,7 +157,7 @@ class GasSensorArray(Block):
         )
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step, with the noise and the mismatch of the run."""
+        """Returns the step with the noise and the sensor mismatch of the run."""
         numbers = self._numbers_of(run.seed_of(self.get_name()))
         return self.step._replace(numbers=numbers)
 

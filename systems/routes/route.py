@@ -206,7 +206,7 @@ def _spaced(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
 def _sees(
     a: Any, b: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether a segment keeps a clearance."""
+    """Return whether all points of a segment keep a clearance from obstacles."""
     found = _clearance(a, b, rectangles, discs, clearance, clearance)
     return bool(found >= clearance)
 

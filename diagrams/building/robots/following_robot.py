@@ -114,7 +114,7 @@ _OF_RANGES = {"ranges", "echo", "range_ages", "free_space"}
 
 
 def _check_sensing(robot: Follower, controller: Any) -> None:
-    """Refuses a law that reads ranges if the robot has no range sensors."""
+    """Raises an error if a law reads ranges, but the robot has no range sensors."""
     wanted = _OF_RANGES.intersection(_inputs(controller))
     if wanted and robot.obstacle_sensing != "ultrasonic" and not robot.blocks:
         raise InputError(

@@ -22,7 +22,7 @@ from systems.laws.trajectory.trajectory_filtered import FilteredTrajectoryParame
 
 
 def _adapting(own: Any) -> AdaptiveTrajectoryParameters | None:
-    """The gains of a law if it adapts them; otherwise None."""
+    """The gains of a law that adapts its gains; None for any other law."""
     return own if isinstance(own, AdaptiveTrajectoryParameters) else None
 
 

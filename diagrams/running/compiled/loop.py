@@ -60,7 +60,7 @@ class CompiledLoop:
     yet filled."""
     tick_s: float
     referee: Referee
-    """It knows why the run ended."""
+    """Referee of the run, which states why the run ended."""
     columns: Mapping[str, Mapping[str, int]]
     """Indices of the columns in the log, by robot or world, and by column name."""
     plan: LoopPlan

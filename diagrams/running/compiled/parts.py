@@ -97,7 +97,7 @@ ARRAYS: dict[Any, Callable[[int, Any], Any]] = {
 
 
 def _define_called(_, address, tick, words):  # type: ignore[no-untyped-def]
-    """Calls a part at an address and returns its result; exceptions are passed on."""
+    """Calls the part at an address and returns its result; passes exceptions on."""
     whole, arguments = types.int64, (types.int64, types.int64)
 
     def codegen(context: Any, builder: Any, _signature: Any, values: Any) -> Any:

@@ -76,7 +76,7 @@ class LoopPart:
         return "\n".join(["def part(tick, address):", *_indented(body), ""])
 
     def words(self) -> NDArray[np.int64]:
-        """The words of the part; the caller keeps them and passes their address."""
+        """The words of the part. The caller keeps this array and passes its address."""
         floats = np.array(self._floats)
         self._kept.append(floats)
         self._words[:2] = floats.ctypes.data, floats.size
@@ -195,7 +195,7 @@ def _compilable(function: FunctionType) -> Any:
 def _users_helpers(
     function: FunctionType, known: set[FunctionType]
 ) -> set[FunctionType]:
-    """The plain functions in a user's own modules that a function of the user calls."""
+    """Returns the functions of a user's modules that a user's function calls."""
     if _is_ours(function):
         return set()
     for name in function.__code__.co_names:

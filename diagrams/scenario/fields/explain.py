@@ -1,4 +1,4 @@
-"""Turns validation errors of pydantic into messages, one line per fault."""
+"""Converts validation errors of pydantic to messages, one line per fault."""
 
 from __future__ import annotations
 

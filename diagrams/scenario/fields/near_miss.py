@@ -45,7 +45,7 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
 
 
 def _of_that_meaning(name: str, siblings: Iterable[str]) -> str:
-    """Suggests a sibling with the same meaning; units are ignored."""
+    """Suggests a field of the same group with the same meaning, whatever its unit."""
 
     def told(field: str) -> str:
         return field.casefold().partition("_")[0]

@@ -1,4 +1,4 @@
-"""Navigates the JSON Schema of a tree of parameters."""
+"""Finds fields and paths in the JSON Schema of a tree of parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speeds of the corners of bodies; corners of a turning body are the fastest points."""
+"""Computes the speeds of corners, which are the fastest points of turning bodies."""
 
 from __future__ import annotations
 

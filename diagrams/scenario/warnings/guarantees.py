@@ -253,7 +253,7 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
 
 
 def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
-    """A1: no body is faster than the guard expects."""
+    """Returns assumption A1: no body is faster than the guard expects."""
     text, fastest = "speed of the fastest body", 0.0
     if speeds:
         name = max(speeds, key=speeds.__getitem__)
@@ -264,7 +264,7 @@ def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
 
 
 def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
-    """A3: no body is within the start bubble."""
+    """Returns assumption A3: no body is within the start bubble."""
     place = scenario.only.start.position_m
     nearest = min(
         (math.hypot(*beyond_rectangle(place, body.rectangle(0.0))) for body in bodies),
@@ -312,7 +312,7 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
 
 
 def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A4 and A5: errors of position and wheels are bounded, and the tires grip."""
+    """Returns A4 and A5: position and wheel errors are bounded, and the tires grip."""
     own, tick_s = scenario.follower, scenario.tick_s
     guard, robot, plant = own.own_guard, own.robot, own.plant
     assert guard is not None

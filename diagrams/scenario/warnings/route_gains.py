@@ -126,7 +126,7 @@ def _of_stiffness(
 def _of_rate(
     field: str, own: AdaptiveTrajectoryParameters, of: SampledMass
 ) -> list[ScenarioWarning]:
-    """Warns if K and D without limits can run away."""
+    """Warns if the adapted gains K and D have no limits and can grow without bound."""
     amplitude_m = pull_through_m(own)
     bound = rate_bound(own.rule, amplitude_m, of)
     if own.projected or own.rate < bound:
