@@ -106,6 +106,34 @@ def renamed(path: str) -> str:
     return new
 
 
+def is_constant_now(path: str, value: Any) -> bool:
+    """Whether a field has become a constant with a certain value.
+
+    Args:
+        path: Dotted path that a user has set.
+        value: Value that the user has given.
+
+    Returns:
+        True if the constant has this value, and False if the path is no constant.
+
+    Raises:
+        InputError: The constant has another value.
+    """
+    begin = _PREFIX.match(path)
+    own = path[begin.end() :] if begin else path
+    if own.startswith("repulsion."):
+        own = f"laws.{own.removeprefix('repulsion.')}"
+    if not (constant := constant_now(own)):
+        return False
+    if value != next(each.value for each in former_fields() if each.path == own):
+        raise InputError(
+            path,
+            f"is {value!r}, but this is no longer a field; it is now {constant}; leave "
+            "it out",
+        )
+    return True
+
+
 def constant_now(path: str) -> str:
     """Returns the constant that has replaced a field of the previous version.
 
@@ -118,7 +146,7 @@ def constant_now(path: str) -> str:
     """
     for former in former_fields():
         if former.path == path and not former.new:
-            return f"the constant {former.place}, {former.value!r}"
+            return f"the constant {former.place} = {former.value!r}"
     return ""
 
 
@@ -150,7 +178,7 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
         elif value != former.value:
             raise InputError(
                 f"{where}{path}",
-                f"is {value!r}, but is no longer a field, but "
+                f"is {value!r}, but this is no longer a field; it is now "
                 f"{constant_now(former.path)}; remove it",
             )
         else:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from diagrams.scenario.former_fields import renamed
+from diagrams.scenario.former_fields import is_constant_now, renamed
 from diagrams.scenario.shorthand import begins_anew, require_effect
 from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
@@ -81,7 +81,11 @@ def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:
         InputError: A field has no effect, because all robots or all sources have values
             of their own.
     """
-    fields = {renamed(key): value for key, value in settings.items()}
+    fields = {
+        renamed(key): value
+        for key, value in settings.items()
+        if not is_constant_now(key, value)
+    }
     set_fields(data, fields.items())
     require_effect(data, fields)
 

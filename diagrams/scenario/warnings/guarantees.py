@@ -233,7 +233,7 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
     needed = clear_way(alone, body.top_speed_m_s, speed)
     axes, places, half_angles = sensors.beams
     forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angles
-    # Only sensors that look ahead count. The sensor that sees farthest is decisive.
+    # Only the sensor that sees farthest ahead counts.
     reach = body.control_point_m + places[:, 0] + sensors.each("maximum_range_m")
     seen = float(np.max(reach[forward], initial=-np.inf))
     return (
@@ -281,7 +281,8 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
 
     A2 states that no body is nearer than a range reading minus the margin. The
     conditions limit the share of missed echoes, the number of blind sensors, and the
-    error of ranges due to the assumed speed of sound.
+    error of ranges due to the assumed speed of sound. If the sensors differ, the
+    greatest share of missed echoes and the greatest maximum range count.
     """
     sensors = scenario.follower.ultrasonic
     stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s
