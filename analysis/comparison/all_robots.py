@@ -18,17 +18,17 @@ _WORST = ("minimum_", "least_"), ("_max_", "greatest_")
 def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
     """A sweep's results with figures of all robots together beside each one's own.
 
-        Least distances and times to contact are those of the robot that had the least,
-        greatest ones of that with the greatest, and a time to the goal is that of the last
-        one there; of everything else it is the mean over robots. A run in which a robot
-        lacks a figure has none.
+    Least distances and times to contact are those of the robot that had the least,
+    greatest ones of that with the greatest, and a time to the goal is that of the last
+    one there; of everything else it is the mean over robots. A run in which a robot
+    lacks a figure has none.
 
-        Args:
-            table: See ``analysis.sweeps.store.load_results``.
-                robots: Names of the robots. The table has the figures of an only robot already.
-    
-        Returns:
-            The table, or one with more columns.
+    Args:
+        table: See ``analysis.sweeps.store.load_results``.
+            robots: Names of the robots. The table has the figures of an only robot already.
+
+    Returns:
+        The table, or one with more columns.
     """
     if len(robots) < 2:
         return table
