@@ -25,7 +25,7 @@ def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
 
     Args:
         table: See ``analysis.sweeps.store.load_results``.
-            robots: Names of the robots. The table has the figures of an only robot already.
+        robots: Names of the robots. A table of one robot already has its figures.
 
     Returns:
         The table, or one with more columns.
