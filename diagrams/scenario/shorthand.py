@@ -232,7 +232,10 @@ def fields_of(group: str, name: str, **renamed: str) -> Iterator[None]:
 
 
 def field_in(group: str, name: str, field: str) -> str:
-    """Returns the shortest path of a field of a robot or source in a scenario.
+    """Returns the shortest dotted path of a robot's or source's field in a scenario.
+
+    For a robot with the default name, the path of ``start.position_m`` is the same
+    text. For a robot named ``first``, the path is ``robots.first.start.position_m``.
 
     Args:
         group: ``robots`` or ``sources``.
