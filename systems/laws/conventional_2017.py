@@ -25,9 +25,9 @@ def conventional_2017_force(
 ) -> Any:
     """Computes the force K_0/c + D_0 s at any distance c (Kim 2017, eq. 20).
 
-    In the printed equation, the push K_0/c becomes infinite as c approaches 0. In this
-    function, the push for a distance below the least range of the sensors is that for
-    the least range. The sensors cannot distinguish distances below the least range.
+    The push of the law is the term K_0/c. In the printed equation, the push becomes
+    infinite as c approaches 0. In this function, the push is constant below the least
+    range of the sensors, because the sensors cannot distinguish these distances.
 
     The law acts at any distance. If the distance doubles, the push halves.
 

@@ -32,14 +32,14 @@ class FilterNumbers(NamedTuple):
     """Distances that the control point P keeps, and limits of the wheels."""
 
     keep_m: float
-    """Distance that P keeps from objects, m. The distance is the sum of three terms:
-    the radius of the body around the axle, the distance epsilon of P ahead of the axle,
-    and the margin."""
+    """Distance that the control point P keeps from objects, m. The distance is the sum
+    of three terms: the radius of the body around the axle, the distance epsilon of P
+    ahead of the axle, and the margin."""
     top_speed: float
     """Top speed of each wheel's rim and of P, m/s."""
     turn_share: float
-    """Ratio L/(2 epsilon). L is the wheel separation, and epsilon is the distance of P
-    ahead of the axle."""
+    """Ratio L/(2 epsilon). L is the wheel separation, and epsilon is the distance of
+    the control point P ahead of the axle."""
 
 
 @njit(cache=True)

@@ -354,8 +354,7 @@ def collision_step(
 @define_for_scalars("CollisionVector_", __name__)
 def CollisionVector_(T):
     class Impl(Block_[T]):
-        """Computes collision vectors from the echoes of the sensors (Han 2019, eq.
-        11-14).
+        """Computes collision vectors from sensor echoes (Han 2019, eq. 11-14).
 
         A collision vector points from the control point P to an obstacle. The block
         fills the slots of the output ports in order. Only ``aggregation: sum`` fills

@@ -329,8 +329,8 @@ def _keeps_off_moving(
 
     The result is true in two cases:
 
-    - No such obstacle can be within ``keep_m`` of the position ``place`` after
-      ``ahead_s``.
+    - No moving obstacle can be within ``keep_m`` of the position ``place`` after the
+      time ``ahead_s``.
     - The robot withdraws from the end of the sensors' view.
     """
     x, y = place

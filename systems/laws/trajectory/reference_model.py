@@ -53,7 +53,7 @@ def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNum
 def nominal_poles(mass: float, stiffness: float, damping: float) -> tuple[float, float]:
     """Computes the natural frequency and damping ratio of a mass, spring, and damper.
 
-    The paper prints neither of these numbers.
+    Engelbrecht 2021 prints neither of these numbers.
 
     Args:
         mass: Virtual mass M, kg.

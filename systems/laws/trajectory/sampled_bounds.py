@@ -129,7 +129,8 @@ def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
     """Computes the lag at which the target pulls the control point P through a contact.
 
     Args:
-        own: Parameters of the law.
+        own: Parameters of the law: stiffness K to the target, stiffness K_e of
+            contacts, and distance S at which contacts begin.
 
     Returns:
         Lag K_e S/K of P behind the target, m. If K_e is 0, the result is 1 m.

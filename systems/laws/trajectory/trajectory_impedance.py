@@ -65,7 +65,9 @@ def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
 def target_force(
     p_WP: Any, v_WP: Any, target: Any, stiffness: Any, damping: Any
 ) -> Any:
-    """Computes the force toward the target, U = -K (p - p_d) - D (v - v_d) (eq. 2).
+    """Computes the force toward the target, U = -K (p - p_d) - D (v - v_d).
+
+    The force is eq. 2 of Engelbrecht 2021.
 
     Args:
         p_WP: Position p (x, y) of the control point P in the world frame W, m; floats
