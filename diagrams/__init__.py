@@ -1,6 +1,6 @@
-"""Scenarios, the builder that wires blocks, and the run.
+"""Describes scenarios, connects their blocks in diagrams, and runs the diagrams.
 
-``__init__.pyi`` lists what it offers; a name is loaded at its first use.
+``__init__.pyi`` lists the public names. Python loads a name at its first use.
 """
 
 import lazy_loader

@@ -34,7 +34,7 @@ class RunResult(diagrams.RunResult):
     def __repr__(self) -> str:
         whole = self.full_scenario
         return (
-            f"<RunResult {whole.name}, law {self.scenario.only.law}, seed {whole.seed}: "
+            f"<RunResult {whole.name}, law {whole.law_names}, seed {whole.seed}: "
             f"{self.ending} after {self.simulated_s:.1f} s>"
         )
 

@@ -75,7 +75,7 @@ def test_near_misses_are_named(capsys, words, meant):
         (["simulate", "--runs", "10"], " (--runs is an option of compare, falsify)"),
         (
             ["design", "--law", "active"],
-            " (--law is an option of simulate, stability)",
+            " (--law is an option of simulate, fields, stability)",
         ),
         (["simulate", "--obstacles", "3"], "--obstacles"),
         (["simulate", "--gui"], "--gui"),

@@ -24,7 +24,7 @@ def quick_parts(
     """Stand-ins for analyses that take their time."""
 
     def verdicts(study):
-        return (judge(MASS, study.scenario.robot.mass_kg),)
+        return (judge(MASS, study.scenario.only.robot.mass_kg),)
 
     def impossible(study):
         raise InputError("law", "has no such thing; choose another one")
@@ -163,7 +163,7 @@ def test_of_several_robots_one_is_analysed_alone(quick, capsys, tmp_path):
         assert f"the report covers robot {['first', 'second'][k]!r} alone" in complaint
         documents.append(json.loads(printed))
         again = load_scenario(out / "scenario.yaml")
-        assert not again.robots
+        assert [*again.robots] == [["first", "second"][k]]
         assert again.only.start.position_m == [(-3.0, 0.0), (0.0, -3.0)][k]
     assert documents[0]["law"] == "trajectory_filtered"
     status, _, complaint = run(capsys, "robots_2", "--robot", "nobody")

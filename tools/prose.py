@@ -120,6 +120,8 @@ def remarks(path: Path) -> Iterator[tuple[int, str]]:
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             text = node.value.value
             if isinstance(text, str):
+                # Names of arguments are identifiers.
+                text = re.sub(r"(?m)^( +)\*{0,2}\w+:", r"\1:", text)
                 yield node.lineno, prose_of_page(text.replace("``", "`"))
     above, block = -1, list[str]()
     for token in tokenize.generate_tokens(io.StringIO(source).readline):

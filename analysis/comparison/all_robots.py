@@ -25,12 +25,12 @@ def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
 
     Args:
         table: See ``analysis.sweeps.store.load_results``.
-        robots: Names; none: of the only robot the table has its figures already.
+            robots: Names of the robots. The table has the figures of an only robot already.
 
     Returns:
         The table, or one with more columns.
     """
-    if not robots:
+    if len(robots) < 2:
         return table
     pooled = {}
     for name in (*ALL_RUNS, *SUCCESSES):

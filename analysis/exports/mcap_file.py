@@ -84,7 +84,7 @@ def _write(writer: Any, run: RecordedRun) -> None:
     scenario = run.scenario
     about = {
         "scenario": scenario.name,
-        "law": scenario.only.law,
+        "law": scenario.law_names,
         "seed": str(scenario.seed),
         "warnings": "\n".join(map(str, warnings_of(scenario))),
     }

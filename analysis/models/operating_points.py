@@ -301,7 +301,6 @@ def _steady_scenario(scenario: Scenario, vx: float, vy: float) -> Scenario:
     source = {
         "waypoints_m": [[0.0, 0.0], [900.0 * vx / speed, 900.0 * vy / speed]],
         "speed_m_s": speed,
-        "top_speed_m_s": 2.0 * speed + 1.0,
         "start_time_s": 0.0,
         "at_end": "stop",
     }

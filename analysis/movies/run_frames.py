@@ -17,6 +17,7 @@ from analysis.runs.scene import (
     compose,
     contact_point,
     followed_sources,
+    logged_sensors,
     looks,
     moving_and_static,
     run_title,
@@ -188,9 +189,7 @@ class RunFrames:
         tick, scenario = tick_at(own, time), own.scenario
         pose = own.poses("WB")[tick]
         found: list[Any] = []
-        for sensor in range(scenario.sensing.ultrasonic.count):
-            if f"range_{sensor + 1}" not in own.columns:
-                continue
+        for sensor in logged_sensors(own):
             echo = own.columns[f"echo_{sensor + 1}"][tick] > 0.5
             x, y, theta = compose(pose, sensor_pose(scenario, sensor))
             half = scenario.sensing.ultrasonic.sensors[sensor].beam_half_angle_deg

@@ -22,7 +22,7 @@ from analysis.reporting.palette import COLOURS
 from analysis.runs import replay_scene
 from analysis.runs.floor_layers import clipped, floor_layers
 from analysis.runs.guarded_motion import guarded_motion
-from analysis.runs.known_space import known_space
+from analysis.runs.known_space import has_known_space, known_space
 from analysis.runs.replay_layers import replay_layers
 from analysis.runs.replay_scene import OBSTACLE_HEIGHT_M, upright
 from analysis.runs.run_plots import clearance_panel, heard_bursts, time_panels
@@ -31,6 +31,7 @@ from analysis.runs.scene import (
     contact_point,
     followed_sources,
     lightened,
+    logged_sensors,
     looks,
     moving_and_static,
     run_title,
@@ -190,7 +191,7 @@ def source_path(scenario: Scenario, name: str) -> str:
     Returns:
         Path without a slash in front.
     """
-    return f"sources/{name}" if scenario.sources else "source"
+    return f"sources/{name}" if len(scenario.sources) > 1 else "source"
 
 
 def robot_path(own: RunResult, result: RunResult) -> str:
@@ -310,12 +311,11 @@ def _record_robot(
         for time, angle in zip(frames, turned, strict=True):
             spin = upright(0.0, 0.0, 0.0, angle)
             meshcat.SetTransform(f"{path}/{side}/wheel", spin, float(time))
-    for number in range(1, result.scenario.sensing.ultrasonic.count + 1):
-        if f"echo_{number}" in result.columns:
-            echo = result.columns[f"echo_{number}"] > 0.5
-            cone = f"{path}/cone_{number}"
-            record_switch(meshcat, f"{cone}/echo", result.time, echo)
-            record_switch(meshcat, f"{cone}/empty", result.time, ~echo)
+    for sensor in logged_sensors(result):
+        echo = result.columns[f"echo_{sensor + 1}"] > 0.5
+        cone = f"{path}/cone_{sensor + 1}"
+        record_switch(meshcat, f"{cone}/echo", result.time, echo)
+        record_switch(meshcat, f"{cone}/empty", result.time, ~echo)
 
 
 def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
@@ -425,6 +425,8 @@ def _record_known_space(
 ) -> None:
     """Parts of the floor, seen while the robot knows them; and dots of echoes."""
     own = look.result
+    if not has_known_space(own):
+        return
     known = known_space(own, known_times(own))
     if known is None:
         return

@@ -6,7 +6,7 @@ from analysis.replays.arrows import arrow_path, arrows, scale_m_n
 from analysis.replays.replay_page import Layer
 from analysis.reporting.palette import COLOURS
 from analysis.runs.known_space import has_known_space
-from analysis.runs.scene import followed_sources, lightened, looks
+from analysis.runs.scene import followed_sources, lightened, logged_sensors, looks
 from diagrams import RunResult
 
 
@@ -56,11 +56,9 @@ def _of_sensors(
 ) -> list[Layer]:
     found = []
     cones = [
-        f"{paths[name]}/cone_{number}"
+        f"{paths[name]}/cone_{sensor + 1}"
         for name, own in result.robots.items()
-        if own.scenario.only.searches is None
-        for number in range(1, own.scenario.sensing.ultrasonic.count + 1)
-        if f"echo_{number}" in own.columns
+        for sensor in logged_sensors(own)
     ]
     if cones:
         text = "ultrasonic; with or without an echo"

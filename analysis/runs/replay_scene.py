@@ -17,7 +17,7 @@ from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from analysis.reporting.palette import COLOURS
-from analysis.runs.scene import Look, bounds, sensor_pose
+from analysis.runs.scene import Look, bounds, logged_sensors, sensor_pose
 from diagrams import RunResult, Scenario
 from diagrams.scenario.participants import SourceParameters
 from systems.base.robot import microphones_B
@@ -187,12 +187,8 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
         _add_microphones(meshcat, scenario, path)
     elif scenario.only.kind == "router":
         _add_goal(meshcat, scenario.router.route.goal_m, look.colour, path)
-    if (
-        scenario.sensing.obstacle_sensing == "ultrasonic"
-        and scenario.only.searches is None
-    ):
-        for sensor in range(scenario.sensing.ultrasonic.count):
-            _add_cone(meshcat, scenario, f"{path}/cone_{sensor + 1}", sensor)
+    for sensor in logged_sensors(look.result):
+        _add_cone(meshcat, scenario, f"{path}/cone_{sensor + 1}", sensor)
     if scenario.only.loudspeaker is not None:
         _add_loudspeaker(meshcat, path, ROBOT_HEIGHT_M, look.colour)
     if scenario.only.searches is None:

@@ -33,7 +33,7 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
     document = {
         "schema_version": SCHEMA_VERSION,
         "scenario": result.full_scenario.name,
-        "law": result.full_scenario.only.law,
+        "law": result.full_scenario.law_names,
         "seed": result.full_scenario.seed,
         "engine": result.engine,
         **_outcome(result),
@@ -65,7 +65,7 @@ def _outcome(result: RunResult) -> dict[str, Any]:
         "collision": collision,
         "halts": halts,
     }
-    if result.scenario.only.searches is not None:
+    if not result.several and result.scenario.only.searches is not None:
         faults = fault_names(result.columns["search_fault"][-1])
         ended |= {"reason": result.reason or None, "faults": faults}
     return ended
@@ -182,7 +182,7 @@ def _robot_rows(
     result: RunResult, metrics: dict[str, Any], prefix: str
 ) -> dict[str, str]:
     """What one robot did; names of rows and metrics begin with the prefix."""
-    attraction, stop = result.scenario.follower.attraction, result.scenario.stop
+    robot, stop = result.scenario.only, result.scenario.stop
 
     def metric(name: str) -> Any:
         return metrics[f"{prefix}{name}"]
@@ -192,11 +192,11 @@ def _robot_rows(
         "distance at the end": _metres(metric("final_distance_m")),
         "path length": _metres(metric("path_length_m")),
     }
-    if result.scenario.only.searches is not None:
+    if robot.searches is not None:
         rows |= _search_rows(result, metric)
-    elif result.scenario.only.kind != "router":
+    elif robot.kind != "router":
         rows |= {
-            "follow distance": _metres(attraction.follow_distance_m),
+            "follow distance": _metres(robot.follow_distance_m),
             "following": _percent(metric("following_fraction"))
             + f" of the time within {stop.following_band_m:.2f} m of it",
             "following error": _metres(metric("following_error_rms_m")) + " rms",

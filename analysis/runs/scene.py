@@ -14,6 +14,7 @@ from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
 from diagrams import RunResult, Scenario
 from diagrams.running.stop_rules import SUCCESSFUL
 from diagrams.scenario.bodies import Path, robot_rectangle
+from diagrams.scenario.participants import HasRangeSensors
 from systems.framework.input_error import InputError
 from systems.sound.parameters import SoundParameters
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
@@ -116,10 +117,8 @@ def run_title(result: RunResult) -> str:
     """What was run and how it ended, on one line."""
     told = result.several and result.cause not in SUCCESSFUL
     who = f"{result.name} " if told else ""
-    laws = ", ".join(
-        dict.fromkeys(own.scenario.only.law for own in result.robots.values())
-    )
-    return f"{result.full_scenario.name}, law {laws}: {who}{result.ending}"
+    scenario = result.full_scenario
+    return f"{scenario.name}, law {scenario.law_names}: {who}{result.ending}"
 
 
 def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
@@ -134,6 +133,21 @@ def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]
     """
     starts = np.arange(sound.start_s, end, sound.period_s)
     return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
+
+
+def logged_sensors(result: RunResult) -> range:
+    """The range sensors whose readings a run has logged.
+
+    Args:
+        result: The run of one robot.
+
+    Returns:
+        Their numbers, from 0; none without cones.
+    """
+    robot = result.scenario.only
+    if isinstance(robot, HasRangeSensors) and "range_1" in result.columns:
+        return range(robot.ultrasonic.count)
+    return range(0)
 
 
 def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:

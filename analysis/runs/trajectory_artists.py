@@ -19,6 +19,7 @@ from analysis.runs.scene import (
     compose,
     contact_point,
     followed_sources,
+    logged_sensors,
     moving_and_static,
     picture_times,
     sensor_pose,
@@ -301,18 +302,21 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
         result: The run of one robot.
         times: s; of many only some are used.
     """
-    if "range_1" not in result.columns:
+    sensors = logged_sensors(result)
+    if not sensors:
         return
     step = max(1, math.ceil(len(times) / CONE_INSTANTS))
+    half_angles = result.scenario.sensing.ultrasonic.half_angles
     labelled: set[bool] = set()
     for time in times[::step]:
         tick = tick_at(result, time)
-        for sensor, own in enumerate(result.scenario.sensing.ultrasonic.sensors):
+        for sensor in sensors:
             echo = bool(result.columns[f"echo_{sensor + 1}"][tick] > 0.5)
             colour = to_rgb(COLOURS["echo" if echo else "empty"])
             pose = result.poses("WB")[tick]
             x, y, theta = compose(pose, sensor_pose(result.scenario, sensor))
-            axis, half = math.degrees(theta), own.beam_half_angle_deg
+            axis = math.degrees(theta)
+            half = math.degrees(half_angles[sensor])
             wedge = Wedge(
                 (x, y),
                 result.columns[f"range_{sensor + 1}"][tick],

@@ -43,10 +43,13 @@ _PARTS = {
 _OTHERS = frozenset(
     {
         "robot.microphones_m",
+        "collision_vector.aggregation",
         *(f"sound.{name}" for name in ("kind", "file", "level_pa")),
         *(f"sound.{name}_hz" for name in ("low", "high", "tone")),
     }
 )
+#: The field that says which speed of an obstacle a law gets.
+_VELOCITY_TERM = "collision_vector.velocity_term"
 
 #: Conventions and assumptions, for every law.
 _CONVENTIONS = (
@@ -112,7 +115,7 @@ class ParameterRow:
     @property
     def of_law(self) -> bool:
         """Whether it belongs to the law, rather than to every loop."""
-        return self.field.startswith("laws.")
+        return self.field.startswith("laws.") or self.field == _VELOCITY_TERM
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import pickle
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -25,7 +25,7 @@ from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.loading import resolve_sound, written_fields
 from diagrams.scenario.own_code import own_files
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
-from diagrams.scenario.settings import apply_settings
+from diagrams.scenario.settings import apply_settings, set_fields
 from diagrams.scenario.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
@@ -127,11 +127,15 @@ class SweepPlan(Parameters):
 
     @cached_property
     def base(self) -> dict[str, Any]:
-        """Fields of the scenario's file, with ``set`` applied; not to be changed."""
+        """Fields of the scenario's file, with ``set`` applied; not to be changed.
+
+        A list is stated if another field of the sweep sets one of its elements.
+        """
         data = written_fields(self.source)
+        _state_lists(data, scenario_from_mapping(data), self.set)
         apply_settings(data, copy.deepcopy(self.set))
         resolve_sound(data, Path(self.folder))
-        scenario_from_mapping(data)
+        _state_lists(data, scenario_from_mapping(data), self.paths)
         return data
 
     @cached_property
@@ -336,6 +340,34 @@ def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
             yield from _texts(key, item)
     elif isinstance(value, str):
         yield key, value
+
+
+def _state_lists(
+    data: dict[str, Any], scenario: Scenario, paths: Iterable[str]
+) -> None:
+    """States the lists that paths lead into, where the data leave them out.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+        scenario: The scenario that they make.
+        paths: Dotted paths.
+    """
+    whole = scenario.model_dump(mode="json")
+    for group in ("robots", "sources"):
+        named = getattr(scenario, group)
+        whole[group] = {k: each.model_dump(mode="json") for k, each in named.items()}
+    for path in paths:
+        parts = path.split(".")
+        index = next((k for k, part in enumerate(parts) if part.isdigit()), 0)
+        values, there = _value_at(whole, parts[:index]), _value_at(data, parts[:index])
+        if isinstance(values, list) and there is None:
+            set_fields(data, [(".".join(parts[:index]), values)])
+
+
+def _value_at(data: Any, place: Sequence[str]) -> Any:
+    for part in place:
+        data = data.get(part) if isinstance(data, dict) else None
+    return data
 
 
 def _check_path(field: str, path: str, earlier: list[str]) -> None:

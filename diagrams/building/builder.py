@@ -27,28 +27,29 @@ from systems.sound.parameters import SoundParameters
 
 @dataclass(frozen=True)
 class SoundFollower:
-    """The diagram of a scenario, with its robots and sources by name.
+    """Contains the diagram of a scenario, and its robots and sources by name.
 
-    ``blocks``, ``port``, ``log`` and ``logged`` refer to the only robot.
+    If the scenario has only one robot, the properties ``blocks``, ``port``, ``log`` and
+    ``logged`` refer to this robot.
     """
 
     diagram: Diagram
     scenario: Scenario
     robots: Mapping[str, Parts]
-    """Blocks of each robot. A robot that follows a sound has plant, odometry, hearing,
-    tracker, collision, controller and command. Robots that hear audio also have
-    microphones. Robots with ultrasonic sensing also have ultrasonic. Robots with a
-    loudspeaker also have emitter."""
+    """Blocks of each robot, by name of the robot. A robot that follows a sound has the
+    parts plant, odometry, hearing, tracker, collision, controller and command. If the
+    robot hears audio, it also has the part microphones. With ultrasonic sensing, it has
+    ultrasonic. With a loudspeaker, it has emitter."""
     sources: Mapping[str, Parts]
     """Blocks of each source: source, and with audio also emitter."""
     obstacles: Obstacles
     world: Parts | None = None
-    """Blocks that all robots share: wind, plume, radio and sink; None if no robot
+    """Blocks that all robots share: wind, plume, radio and sink. None if no robot
     searches."""
 
     @cached_property
     def only(self) -> Parts:
-        """The only robot.
+        """The blocks of the only robot.
 
         Raises:
             InputError: There are several robots.
@@ -81,31 +82,32 @@ class SoundFollower:
         return self.only.logged
 
     def port(self, part: str, name: str) -> Any:
-        """Returns an output port of the only robot, its source or the obstacles.
+        """Returns an output port of the only robot, of its source or of the obstacles.
 
         Args:
-            part: A key of ``blocks``.
+            part: Part of the block (its role, for example ``plant``), a key of
+                ``blocks``.
             name: Name of the port.
 
         Returns:
-            The port; evaluate it in the context of its block.
+            The port. To evaluate the port, use the context of its block.
         """
         return self.blocks[part].GetOutputPort(name)
 
 
 def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollower:
-    """Builds the diagram of a scenario.
+    """Builds the diagram of a scenario with all its robots, sources and obstacles.
 
-    Each robot and each source is a separate diagram (``make_robot``, ``make_source``)
-    in a common world. Each robot can see and hit the obstacles, the other robots and
-    the sources, and hears all sounds.
+    Each robot and each source is a separate diagram inside this diagram
+    (``make_robot``, ``make_source``). Each robot can see and hit the obstacles, the
+    other robots and the sources. Each robot hears all sounds.
 
     Args:
         scenario: The scenario to build.
         log: Whether each robot logs the columns of its blocks.
 
     Returns:
-        The diagram, and its blocks by robot, source and part.
+        The diagram, with the blocks of each robot and source.
 
     Raises:
         InputError: The law is not known.
@@ -141,27 +143,29 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
 
 
 def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
-    """Returns the sounds that a robot hears as waves.
+    """Returns the sounds of a scenario, if a robot hears them as waves.
 
     Args:
         scenario: The scenario that is run.
 
     Returns:
-        The sound of each source and loudspeaker, by name; empty if no robot listens.
+        Sound of each source and loudspeaker, by name of the source or robot. The
+        mapping is empty if no robot hears sound waves.
     """
     listens = any(robot.listens for robot in scenario.robots.values())
     return scenario.sounds() if listens else {}
 
 
 def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
-    """Builds the diagram of a robot of a scenario, see ``make_robot``.
+    """Builds the diagram of one robot of a scenario with ``make_robot``.
 
-    A loudspeaker that no robot hears is left out.
+    If no robot hears the robot's loudspeaker, the function leaves out the loudspeaker.
 
     Args:
         scenario: The scenario that is run.
         name: Name of the robot.
-        log: Whether to log the columns of its blocks at every tick.
+        log: Whether the diagram logs the columns of its blocks at every tick (control
+            period).
 
     Returns:
         The diagram, see ``make_robot``.
@@ -192,10 +196,10 @@ class _World:
     shared: Any
 
     def surround(self, name: str) -> None:
-        """Connects all inputs of a robot.
+        """Connects all inputs of a robot to sources, obstacles and other robots.
 
-        A robot has only the inputs that its blocks need. ``poses_WO`` and ``sizes``
-        contain the obstacles first, and then the other robots and the sources.
+        A robot has only the inputs that its blocks need. The inputs ``poses_WO`` and
+        ``sizes`` contain the obstacles first, then the other robots and the sources.
         """
         around, target = self.scenario.surroundings(name), self.scenario.target(name)
         if self.shared is not None:
@@ -249,7 +253,7 @@ class _World:
         return self.builder.GetSubsystemByName(name).get_output_port()
 
     def _joined(self, name: str, port: str, more: list[Any]) -> Any:
-        """Returns the obstacles' port, joined with further ports if there are any."""
+        """Returns the port of the obstacles, joined with any further ports."""
         first = self.obstacles.GetOutputPort(port)
         ports = [each for each in (first, *more) if each.size()]
         if len(ports) < 2:

@@ -30,33 +30,35 @@ _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
 
 
 def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> Any:
-    """Builds the controller that ``scenario.law`` names.
+    """Builds the controller block for the control law that ``scenario.law`` names.
 
-    The name of a user's own law is ``package.module:Name`` or
-    ``path/to/file.py:Name``; Python also searches the working directory. The law is
-    either a function or a class.
+    A user can write a law. The name of the user's law is ``package.module:Name`` or
+    ``path/to/file.py:Name``. Python also searches the working directory. The law is a
+    function or a class.
 
-    A function ``law(c, s, laws)`` returns the force away from an obstacle, N. c is
-    the distance of the obstacle, m, and s is its speed, m/s. ``laws`` has the gains of
-    all laws of the package. ``make_controller`` calls the law at a few distances and
-    speeds as a test.
+    A function ``law(c, s, laws)`` returns the force away from an obstacle, N. c is the
+    distance of the obstacle, m, and s is its speed, m/s. ``laws`` contains the gains of
+    all laws of the package. ``make_controller`` tests the function at several distances
+    and speeds.
 
-    A class derives from LeafSystem. Its arguments may be ``robot``, ``attraction``,
-    ``laws``, ``gains`` (those of the law of the package from whose block the class
-    derives), ``velocity_term``, ``sensors``, ``tick_s``, ``guard``, ``bodies`` and
-    ``seed``. Each of its inputs has the name of an output port in the diagram. The
-    class has exactly one of the outputs that ``make_command`` accepts.
+    A class derives from LeafSystem. Each input port of the class has the name of an
+    output port in the diagram. The class has exactly one of the output ports that
+    ``make_command`` accepts. The arguments of the class can be any of these: ``robot``,
+    ``attraction``, ``laws``, ``gains``, ``velocity_term``, ``sensors``, ``tick_s``,
+    ``guard``, ``bodies`` and ``seed``. If the class derives from the block of a law of
+    the package, ``gains`` are the gains of that law.
 
     Args:
         scenario: Scenario with the law and the parameters of its block.
-        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
         seed: Seed of a law that uses random numbers.
 
     Returns:
-        The block.
+        The controller block.
 
     Raises:
-        InputError: The law does not exist, or does not have the form of a law.
+        InputError: The law does not exist, or is neither a valid function nor a valid
+            class.
     """
     robot = scenario.only
     if robot.searches is not None:
@@ -103,7 +105,7 @@ def _radial(law: Any, parts: dict[str, Any]) -> Any:
 
 
 def _gains_of_base(block: type, laws: LawGains) -> Any:
-    """Returns the gains of the law of the package whose block is a base of a class."""
+    """Returns the gains of a law of the package, if its block is a base of a class."""
     for name, law in LAWS.items():
         if law.controller is not None and issubclass(block, law.controller):
             return getattr(laws, name, None)
@@ -133,20 +135,25 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
 def make_command(
     controller: Any, robot: RobotParameters, tick_s: float = TICK_S
 ) -> Any:
-    """Builds the block that drives the wheels by the commands of a controller.
+    """Builds the block that converts the commands of a controller to wheel commands.
+
+    The controller must have exactly one of these output ports of size 2. P is the
+    control point ahead of the axle:
+
+    - ``acceleration_W``: acceleration of P, m/s^2;
+    - ``velocity_W``: velocity of P, m/s;
+    - ``twist_B``: forward speed, m/s, and yaw rate, rad/s.
 
     Args:
-        controller: A block with exactly one output of size 2 among ``acceleration_W``
-            (of P, m/s^2), ``velocity_W`` (of P, m/s) and ``twist_B`` (forward speed and
-            yaw rate, m/s and rad/s).
-        robot: Dimensions and limits.
-        tick_s: Period of the command, s.
+        controller: The controller block.
+        robot: Dimensions and limits of the robot.
+        tick_s: Control period, s.
 
     Returns:
-        The block. Its input has the same name as that output of the controller.
+        The block. Its input has the same name as the output of the controller.
 
     Raises:
-        InputError: The controller has none of these outputs, or several.
+        InputError: The controller has none of these outputs, or has several of them.
     """
     return WheelCommand(command=commanded(controller), robot=robot, tick_s=tick_s)
 
@@ -155,14 +162,14 @@ def commanded(controller: Any, name: str = "") -> str:
     """Returns the name of the output port that carries the commands of a controller.
 
     Args:
-        controller: A controller, see ``make_command``.
-        name: Name of its law, for errors.
+        controller: A controller block, see ``make_command``.
+        name: Name of the controller's law, for messages.
 
     Returns:
-        Name of the port.
+        Name of the output port.
 
     Raises:
-        InputError: The controller has no such port, or several.
+        InputError: The controller has no output port for commands, or has several.
     """
     name = name or controller.get_name()
     sizes = _output_sizes(controller)

@@ -14,21 +14,24 @@ from systems.framework.input_error import InputError
 def with_own_blocks(
     blocks: Mapping[str, Any], names: tuple[str, ...], parts: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Returns the blocks of a robot by part, including a user's own blocks.
+    """Adds a user's own blocks to the blocks of a robot.
+
+    Each block has a part, which is its role in the robot, for example ``plant``. If a
+    block of the user has the same part as a block of the package, the user's block
+    replaces the block of the package.
 
     Args:
-        blocks: Blocks of the package by part.
+        blocks: Blocks of the package, by part.
         names: Names of the user's blocks, as ``package.module:Name`` or
-            ``path/to/file.py:Name``. A block of the user replaces the block of the
-            package with the same part.
-        parts: Available arguments for ``__init__`` of the user's blocks, by name.
+            ``path/to/file.py:Name``.
+        parts: Values for the arguments of the user's blocks, by name of the argument.
 
     Returns:
         A new mapping of blocks by part.
 
     Raises:
-        InputError: Two of the user's blocks have the same part, or a block does not
-            exist, does not state its part, or cannot be made.
+        InputError: Two of the user's blocks have the same part.
+        InputError: A block does not exist, does not state its part, or cannot be made.
     """
     joined, own = dict(blocks), set()
     for name in names:

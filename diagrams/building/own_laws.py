@@ -16,15 +16,19 @@ from systems.framework.input_error import InputError, shortened
 
 
 def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
-    """Wraps a law so that an invalid result raises an error that names the law.
+    """Wraps a user's control law so that an invalid result raises an error.
+
+    The error states the name of the law.
 
     Args:
         name: Name of the law, for messages.
-        law: ``law(c, s, laws)``; returns a force, N.
+        law: Function ``law(c, s, laws)`` that returns the force away from an obstacle,
+            N. c is the distance of the obstacle, m, and s is its speed, m/s. ``laws``
+            contains the gains of all laws of the package.
 
     Returns:
-        A function with the same arguments. It returns a finite force, N, as a float or
-        AutoDiffXd, or raises InputError.
+        A function with the same arguments. The function returns a finite force, N, as a
+        float or AutoDiffXd. Otherwise it raises an InputError.
     """
 
     @functools.wraps(law)
@@ -57,16 +61,16 @@ def try_law(
     range_m: float,
     top_speed_m_s: float,
 ) -> None:
-    """Calls a law at several distances and speeds, as a test before the run.
+    """Tests a user's control law at several distances and speeds, before the run.
 
     Args:
-        law: A function from ``checked_law``.
+        law: A function from ``checked_law``. It raises an error if a result is invalid.
         laws: Gains of all laws.
-        range_m: Largest tested distance, m.
-        top_speed_m_s: Largest tested speed, m/s.
+        range_m: Largest tested distance of an obstacle, m.
+        top_speed_m_s: Largest tested speed of an obstacle, m/s.
 
     Raises:
-        InputError: The law does not always return a force.
+        InputError: The law does not return a finite force at one of the tested points.
     """
     for share in (1e-3, 0.1, 0.5, 1.0):
         for s in (0.0, 0.5 * top_speed_m_s, top_speed_m_s):

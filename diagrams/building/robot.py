@@ -36,8 +36,8 @@ from systems.laws.impedance_controller import LAW_COLUMNS
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import SoundParameters
 
-#: Inputs of a robot that come from the world; ``emission`` also represents all inputs
-#: ``emission_<name>``.
+#: Inputs of a robot that come from outside of its diagram. ``emission`` also stands for
+#: all inputs ``emission_<name>``.
 OUTSIDE = "pose_WS", "poses_WO", "sizes", "emission", "wind", "plume", "air"
 
 
@@ -57,11 +57,12 @@ class Parts:
         """Returns an output port of a block.
 
         Args:
-            part: A key of ``blocks``.
+            part: Part of the block (its role, for example ``plant``), a key of
+                ``blocks``.
             name: Name of the port.
 
         Returns:
-            The port; evaluate it in the context of its block.
+            The port. To evaluate the port, use the context of its block.
         """
         return self.blocks[part].GetOutputPort(name)
 
@@ -80,13 +81,13 @@ def parts_of(diagram: Diagram) -> Parts:
 
 
 def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ...]]:
-    """Returns the columns in the log of a robot, in order.
+    """Returns the names of the columns in the log of a robot, in order.
 
     Args:
-        blocks: Blocks of the robot, by part.
+        blocks: Blocks of the robot, by part (role of the block, for example ``plant``).
 
     Returns:
-        The columns of each (part, port).
+        Names of the columns of each output port. The keys are (part, name of the port).
     """
     return {
         (part, port): names
@@ -96,14 +97,15 @@ def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ..
 
 
 def publishes_state(block: Any, port: str) -> bool:
-    """Whether an output of a block is a part of its state, set by the last update.
+    """Whether an output of a block is a part of its state, as set by the last update.
 
     Args:
         block: A block of a robot or of the world.
-        port: Name of its output.
+        port: Name of the output port.
 
     Returns:
-        False if the output depends on the present inputs, or changes between ticks.
+        False if the output depends on the present inputs, or if it changes between
+        updates.
     """
     if block.num_continuous_states():
         return False
@@ -129,27 +131,31 @@ def block_seed(seed: int, name: str) -> int:
 
 
 def seed_of(scenario: Scenario, block: str, owner: str) -> int:
-    """Returns the seed of a block of a robot or source.
+    """Returns the random seed of a block that belongs to a robot or source.
 
-    The default names ``robot`` and ``source`` do not affect the seed.
+    The seed depends on the names of the block and of its owner. However, the default
+    names ``robot`` and ``source`` of owners do not affect the seed.
 
     Args:
         scenario: The scenario that is run.
         block: Name of the block.
-        owner: Name of the robot or source that has the block.
+        owner: Name of the robot or source to which the block belongs.
 
     Returns:
-        A seed, see ``block_seed``.
+        The seed, see ``block_seed``.
     """
     name = block if owner in (ROBOT, SOURCE) else f"{block}_{owner}"
     return block_seed(scenario.seed, name)
 
 
 def world_seeds(scenario: Scenario) -> dict[str, int]:
-    """Returns the seeds of the blocks that all robots share, by name.
+    """Returns the random seeds of the blocks that all robots share.
 
     Args:
         scenario: The scenario that is run.
+
+    Returns:
+        Seed of each block, by name of the block.
     """
     names = "wind_field", "odor_plume", "radio_channel"
     return {name: block_seed(scenario.seed, name) for name in names}
@@ -167,16 +173,17 @@ def robot_blocks(
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
-        name: Name of the robot; its random numbers depend on the name.
-        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Indices of the bodies that are robots.
+        name: Name of the robot. The random numbers of the robot depend on its name.
+        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
+        robots: Indices of those bodies that are robots.
         others: Names of the sources and loudspeakers that the robot does not follow.
 
     Returns:
-        Blocks by part, not yet in a diagram.
+        Blocks by part (role of the block, for example ``plant``). They are not yet in a
+        diagram.
 
     Raises:
-        InputError: See ``make_robot``.
+        InputError: The law is not known, or a block cannot be made.
     """
     robot, own_seed = scenario.only, partial(seed_of, scenario, owner=name)
     seed = own_seed("controller")
@@ -238,29 +245,36 @@ def make_robot(
 ) -> Diagram:
     """Builds the diagram of a robot.
 
-    The same function builds all levels of detail: ``hearing`` and ``obstacle_sensing``
-    select blocks with the same ports. Each input connects to the only output with the
-    same name (see docs/model.md). If both are ``ideal`` and ``odometry.rounding`` is
-    off, the diagram can be converted to AutoDiffXd.
+    The robot can have simulated sensors or ideal sensors, as the fields ``hearing`` and
+    ``obstacle_sensing`` state. Both kinds of blocks have the same ports. If both fields
+    are ``ideal`` and ``odometry.rounding`` is off, Drake can convert the diagram to
+    AutoDiffXd. Each input of a block connects to the only output with the same name
+    (see docs/model.md).
 
-    The diagram has only the inputs that its blocks need. The possible inputs are
-    ``pose_WS`` and ``emission`` of the target, ``poses_WO`` and ``sizes`` of the other
-    bodies, ``emission_<name>`` of each other source, and ``wind``, ``plume`` and
-    ``air`` of the world. Its outputs are ``pose_WB`` and ``velocity_WB``. A robot with
-    a loudspeaker also has ``own_emission``, and a searching robot has ``frames``.
+    The diagram can have the following inputs. Only those that the blocks need exist:
+
+    - ``pose_WS`` and ``emission`` of the target;
+    - ``poses_WO`` and ``sizes`` of the other bodies;
+    - ``emission_<name>`` of each other source;
+    - ``wind``, ``plume`` and ``air`` of the world.
+
+    The outputs are ``pose_WB`` and ``velocity_WB``. If the robot has a loudspeaker,
+    ``own_emission`` is a further output. If the robot searches, ``frames`` is a further
+    output.
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
-        name: Name of the robot; its random numbers depend on the name.
-        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Indices of the bodies that are robots.
+        name: Name of the robot. The random numbers of the robot depend on its name.
+        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
+        robots: Indices of those bodies that are robots.
         others: Names of the sources and loudspeakers that the robot does not follow.
-        listeners_frame_s: Longest audio frame, s, of the robots that hear the
-            loudspeaker.
-        log: Whether to log the columns of its blocks at every tick.
+        listeners_frame_s: Longest audio frame of the robots that hear the loudspeaker,
+            s.
+        log: Whether the diagram logs the columns of its blocks at every tick (control
+            period).
 
     Returns:
-        The diagram; ``parts_of`` returns its blocks by part.
+        The diagram. ``parts_of`` returns its blocks by part (role of the block).
 
     Raises:
         InputError: The law is not known, or a sound file cannot be played.
@@ -294,17 +308,18 @@ def make_robot(
 
 
 def make_world(scenario: Scenario, *, log: bool = False) -> Diagram | None:
-    """Builds the diagram of the blocks that all robots share.
+    """Builds the diagram of the blocks that all robots share, such as the radio.
 
-    Its inputs are ``frames_<name>`` of each searching robot. Its outputs are the ports
-    of its blocks that robots need, for example ``air``.
+    The inputs of the diagram are ``frames_<name>`` of each searching robot. Its outputs
+    are the ports that robots need, for example ``air``.
 
     Args:
         scenario: The scenario that is run.
-        log: Whether to log the columns of its blocks at every tick.
+        log: Whether the diagram logs the columns of its blocks at every tick (control
+            period).
 
     Returns:
-        The diagram; None if no robot searches.
+        The diagram, or None if no robot searches.
     """
     blocks = [*world_blocks(scenario, world_seeds(scenario)).values()]
     if not blocks:
@@ -328,21 +343,22 @@ def make_world(scenario: Scenario, *, log: bool = False) -> Diagram | None:
 def make_source(
     scenario: Scenario, name: str, source: SourceParameters, *, audible: bool
 ) -> Diagram:
-    """Builds the diagram of a source, which moves along its waypoints.
+    """Builds the diagram of a sound source that moves along its waypoints.
 
-    Its outputs are ``pose_WS`` and ``v_WS``. An audible source also has ``emission``.
+    The outputs of the diagram are ``pose_WS`` and ``v_WS``. The diagram of an audible
+    source also has the output ``emission``.
 
     Args:
-        scenario: Scenario with the seed, the air and the room.
-        name: Name of the source; its random numbers depend on the name.
-        source: Its path, drive and sound.
-        audible: Whether a robot hears its sound as waves.
+        scenario: Scenario with the seed, the speed of sound and the room.
+        name: Name of the source. The random numbers of the source depend on its name.
+        source: Path, drive and sound of the source.
+        audible: Whether a robot hears the sound as waves.
 
     Returns:
-        The diagram, named after the source.
+        The diagram. It has the name of the source.
 
     Raises:
-        InputError: Its sound file cannot be played.
+        InputError: The sound file of the source cannot be played.
     """
     robot = SourceRobot(source=source)
     blocks: list[Any] = [robot]
@@ -413,20 +429,23 @@ def _driving(scenario: Scenario, controller: Any) -> Any:
 def connect_by_name(
     builder: DiagramBuilder, blocks: Sequence[Any], outside: Sequence[str] = ()
 ) -> None:
-    """Connects each input port to the only output port with the same name.
+    """Connects each input port of the blocks to the only output port of the same name.
 
-    A quantity has the same name on every port (see docs/model.md), so there is no list
-    of connections.
+    Each quantity has the same name on all ports (see docs/model.md). A list of
+    connections is therefore unnecessary.
 
     Args:
-        builder: Builder of the robot or source, which contains the blocks.
+        builder: Builder of the robot or source. The builder already contains the
+            blocks.
         blocks: Blocks to connect.
-        outside: Quantities from outside, which become inputs of the diagram. Names that
-            begin with one of these and an underscore also count.
+        outside: Quantities that come from outside and become inputs of the diagram. An
+            input also counts if its name begins with one of these names and an
+            underscore.
 
     Raises:
-        InputError: Several blocks publish a quantity that a block needs; or no block
-            publishes it, and it does not come from outside.
+        InputError: Several blocks publish a quantity that a block needs.
+        InputError: No block publishes a quantity that a block needs, and the quantity
+            does not come from outside.
     """
     outputs, counts = dict[str, Any](), Counter[str]()
     for block in blocks:
@@ -455,10 +474,11 @@ def connect_by_name(
 
 
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:
-    """Returns the columns of a block's output ports, by port.
+    """Returns the names of the columns of a block's output ports, by port.
 
-    A user's own block without the attribute ``columns`` uses ``LAW_COLUMNS``. Names of
-    columns apply only if the block has a port of the right size.
+    If a user's own block lacks the attribute ``columns``, the function uses
+    ``LAW_COLUMNS``. Column names apply to a port only if the port has as many elements
+    as there are names.
     """
     columns = getattr(block, "columns", None) or LAW_COLUMNS
     ports = {
@@ -471,9 +491,9 @@ def _columns(block: Any) -> dict[str, tuple[str, ...]]:
 
 
 def _add_log(builder: DiagramBuilder, blocks: Sequence[Any], tick_s: float) -> None:
-    """Adds one log for all ports, behind a multiplexer.
+    """Adds one log for all ports of the blocks, behind a multiplexer.
 
-    It takes a third less time than one log per port.
+    One log takes a third less time than one log per port.
     """
     ports = [block.GetOutputPort(name) for block in blocks for name in _columns(block)]
     joined = multiplexed(builder, "log_multiplexer", ports)
@@ -481,7 +501,7 @@ def _add_log(builder: DiagramBuilder, blocks: Sequence[Any], tick_s: float) -> N
 
 
 def multiplexed(builder: DiagramBuilder, name: str, ports: Sequence[Any]) -> Any:
-    """Joins several output ports into one, in order.
+    """Joins several output ports into one port that carries all their values in order.
 
     Args:
         builder: Builder of the diagram.

@@ -12,13 +12,13 @@ from systems import OdorPlume, RadioChannel, SinkMonitor, WindField
 
 
 def radio_nodes(scenario: Scenario) -> dict[str, int]:
-    """Returns the robots with a radio, and their addresses.
+    """Returns the radio addresses of the robots that have a radio.
 
     Args:
         scenario: The scenario that is run.
 
     Returns:
-        Addresses by name.
+        Radio addresses, by name of the robot.
     """
     return {
         name: address_of_robot(robot)
@@ -28,14 +28,18 @@ def radio_nodes(scenario: Scenario) -> dict[str, int]:
 
 
 def world_blocks(scenario: Scenario, seeds: Mapping[str, int]) -> dict[str, Any]:
-    """Makes the shared blocks; there are none if no robot needs them.
+    """Makes the blocks that all robots share: wind, odor plume, radio and sink.
+
+    If no robot needs these blocks, the function makes none. The sink is the computer of
+    the operator, which receives radio frames.
 
     Args:
         scenario: The scenario that is run.
-        seeds: Seeds of the blocks, by name.
+        seeds: Random seeds of the blocks, by name of the block.
 
     Returns:
-        Blocks by part, not yet in a diagram.
+        Blocks by part (role of the block, for example ``radio``). They are not yet in a
+        diagram.
     """
     blocks: dict[str, Any] = {}
     nodes, tick_s = radio_nodes(scenario), scenario.tick_s

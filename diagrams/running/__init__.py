@@ -1,1 +1,1 @@
-"""Running a diagram: Drake's simulator, the compiled loop, stop rules, and results."""
+"""Runs a diagram: Drake's simulator, the compiled loop, stop rules, and results."""

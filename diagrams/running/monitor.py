@@ -15,14 +15,15 @@ _GO_ON = EventStatus.DidNothing()
 
 
 class Monitor:
-    """Reads the ports of a diagram at every tick, for the referee and the sound files.
+    """Reads ports of a diagram at every tick, to judge the run and to save its sound.
 
-    The simulator calls the monitor before the updates of a tick. The monitor therefore
-    reads the same values as the updates, and Drake computes these values only once.
+    Drake's simulator calls the monitor before the blocks update their states in a tick
+    (control period). The monitor therefore reads the same values as the updates, and
+    Drake computes these values only once.
 
     Args:
-        follower: The diagram.
-        audio: Open files for the sound of the run; None: no sound is saved.
+        follower: The diagram with its robots and sources.
+        audio: Open files for the sound of the run. None: no sound is saved.
     """
 
     def __init__(self, follower: SoundFollower, audio: RunAudio | None = None) -> None:
@@ -39,18 +40,20 @@ class Monitor:
         self._contexts: dict[tuple[str, str], Any] = {}
 
     def __call__(self, context: Any) -> EventStatus:
-        """Saves the sound and judges the run; the simulator calls it after every step.
+        """Saves the sound of a tick and judges whether the run is over.
 
-        Steps may be shorter than ticks; this method ignores the instants between ticks.
+        The simulator calls this method after every integration step. Steps may be
+        shorter than ticks (control periods). The method does nothing at instants
+        between ticks.
 
         Args:
-            context: Context of the diagram.
+            context: Drake context of the diagram.
 
         Returns:
-            Termination if the run is over.
+            A status that ends the simulation if the run is over.
 
         Raises:
-            InputError: A robot that listens has no frames to save.
+            InputError: A robot that listens has no audio frames to save.
             OSError: The disk is full, or fails.
         """
         time, referee = context.get_time(), self.referee

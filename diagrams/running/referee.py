@@ -28,17 +28,17 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.block import Step
 from systems.world.geometry import rectangle_clearance
 
-#: The rules check for contacts at the ends of equal parts of a tick. These are the
-#: least number of parts, and the greatest distance that a body on its own path may move
-#: in one part, m. If a body is faster, ticks have more parts.
+#: The rules check for contacts at the ends of equal parts of a tick. ``BETWEEN_TICKS``:
+#: least number of parts. ``_PART_M``: greatest distance that a body may move in one
+#: part, m. If a body is faster, ticks have more parts.
 BETWEEN_TICKS, _PART_M = 5, 0.02
 
 
 class Referee:
-    """Judges all robots of a run at every tick.
+    """Judges all robots of a run at every tick (control period).
 
-    There is one step per robot. Both engines call these steps at every tick, before any
-    block changes its state.
+    The referee has one step function per robot. Both engines call these functions at
+    every tick, before any block changes its state.
 
     Args:
         scenario: The scenario to run.
@@ -48,8 +48,8 @@ class Referee:
         robots = [*scenario.robots]
         self.scenario = scenario
         self.poses = np.zeros((len(robots), 3))
-        """(robots, 3) poses of all robots in W at the present tick, m and rad; the
-        engine fills them, and passes them to each step."""
+        """(robots, 3) poses of all robots in W at the present tick, m and rad. The
+        engine fills this array, and passes it to each step."""
         self.found = np.zeros(len(robots), dtype=np.int64)
         """(robots,) index of the cause of each robot in ``FOUND``."""
         self.steps = {
@@ -80,9 +80,12 @@ class Referee:
     def decisive(self) -> str:
         """Name of the robot whose cause is the cause of the whole run.
 
-        It is the first robot that collided or diverged. If there is none, it is the
-        first robot that was neither successful nor interrupted. If there is no such
-        robot either, it is the first robot.
+        The cause of a robot is the reason why its run ended. The first robot of the
+        first group that is not empty decides:
+
+        1. robots that collided or diverged;
+        2. robots that were neither successful nor interrupted;
+        3. all other robots.
         """
 
         def rank(name: str) -> int:
@@ -94,13 +97,13 @@ class Referee:
         return min(self.steps, key=rank)
 
     def cause_of(self, name: str) -> str:
-        """Returns the cause of a robot after the run.
+        """Returns the cause for which the run of a robot has ended.
 
         Args:
             name: Name of the robot.
 
         Returns:
-            A cause, see ``RunResult.cause``.
+            One of the causes that ``RunResult.cause`` lists.
         """
         found = self.steps[name].state.found[0]
         if found:
@@ -122,27 +125,30 @@ class Referee:
         return "unsettled" if been_in_goal else "timeout"
 
     def ended(self, name: str) -> float:
-        """Returns how a robot's search ended.
+        """Returns how the search of a robot ended.
 
         Args:
             name: Name of the robot.
 
         Returns:
-            Number of the ending, see ``systems.search.search_ending``; 0 without one.
+            Number of the ending, see ``systems.search.search_ending``. It is 0 if the
+            search has not ended, or if the robot does not search.
         """
         return float(self.steps[name].state.ended[0])
 
     def collision(self, name: str) -> Collision | None:
-        """Returns the collision of a robot after the run.
+        """Returns the collision of a robot after the run, and who is at fault.
 
-        The robot is at fault if its own motion since the last tick brings it nearer to
-        the body than the motion of the body alone would.
+        The function compares two motions since the last tick (control period): the
+        motion of the robot alone, and the motion of the body alone. If the robot's
+        motion brings the two at least as near to each other as the body's motion, the
+        robot is at fault.
 
         Args:
             name: Name of the robot.
 
         Returns:
-            The collision; None if the robot has not collided.
+            The collision, or None if the robot has not collided.
         """
         state, tick_s = self.steps[name].state, self.scenario.tick_s
         body, part, tick = state.contact.tolist()
@@ -195,10 +201,11 @@ def _numbers_of(scenario: Scenario, name: str) -> RefereeNumbers:
 def _table_of(
     bodies: Mapping[str, Body], own: Scenario, robots: list[str], *, touchable: int
 ) -> BodyTable:
-    """Tabulates bodies; those after the first ``touchable`` ones cannot be touched.
+    """Tabulates the poses and sizes of bodies that a robot could touch.
 
-    If a body is fast, ticks have more parts, so that the body moves at most ``_PART_M``
-    per part.
+    Only the first ``touchable`` bodies can be touched. Each tick (control period) has
+    equal parts, at whose ends contacts are checked. If a body is fast, ticks have more
+    parts, so that the body moves at most ``_PART_M`` per part.
     """
     ticks = int(own.duration_s / own.tick_s + 1e-9)
     times: NDArray[np.float64] = own.tick_s * np.arange(ticks + 1.0)
@@ -244,11 +251,11 @@ def _instants(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
     """Returns the instants at which contacts are checked.
 
     Args:
-        times: (n + 1,) times of the ticks, s.
-        parts: Number of parts per tick.
+        times: (n + 1,) times of the ticks (control periods), s.
+        parts: Number of equal parts per tick.
 
     Returns:
-        (n * parts + 1,) instants, s, including the ticks.
+        (n * parts + 1,) instants, s. They include the ticks themselves.
     """
     shares = np.arange(1, parts + 1) / parts
     between = times[:-1, None] + shares * np.diff(times)[:, None]

@@ -27,27 +27,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a robot did at every tick, and why its run ended.
+    """Describes what a robot did at every tick (control period), and why its run ended.
 
-    For a run of several robots, ``robots`` has one result per robot. Column names then
-    begin with the name of the robot and a dot. ``cause`` is then the cause of one
-    robot, see ``Referee.decisive``.
+    If the run has several robots, the field ``several`` has one result per robot. In
+    the result of the whole run, each column name then begins with the name of the robot
+    and a dot. The field ``cause`` is then the cause of one robot, see
+    ``Referee.decisive``.
     """
 
     scenario: Scenario
     """The scenario that was run. In the result of one of several robots, it is the
     scenario of that robot alone (``Scenario.of_robot``)."""
     cause: str
-    """One of reached, completed, found, unsettled, timeout, astray, collision, stuck,
-    no way found, false find, lost, diverged, interrupted; docs/model.md defines
-    them."""
+    """Cause for which the run ended: reached, completed, found, unsettled, timeout,
+    astray, collision, stuck, no way found, false find, lost, diverged, or interrupted.
+    docs/model.md defines these causes."""
     collision: Collision | None
     """The collision, if the cause is collision."""
     columns: dict[str, NDArray[np.float64]]
     """Columns of ``trajectory``."""
     wall_s: float
-    """Duration of the simulation, s. It excludes building the diagram, and compiling or
-    loading code with numba."""
+    """Computing time of the simulation, s. It excludes the time to build the diagram,
+    and the time to compile or load code with numba."""
     name: str = ROBOT
     """Name of the robot."""
     engine: Engine = "drake"
@@ -61,9 +62,9 @@ class RunResult:
     ended: float = 0.0
     """Number of the ending of a search, see ``systems.search.search_ending``."""
     world: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """Columns with the data that the sink of a search heard from each robot. The
-    results of each robot contain these data, too: ``robot.frames`` in ``world`` is the
-    same as ``sink_frames`` in ``columns`` of ``robot``."""
+    """Columns with the data that the sink received from each searching robot. The sink
+    is the computer of the operator. The result of each robot contains these data, too:
+    ``robot.frames`` in ``world`` equals ``sink_frames`` in ``columns`` of ``robot``."""
 
     @property
     def full_scenario(self) -> Scenario:
@@ -82,7 +83,7 @@ class RunResult:
 
     @cached_property
     def surroundings(self) -> Surroundings:
-        """The bodies that the robot could hit, and its target."""
+        """The bodies that the robot could hit, and the target of the robot."""
         return self.others or self.scenario.surroundings()
 
     @property
@@ -141,18 +142,18 @@ def gather_result(
     engine: Engine = "drake",
     world: dict[str, NDArray[np.float64]] | None = None,
 ) -> RunResult:
-    """Collects the result of a run that has ended.
+    """Makes the result of a run that has ended.
 
     Args:
-        referee: The referee of the run.
-        logs: The columns of each robot, with the time t.
-        wall_s: Duration of the simulation, s.
+        referee: The referee, which has judged the robots during the run.
+        logs: Columns of each robot, including the time t.
+        wall_s: Computing time of the simulation, s.
         engine: The engine that simulated the run.
         world: Columns of the blocks that all robots share.
 
     Returns:
-        The result of the only robot. If there are several robots, one result for all
-        robots together; its field ``several`` contains the result of each robot.
+        The result of the run. If there are several robots, the field ``several`` of
+        this result contains the result of each robot.
     """
     scenario = referee.scenario
     paths = {
@@ -202,7 +203,7 @@ def gather_result(
 def _heard_by_sink(
     world: Mapping[str, NDArray[np.float64]], robot: str
 ) -> dict[str, NDArray[np.float64]]:
-    """What the sink of a search knows about one robot, as columns of that robot."""
+    """Returns what the sink has received from one robot, as columns of this robot."""
     begin = f"{robot}."
     return {
         f"sink_{key.removeprefix(begin)}": values
@@ -217,15 +218,15 @@ _POSE = ("p_WB_x", "p_WB_y", "theta_WB")
 def logged_columns(
     parts: Parts, times: NDArray[np.float64], rows: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """Returns the columns of a robot's log, and the time.
+    """Returns the columns of a robot's log, including the time of each row.
 
     Args:
-        parts: Parts of the robot.
+        parts: Blocks of the robot, and names of its columns.
         times: (n,) times of the rows, s.
         rows: (columns, n) logged values.
 
     Returns:
-        (n,) arrays, by name.
+        (n,) array of each column, by name of the column.
     """
     names = [name for columns in parts.logged.values() for name in columns]
     return {"t": times, **dict(zip(names, rows, strict=True))}
@@ -234,10 +235,10 @@ def logged_columns(
 def _completed(
     columns: dict[str, NDArray[np.float64]], scenario: Scenario, around: Surroundings
 ) -> dict[str, NDArray[np.float64]]:
-    """Adds columns that follow from the log.
+    """Adds columns that follow from the logged columns.
 
-    They contain the position of P, the true pose of the source, and the true and
-    measured range and bearing of the source.
+    The added columns are the position of the control point P, the true pose of the
+    source, and the true and measured range and bearing of the source.
     """
     offset, theta = scenario.only.robot.control_point_m, columns["theta_WB"]
     c, s = np.cos(theta), np.sin(theta)

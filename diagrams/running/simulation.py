@@ -22,8 +22,8 @@ from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import WORLD, Scenario
 from systems.framework.input_error import InputError
 
-# After this time, s, a robot has heard a source that sounds from the start, and
-# follows it.
+# Time after which a robot has heard a source that sounds from the start, s. The robot
+# then follows this source.
 _FIRST_TICKS_S = 0.15
 # Kinds of scenarios whose compiled code this process has loaded.
 _LOADED: set[tuple[object, ...]] = set()
@@ -58,14 +58,16 @@ def simulate(
     Args:
         scenario: The scenario to run.
         follower: Existing diagram of the same scenario, built with ``log=True``. Drake
-            never frees blocks written in Python, so many runs in one process should
-            share one diagram. Compiled runs share blocks automatically.
-        progress: Called with the simulated time, s, once per simulated second.
-        engine: ``drake``, or ``compiled``, which runs the same blocks in one compiled
-            loop. The first compiled run takes up to 15 s to compile the blocks; the
-            code stays on the disk. None: the engine of the scenario, where ``auto``
-            means ``drake``.
-        audio: Open files for the sound of the run; None: no sound is saved.
+            never frees blocks written in Python. If one process runs many scenarios,
+            the runs should therefore share one diagram. Compiled runs share blocks
+            automatically.
+        progress: Function that is called once per simulated second. Its argument is the
+            simulated time, s.
+        engine: ``drake``: Drake's simulator. ``compiled``: the same blocks in one
+            compiled loop. The first compiled run takes up to 15 s to compile the
+            blocks; the compiled code stays on the disk. None: the engine of the
+            scenario, where ``auto`` means ``drake``.
+        audio: Open files for the sound of the run. None: no sound is saved.
 
     Returns:
         The result of the run.
@@ -109,13 +111,13 @@ def simulate(
 def _logged(
     follower: SoundFollower, simulator: Simulator
 ) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """Returns the columns of each robot, and of the world if there is one, after a run.
+    """Returns the logged columns of each robot after a run, and of the shared blocks.
 
-    Drake logs before it performs the updates of the same instant. An output that is
-    part of the state of a block therefore appears one row too late. Such outputs change
-    only at ticks. This function moves their columns up by one row, to the tick at which
-    the block computed them. It evaluates the last row after the updates of the last
-    tick.
+    Drake logs before the blocks update their states at the same instant. If an output
+    is part of a block's state, its values therefore appear one row too late in the log.
+    This function moves the columns of such outputs up by one row. Each value is then in
+    the row of the tick (control period) in which the block computed the value. The last
+    row contains the values after the updates of the last tick.
     """
     context = simulator.get_context()
     every = {**follower.robots}
@@ -140,17 +142,20 @@ def _logged(
 
 
 def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
-    """Compiles or loads the compiled loop of a scenario, without running a tick.
+    """Makes the compiled loop of a scenario ready to run, without running a tick.
+
+    A tick is a control period. The function compiles the code of the loop, or loads the
+    code that an earlier process has compiled.
 
     Args:
         scenario: The scenario to run.
-        audio: Open files for the sound, if it is saved.
+        audio: Open files for the sound of the run. None: no sound is saved.
 
     Returns:
-        The loop before its first tick.
+        The compiled loop before its first tick.
 
     Raises:
-        InputError: See ``simulate``.
+        InputError: The scenario cannot be run, see ``simulate``.
     """
     loop = compile_loop(scenario, audio)
     loop.prepare()
@@ -186,10 +191,10 @@ def _run_compiled(
 
 
 def _python_views(follower: SoundFollower, context: Any) -> list[Any]:
-    """Returns Python objects for the contexts, states and outputs of the blocks.
+    """Returns Python objects for the contexts, states and outputs of all blocks.
 
-    While the caller holds them, they are not created again for each call of a block.
-    This saves 5 % of the time of a run.
+    While the caller keeps these objects, Drake does not create them again for each call
+    of a block. This saves 5 % of the time of a run.
     """
     views: list[Any] = []
     for parts in (*follower.sources.values(), *follower.robots.values()):
@@ -207,14 +212,19 @@ def _python_views(follower: SoundFollower, context: Any) -> list[Any]:
 def load_compiled_code(follower: SoundFollower) -> None:
     """Compiles or loads the numba code that a diagram needs, by running a few ticks.
 
-    Each process needs to do this only once for each kind of diagram. numba compiles the
-    code, or loads the code that an earlier process compiled. Loading takes about a
-    tenth of the computing time of a run of 40 s; compiling takes many times longer.
-    Neither counts as simulation time. ``simulate`` calls this function. A process that
-    forks should call it before the fork.
+    If an earlier process has compiled the code, numba loads the code from the disk.
+    Loading takes about a tenth of the computing time of a run of 40 s. Compiling takes
+    many times longer. Neither time counts as simulation time.
+
+    Each process needs to call this function only once for each kind of diagram.
+    ``simulate`` calls this function. If a process forks, it should call this function
+    before the fork.
+
+    Args:
+        follower: The diagram of a scenario.
 
     Raises:
-        InputError: See ``simulate``.
+        InputError: The scenario cannot be run, see ``simulate``.
     """
     kind = _kind(follower.scenario)
     if kind not in _LOADED:

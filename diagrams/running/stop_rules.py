@@ -1,7 +1,8 @@
-"""The stop rules: they decide at every tick whether a run ends, and for which cause.
+"""Decides at every tick whether a run ends, and for which cause.
 
-``judge_robot`` is the step of a referee (``diagrams.running.referee``), which both
-engines call.
+A tick is a control period. ``judge_robot`` applies these stop rules to one robot at one
+tick. Both engines call ``judge_robot`` through the referee
+(``diagrams.running.referee``).
 """
 
 from __future__ import annotations
@@ -28,25 +29,26 @@ ENDING = ("collision", "diverged")
 #: Cause of a robot whose run ends early because the run of all robots ends.
 INTERRUPTED = "interrupted"
 
-#: Tolerance for rounded tick times, s: a rest of exactly ``stop.rest_time_s`` counts.
+#: Tolerance for rounded tick times, s. With this tolerance, a rest of exactly
+#: ``stop.rest_time_s`` counts.
 ROUNDING_S = 1e-9
 
 #: Speed below which P is at rest, m/s.
 REST_SPEED_M_S = 0.05
-#: Least share of the time since the first detection in which P must follow, so that the
-#: run counts as completed.
+#: Least share of the time since the first detection. If P follows the target for at
+#: least this share, the run counts as completed.
 FOLLOWING_SHARE = 0.5
-#: Greatest distance that P can move and still count as in one place, m.
+#: If P stays within this distance of a position, m, P counts as in one place.
 _STUCK_RADIUS_M = 0.1
-#: At the end of a search for an odor that counts as found: greatest distance of the
-#: source from the origin of B, m, and greatest angle between the heading and the
-#: direction to the source, deg.
+#: Limits at the end of a search for an odor. If both limits hold, the run counts as
+#: found. ``ODOR_WITHIN_M``: distance of the source from the origin of B, m.
+#: ``_ODOR_AHEAD_DEG``: angle between the heading and the direction to the source, deg.
 ODOR_WITHIN_M, _ODOR_AHEAD_DEG = 0.22, 75.0
 
-#: Ports of a robot that the stop rules read, with their sizes. A port that a robot
-#: lacks reads 0. ``gives_up``: a law reports that no route leads to the target;
-#: ``search_report``: a search reports how it ended; ``contact`` and ``touched``: the
-#: contact switches of a searching robot, and the body that they touch.
+#: Ports of a robot that the stop rules read, with their sizes. If a robot lacks a port,
+#: its values are 0. ``gives_up``: whether the law has found that no route leads to the
+#: target. ``search_report``: how a search ended. ``contact``: the contact switches of a
+#: searching robot. ``touched``: the body that these switches touch.
 READ_PORTS = {
     "velocity_WB": 3,
     "target_valid": 1,
@@ -64,8 +66,8 @@ class Collision:
     object: str
     """Name of the body that the robot touched."""
     fault: str
-    """Which one is at fault, ``robot`` or ``obstacle``. The rule compares the motion of
-    the robot alone since the last tick with that of the body alone. The motion that
+    """Who is at fault, ``robot`` or ``obstacle``. The rule compares two motions since
+    the last tick: that of the robot alone, and that of the body alone. The motion that
     brings the two nearer to each other decides. Turning counts as motion. A body at
     rest is never at fault."""
     time: float
@@ -106,7 +108,7 @@ class _StatePlaces(NamedTuple):
 
     stays: int
     """Time at which P began to stay in its present place, s. The next two elements are
-    the position of P at this time in W, m."""
+    x and y of P at this time in W, m."""
     x: int
     y: int
     seen: int
@@ -137,23 +139,25 @@ def judge_tick(
     gives_up: bool,  # noqa: FBT001
     numbers: RuleNumbers,
 ) -> int:
-    """Decides whether a run ends at a tick, and why, apart from contacts.
+    """Decides whether the run of a robot ends at a tick (control period), and why.
 
-    The rules apply in this order: diverged, reached, lost, stuck or no way found.
+    The function applies all stop rules except the rule for contacts. The rules apply in
+    this order: diverged, reached, lost, and stuck or no way found.
+
     ``state`` holds the start time of each condition that must last for some time. It
-    also counts the ticks since the first detection, and among them the ticks in which P
-    follows the target. If the run reaches its time limit, ``Referee.cause_of``
-    evaluates these counts.
+    also counts the ticks since the first detection of the target. Among these ticks, it
+    counts those in which the control point P follows the target. If the run reaches its
+    time limit, ``Referee.cause_of`` evaluates these two counts.
 
     Args:
         time: Time of the tick, s.
-        state: State of the rules, as ``UNJUDGED``; changed in place.
-        pose: (x, y, theta) of the robot in W, m and rad.
+        state: State of the rules, initially ``UNJUDGED``; changed in place.
+        pose: (x, y, theta) of the robot in the world frame W, m and rad.
         velocity: (vx, vy, omega) of the robot in W, m/s and rad/s.
-        p_WS: Position of the target in W, m.
-        valid: Whether the robot has a target.
+        p_WS: (x, y) of the target in W, m.
+        valid: Whether the robot has a valid estimate of a target.
         gives_up: Whether the law reports that no route leads to the target.
-        numbers: Numbers that the rules use.
+        numbers: Constants of the rules.
 
     Returns:
         Index of the cause in ``FOUND``; 0 if the run continues.
@@ -198,17 +202,21 @@ def judge_tick(
 
 @register_jitable
 def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> int:
-    """Decides whether the run of a search ends at a tick, and why, apart from contacts.
+    """Decides whether the run of a searching robot ends at a control period, and why.
 
-    A search that ended successfully counts as found if it ended near the source. A
-    search for an odor must also end with the source ahead. Otherwise it counts as a
-    false find. A search that was given up counts as lost.
+    The function applies all stop rules of a search except the rule for contacts:
+
+    - The robot is too far from the source: the run ends as diverged.
+    - The search succeeded, and the robot is near the source: the run ends as found. In
+      a search for an odor, the source must also be ahead of the robot.
+    - The search succeeded elsewhere: the run ends as a false find.
+    - The robot gave up the search: the run ends as lost.
 
     Args:
         ended: Number of the ending, see ``systems.search.search_ending``.
-        pose: (x, y, theta) of the robot in W, m and rad.
-        p_WS: Position of the source in W, m.
-        numbers: Numbers that the rules use.
+        pose: (x, y, theta) of the robot in the world frame W, m and rad.
+        p_WS: (x, y) of the source in W, m.
+        numbers: Constants of the rules.
 
     Returns:
         Index of the cause in ``FOUND``; 0 if the run continues.
@@ -231,26 +239,26 @@ def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> in
 
 
 class BodyTable(NamedTuple):
-    """The bodies that a robot can touch, and its target."""
+    """The bodies that a robot can touch, and the target of this robot."""
 
     sizes: NDArray[np.float64]
     """(n, 2) lengths and widths, m."""
     reach: NDArray[np.float64]
-    """(n,) distances of the centers, m, beyond which the robot and the body cannot
-    touch; -inf for a goal, which has no body."""
+    """(n,) distances between the centers of robot and body, m. Beyond this distance,
+    they cannot touch. The value is -inf for a goal, which has no body."""
     steps: NDArray[np.float64]
-    """(n,) upper bounds of the distances that the bodies move in a tick on their own
-    paths, m; 0 for robots."""
+    """(n,) upper bounds of the distances that the bodies move in a tick, m. The value
+    is 0 for robots."""
     robots: NDArray[np.int64]
     """(n,) number of the robot if the body is a robot; otherwise -1."""
     parts: int
     """Number of equal parts of a tick. Contacts are checked at the end of each part."""
     rows: NDArray[np.int64]
-    """(n, 2) row in ``poses`` of the first tick, and number of rows per tick; 0 rows
-    per tick for a body at rest."""
+    """(n, 2) two numbers for each body: the row in ``poses`` of the first tick, and the
+    number of rows per tick. A body at rest has 0 rows per tick."""
     poses: NDArray[np.float64]
-    """(m, 3) x, y, theta in W of the bodies that are not robots, m and rad, at the ends
-    of all parts of the ticks."""
+    """(m, 3) poses (x, y, theta) in W of the bodies that are not robots, m and rad. The
+    rows belong to the ends of all parts of the ticks."""
 
 
 class RefereeNumbers(NamedTuple):
@@ -273,8 +281,8 @@ class RefereeState(NamedTuple):
     rules: NDArray[np.float64]
     """(8,) state of ``judge_tick``."""
     before: NDArray[np.float64]
-    """(robots, 3) poses of all robots at the previous tick, m and rad; at the first
-    tick the present poses."""
+    """(robots, 3) poses of all robots at the previous tick, m and rad. At the first
+    tick, these are the present poses."""
     now: NDArray[np.float64]
     """(robots, 3) poses of all robots at the last tick."""
     valid: NDArray[np.float64]
@@ -282,8 +290,8 @@ class RefereeState(NamedTuple):
     ended: NDArray[np.float64]
     """(1,) number of the ending of a search; 0 while the search continues."""
     contact: NDArray[np.float64]
-    """(3,) number of the touched body (-1: none), elapsed part of the tick at the
-    contact (0 to 1), and number of the tick."""
+    """(3,) data of the contact: number of the touched body (-1: none), elapsed part of
+    the tick (0 to 1), and number of the tick."""
     found: NDArray[np.int64]
     """(1,) index of the cause in ``FOUND``; 0 while the run continues."""
 
@@ -291,20 +299,25 @@ class RefereeState(NamedTuple):
 def judge_robot(
     tick: int, state: RefereeState, inputs: Any, outputs: Any, numbers: RefereeNumbers
 ) -> None:
-    """Applies the stop rules to one robot at a tick.
+    """Applies the stop rules to one robot at a tick (control period).
 
-    The function first looks for a contact, unless a contact switch of the robot is
-    closed because it touches a body: such a contact is intended. If there is no
-    contact and the robot has no cause yet, ``judge_search`` or ``judge_tick`` judges
-    the robot. A robot keeps its cause while other robots continue. However, it can
-    still collide; its cause is then collision.
+    The result is a cause, the reason why the run of the robot ends. The function first
+    looks for a contact between the robot and a body. If a contact switch of the robot
+    is closed because the robot touches a body, the contact is intended and does not
+    count. If there is no contact and the robot has no cause yet, ``judge_search`` or
+    ``judge_tick`` judges the robot.
+
+    A robot with a cause keeps this cause while the run of the other robots continues.
+    However, if the robot collides later, its cause becomes collision.
 
     Args:
         tick: Number of the tick.
-        state: Changed in place.
-        inputs: (robots, 3) poses of all robots in W, and the values of ``READ_PORTS``.
-        outputs: Empty; ``state.found`` is the result.
-        numbers: The constants.
+        state: State of the rules for this robot, changed in place. ``state.found`` is
+            the result.
+        inputs: (robots, 3) poses of all robots in the world frame W, m and rad; then
+            the values of ``READ_PORTS``.
+        outputs: Empty.
+        numbers: Constants of the rules for this robot.
     """
     poses, velocity, valid, gives_up, report, switches, body = inputs
     for k in range(len(poses)):
@@ -349,16 +362,18 @@ def _pose_of_body(
 def _first_touched(
     tick: int, state: RefereeState, numbers: RefereeNumbers
 ) -> tuple[int, float]:
-    """Returns the first body that a robot has touched since the last tick.
+    """Returns the first body that a robot has touched in the last control period.
 
-    The function skips a body if its center is too far away for a contact. This is so if
-    the distance of the centers exceeds the reach plus the motions of the robot and the
-    body since the last tick. ``first_overlap`` checks all other bodies at the ends of
-    the parts of the tick. The poses of other robots are interpolated; those of other
-    bodies are known in advance.
+    A tick is a control period. The function skips a body that is too far away for a
+    contact. A body is too far away if the distance of the centers exceeds the sum of
+    these lengths: half the diagonals of robot and body, and their motions since the
+    last tick. ``first_overlap`` checks all other bodies at several instants within the
+    tick. The poses of other robots are interpolated. The poses of all other bodies are
+    known in advance.
 
     Returns:
-        Number of the body (-1 for none), and the elapsed part of the tick (0 to 1).
+        Two values: the number of the body (-1 for none), and the elapsed part of the
+        tick (0 to 1).
     """
     bodies, parts = numbers.bodies, numbers.bodies.parts
     pose, before = state.now[numbers.robot], state.before[numbers.robot]
@@ -392,11 +407,13 @@ def _first_touched(
 def run_is_over(found: Any) -> bool:
     """Returns whether the run of all robots is over.
 
-    The run ends when every robot has a cause, or when a robot collides or diverges. A
-    robot with any other cause keeps moving until the run ends.
+    The cause of a robot is the reason why its run ends. The run of all robots ends when
+    every robot has a cause, or when one robot collides or diverges. A robot with any
+    other cause keeps moving until the run ends.
 
     Args:
-        found: (robots,) index of the cause of each robot in ``FOUND``.
+        found: (robots,) index of the cause of each robot in ``FOUND``; 0 without a
+            cause.
 
     Returns:
         True if the run is over.

@@ -14,14 +14,15 @@ HEARD_BYTES, PLAYED_BYTES = 2, 4
 
 
 def check_audible(scenario: Scenario) -> None:
-    """Refuses a scenario without sound that can be saved.
+    """Raises an error if a scenario has no sound that can be saved in WAV files.
 
     Args:
         scenario: The scenario to run.
 
     Raises:
-        InputError: No robot hears sound waves, a sample rate is not a whole number of
-            Hz, or a file would exceed the maximum size of WAV files.
+        InputError: No robot hears sound waves.
+        InputError: A sample rate is not a whole number of Hz.
+        InputError: A file would exceed the maximum size of WAV files.
     """
     robots = scenario.robots
     listening = [name for name, own in robots.items() if own.listens]

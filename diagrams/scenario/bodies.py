@@ -71,11 +71,11 @@ class Body(NamedTuple):
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The bodies that one robot can hit, and its target."""
+    """The bodies that one robot can hit, and the target of this robot."""
 
     bodies: Mapping[str, Body]
-    """Bodies by name: obstacles, other robots, other sources, and finally the target
-    unless it is a goal."""
+    """Bodies by name, in this order: obstacles, other robots, other sources, and the
+    target. A goal is not a body."""
     target: str
     """Name of the target: the source, the leader, or the goal."""
     goal: Path | None = None
@@ -83,7 +83,7 @@ class Surroundings:
 
     @property
     def followed(self) -> Body:
-        """The target; a goal has no extent and cannot be hit."""
+        """The target. If the target is a goal, it has no extent and cannot be hit."""
         if self.goal is not None:
             return Body(self.goal, (0.0, 0.0))
         return self.bodies[self.target]
@@ -100,11 +100,11 @@ def rectangles_at(
     """Returns rectangles of the same size at several poses.
 
     Args:
-        poses: (n, 3) x, y, theta of the centers, m and rad.
-        size: Length and width, m.
+        poses: (n, 3) poses (x, y, theta) of the centers, m and rad.
+        size: Length and width of all rectangles, m.
 
     Returns:
-        (n, 5) x, y, theta, length, width.
+        (n, 5) rectangles (x, y, theta, length, width), m and rad.
     """
     rectangles = np.empty((len(poses), 5))
     rectangles[:, :3], rectangles[:, 3:] = poses, size
@@ -112,11 +112,11 @@ def rectangles_at(
 
 
 def microphones_W(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
-    """Returns the positions of a robot's microphones.
+    """Returns the positions of a robot's microphones in the world frame W.
 
     Args:
-        pose_WB: (x, y, theta), m and rad.
-        robot: Parameters with the positions in B.
+        pose_WB: Pose (x, y, theta) of the robot in W, m and rad.
+        robot: Parameters of the robot, with the positions in its body frame B.
 
     Returns:
         (n, 2) positions in W, m.
@@ -126,14 +126,15 @@ def microphones_W(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.floa
 
 
 def robot_rectangle(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
-    """Returns the footprint of a robot, a rectangle centered on the origin of B.
+    """Returns the footprint of a robot, a rectangle around the origin of its frame B.
 
     Args:
-        pose_WB: (x, y, theta), m and rad.
-        robot: Parameters with the size.
+        pose_WB: Pose (x, y, theta) of the robot's body frame B in the world frame W, m
+            and rad.
+        robot: Parameters of the robot, with its size.
 
     Returns:
-        (5,) x, y, theta, length, width in W.
+        (5,) rectangle (x, y, theta, length, width) in W, m and rad.
     """
     x, y, theta = np.asarray(pose_WB)
     return np.array([x, y, theta, robot.length_m, robot.width_m])

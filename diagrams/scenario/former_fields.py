@@ -1,7 +1,8 @@
-"""Accepts fields of the previous version, and says what has replaced them.
+"""Accepts fields of the previous version, and states what has replaced them.
 
-``former_fields.tsv`` lists these fields. A renamed field has its new path there. A
-field that has become a constant has the value and the place of the constant.
+The file ``former_fields.tsv`` lists the fields of the previous version. For a renamed
+field, the file states the new path. Some fields have become constants. For such a
+field, the file states the value and the place of the constant.
 """
 
 from __future__ import annotations
@@ -57,19 +58,21 @@ def former_fields() -> tuple[_Former, ...]:
 
 
 def renewed(data: dict[str, Any]) -> dict[str, Any]:
-    """Replaces fields of the previous version, with a note for the user.
+    """Replaces fields of the previous version, and prints a note for the user.
 
-    In data with such fields, groups that the kinds of its robots do not have are
-    ignored, because the previous version saved all groups of all kinds.
+    The previous version saved all groups of all kinds of robots. If the data contain
+    fields of the previous version, the function therefore also removes groups that the
+    robots do not have.
 
     Args:
         data: Fields of a scenario, changed in place.
 
     Returns:
-        The data.
+        The same data.
 
     Raises:
-        InputError: A field that has become a constant has another value.
+        InputError: A field has become a constant, but its value in the data differs
+            from the constant.
     """
     notes: dict[str, None] = {}
     for where, fields in _robots_and_sources(data):
@@ -82,13 +85,15 @@ def renewed(data: dict[str, Any]) -> dict[str, Any]:
 
 @lru_cache(maxsize=1024)
 def renamed(path: str) -> str:
-    """Returns the present path of a field, with a note if it had another name.
+    """Returns the present path of a field.
+
+    If the field had another name in the previous version, the function prints a note.
 
     Args:
-        path: Dotted path that a user has set.
+        path: Dotted path of a field, as written by a user.
 
     Returns:
-        The new path of a renamed field; every other path as it is.
+        The new path if the field has been renamed; otherwise the same path.
     """
     new = path
     for former in former_fields():
@@ -101,18 +106,47 @@ def renamed(path: str) -> str:
     return new
 
 
+def is_constant_now(path: str, value: Any) -> bool:
+    """Whether a field has become a constant with a certain value.
+
+    Args:
+        path: Dotted path that a user has set.
+        value: Value that the user has given.
+
+    Returns:
+        True if the constant has this value, and False if the path is no constant.
+
+    Raises:
+        InputError: The constant has another value.
+    """
+    begin = _PREFIX.match(path)
+    own = path[begin.end() :] if begin else path
+    if own.startswith("repulsion."):
+        own = f"laws.{own.removeprefix('repulsion.')}"
+    if not (constant := constant_now(own)):
+        return False
+    if value != next(each.value for each in former_fields() if each.path == own):
+        raise InputError(
+            path,
+            f"is {value!r}, but this is no longer a field; it is now {constant}; leave "
+            "it out",
+        )
+    return True
+
+
 def constant_now(path: str) -> str:
-    """Returns the constant that a field of the previous version has become.
+    """Returns the constant that has replaced a field of the previous version.
 
     Args:
         path: Dotted path of the field.
 
     Returns:
-        The place and value of the constant, in words; empty if there is none.
+        Place and value of the constant, in words. The text is empty if no constant has
+        replaced the field.
     """
     for former in former_fields():
         if former.path == path and not former.new:
-            return f"the constant {former.place}, {former.value!r}"
+            return f"the constant {former.place} = {former.value!r}"
     return ""
 
 
@@ -144,7 +178,7 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
         elif value != former.value:
             raise InputError(
                 f"{where}{path}",
-                f"is {value!r}, but is no longer a field, but "
+                f"is {value!r}, but this is no longer a field; it is now "
                 f"{constant_now(former.path)}; remove it",
             )
         else:
@@ -153,7 +187,7 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
 
 
 def _renew_safety_filter(fields: Mapping[str, Any]) -> None:
-    """Makes the filter of the adaptive law true or false; it was a group or null."""
+    """Replaces a group or null by true or false, for the filter of the adaptive law."""
     for laws in (fields.get("repulsion"), fields.get("laws")):
         adaptive = laws.get("trajectory_adaptive") if isinstance(laws, dict) else None
         if isinstance(adaptive, dict) and "safety_filter" in adaptive:
@@ -193,7 +227,7 @@ def _fault(group: str, kind: str, fault: Any) -> Any:
 
 
 def _taken(fields: dict[str, Any], path: list[str]) -> Any:
-    """Removes a field and the groups that this leaves empty; returns its value."""
+    """Removes a field and all groups that become empty; returns the field's value."""
     first, *rest = path
     if first not in fields:
         return _MISSING

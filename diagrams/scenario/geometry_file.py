@@ -10,7 +10,8 @@ from diagrams.scenario.yaml_text import dump_yaml
 from systems.base.robot import microphones_B
 from systems.framework.input_error import shortened
 
-#: Least standard deviations in the file: of the positions, and of the speed of sound.
+#: Least standard deviations in the file: the first of the positions, and the second of
+#: the speed of sound.
 _LEAST_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
 #: Positions are rounded to a nanometer, which removes the rounding errors of sums.
 _DECIMALS = 9
@@ -19,14 +20,16 @@ _DECIMALS = 9
 def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
     """Returns the YAML text that describes the microphones of a recording.
 
+    Comments in the text describe the recording and the errors of the microphones.
+
     Args:
         scenario: The scenario that is run.
-        robot: Name of the robot.
+        robot: Name of the robot that records.
         file: Name of the recording.
 
     Returns:
-        Nominal positions of the microphones in B, m, and the speed of sound. Comments
-        describe the recording and the errors of the array.
+        YAML text with the nominal positions of the microphones in the body frame B, m,
+        and with the speed of sound, m/s.
     """
     own = scenario.robots[robot]
     assert isinstance(own, HasMicrophones)

@@ -21,7 +21,7 @@ _LIBRARY = Path(__file__).parents[1] / "scenarios"
 
 
 def library_scenarios() -> dict[str, Path]:
-    """Names and files of the scenarios in the package."""
+    """Returns the file of each scenario in the package, by name of the scenario."""
     return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
 
 
@@ -29,24 +29,25 @@ def load_scenario(
     source: str | Path = "default",
     overrides: Iterable[str] | Mapping[str, Any] = (),
 ) -> Scenario:
-    """Loads a scenario.
+    """Loads a scenario from the library or from a file, and changes some of its fields.
 
     Args:
         source: A name from the library (``phonotaxis scenarios``), or the path of a
             file.
-        overrides: Texts ``key=value`` with a dotted key and a value in YAML, for
-            example ``source.speed_m_s=0.2``. An obstacle is given by its name or by its
-            index: ``obstacles.cart.size_m=[0.2, 0.1]`` or
-            ``obstacles.0.size_m=[0.2, 0.1]``. A mapping of dotted keys to values also
-            works, for example ``{"source.speed_m_s": 0.2}``.
+        overrides: Fields to change. Either a list of texts ``key=value``, where the key
+            is a dotted path and the value is YAML, for example
+            ``source.speed_m_s=0.2``; or a mapping of dotted paths to values, for
+            example ``{"source.speed_m_s": 0.2}``. A path names an obstacle by its name
+            or by its index: ``obstacles.cart.size_m=[0.2, 0.1]`` or
+            ``obstacles.0.size_m=[0.2, 0.1]``.
 
     Returns:
         The validated scenario.
 
     Raises:
-        InputError: The name is unknown, the file is unreadable, or fields are unknown,
-            of the wrong type or out of range. The error names each field by its full
-            path.
+        InputError: The name is unknown, or the file is unreadable.
+        InputError: A field is unknown, has the wrong type, or is out of range. The
+            error states the full path of each such field.
     """
     from diagrams.scenario.scenario import scenario_from_mapping
 
@@ -59,11 +60,15 @@ def load_scenario(
 def written_fields(source: str | Path) -> dict[str, Any]:
     """Reads the fields that the file of a scenario sets.
 
+    Names of fields from the previous version are replaced by the present names. Paths
+    of sound files become absolute. If the file states no name of the scenario, the
+    function adds a name.
+
     Args:
-        source: See ``load_scenario``.
+        source: A name from the library, or the path of a file.
 
     Returns:
-        Plain values by present names, with a name, and with absolute paths of sounds.
+        Plain values of the fields.
 
     Raises:
         InputError: The name is unknown, or the file is unreadable.
@@ -81,14 +86,15 @@ def dump_scenario(scenario: Scenario) -> str:
 
 
 def write_scenario(scenario: Scenario, directory: Path) -> None:
-    """Writes the whole scenario and a copy of its schema, which helps editors.
+    """Writes a whole scenario and a copy of its JSON Schema to a directory.
 
-    With the copy, editors find the schema even if the directory is moved to another
-    place or machine.
+    Text editors use the schema to check and complete fields. With the copy, they find
+    the schema even if the directory is moved to another place or machine.
 
     Args:
-        scenario: The scenario, for ``scenario.yaml``.
-        directory: An existing directory; it also gets ``scenario.schema.json``.
+        scenario: The scenario, written to ``scenario.yaml``.
+        directory: An existing directory. The schema is written to
+            ``scenario.schema.json`` in this directory.
     """
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
     (directory / "scenario.yaml").write_text(first + dump_scenario(scenario), "utf-8")
@@ -117,8 +123,14 @@ def _find(source: str | Path) -> Path:
 def read_mapping(path: Path) -> dict[str, Any]:
     """Reads the mapping of fields in a YAML file; an empty file has no fields.
 
+    Args:
+        path: Path of the file.
+
+    Returns:
+        Plain values of the fields.
+
     Raises:
-        InputError: The file cannot be read, or contains something else.
+        InputError: The file cannot be read, or does not contain a mapping.
     """
     try:
         with path.open("rb") as file:
@@ -140,8 +152,8 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
 
     Args:
         data: Fields of a scenario, changed in place.
-        folder: Folder to which the paths are relative: that of the scenario file, or
-            the working directory.
+        folder: Folder to which the relative paths refer. It is the folder of the
+            scenario file, or the working directory.
     """
     for place in [
         data,

@@ -1,8 +1,8 @@
-"""A user's own functions and classes that a scenario names.
+"""Imports a user's own functions and classes that a scenario names.
 
 Python loads a module only once per process. However, a user may edit a law in a
-notebook and run it again. ``import_own`` therefore compares the files with the loaded
-modules, and loads changed modules again.
+notebook and run it again. ``import_own`` therefore compares the present files with the
+loaded modules. If a file has changed, it loads the module again.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ if TYPE_CHECKING:
 #: Packages of the project.
 OURS = ("analysis", "diagrams", "phonotaxis", "systems")
 
-#: Loaded modules of users and the SHA-256 of their files, by name of the module.
+#: Loaded modules of the user, with the SHA-256 of their files, by name of the module.
 _LOADED: dict[str, tuple[ModuleType, str]] = {}
 #: Whether loaded modules remain in use after a change, see ``code_of_sweep``.
 _KEEPS = False
 
 
 def import_own(name: str, field: str) -> Any:
-    """Imports the function or class that a name denotes.
+    """Imports a user's function or class by its name.
 
-    The result always corresponds to the present files. If the file of the module has
-    changed since it was loaded, the module is loaded again. The same applies to those
-    other modules of the user that this module uses.
+    The result always corresponds to the present files. If the file of a module has
+    changed since the module was loaded, the function loads the module again. This also
+    applies to the user's other modules that the module uses.
 
     Args:
-        name: ``package.module:Name`` or ``path/to/file.py:Name``; Python also searches
+        name: ``package.module:Name`` or ``path/to/file.py:Name``. Python also searches
             the working directory.
-        field: Field of the scenario that contains the name.
+        field: Field of the scenario that contains the name, for messages.
 
     Returns:
         The function or class.
@@ -110,7 +110,7 @@ def _module_of(name: str) -> ModuleType:
 
 
 def _has_changed(module: ModuleType) -> bool:
-    """Whether a module's file has changed since loading; records a new module."""
+    """Whether a module's file has changed since loading. Records a new module."""
     digest = _digest(Path(_file_of(module)))
     known, loaded = _LOADED.get(module.__name__, (None, ""))
     if known is not module:
@@ -128,7 +128,7 @@ def _digest(file: Path) -> str:
 
 
 def _forget(changed: Sequence[ModuleType]) -> None:
-    """Unloads changed modules of a user, and the modules that use them."""
+    """Unloads the user's changed modules, and the modules that use them."""
     gone = {
         name: module
         for name, (module, _) in _LOADED.items()
@@ -145,17 +145,18 @@ def _forget(changed: Sequence[ModuleType]) -> None:
 
 
 def loaded_digests(scenario: Scenario) -> dict[str, str]:
-    """Returns digests of a user's laws and blocks, which identify their versions.
+    """Returns digests of a user's own laws and blocks, to identify their versions.
 
     Args:
-        scenario: Any scenario. Its laws and blocks from the package are ignored.
+        scenario: Any scenario. The function ignores laws and blocks of the package.
 
     Returns:
         SHA-256 of each file of the user that the robots use, by absolute path. If a
-        file has changed since it was loaded, the digest is that of the loaded version.
+        file has changed since Python loaded it, the digest is that of the loaded
+        version.
 
     Raises:
-        InputError: See ``import_own``.
+        InputError: A law or block cannot be imported, see ``import_own``.
     """
     digests: dict[str, str] = {}
     for robot in scenario.robots.values():
@@ -169,9 +170,10 @@ def loaded_digests(scenario: Scenario) -> dict[str, str]:
 
 @contextmanager
 def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[None]:
-    """Within this context, a scenario runs with the code of the start of its sweep.
+    """Makes a scenario run with the code that the user had at the start of a sweep.
 
-    If all loaded code is the wanted code, it remains in use even if its files change.
+    A sweep is a series of runs. Within this context, Python does not load changed files
+    again, if all loaded code is the code from the start of the sweep.
 
     Args:
         scenario: The scenario to run.
@@ -181,8 +183,8 @@ def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[Non
         Nothing.
 
     Raises:
-        InputError: A user's file has changed, and this process has not loaded its
-            earlier version.
+        InputError: A user's file has changed, and this process has not loaded the
+            version from the start of the sweep.
     """
     global _KEEPS  # noqa: PLW0603
     loaded = {_file_of(module): digest for module, digest in _LOADED.values()}
@@ -203,14 +205,15 @@ def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[Non
 
 
 def own_files(name: str, field: str) -> tuple[Path, ...]:
-    """Returns the files of a user's module and of the user's modules that it uses.
+    """Returns the files of a user's module, and of the user's modules that it uses.
 
     Args:
         name: Name of a law or a block.
-        field: Field of the scenario that contains the name.
+        field: Field of the scenario that contains the name, for messages.
 
     Returns:
-        Absolute paths in ascending order; none for a name from the package.
+        Absolute paths in ascending order. There are none if the name belongs to the
+        package.
     """
     if ":" not in name:
         return ()
@@ -220,14 +223,14 @@ def own_files(name: str, field: str) -> tuple[Path, ...]:
 
 
 def digests_of(module: ModuleType) -> dict[str, str]:
-    """Returns digests of a user's module and of the user's modules that it uses.
+    """Returns digests of a user's module, and of the user's modules that it uses.
 
     Args:
         module: An imported module.
 
     Returns:
-        SHA-256 of the loaded version of each file, by absolute path; empty for a module
-        without a file.
+        SHA-256 of the loaded version of each file, by absolute path. The mapping is
+        empty if the module has no file of the user.
     """
     digests: dict[str, str] = {}
     for each in _users_modules(module):
@@ -237,10 +240,10 @@ def digests_of(module: ModuleType) -> dict[str, str]:
 
 
 def _imports(file: Path, package: str) -> list[str]:
-    """Names of the modules that a file imports.
+    """Returns the names of the modules that the source code of a file imports.
 
-    Only the source shows the origin of an imported number, because numbers have no
-    ``__module__``.
+    The objects in a loaded module do not suffice to find these names. A number, for
+    example, has no attribute ``__module__``, so only the source code shows its origin.
     """
     try:
         tree = ast.parse(file.read_bytes())
@@ -283,14 +286,16 @@ def _users_modules(module: ModuleType) -> list[ModuleType]:
 
 
 def made(name: str, field: str, maker: type, parts: Mapping[str, Any]) -> Any:
-    """Makes an object from a user's class, with the arguments that it accepts.
+    """Makes an object from a user's class.
+
+    The class receives only those of the available arguments that it accepts.
 
     Args:
         name: Name of the class, for messages.
-        field: Field of the scenario that contains the name.
-        maker: The class. For a scalar-templated class, the signature of its
-            ``_construct`` counts.
-        parts: Available arguments by name.
+        field: Field of the scenario that contains the name, for messages.
+        maker: The class. If it is a scalar-templated class of Drake, the signature of
+            its ``_construct`` counts.
+        parts: Values of the available arguments, by name of the argument.
 
     Returns:
         The object.
@@ -310,17 +315,18 @@ def made(name: str, field: str, maker: type, parts: Mapping[str, Any]) -> Any:
 
 
 def asked_for(maker: type, parts: Mapping[str, Any]) -> dict[str, Any]:
-    """Selects the arguments that a class accepts.
+    """Selects those arguments that a class accepts.
 
-    A class that accepts any keyword passes it on to its base class. Therefore the
-    arguments of the base class count, too.
+    A class that accepts any keyword (``**kwargs``) passes the keywords on to its base
+    class. The function therefore also considers the arguments of the base class.
 
     Args:
         maker: The class, see ``made``.
-        parts: Available arguments by name.
+        parts: Values of the available arguments, by name of the argument.
 
     Returns:
-        The arguments in the signatures; all of them if no base class limits them.
+        The arguments that occur in the signatures. If all base classes accept any
+        keyword, the result contains all arguments.
     """
     asked: set[str] = set()
     any_keyword = False
@@ -349,13 +355,18 @@ def _is_users(module: ModuleType, file: str) -> bool:
 def is_interrupt(error: BaseException) -> bool:
     """Whether an exception comes from Ctrl-C, and not from a user's own code.
 
-    On Ctrl-C, the handler of the command line raises a subclass of KeyboardInterrupt.
-    With this handler, a plain KeyboardInterrupt therefore comes from the user's code.
-    Python's default handler raises a plain KeyboardInterrupt on Ctrl-C. With the
-    default handler, a plain KeyboardInterrupt therefore counts as Ctrl-C.
+    The answer depends on the handler of the signal that Ctrl-C sends:
+
+    - The handler of the command line raises a subclass of KeyboardInterrupt. With this
+      handler, a plain KeyboardInterrupt comes from the user's code.
+    - Python's default handler raises a plain KeyboardInterrupt. With this handler, a
+      plain KeyboardInterrupt counts as Ctrl-C.
 
     Args:
         error: An exception raised while a user's code ran.
+
+    Returns:
+        True if the exception comes from Ctrl-C.
     """
     if type(error) is not KeyboardInterrupt:
         return isinstance(error, KeyboardInterrupt)
@@ -363,7 +374,7 @@ def is_interrupt(error: BaseException) -> bool:
 
 
 def why(error: BaseException) -> str:
-    """Kind, text and line of an error in a user's code."""
+    """Returns the kind, text and line of an error in a user's code."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = Path(__file__).resolve().parents[1]
     own = [f for f in frames if ours not in Path(f.filename).resolve().parents]

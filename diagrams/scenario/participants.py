@@ -1,6 +1,7 @@
-"""The fields of each robot and of each source in a scenario.
+"""Defines the fields of each robot and of each source in a scenario.
 
-The law of a robot decides its kind, and each kind has only the fields that it uses.
+The control law of a robot determines the kind of the robot. Each kind has only the
+fields that it uses.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class StartParameters(Parameters):
 class _LawGains(Parameters):
     @model_serializer(mode="wrap")
     def _dump(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leaves out the laws whose gains nobody has set or uses."""
+        """Leaves out the gains of laws that are neither set nor used."""
         return {k: v for k, v in dump(self).items() if k in self.model_fields_set}
 
 
@@ -112,15 +113,16 @@ class Robot(Parameters):
     """Whether the target is silent: the goal of a route, or an odor source."""
 
     law: str = Field(default=DEFAULT_LAW, min_length=1)
-    """Name of a law in the list of ``phonotaxis laws``; or a user's own law, as
-    ``package.module:Name`` or ``path/to/file.py:Name``. The law decides the kind of the
-    robot."""
+    """Name of the control law. ``phonotaxis laws`` lists the names. The name of a
+    user's own law is ``package.module:Name`` or ``path/to/file.py:Name``. The law
+    determines the kind of the robot."""
     blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
-    """A user's own blocks, as ``package.module:Name`` or ``path/to/file.py:Name``. Each
-    replaces the robot's block with the same part; a block with a new part is added."""
+    """Names of a user's own blocks, as ``package.module:Name`` or
+    ``path/to/file.py:Name``. Each block replaces the robot's block with the same part
+    (role). A block with a new part is added."""
     loudspeaker: SoundParameters | None = None
     """Sound that the robot itself plays at the origin of B, so that other robots can
-    follow it. Its fields are those of ``sound``, which also has the defaults."""
+    follow the robot. Its fields and defaults are those of ``sound``."""
     start: StartParameters = StartParameters()
     assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed of sound that hearing and range sensors assume, m/s; null: the true speed
@@ -159,7 +161,7 @@ class Robot(Parameters):
 
     @property
     def own_guard(self) -> GuardParameters | None:
-        """The guard of the robot, or None."""
+        """The guard of the robot; None without a guard."""
         return None
 
     @property
@@ -198,8 +200,8 @@ class Follower(Robot):
     attraction: AttractionParameters = AttractionParameters()
     laws: LawGains = LawGains()
     guard: GuardParameters | None = None
-    """The guard works with any law and keeps the robot in space that its sensors have
-    seen as free; null: no guard, unless the law is ``guarded``."""
+    """The guard limits the commands of any law, so that the robot stays in space that
+    its sensors have seen as free. null: no guard, unless the law is ``guarded``."""
 
     @model_validator(mode="after")
     def _check_channels(self) -> Follower:
@@ -216,7 +218,7 @@ class Follower(Robot):
 
     @property
     def gains(self) -> Any:
-        """Gains of the robot's law; None for a law without gains."""
+        """Gains of the robot's control law; None for a law without gains."""
         return getattr(self.laws, self.law, None)
 
     @property
@@ -277,7 +279,7 @@ class Router(Robot):
 
     @property
     def gains(self) -> Any:
-        """Gains of the robot's law; None for a law without gains."""
+        """Gains of the robot's control law; None for a law without gains."""
         return getattr(self.laws, self.law, None)
 
 
@@ -343,14 +345,16 @@ KINDS: Mapping[str, type[Robot]] = {
 
 
 def kind_of(robot: Any) -> str:
-    """Returns the kind of a robot, which follows from its law.
+    """Returns the kind of a robot, which follows from its control law.
+
+    If the law is a user's own law and the fields contain a route, the robot is a
+    router, which drives on a route.
 
     Args:
-        robot: The fields of a robot, as a model or as plain values. A user's own law
-            is the law of a router if the fields contain a route.
+        robot: The fields of a robot, as a model or as plain values.
 
     Returns:
-        A key of ``KINDS``.
+        Name of the kind, a key of ``KINDS``.
     """
     if isinstance(robot, Robot):
         return robot.kind
@@ -372,7 +376,7 @@ AnyRobot = Annotated[
 
 
 class SourceParameters(SourceRobotParameters):
-    """One source: the leader that carries it, and its sound."""
+    """One source: the leader that carries the source, and the sound of the source."""
 
     sound: SoundParameters = SoundParameters()
     """The sound of the source."""

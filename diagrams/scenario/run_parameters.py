@@ -29,27 +29,27 @@ MANY_RUNS = 100
 
 
 class StopParameters(Parameters):
-    """When a run ends, and what counts as following."""
+    """Conditions that end a run, and limits within which a robot follows."""
 
     goal_margin_m: Length = 0.3
     """Margin of the goal at a source at rest, m. P is in the goal if its distance from
     the source is at most the follow distance plus this margin."""
     rest_time_s: Duration = 1.0
-    """Time for which P must be at rest in the goal without a break, s. Then the run
-    ends as reached."""
+    """Time for which P must be at rest in the goal without a break, s. After this time,
+    the run ends as reached."""
     following_band_m: Length = 0.8
     """Greatest deviation from the follow distance, m. P follows if its distance from
     the source deviates from the follow distance by at most this value."""
     stuck_after_s: Duration = 10.0
-    """Time after which the run ends as stuck, s: P has stayed in one place (within
-    0.1 m) outside of its goal for this time."""
+    """Time after which the run ends as stuck, s. The run ends if P stays in one place
+    (within 0.1 m) outside of its goal for this time."""
     lost_after_s: Duration = 20.0
     """Time without a valid target after which the run ends as lost, s."""
     diverged_range_m: Length = 20.0
     """Distance from the source or the goal beyond which the run ends as diverged, m."""
     sound_within_m: Length = 0.6
-    """Greatest distance of the source from the origin of B, m, at the end of a search
-    for a sound that counts as found."""
+    """Greatest distance of the source from the origin of B, m. If a search for a sound
+    ends within this distance, the run counts as found."""
 
 
 class RunParameters(Parameters):

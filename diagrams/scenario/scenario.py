@@ -1,7 +1,7 @@
-"""The scenario: all that a run depends on, in one tree of fields.
+"""Defines the scenario: all that a run depends on, in one tree of fields.
 
 The tree consists of the parameter models of the blocks. Each quantity therefore has one
-name, one default and one legal range. ``load_scenario`` reads a scenario from YAML.
+name, one default and one permitted range. ``load_scenario`` reads a scenario from YAML.
 """
 
 from __future__ import annotations
@@ -48,7 +48,13 @@ from diagrams.scenario.participants import (
 )
 from diagrams.scenario.run_parameters import RunParameters
 from diagrams.scenario.settings import apply_settings, plain_settings
-from diagrams.scenario.shorthand import SOURCE, as_written, file_form, resolved
+from diagrams.scenario.shorthand import (
+    SOURCE,
+    as_written,
+    field_in,
+    file_form,
+    resolved,
+)
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
@@ -70,19 +76,20 @@ _R = TypeVar("_R", bound=Robot)
 
 
 class Scenario(RunParameters):
-    """One run. Every field has a default: the default scenario is complete.
+    """Describes one run; the default value of each field makes a complete scenario.
 
-    A file may state fields of robots and of sources at the top level. They apply to all
-    robots, or to all sources, that do not set them (``diagrams.scenario.shorthand``).
+    A file can state fields of robots and of sources at the top level. Such fields apply
+    to all robots, or to all sources, that do not set these fields
+    (``diagrams.scenario.shorthand``).
     """
 
     robots: Annotated[dict[Name, AnyRobot], Field(min_length=1, max_length=16)]
-    """Robots by name. In a file, each has the fields that differ from those of the
-    scenario; empty: one robot, named ``robot``."""
+    """Robots by name. In a file, each robot has only the fields that differ from those
+    at the top level. Empty: one robot, named ``robot``."""
     sources: Annotated[dict[Name, SourceParameters], Field(max_length=16)]
-    """Sources by name. In a file, each has the fields that differ from ``source`` and
-    ``sound``; empty: one source, named ``source``, if a robot follows it. A source that
-    no robot follows is an interferer."""
+    """Sources by name. In a file, each source has only the fields that differ from
+    ``source`` and ``sound``. Empty: if a robot follows a source, there is one source,
+    named ``source``. A source that no robot follows is an interferer."""
 
     def __init__(self, **fields: Any) -> None:
         super().__init__(**fields)
@@ -94,7 +101,7 @@ class Scenario(RunParameters):
 
     @property
     def only(self) -> Robot:
-        """The only robot.
+        """The only robot of the scenario.
 
         Raises:
             InputError: There are several robots.
@@ -108,7 +115,7 @@ class Scenario(RunParameters):
 
     @property
     def follower(self) -> Follower:
-        """The only robot, which follows a sound.
+        """The only robot of the scenario, which must be a robot that follows a sound.
 
         Raises:
             InputError: There are several robots, or the robot is of another kind.
@@ -117,7 +124,7 @@ class Scenario(RunParameters):
 
     @property
     def router(self) -> Router:
-        """The only robot, which drives on a route.
+        """The only robot of the scenario, which must be a robot that drives on a route.
 
         Raises:
             InputError: There are several robots, or the robot is of another kind.
@@ -126,7 +133,9 @@ class Scenario(RunParameters):
 
     @property
     def sensing(self) -> Follower | Router:
-        """The only robot, which has range sensors or ideal obstacle sensing.
+        """The only robot of the scenario, which must be able to sense obstacles.
+
+        Such a robot has range sensors or ideal obstacle sensing.
 
         Raises:
             InputError: There are several robots, or the robot is of another kind.
@@ -136,7 +145,7 @@ class Scenario(RunParameters):
 
     @property
     def searcher(self) -> OdorSearcher | SoundSearcher:
-        """The only robot, which searches step by step.
+        """The only robot of the scenario, which must be a searching robot.
 
         Raises:
             InputError: There are several robots, or the robot is of another kind.
@@ -156,13 +165,14 @@ class Scenario(RunParameters):
 
     @property
     def source(self) -> SourceParameters:
-        """The source that the only robot follows.
+        """The sound source that the first robot follows.
 
         Raises:
-            InputError: The robot does not follow a source, or there are several robots.
+            InputError: The first robot does not follow a source.
         """
-        if (target := self.target(next(iter(self.robots)))) not in self.sources:
-            raise InputError("source", "there is none: no robot follows a source")
+        first = next(iter(self.robots))
+        if (target := self.target(first)) not in self.sources:
+            raise InputError("source", f"robot {first!r} does not follow a source")
         return self.sources[target]
 
     def sounds(self) -> dict[str, SoundParameters]:
@@ -178,6 +188,11 @@ class Scenario(RunParameters):
         """Longest audio frame of all robots with microphones, s; 0 without any."""
         return max(map(frame_of, self.robots.values()))
 
+    @property
+    def law_names(self) -> str:
+        """The laws of all robots, each once, separated by commas."""
+        return ", ".join(dict.fromkeys(robot.law for robot in self.robots.values()))
+
     def target(self, robot: str) -> str:
         """Name of the target of a robot: a source, a leader, its goal, or the odor."""
         own = self.robots[robot]
@@ -188,10 +203,11 @@ class Scenario(RunParameters):
         return ODOR
 
     def of_robot(self, name: str) -> Scenario:
-        """Returns the scenario of one robot and of the source that it follows.
+        """Returns the scenario of one robot alone, with the source that it follows.
 
-        If the robot follows a leader, the source has the name, size and sound of this
-        leader and is at rest at the leader's start pose.
+        If the robot follows another robot (leader), the leader becomes a source in the
+        new scenario. This source has the name, size and sound of the leader, and is at
+        rest at the leader's start pose.
         """
         robot, target = self.robots[name], self.target(name)
         if robot.has_goal:
@@ -215,10 +231,15 @@ class Scenario(RunParameters):
         return self.model_copy(update={"robots": {name: robot}, "sources": sources})
 
     def with_robot(self, **fields: Any) -> Scenario:
-        """Returns a copy in which the only robot has other values, unchecked.
+        """Returns a copy of the scenario in which fields of the only robot differ.
+
+        The new values are not validated.
 
         Args:
-            **fields: Models and values, by field of the robot.
+            **fields: New values, by name of the robot's field.
+
+        Returns:
+            The new scenario.
 
         Raises:
             InputError: There are several robots.
@@ -227,26 +248,27 @@ class Scenario(RunParameters):
         return self.model_copy(update={"robots": {next(iter(self.robots)): robot}})
 
     def with_(self, changes: Mapping[str, Any]) -> Scenario:
-        """Returns a copy with some fields changed, which is validated.
+        """Returns a validated copy of the scenario in which some fields differ.
 
         Args:
-            changes: Plain values by dotted path, as for ``load_scenario``.
+            changes: New plain values, by dotted path, as for ``load_scenario``.
 
         Returns:
             The new scenario.
 
         Raises:
-            InputError: See ``load_scenario``.
+            InputError: A path or value is invalid, see ``load_scenario``.
         """
         data = self.model_dump(mode="json")
         apply_settings(data, dict(plain_settings(changes)))
         return scenario_from_mapping(data)
 
     def require_one_robot(self, purpose: str) -> None:
-        """Refuses several robots or sources.
+        """Raises an error if the scenario has several robots or sources.
 
         Args:
-            purpose: What needs one robot, for example 'a linear model'.
+            purpose: What needs one robot, for the message, for example 'a linear
+                model'.
 
         Raises:
             InputError: The scenario has several robots or sources.
@@ -260,13 +282,14 @@ class Scenario(RunParameters):
                 )
 
     def require_one_rate(self, purpose: str) -> None:
-        """Refuses hearing and range sensors that are slower than the tick.
+        """Raises an error if a sensor's period is longer than the control period.
 
         Args:
-            purpose: What needs one rate, for example 'a linear model'.
+            purpose: What needs a single sample rate, for the message, for example 'a
+                linear model'.
 
         Raises:
-            InputError: A period differs from the tick.
+            InputError: The period of a sensor differs from the control period.
         """
         for field, period in _periods(self.follower):
             if period != self.tick_s:
@@ -279,12 +302,12 @@ class Scenario(RunParameters):
     def surroundings(
         self, robot: str = "", paths: Mapping[str, Path] | None = None
     ) -> Surroundings:
-        """Returns all bodies that a robot can hit and see, and its target.
+        """Returns all bodies that a robot can hit and see, and the target of the robot.
 
         Args:
-            robot: Name of the robot; empty: the first robot.
-            paths: Paths of the other robots; a robot without a path is at rest at its
-                start.
+            robot: Name of the robot. Empty: the first robot.
+            paths: Paths of the other robots, by name. A robot without a path is at rest
+                at its start.
 
         Returns:
             The bodies by name, and the target. If the target has a body, this body is
@@ -345,11 +368,17 @@ class Scenario(RunParameters):
         return self.goal_radius(moves=self.source.path().moves)
 
     def goal_radius(self, *, moves: bool) -> NonNegative:
-        """Greatest distance of P from the target with which P is in the goal, m.
+        """Greatest distance from the target at which the robot is in its goal, m.
+
+        The robot is in its goal if its control point P is within this distance. The
+        distance is the follow distance plus a margin.
 
         Args:
-            moves: Whether the target moves. The follow distance is then increased by
-                the following band, and otherwise by the goal margin.
+            moves: Whether the target moves. If it moves, the margin is the following
+                band; otherwise, it is the goal margin.
+
+        Returns:
+            The distance, m.
         """
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
         return self.only.follow_distance_m + margin
@@ -411,11 +440,12 @@ class Scenario(RunParameters):
             field = f"robots.{name}.follows"
             target = self.target(name)
             if target not in played or target == name:
-                can = [each for each in played if each != name]
+                can = ", ".join(each for each in played if each != name)
+                remedy = f"use {can}" if can else "add a source, or a loudspeaker"
                 raise InputError(
                     field,
                     f"{target!r} is neither a source nor another robot with a "
-                    f"loudspeaker; use {', '.join(can)}",
+                    f"loudspeaker; {remedy}",
                 )
             if target in sources and not sources[target].body:
                 raise InputError(
@@ -533,7 +563,7 @@ class Scenario(RunParameters):
                         field,
                         f"{name!r} is on the robot's start at "
                         f"{self.robots[robot].start.position_m}; move its first "
-                        f"waypoint or start.position_m of the robot",
+                        f"waypoint, or {field_in('robots', robot, 'start.position_m')}",
                     )
 
     def _check_guards(self) -> None:
@@ -570,7 +600,7 @@ def _periods(robot: Robot) -> Iterator[tuple[str, float]]:
 def _check_schedule(
     field: str, target: str, played: Mapping[str, SoundParameters]
 ) -> None:
-    """Refuses ``schedule_known`` for a target that sounds without a pause."""
+    """Raises an error if ``schedule_known`` is set, but the target never pauses."""
     sound = played[target]
     if sound.on_s >= sound.period_s:
         raise InputError(

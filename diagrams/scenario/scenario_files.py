@@ -15,13 +15,15 @@ if TYPE_CHECKING:
 
 
 def check_files(scenario: Scenario) -> None:
-    """Refuses files that a run cannot use, before the simulation is loaded.
+    """Raises an error if a scenario names files that a run cannot use.
+
+    Such files are sound files and a user's own code.
 
     Args:
         scenario: The scenario to check.
 
     Raises:
-        InputError: Files are missing or unusable; the error lists all of them.
+        InputError: Files are missing or unusable. The error lists all of them.
     """
     faults: list[InputError] = []
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from diagrams.scenario.former_fields import renamed
+from diagrams.scenario.former_fields import is_constant_now, renamed
 from diagrams.scenario.shorthand import begins_anew, require_effect
 from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
@@ -15,10 +15,11 @@ from systems.framework.input_error import InputError
 def plain_settings(
     overrides: Iterable[str] | Mapping[str, Any],
 ) -> Iterable[tuple[str, Any]]:
-    """Returns settings as pairs of path and plain value.
+    """Returns settings as pairs of a dotted path and a plain value.
 
     Args:
-        overrides: See ``load_scenario``.
+        overrides: Texts ``key=value``, or a mapping of paths to values, as for
+            ``load_scenario``.
 
     Returns:
         The pairs, in order.
@@ -48,7 +49,13 @@ def _plain(key: str, value: Any) -> Any:
 
 
 def parse_setting(text: str) -> tuple[str, Any]:
-    """Splits ``key=value`` into the key and the value, which is YAML.
+    """Splits a text ``key=value`` into the key and the value, where the value is YAML.
+
+    Args:
+        text: The text. The key is the dotted path of a field.
+
+    Returns:
+        Two values: the key, and the plain value.
 
     Raises:
         InputError: The text does not have this form.
@@ -62,37 +69,45 @@ def parse_setting(text: str) -> tuple[str, Any]:
 
 
 def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:
-    """Sets fields of a scenario that a user has given by their paths.
+    """Changes fields of a scenario that a user has given by their paths.
 
     Args:
         data: Fields of a scenario, changed in place.
-        settings: Plain values by dotted path. Former names are accepted.
+        settings: Plain values, by dotted path of the field. The function also accepts
+            names from the previous version.
 
     Raises:
-        InputError: See ``set_fields``, or a field has no effect because all robots or
-            all sources have values of their own.
+        InputError: A path is invalid, see ``set_fields``.
+        InputError: A field has no effect, because all robots or all sources have values
+            of their own.
     """
-    fields = {renamed(key): value for key, value in settings.items()}
+    fields = {
+        renamed(key): value
+        for key, value in settings.items()
+        if not is_constant_now(key, value)
+    }
     set_fields(data, fields.items())
     require_effect(data, fields)
 
 
 def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
-    """Sets fields of a mapping.
+    """Sets fields in a tree of plain values.
 
-    The function sets presets first, so that all other fields override them. If a group
-    already has a preset, a new preset clears the group. Missing groups on the path to a
-    field are created.
+    Some groups have a field ``preset``, which selects defaults for the group. The
+    function sets presets first, so that all other fields override them. If a group
+    already has a preset, a new preset clears the group. If a group on the path to a
+    field is missing, the function creates the group.
 
     Args:
         data: Fields of a scenario, changed in place.
-        fields: Dotted paths and plain values. An entry of a list is given by its index
-            (``obstacles.0.size_m``) or by its name (``obstacles.cart.size_m``). If two
-            paths are the same, the later value wins.
+        fields: Dotted paths and plain values. A path names an entry of a list by its
+            index (``obstacles.0.size_m``) or by its name (``obstacles.cart.size_m``).
+            If a path occurs twice, the later value wins.
 
     Raises:
-        InputError: A path leads into a plain value or past the end of a list, or a
-            name in it is the name of no entry or of several entries of a list.
+        InputError: A path leads into a plain value, or past the end of a list.
+        InputError: A name in a path belongs to no entry of a list, or to several
+            entries.
     """
     for key, value in sorted(fields, key=lambda field: not _is_preset(*field)):
         _set_field(data, key, value)

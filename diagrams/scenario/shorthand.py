@@ -1,9 +1,10 @@
-"""The shorthand of scenario files, and the resolved tree of robots and sources.
+"""Expands the shorthand of scenario files to complete robots and sources, and back.
 
-A file may state fields of robots at the top level. They then apply to all robots of the
-kinds that have these fields, unless ``robots`` sets them for one robot. In the same
-way, ``source`` and ``sound`` apply to all sources. ``resolved`` expands this shorthand,
-and ``file_form`` makes it from a resolved tree.
+A file can state fields of robots at the top level. Such fields then apply to all robots
+of the kinds that have these fields. However, a value under ``robots`` replaces such a
+field for one robot. In the same way, ``source`` and ``sound`` apply to all sources.
+``resolved`` expands this shorthand. ``file_form`` makes the shorthand from an expanded
+scenario.
 """
 
 from __future__ import annotations
@@ -29,28 +30,31 @@ for _kind, _model in KINDS.items():
 
 
 def begins_anew(changes: Mapping[str, Any]) -> bool:
-    """Whether changes to a group choose a preset, which clears the other fields.
+    """Returns whether changes to a group of fields select a preset for this group.
+
+    A preset selects defaults for a group. A new preset clears the other fields of the
+    group. However, ``preset`` can also be the name of a robot or source. The value of
+    ``preset`` is then a mapping.
 
     Args:
-        changes: Plain values by field.
+        changes: New plain values, by name of the field.
 
     Returns:
-        True if the value of ``preset`` is a text. If ``preset`` is the name of a robot
-        or source, its value is a mapping, and the result is False.
+        True if the value of ``preset`` is a text.
     """
     return isinstance(changes.get("preset"), str)
 
 
 def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a tree of plain values with changes applied.
+    """Returns a copy of a tree of plain values, with changes applied.
 
     Args:
         base: The tree.
-        changes: A tree that contains only the leaves to change or add. Changes that
-            choose a preset for a group replace the whole group.
+        changes: A tree that contains only the values to change or add. If the changes
+            select a preset for a group, they replace the whole group.
 
     Returns:
-        A new tree; the arguments stay unchanged.
+        A new tree. The arguments stay unchanged.
     """
     result = {} if begins_anew(changes) else dict(base)
     for key, value in changes.items():
@@ -73,14 +77,17 @@ def _plain(value: Any) -> Any:
 
 
 def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Expands the shorthand of a scenario.
+    """Expands the shorthand of a scenario file to complete robots and sources.
+
+    In a file, a field at the top level applies to all robots or sources (shorthand).
+    The function copies such fields to each robot and source.
 
     Args:
         data: Fields of a scenario, as in a file.
 
     Returns:
-        Fields of the run, with complete ``robots`` and ``sources``. Values of a wrong
-        type stay as they are, for the validator.
+        Fields of the run, with complete ``robots`` and ``sources``. If a value has a
+        wrong type, it stays unchanged, so that the validation reports it.
 
     Raises:
         InputError: ``source`` has a sound.
@@ -99,7 +106,10 @@ def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
     base = joined({"sound": sound}, source)
     sources = run.get("sources") or {}
     if isinstance(robots, Mapping) and not sources:
-        follows = any(_follows_a_source(each, robots) for each in robots.values())
+        follows = any(
+            _follows_a_source(each, [other for other in robots if other != name])
+            for name, each in robots.items()
+        )
         sources = {SOURCE: {}} if follows else {}
     if isinstance(sources, Mapping):
         run["sources"] = {
@@ -116,10 +126,10 @@ def _group(value: Any) -> dict[str, Any]:
 def _robots(
     robots: Mapping[str, Any], shared: Mapping[str, Any], sound: Any
 ) -> dict[str, Any]:
-    """Applies shared fields to the robots that have them.
+    """Applies fields at the top level of a file to the robots that have these fields.
 
-    A shared field that no robot has goes to all robots, so that the validator refuses
-    it.
+    If no robot has a field, the function gives the field to all robots, so that the
+    validation reports an error.
     """
     kinds = {
         name: own.kind if isinstance(own, Robot) else kind_of({**shared, **_group(own)})
@@ -153,19 +163,19 @@ def _robots(
     return found
 
 
-def _follows_a_source(robot: Any, robots: Mapping[str, Any]) -> bool:
+def _follows_a_source(robot: Any, others: Sequence[str]) -> bool:
     if KINDS[kind_of(robot)].has_goal:
         return False
     follows = robot.get("follows") if isinstance(robot, Mapping) else robot.follows
-    return follows not in robots
+    return follows not in others
 
 
 def as_written(place: Sequence[str], data: Mapping[str, Any]) -> list[str]:
-    """Returns the place of a field in a file, where the user wrote it.
+    """Returns the path at which a user wrote a field in the file.
 
     Args:
-        place: Parts of the path of a field in the resolved tree. The name of a kind may
-            follow the name of a robot, as in errors of pydantic.
+        place: Parts of the path of the field in the expanded scenario. As in errors of
+            pydantic, the kind of a robot may follow the name of the robot.
         data: Fields of the scenario, as in the file.
 
     Returns:
@@ -195,7 +205,10 @@ def _has(data: Any, place: Sequence[str]) -> bool:
 
 @contextmanager
 def fields_of(group: str, name: str, **renamed: str) -> Iterator[None]:
-    """Makes errors of a block name the field in the scenario.
+    """Makes errors of a block state the path of the field in the scenario.
+
+    The function is a context manager. A block knows only the path within its own
+    parameters.
 
     Args:
         group: ``robots`` or ``sources``.
@@ -206,7 +219,7 @@ def fields_of(group: str, name: str, **renamed: str) -> Iterator[None]:
         Nothing.
 
     Raises:
-        InputError: The block raises this error.
+        InputError: The block raises this error. Its field is the path in the scenario.
     """
     try:
         yield
@@ -219,12 +232,12 @@ def fields_of(group: str, name: str, **renamed: str) -> Iterator[None]:
 
 
 def field_in(group: str, name: str, field: str) -> str:
-    """Returns the path of a field of a robot or source, in its shortest form.
+    """Returns the shortest path of a field of a robot or source in a scenario.
 
     Args:
         group: ``robots`` or ``sources``.
         name: Name of the robot or source.
-        field: Path of the field below this name.
+        field: Path of the field within the robot or source.
 
     Returns:
         Path of the field in the scenario.
@@ -237,14 +250,17 @@ def field_in(group: str, name: str, field: str) -> str:
 
 
 def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
-    """Refuses shorthand that every robot or every source overrides.
+    """Raises an error if a field that a user has set has no effect.
+
+    A field at the top level applies to all robots or sources that do not set this
+    field. It has no effect if all robots or all sources set the field themselves.
 
     Args:
         data: Fields of a scenario, as in a file.
-        fields: Dotted paths that a user has set.
+        fields: Dotted paths of the fields that the user has set.
 
     Raises:
-        InputError: A path has no effect.
+        InputError: A field has no effect.
     """
     for field in fields:
         place = field.split(".")
@@ -255,22 +271,40 @@ def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
         else:
             continue
         named = _group(data.get(group))
-        if below and named and all(_has(own, below) for own in named.values()):
+        leaves = [[*below, *leaf] for leaf in _leaves(data, place)]
+        if (
+            below
+            and named
+            and all(_has(own, leaf) for own in named.values() for leaf in leaves)
+        ):
             names = ", ".join(f"{group}.{name}.{'.'.join(below)}" for name in named)
             raise InputError(
                 field, f"has no effect, because {names} are set; set these instead"
             )
 
 
+def _leaves(tree: Any, place: Sequence[str]) -> Iterator[list[str]]:
+    """Yields the paths of the leaves below a place, relative to this place."""
+    if place:
+        below = tree.get(place[0]) if isinstance(tree, Mapping) else None
+        yield from _leaves(below, place[1:])
+    elif isinstance(tree, Mapping) and tree:
+        for key, value in tree.items():
+            yield from ([key, *leaf] for leaf in _leaves(value, []))
+    else:
+        yield []
+
+
 def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a resolved tree in the form of a file, which is as short as possible.
+    """Returns a scenario in the shortest form that a file can have.
+
+    In this form, fields that are equal in all robots or sources are at the top level.
 
     Args:
-        dump: Plain values of a scenario.
+        dump: Plain values of all fields of a scenario.
 
     Returns:
-        A tree that ``resolved`` turns into the same tree again. Fields that are equal
-        in all robots are at the top level.
+        Plain values for the file. ``resolved`` turns them into ``dump`` again.
     """
     run = dict(dump)
     robots, sources = run.pop("robots"), run.pop("sources")
@@ -290,16 +324,17 @@ def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:
 def _hoisted(
     trees: Mapping[str, Mapping[str, Any]],
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """Separates what all trees have in common from the rest of each tree."""
+    """Separates the values that all trees share from the rest of each tree."""
     shared = _common(list(trees.values()))
     return shared, {name: _without(tree, shared) for name, tree in trees.items()}
 
 
 def _common(trees: Sequence[Mapping[str, Any]], depth: int = 0) -> dict[str, Any]:
-    """Returns leaves that are equal in all trees.
+    """Returns the values that are equal in all trees of fields.
 
-    At the top, trees without the field do not count, because robots of another kind
-    lack it. A group with different presets has nothing in common.
+    At the top level, a tree without a field does not count, because robots of other
+    kinds lack this field. If a group has different presets, its trees have nothing in
+    common.
     """
     found: dict[str, Any] = {}
     for key in dict.fromkeys(key for tree in trees for key in tree):

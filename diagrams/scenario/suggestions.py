@@ -9,7 +9,7 @@ from systems.framework.input_error import InputError
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """Returns the end of a message that suggests similar names.
+    """Returns a text that suggests similar names, for the end of an error message.
 
     Args:
         name: The mistyped name.
@@ -17,7 +17,7 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
         most: Greatest number of suggestions.
 
     Returns:
-        The text; empty if no name is similar.
+        The text. It is empty if no name is similar.
     """
     by_folded = {each.casefold(): each for each in known}
     near = get_close_matches(name.casefold(), by_folded, n=most)
@@ -27,11 +27,11 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
 
 
 def unknown_law(name: str, known: Collection[str]) -> InputError:
-    """Returns the error for an unknown law.
+    """Returns the error for a control law whose name is unknown.
 
     Args:
         name: The unknown name.
-        known: Names of the laws.
+        known: Names of the known laws.
 
     Returns:
         The error to raise.

@@ -1,4 +1,4 @@
-"""Reads YAML from any origin within limits, and writes YAML."""
+"""Reads YAML texts within limits, because users write them, and writes YAML."""
 
 from __future__ import annotations
 
@@ -28,18 +28,19 @@ LARGEST_MEANING = 1_000_000
 
 
 def parse_yaml(text: str | bytes, field: str) -> Any:
-    """Parses a YAML text into plain values.
+    """Parses a YAML text into plain values, within limits that protect the program.
 
     Args:
-        text: One document.
-        field: Start of error messages.
+        text: One YAML document.
+        field: Name of the field or file, for the start of error messages.
 
     Returns:
-        Mappings, lists and scalars; None for an empty text.
+        Mappings, lists and scalars. The result is None for an empty text.
 
     Raises:
-        InputError: The text is not YAML, is longer than 100 kB, has more than 20
-            levels, or expands to more than a million characters through aliases.
+        InputError: The text is not YAML, or is longer than 100 kB.
+        InputError: The text has more than 20 levels.
+        InputError: Aliases expand the text to more than a million characters.
     """
     if len(text) > LARGEST_BYTES:
         raise InputError(

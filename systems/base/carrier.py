@@ -1,9 +1,10 @@
-"""The motion of a robot that carries a loudspeaker along its waypoints.
+"""Computes the motion of a robot that carries a loudspeaker along its waypoints.
 
-The carrier is a differential drive with the same equations as the plant
-(``plant_derivatives``). The controller knows the pose of the carrier. No other body
-acts on the carrier, so its motion is a function of time. The motion is integrated once,
-tick by tick, up to the latest time that is needed.
+The carrier is a differential-drive robot. It has the same equations of motion as the
+follower robot (``plant_derivatives``). The controller of the carrier knows the exact
+pose. No other body acts on the carrier, so its motion is a function of time alone. The
+module integrates the motion once, one control period (tick) after the other. The
+integration stops at the latest time that is needed.
 """
 
 from __future__ import annotations
@@ -31,46 +32,49 @@ from systems.world.paths import WaypointPath
 
 register_jitable(value_weights)
 
-#: Wheels of the carrier, and its motors, which have the lag of those of the follower.
+#: Wheels of the carrier.
 _ROBOT = RobotParameters(
     wheel_radius_m=WHEEL_RADIUS_M,
     wheel_separation_m=WHEEL_SEPARATION_M,
     top_speed_m_s=TOP_SPEED_M_S,
 )
+#: Motors of the carrier. They have the default motor lag of the follower robot.
 _PLANT = PlantParameters()
 _NUMBERS = tuple(PlantNumbers.of(_ROBOT, _PLANT))
 
-#: Limit of the difference between a commanded and a present wheel speed, rad/s. The
-#: acceleration of a wheel is this difference divided by the motor lag.
+#: Limit of the difference between the commanded and the present speed of a wheel,
+#: rad/s. The acceleration of a wheel is this difference divided by the motor lag.
 _MOST = WHEEL_ACCELERATION_M_S2 / WHEEL_RADIUS_M * _PLANT.motor_lag_s
 
-#: Time from a command to its mean effect, s: the motor lag plus half a tick, because
-#: the command is held for a tick. The feed-forward uses the plan this far ahead.
+#: Mean time from a command to its effect, s. It is the motor lag plus half a control
+#: period, because each command is held for one period. The feed-forward uses the plan
+#: this far ahead.
 LEAD_S = _PLANT.motor_lag_s + 0.5 * TICK_S
 
-# Feedback gains: longitudinal error, 1/s; lateral error, 1/m^2; heading error, 1/s.
-# Longitudinal errors decay within half a second (ten motor lags). Lateral errors decay
-# over 0.3 m of the path at 0.3 m/s.
+# Feedback gains of three errors:
+# - _AHEAD, 1/s: longitudinal error. It decays in half a second (ten motor lags).
+# - _ASIDE, 1/m^2: lateral error. It decays over 0.3 m of the path at 0.3 m/s.
+# - _TURN, 1/s: heading error.
 _AHEAD, _ASIDE, _TURN = 2.0, 50.0, 5.0
 
-# Integration steps per tick.
+# Number of integration steps per control period.
 _STEPS_A_TICK = 5
 
 
 def drive_along(
     plan: WaypointPath, ticks: tuple[int, int], knot: Sequence[float]
 ) -> NDArray[np.float64]:
-    """Continues the motion of a carrier from one tick to another.
+    """Continues the motion of a carrier from one control period (tick) to a later one.
 
     Args:
         plan: Path that the carrier follows.
-        ticks: First and last tick of the interval.
-        knot: (8,) state at the first tick: pose in W (m, m, rad), velocity in W (m/s,
-            m/s, rad/s), and left and right wheel speed, rad/s.
+        ticks: Numbers of the first and of the last tick of the interval.
+        knot: (8,) state at the first tick: pose in the world frame W (m, m, rad),
+            velocity in W (m/s, m/s, rad/s), and left and right wheel speed (rad/s).
 
     Returns:
-        (n, 8) states in the order of ``knot``, at the n ticks after the first tick, up
-        to the last tick.
+        (n, 8) states, one row per tick. The rows begin one tick after the first tick
+        and end at the last tick. The columns are those of ``knot``.
     """
     times = np.arange(*ticks) * TICK_S
     states = drive(
@@ -90,21 +94,24 @@ def drive(
     poses: NDArray[np.float64],
     twists: NDArray[np.float64],
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Follows planned poses with feed-forward and feedback, tick by tick.
+    """Simulates a carrier that follows planned poses by feed-forward and feedback.
 
-    In each tick the function computes the longitudinal, lateral, and heading errors. It
-    adds the feedback of these errors to the planned speed and yaw rate. It converts the
-    sum to wheel commands and limits the acceleration of each wheel. Then it integrates
-    the plant over the tick by the classical Runge-Kutta method of fourth order.
+    The function does these steps in each control period (tick):
+
+    1. Compute the longitudinal, lateral, and heading errors.
+    2. Add the feedback of these errors to the planned speed and yaw rate.
+    3. Convert the sum to wheel commands and limit the acceleration of each wheel.
+    4. Integrate the equations of motion by the classical Runge-Kutta method of fourth
+       order.
 
     Args:
-        state: (7,) state of the plant at the first tick, see ``plant_derivatives``.
-        poses: (n, 3) planned pose at each tick in W, m and rad.
-        twists: (n, 2) planned speed, m/s, and yaw rate, rad/s, at the time ``LEAD_S``
-            after each tick, when the commands take effect.
+        state: (7,) state of the robot at the first tick, see ``plant_derivatives``.
+        poses: (n, 3) planned pose at each tick in the world frame W, m and rad.
+        twists: (n, 2) planned speed, m/s, and yaw rate, rad/s. Row k applies to the
+            time ``LEAD_S`` after tick k, when the command of tick k takes effect.
 
     Returns:
-        (n + 1, 7) states at the ticks.
+        (n + 1, 7) states, at the n ticks and one tick later.
 
     Reference: the feedback is that of Kanayama, Kimura, Miyazaki and Noguchi, "A stable
     tracking control method for an autonomous mobile robot", ICRA 1990. In contrast to
@@ -145,13 +152,15 @@ def poses_between(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Interpolates poses between knots by cubic Hermite polynomials.
 
+    The knots are states of the robot, one control period (tick) apart.
+
     Args:
-        knots: (m, 8) states as in ``drive_along``, one tick apart.
-        ticks: (n,) times since the first knot, in ticks. Times after the last knot give
-            the last pose.
+        knots: (m, 8) states; the columns are those of ``knot`` in ``drive_along``.
+        ticks: (n,) times since the first knot, in control periods. Times after the last
+            knot give the pose of the last knot.
 
     Returns:
-        (n, 3) poses in W, m and rad.
+        (n, 3) poses in the world frame W, m and rad.
     """
     poses = np.empty((ticks.size, 3))
     for i in range(ticks.size):

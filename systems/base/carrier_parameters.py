@@ -25,9 +25,9 @@ from systems.framework.parameters import (
 )
 from systems.world.paths import ACCELERATION_M_S2, AtEnd, WaypointPath
 
-#: Least ratio of the wheels' acceleration to the acceleration along the path. It is
-#: above 1 because commands are held for a tick (half a motor lag), and because the
-#: feedback needs a reserve.
+#: Least ratio of the wheels' acceleration to the acceleration along the path. The ratio
+#: is above 1 for two reasons. Commands are held for a control period (half a motor
+#: lag). The feedback needs a reserve.
 _HEADROOM = 1.5
 
 #: Angle by which the robot turns while its yaw rate rises in a corner, rad.
@@ -53,8 +53,8 @@ class SourceRobotParameters(Parameters):
     start_time_s: Time = 0.0
     """Time until which the source rests at its first waypoint, s."""
     at_end: AtEnd = "stop"
-    """Behavior at the last waypoint: ``stop`` rests there, ``shuttle`` goes back and
-    forth."""
+    """Behavior at the last waypoint. ``stop``: the robot rests there. ``shuttle``: the
+    robot goes back and forth."""
     heading_deg: Angle = 0.0
     """Heading of a source at rest, deg CCW from the x axis of W."""
     length_m: Length = 0.326
@@ -100,13 +100,13 @@ class SourceRobotParameters(Parameters):
 
 @lru_cache(maxsize=16)
 def driven_path(source: SourceRobotParameters) -> DrivenPath:
-    """Returns the driven motion of a source.
+    """Returns the motion of a leader robot, which carries the sound source.
 
-    The cache keeps the motions of the last 16 sources. A run and the runs of a sweep
-    use the same source many times.
+    The function keeps the motions of the last 16 leaders in a cache. A run and the runs
+    of a sweep use the same motion many times.
 
     Args:
-        source: Parameters of the source.
+        source: Path and size of the leader.
 
     Returns:
         The motion. Equal parameters give the same object.

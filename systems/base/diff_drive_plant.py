@@ -23,15 +23,16 @@ from systems.framework.signals import TICK_S
 def body_twist(
     wheel_speeds: Any, robot: RobotParameters, slip: Any = (0.0, 0.0)
 ) -> Any:
-    """Computes the motion of the body from the speeds of its wheels.
+    """Computes the motion of the body from the speeds of its two wheels.
 
     Args:
         wheel_speeds: Left and right wheel speed, rad/s; floats or AutoDiffXd.
         robot: Radius and separation of the wheels.
-        slip: Share of the left and right rim speed that is lost, below 1.
+        slip: Shares of the left and of the right rim speed that are lost by slip, below
+            1.
 
     Returns:
-        Forward speed, m/s, and yaw rate, rad/s, counterclockwise.
+        Forward speed, m/s, and yaw rate, rad/s, positive counterclockwise.
     """
     left = robot.wheel_radius_m * (1.0 - slip[0]) * wheel_speeds[0]
     right = robot.wheel_radius_m * (1.0 - slip[1]) * wheel_speeds[1]
@@ -59,11 +60,11 @@ class PlantNumbers(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotParameters, plant: PlantParameters) -> PlantNumbers:
-        """Computes the constants from the parameters.
+        """Computes the constants from the parameters of the robot.
 
         Args:
-            robot: Wheels and top speed.
-            plant: Lag of the motors, and share of the rim speeds that is lost by slip.
+            robot: Dimensions of the wheels, and top speed.
+            plant: Motor lag, and shares of the rim speeds that are lost by slip.
 
         Returns:
             The constants. Slip reduces ``left_rim_m`` and ``right_rim_m``.
@@ -88,14 +89,14 @@ def plant_derivatives(
     top_wheel_speed: Any,
     motor_lag_s: Any,
 ) -> Any:
-    """Computes the time derivatives of the plant.
+    """Computes the time derivatives of the state of a robot whose wheels roll.
 
     The compiled function takes floats. Its attribute ``.py_func`` is the same function
-    in Python and also takes AutoDiffXd.
+    in Python. That function takes floats or AutoDiffXd.
 
     Args:
-        state: (7,) x, y, theta, left and right wheel angle, left and right wheel
-            speed; m, rad, rad/s.
+        state: (7,) x and y, m; heading theta, rad; left and right wheel angle, rad;
+            left and right wheel speed, rad/s.
         commanded: (2,) commanded left and right wheel speed, rad/s.
         left_rim_m: See ``PlantNumbers``.
         right_rim_m: See ``PlantNumbers``.
@@ -125,18 +126,18 @@ def slipping_derivatives(
     motor_lag_s: Any,
     grip: Any,
 ) -> Any:
-    """Computes the time derivatives of the plant with tires that may slip.
+    """Computes the time derivatives of the state of a robot whose tires may slip.
 
     Args:
-        state: (10,) state of ``plant_derivatives``, then forward and leftward speed of
-            the body, m/s, and its yaw rate, rad/s.
+        state: (10,) the 7 components of ``plant_derivatives``; then forward and
+            leftward speed of the body, m/s; then its yaw rate, rad/s.
         commanded: (2,) commanded left and right wheel speed, rad/s.
         left_rim_m: See ``PlantNumbers``.
         right_rim_m: See ``PlantNumbers``.
         wheel_separation_m: See ``PlantNumbers``.
         top_wheel_speed: See ``PlantNumbers``.
         motor_lag_s: See ``PlantNumbers``.
-        grip: ``GripNumbers``.
+        grip: Limit of the tire forces, see ``GripNumbers``.
 
     Returns:
         (10,) derivatives in the order of the state.
@@ -188,8 +189,8 @@ def saturated(value: Any, limit: Any) -> Any:
         limit: Largest magnitude, not negative.
 
     Returns:
-        The value, or the limit with the sign of the value. A limited value has zero
-        derivatives.
+        The value, if its magnitude is at most the limit. Otherwise the limit with the
+        sign of the value; its derivatives are zero.
     """
     if value > limit:
         return value * 0.0 + limit
@@ -200,10 +201,13 @@ def saturated(value: Any, limit: Any) -> Any:
 
 @register_jitable
 def _velocities(state, numbers):
-    """Returns the velocity in W, m/s and rad/s, and the slip velocities, m/s.
+    """Computes the velocity of the body and the slip velocities of the wheels.
 
-    The slip velocities are the forward speeds of the left and right rim relative to the
-    ground, and the leftward speed of the axle.
+    Returns:
+        Two tuples. The first is the velocity (vx, vy, omega) in the world frame W, m/s
+        and rad/s. The second has the three slip velocities, m/s: the forward speed of
+        the left rim relative to the ground, that of the right rim, and the leftward
+        speed of the axle.
     """
     left, right = numbers.left_rim_m * state[5], numbers.right_rim_m * state[6]
     v, omega = _rim_twist(left, right, numbers.wheel_separation_m)
@@ -231,7 +235,7 @@ class PlantStepNumbers(NamedTuple):
     derivatives: Any
     """Function ``derivatives(state, commanded, *of_plant)``."""
     of_plant: tuple[Any, ...]
-    """``PlantNumbers``, and ``GripNumbers`` with friction."""
+    """The constants ``PlantNumbers``. With friction, ``GripNumbers`` follows."""
     step_s: float
     """Largest step of the integrator, s."""
     tick_s: float
@@ -242,14 +246,15 @@ class PlantStepNumbers(NamedTuple):
 
 
 def plant_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Advances the robot by one tick with Runge-Kutta steps of fifth order.
+    """Advances the robot by one control period with Runge-Kutta steps of fifth order.
 
-    The state is that of ``plant_derivatives`` or ``slipping_derivatives``.
+    Without friction, the state is that of ``plant_derivatives``. With friction, the
+    state is that of ``slipping_derivatives``.
     """
     (commanded,) = inputs
     derivatives, of_plant = numbers.derivatives, numbers.of_plant
     time, end = tick * numbers.tick_s, (tick + 1) * numbers.tick_s
-    # Times, steps, and sums are computed in Drake's order, so rounding is the same.
+    # Compute times, steps, and sums in Drake's order, so that rounding is the same.
     while time < end:
         h = end - time
         if h > _STRETCH * numbers.step_s:
@@ -274,14 +279,15 @@ _STAGES = (
 def advance(
     state: Any, h: Any, commanded: Any, derivatives: Any, of_plant: Any
 ) -> None:
-    """Advances the state by one step of Dormand and Prince, as Drake does.
+    """Advances the state by one step of the Dormand-Prince method, as Drake does.
 
     Args:
-        state: (n,) state, changed.
+        state: (n,) state. The function overwrites the state with the new state.
         h: Length of the step, s.
         commanded: (2,) commanded left and right wheel speed, rad/s.
         derivatives: Function ``derivatives(state, commanded, *of_plant)``.
-        of_plant: ``PlantNumbers``, and ``GripNumbers`` with friction.
+        of_plant: The constants ``PlantNumbers``. With friction, ``GripNumbers``
+            follows.
     """
     size = len(state)
     slopes, reached = np.empty((6, size)), np.copy(state)
@@ -309,25 +315,27 @@ def _publish_plant(state, outputs, numbers):
 @define_for_scalars("DiffDrivePlant_", __name__)
 def DiffDrivePlant_(T):
     class Impl(Block_[T]):
-        """Moves the robot, with motor lag, saturation, and wheels that roll or slip.
+        """Simulates a differential-drive robot whose wheels roll or slip.
 
+        The model includes the lag of the motors and the saturation of the wheel speeds.
         The continuous state has x, y, theta, two wheel angles, and two wheel speeds. If
-        ``plant.friction`` is set, the state also has the forward speed, leftward speed,
-        and yaw rate of the body. Otherwise the wheel speeds determine these three
-        values. The outputs are functions of the state, without feedthrough. The heading
-        is not wrapped to one turn.
+        ``plant.friction`` is set, the state also has the forward speed, the leftward
+        speed, and the yaw rate of the body. Otherwise the wheel speeds determine these
+        three values. The outputs are functions of the state, without feedthrough. The
+        heading is not wrapped to one turn.
 
         Args:
             robot: Dimensions and top speed.
-            plant: ``PlantParameters``.
-            initial_pose: (x, y, theta) in W at time zero, m and rad. The robot starts
-                at rest.
+            plant: Motor lag, slip, and friction.
+            initial_pose: (x, y, theta) in the world frame W at time zero, m and rad.
+                The robot starts at rest.
 
         Raises:
             ValueError: The initial pose, a state, or a command is not finite. With such
                 a value, an error-controlled integrator would never finish.
 
-        Reference: Han 2019, table 6; the motor lag and the grip are ours.
+        Reference: Han 2019, table 6. The motor lag and the friction model are our
+        additions.
         """
 
         part, stage = "plant", "robot"

@@ -1,7 +1,7 @@
-"""Motion of a robot that carries a loudspeaker, as a function of time.
+"""Gives the motion of a robot that carries a loudspeaker as a function of time.
 
-``systems/base/carrier.py`` computes the motion. That module has compiled code, so it
-is imported only when a pose or velocity of a moving robot is needed.
+The module ``systems/base/carrier.py`` computes the motion. Because ``carrier.py`` has
+compiled code, it is imported only when a pose or velocity of a moving robot is needed.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from systems.base.source_drive import value_weights
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath
 
-#: Time from the end of the plan to the time at which the velocity is set to zero, s.
-#: At that time the feedback moves the robot at less than 1 nm/s.
+#: Time from the end of the plan until the velocity is set to zero, s. At the end of
+#: this time, the feedback moves the robot at less than 1 nm/s.
 _SETTLING_S = 10.0
 
 #: Least number of ticks that are computed at once.
@@ -24,13 +24,16 @@ _CHUNK_TICKS = 400
 
 
 class DrivenPath:
-    """Pose and velocity of a robot that drives through waypoints.
+    """Pose and velocity of a robot with wheels that drives through waypoints.
 
-    The wheel commands change every 25 ms from the start time on. This period does not
-    depend on the control period of the followers. Between ticks the pose is a cubic
-    Hermite polynomial, which differs from the plant by at most 1 um and 10 urad. In the
-    scenarios of the library the robot stays within 2 mm of its plan. At 0.7 m/s it
-    stays within 4 cm of the arcs of corners. It stops within 5 mm of the last waypoint.
+    The wheel commands change every 25 ms from the start time on. This period (tick)
+    does not depend on the control period of the follower robots. Between ticks, the
+    pose is a cubic Hermite polynomial. This polynomial differs from the exact motion by
+    at most 1 um and 10 urad.
+
+    In the scenarios of the library, the robot stays within 2 mm of its plan. At 0.7
+    m/s, it stays within 4 cm of the arcs of corners. It stops within 5 mm of the last
+    waypoint.
 
     Args:
         plan: Planned path.
@@ -48,8 +51,8 @@ class DrivenPath:
         self._end = math.inf
         if stops:
             self._end = math.ceil((plan.duration + _SETTLING_S) / TICK_S)
-        # Pose, velocity, and wheel speeds at the ticks so far, as lists and as an
-        # array. Single rows of floats are faster to read from lists.
+        # States (pose, velocity, and wheel speeds) at the ticks so far, as lists and
+        # as an array. Lists give faster access to a single row.
         self._knots = [[*self._rest, 0.0, 0.0, 0.0, 0.0, 0.0]]
         self._table = np.array(self._knots)
 
@@ -112,10 +115,10 @@ class DrivenPath:
         )
 
     def extreme_twists(self, until: float) -> NDArray[np.float64]:
-        """Returns the speeds and yaw rates at the ticks of the path.
+        """Returns the speeds and yaw rates at the ticks (periods of 25 ms) of the path.
 
-        Within a tick the speed of each wheel approaches its command. Therefore every
-        point of the body is fastest at the start or at the end of the tick.
+        Within a tick, the speed of each wheel approaches its command. Therefore every
+        point of the body is fastest at the start or at the end of a tick.
 
         Args:
             until: Time up to which ticks count, s. It is rounded up to a whole tick.

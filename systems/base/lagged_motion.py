@@ -17,12 +17,14 @@ _LONGEST_PANEL_S = 0.1
 
 
 class LaggedMotion(NamedTuple):
-    """Constants of the wheel motion in a period with a held command.
+    """Constants of the wheel motion during a period in which the command is held.
 
-    Each wheel has the speed c + (w - c) exp(-t/tau). Here tau is the lag, c is the
-    command, and w is the speed at the start. The wheel angle is the sum of two parts.
-    The *steady* part c t grows in proportion to time. The *lagged* part grows as
-    1 - exp(-t/tau).
+    Each wheel has the speed c + (w - c) exp(-t/tau). Here t is the time since the start
+    of the period, tau is the motor lag, c is the commanded speed, and w is the speed at
+    the start. The wheel angle is the sum of two parts:
+
+    - The *steady* part c t grows in proportion to time.
+    - The *lagged* part grows as 1 - exp(-t/tau).
     """
 
     duration_s: float
@@ -35,19 +37,19 @@ class LaggedMotion(NamedTuple):
     """Final angle of the lagged part per rad/s of w - c, tau (1 - kept), s."""
     least_share: float
     """Factor kappa in the error bound of the encoders. A wheel that reverses within a
-    tick travels farther than its net distance. Therefore the bound counts at least
-    kappa times the steady part. See docs/results_guard.md, "Encoders"."""
+    control period travels farther than its net distance. Therefore the bound counts at
+    least kappa times the steady part. See docs/results_guard.md, "Encoders"."""
     nodes: tuple[tuple[float, float, float, float], ...]
-    """Nodes of the quadrature. A node has four numbers: the shares of the steady part
-    and of the lagged part that are complete at the node, and the weights of the node
-    for both parts."""
+    """Nodes of the quadrature, four numbers per node. The first two numbers are the
+    shares of the steady part and of the lagged part that are complete at the node. The
+    last two numbers are the weights of the node for both parts."""
 
 
 def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
     """Computes the constants of ``LaggedMotion``.
 
-    No panel of the quadrature is longer than the lag. This keeps the error below 1e-10
-    of the path length.
+    The quadrature divides the period into panels. No panel is longer than the motor
+    lag. This keeps the error of the quadrature below 1e-10 of the path length.
 
     Args:
         duration_s: Duration of the period, s.
@@ -79,20 +81,22 @@ def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
 
 @register_jitable
 def advance_pose(pose: Any, travelled: Any, steady: Any, motion: LaggedMotion) -> Any:
-    """Computes the pose after a period in which the command was held.
+    """Computes the pose after a period in which the wheel command was held.
 
-    Path and turn have a steady part and a lagged part. The function integrates
-    (cos theta, sin theta) along the path by a quadrature over the nodes of ``motion``.
+    The path and the turn of the body each have a steady part and a lagged part, see
+    ``LaggedMotion``. The function integrates (cos theta, sin theta) along the path by a
+    quadrature over the nodes of ``motion``.
 
     Args:
-        pose: (x, y, theta) at the start in W, m and rad; floats or AutoDiffXd.
-        travelled: Path, m, and turn, rad, of the body in the period.
-        steady: Path, m, and turn, rad, that would result if the wheels had run at their
-            commanded speeds from the start.
-        motion: ``LaggedMotion`` of the period.
+        pose: (x, y, theta) at the start in the world frame W, m and rad; floats or
+            AutoDiffXd.
+        travelled: Actual path length, m, and turn, rad, of the body in the period.
+        steady: Path length, m, and turn, rad, that would result if the wheels ran at
+            their commanded speeds from the start.
+        motion: Constants of the period.
 
     Returns:
-        (x, y, theta) at the end in W, m and rad.
+        (x, y, theta) at the end in the world frame W, m and rad.
     """
     lagged_way, lagged_turn = travelled[0] - steady[0], travelled[1] - steady[1]
     x, y, theta = pose[0], pose[1], pose[2]

@@ -20,12 +20,12 @@ class PlantParameters(Parameters):
     motor_lag_s: Duration = 0.05
     """Time constant of each wheel's speed loop, s (not printed, our choice)."""
     slip: Annotated[tuple[_Slip, _Slip], Strict(False)] = (0.0, 0.0)
-    """Share of the rim speed that the left and the right wheel lose by slip. The
+    """Shares of the rim speed that the left and the right wheel lose by slip. The
     encoders do not measure this loss. A negative share describes a wheel whose radius
     is larger than ``wheel_radius_m`` by this share."""
     friction: Annotated[float, Field(ge=1e-3, le=100.0)] | None = None
-    """Coefficient of friction between tires and floor. The wheels slip if the motion
-    needs more force than this share of the weight. None: the wheels never slip."""
+    """Coefficient of friction between tires and floor. If the motion needs more force
+    than this share of the weight, the wheels slip. None: the wheels never slip."""
 
 
 class OdometryParameters(Parameters):

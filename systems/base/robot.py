@@ -27,15 +27,16 @@ LEAST_SPACING_M = 1e-3
 
 
 class RobotParameters(Parameters):
-    """The follower robot of Han 2019, table 6.
+    """Dimensions of the follower robot (Han 2019, table 6).
 
     The table prints "350 (W) x 820 (L)", a wheel distance of 410 mm, and a microphone
-    row of 800 mm. Therefore 820 mm can only be the lateral size.
+    row of 800 mm. The row is lateral, so 820 mm must be the width. Therefore this class
+    exchanges the two printed sizes.
     """
 
     preset: RobotPreset = "han2019"
-    """Named robot that gives the defaults of the other fields. Fields that are set
-    take precedence."""
+    """Named robot that gives the default values of the other fields. Values of fields
+    that are set take precedence over the preset."""
     length_m: Length = 0.35
     """Extent of the body along its x axis, m."""
     width_m: Length = 0.82
@@ -47,8 +48,8 @@ class RobotParameters(Parameters):
         (0.0, 0.0),
         (0.0, -0.4),
     )
-    """Positions of the microphones relative to P in the axes of B, m. There must be at
-    least three, and no two within 1 mm.
+    """Positions of the microphones relative to the control point P, in the axes of the
+    body frame B, m. There must be at least three. No two may be within 1 mm.
 
     The default is a row from left to right with 0.4 m between neighbors (Han 2019,
     2.3).

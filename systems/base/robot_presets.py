@@ -19,8 +19,7 @@ _SONG: Mapping[str, Any] = {
     "top_speed_m_s": 0.2,
 }
 
-#: For each preset, the fields of ``RobotParameters`` that differ from the follower of
-#: Han 2019.
+#: Fields of ``RobotParameters`` that differ from the follower of Han 2019, by preset.
 ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
     "han2019": {},
     # ROBOTIS e-Manual, TurtleBot3 Burger: 138 x 178 mm, 1 kg, wheels of 66 mm diameter,

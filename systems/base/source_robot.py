@@ -13,14 +13,15 @@ from systems.world.paths import seconds
 @define_for_scalars("SourceRobot_", __name__)
 def SourceRobot_(T):
     class Impl(Block_[T]):
-        """Drives the source along its waypoints.
+        """Drives the leader robot, which carries the sound source, along its waypoints.
 
         The motion is that of a robot with wheels (``DrivenPath``). No other body acts
-        on it. The outputs are functions of time, without state and without latency. No
-        gradient passes through the source, because its motion depends on no input.
+        on the leader. The outputs are functions of time, without state and without
+        latency. No gradient passes through this block, because the motion depends on no
+        input.
 
         Args:
-            source: ``SourceRobotParameters``.
+            source: Path and size of the leader.
         """
 
         part, stage = "source", "world"

@@ -10,12 +10,12 @@ from numba.extending import register_jitable
 from systems.base.robot import RobotParameters
 
 GRAVITY_M_S2 = 9.81
-#: Time constant with which the remaining slip decays when a wheel grips again, s. The
-#: longest step of the integrator, 25 ms, is stable with this time constant.
+#: Time constant of the decay of the remaining slip when a wheel grips again, s. With
+#: this time constant, the longest step of the integrator (25 ms) is stable.
 _REGRIP_S = 0.016
-#: Number of iterations of the search for forces. Each iteration multiplies the error by
-#: 0.4 with the printed dimensions (Han 2019). If the body is no wider than the distance
-#: between its wheels, the factor is two thirds.
+#: Number of iterations of the search for the limited forces. With the printed
+#: dimensions (Han 2019), each iteration multiplies the error by 0.4. If the body is no
+#: wider than the distance between its wheels, the factor is two thirds.
 _SWEEPS = 60
 
 
@@ -36,7 +36,8 @@ class GripNumbers(NamedTuple):
             friction: Coefficient of friction between tires and floor.
 
         Returns:
-            friction * gravity / 2, m/s^2, and (length^2 + width^2) / 12, m^2.
+            The two constants. ``traction_m_s2`` is friction * gravity / 2.
+            ``gyration_m2`` is (length^2 + width^2) / 12.
         """
         return cls(
             friction * GRAVITY_M_S2 / 2.0,
@@ -52,17 +53,14 @@ def grip_accelerations(
     wheel_separation_m: float,
     grip: GripNumbers,
 ) -> tuple[Any, Any, Any]:
-    """Computes the acceleration that the forces of the tires give to the body.
+    """Computes the acceleration that the tire forces give to the body.
 
-    All forces are divided by the mass of the robot. If the friction suffices, the
-    forces prevent all slip. Otherwise the force of each wheel is limited to
-    ``traction_m_s2`` in any direction. Within this limit, the function chooses the
-    forces whose motion is nearest to motion without slip (Gauss' principle of least
-    constraint). The tire of a sliding wheel pushes along its slip with the full limit.
-    No force is left across the slip.
-
-    The function first computes the forces that prevent slip. If one of them exceeds the
-    limit, projected gradient descent finds the limited forces.
+    All forces are divided by the mass of the robot. First, the function computes the
+    forces that prevent all slip. If both forces are within the limit ``traction_m_s2``
+    of a wheel, they are the result. Otherwise, projected gradient descent finds the
+    forces within the limit whose motion is nearest to motion without slip (Gauss'
+    principle of least constraint). The tire of a sliding wheel then pushes along its
+    slip with the full limit. The force across the slip is zero.
 
     Args:
         motion: Forward and leftward speed of the middle of the axle, m/s, and yaw rate,
@@ -70,7 +68,7 @@ def grip_accelerations(
         rims: Left and right rim speed, m/s.
         rim_accelerations: Left and right rim acceleration, m/s^2.
         wheel_separation_m: Distance between the wheels, m.
-        grip: ``GripNumbers``.
+        grip: Force limit and moment of inertia, each divided by the mass.
 
     Returns:
         Rates of change of ``motion``, m/s^2 and rad/s^2.

@@ -22,14 +22,14 @@ from systems.framework.signals import TICK_S
 
 @register_jitable
 def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
-    """Rounds a wheel angle down to whole pulses.
+    """Rounds a wheel angle down to whole encoder pulses.
 
     Args:
         angle: Angle of the wheel since the start, rad, positive or negative.
         pulses_per_revolution: Pulses of the encoder per revolution.
 
     Returns:
-        Largest multiple of a pulse that is not above the angle, rad.
+        Largest whole number of pulses that is not above the angle, as an angle in rad.
     """
     pulse = math.tau / pulses_per_revolution
     return math.floor(angle / pulse) * pulse
@@ -50,12 +50,12 @@ class OdometryNumbers(NamedTuple):
 def odometry_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Advances the pose to the present wheel angles.
+    """Advances the estimated pose to the present wheel angles.
 
-    The state is the pose and both encoder angles of the last tick. The step computes
-    the path and turn from the new angles. It also computes the path and turn that the
-    held command would give without lag. ``advance_pose`` computes the new pose from
-    both.
+    The state has five numbers: the pose and the two encoder angles at the last control
+    period. The step computes the path length and the turn from the new angles. It also
+    computes the path length and the turn that the held command would give without motor
+    lag. The function ``advance_pose`` computes the new pose from both pairs.
     """
     left, right = inputs[0][0], inputs[0][1]
     if numbers.pulses > 0:
@@ -68,7 +68,7 @@ def odometry_step(
     turned = left - state[3], right - state[4]
     travelled = body_twist(turned, robot)
     steady = travelled
-    # Directly after an update the wheels have not moved yet, so the motion is zero.
+    # If the wheels have not moved since the update, the motion is zero.
     if turned[0] != 0.0 or turned[1] != 0.0:
         top = robot.top_wheel_speed
         steady_left = motion.duration_s * saturated(inputs[1][0], top)
@@ -86,30 +86,32 @@ def odometry_step(
 @define_for_scalars("WheelOdometry_", __name__)
 def WheelOdometry_(T):
     class Impl(Block_[T]):
-        """Estimates pose and velocity from the encoders of the wheels.
+        """Estimates the pose and the velocity from the encoders of the wheels.
 
-        The block assumes that the wheels approach their command with the nominal motor
-        lag between two ticks. The encoders give the angles at both ticks. Command and
-        lag give the motion in between. If the wheels roll with that lag and the angles
-        are exact, the pose at a tick is exact. A simpler method moves the robot along
-        its mean heading in each tick. The errors of the simpler method add up if the
+        The encoders give the wheel angles at each control period (tick). Between two
+        ticks, the block assumes that the wheel speeds approach their commands with the
+        nominal motor lag. If this assumption holds and the angles are exact, the pose
+        at each tick is exact. A simpler method would move the robot along its mean
+        heading in each tick. The errors of the simpler method would add up if the
         forward speed varies in phase with the yaw acceleration.
 
-        With angles in whole pulses the position error is at most (q/L) s + q. Here q is
-        the path of the rim per pulse, L is the wheel separation, and s is the mean path
-        of both rims (docs/results_guard.md has the proof).
+        If the angles are rounded to whole pulses, the position error is at most (q/L) s
+        + q. Here q is the path of the rim per pulse, L is the wheel separation, and s
+        is the mean path of both rims. The proof is in docs/results_guard.md.
 
-        The discrete state has the pose and the encoder angles of the last tick. It is
-        updated every tick. The outputs advance this pose to the present angles, without
-        latency. The velocity at the output is the mean velocity since the last tick.
-        The block does not measure slip.
+        The discrete state has the pose and the encoder angles of the last tick. The
+        block updates the state every tick. The outputs advance the pose of the state to
+        the present angles, without latency. The output velocity is the mean velocity
+        since the last tick. The block does not measure slip.
 
         Args:
             robot: Wheel radius and separation.
-            odometry: ``OdometryParameters``.
-            faults: Faults of the robot; that of ``odometry`` applies.
+            odometry: Pulses of the encoders, and whether angles are rounded.
+            faults: Faults of the robot. The block applies only the fault of
+                ``odometry``.
             plant: Lag of the motors.
-            initial_pose: Known pose (x, y, theta) in W at time zero, m and rad.
+            initial_pose: Known pose (x, y, theta) in the world frame W at time zero, m
+                and rad.
             tick_s: Period of the update, s.
 
         Raises:

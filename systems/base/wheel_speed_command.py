@@ -40,14 +40,15 @@ def clamped_velocity(vx: Any, vy: Any, top_speed: Any) -> Any:
 def integrate_velocity(
     v_WP: Any, acceleration_W: Any, period: Any, top_speed: Any
 ) -> Any:
-    """Computes the velocity of the virtual mass after one period.
+    """Integrates an acceleration command over one period to a velocity command.
 
-    The function limits the velocity, because the velocity is a state that would wind
-    up. Without the limit, v_P would grow until damping D_r balances the pull of the
-    target. With the default gains this speed is 2 m/s per meter of distance.
+    The function limits the velocity so that this state does not wind up. Without the
+    limit, the speed would grow until the damping of the control law balances the pull
+    of the target. With the default gains this speed is 2 m/s per meter of distance.
 
     Args:
-        v_WP: Velocity (vx, vy) in W, m/s; floats or AutoDiffXd.
+        v_WP: Velocity (vx, vy) of the control point P in the world frame W, m/s; floats
+            or AutoDiffXd.
         acceleration_W: Acceleration (ax, ay) in W, m/s^2.
         period: Period, s.
         top_speed: Largest magnitude of the velocity, m/s.
@@ -62,15 +63,17 @@ def integrate_velocity(
 
 @register_jitable
 def hand_position_twist(v_WP: Any, theta: Any, control_point_m: Any) -> Any:
-    """Computes the forward speed and yaw rate that give P the velocity v_WP.
+    """Computes the twist of the body that moves the control point P at a velocity v_P.
 
-    The result is v = v_P . x_B and omega = v_P . y_B / epsilon. It is exact, and it is
-    smooth at standstill.
+    The twist is the forward speed v and the yaw rate omega. The point P is at the
+    distance epsilon ahead of the axle. The body axes are x_B (ahead) and y_B (left).
+    The result is v = v_P . x_B and omega = v_P . y_B / epsilon. The result is exact,
+    and it is smooth at standstill.
 
     Args:
-        v_WP: Velocity (vx, vy) of P in W, m/s; floats or AutoDiffXd.
-        theta: Heading of B in W, rad.
-        control_point_m: Distance epsilon of P ahead of the axle, m.
+        v_WP: Velocity v_P = (vx, vy) in the world frame W, m/s; floats or AutoDiffXd.
+        theta: Heading of the body in W, rad.
+        control_point_m: Distance epsilon, m.
 
     Returns:
         (v, omega), m/s and rad/s.
@@ -81,43 +84,47 @@ def hand_position_twist(v_WP: Any, theta: Any, control_point_m: Any) -> Any:
 
 @register_jitable
 def hand_position_velocity(twist_B: Any, theta: Any, control_point_m: Any) -> Any:
-    """Computes the velocity of P from a twist, the inverse of ``hand_position_twist``.
+    """Computes the velocity of the control point P from a twist of the body.
+
+    This function is the inverse of ``hand_position_twist``.
 
     Args:
-        twist_B: (v, omega), m/s and rad/s; floats or AutoDiffXd.
-        theta: Heading of B in W, rad.
-        control_point_m: Distance epsilon of P ahead of the axle, m.
+        twist_B: Forward speed, m/s, and yaw rate, rad/s, of the body; floats or
+            AutoDiffXd.
+        theta: Heading of the body in the world frame W, rad.
+        control_point_m: Distance of P ahead of the axle, m.
 
     Returns:
-        (vx, vy) of P in W, m/s.
+        Velocity (vx, vy) of P in W, m/s.
     """
     return rotate(theta, twist_B[0], control_point_m * twist_B[1])
 
 
 @register_jitable
 def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
-    """Turns a vector aside if it points straight back.
+    """Turns a vector aside if the vector points straight backward.
 
-    The vector is a wanted velocity of P or a vector from P to its target.
+    The vector is the wanted velocity v_P of the control point P, or the vector from P
+    to the target. P is at the distance epsilon ahead of the axle.
 
     The heading follows theta' = |v_P| sin(psi - theta)/epsilon, where psi is the
     direction of v_P. A heading along v_P is a stable equilibrium. A heading opposite to
-    v_P is an unstable equilibrium. At the unstable equilibrium the robot would drive
-    backward for meters, even into its target, until rounding errors grow. This function
-    points the vector aside, so the body turns around. The method is ours, because the
-    papers do not say how an acceleration becomes wheel speeds.
+    v_P is an unstable equilibrium. There, the robot would drive backward for meters,
+    even into its target, until rounding errors grow. This function points the vector
+    aside, so that the body turns around. The method is ours, because the papers do not
+    say how an acceleration becomes wheel speeds.
 
     Args:
-        x: First component in W, any unit; float or AutoDiffXd.
+        x: First component in the world frame W, any unit; float or AutoDiffXd.
         y: Second component in W, in the same unit.
-        theta: Heading of B in W, rad.
-        least: Backward component up to which a vector does not change, in the unit of
-            x.
+        theta: Heading of the body in W, rad.
+        least: Largest backward component of a vector that is never turned, in the unit
+            of x.
 
     Returns:
-        (x, y) in W. A vector near straight back turns to the side to which it already
-        points, or to the left if it points exactly back. After the turn it is at most
-        5 deg from straight back. All other vectors do not change.
+        (x, y) in W. A vector near straight backward turns toward the side to which it
+        already points. A vector exactly backward turns to the left. After the turn, the
+        vector is at most 5 deg from straight backward. All other vectors do not change.
     """
     along, across = rotate(-theta, x, y)
     aside = _ASIDE * (-along - least)
@@ -128,9 +135,10 @@ def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
 
 @register_jitable
 def limited_wheel_speeds(v: Any, omega: Any, robot: RobotParameters) -> Any:
-    """Computes the wheel speeds. Scales down both if one exceeds the limit.
+    """Computes the wheel speeds for a forward speed and a yaw rate.
 
-    The scaling keeps the curvature omega/v of the path.
+    If one wheel speed exceeds the limit, the function scales down both speeds. The
+    scaling keeps the curvature omega/v of the path.
 
     Args:
         v: Forward speed, m/s; float or AutoDiffXd.
@@ -159,7 +167,8 @@ class CommandNumbers(NamedTuple):
 
     velocity: Callable[..., Any]
     """Function ``velocity(v_WP, command, theta, robot, tick_s)``. It returns the new
-    velocity of P from the last velocity, the command of the law, and the heading."""
+    velocity of the control point P. Its arguments include the last velocity of P, the
+    command of the control law, and the heading."""
     robot: RobotParameters
     tick_s: float
 
@@ -197,8 +206,8 @@ def _at_twist(v_WP, twist_B, theta, robot, tick_s):
     return clamped_velocity(vx, vy, robot.top_speed_m_s)
 
 
-#: Names of the command ports of laws, each of size 2, and for each port the function
-#: ``CommandNumbers.velocity``.
+#: Functions ``CommandNumbers.velocity`` by the name of the control law's command port.
+#: Each port has size 2.
 COMMANDS: Mapping[str, Callable[..., Any]] = {
     "acceleration_W": _accelerated,
     "velocity_W": _at_velocity,
@@ -209,26 +218,30 @@ COMMANDS: Mapping[str, Callable[..., Any]] = {
 @define_for_scalars("WheelCommand_", __name__)
 def WheelCommand_(T):
     class Impl(Block_[T]):
-        """Computes wheel speeds so that P moves according to the command of a law.
+        """Computes the wheel speeds from the command of a control law.
 
-        If the command is an acceleration, the block integrates it to a velocity of the
-        virtual mass at P. If the command is a velocity of P or a twist of the body, the
-        command acts at once. If P would exceed its top speed, the block reduces the
-        speed of P but keeps its direction. For a twist, this reduction keeps the
-        curvature of the path. If a wheel would exceed its limit, the block scales down
-        both wheel speeds, which keeps the curvature of the path.
+        The law moves the control point P, which is at a fixed distance ahead of the
+        axle. The command has one of three kinds:
 
-        The discrete state has the velocity of P and the wheel speeds, which are the
-        outputs. It is updated every tick. An update at the time t uses the inputs at t
-        and acts from t on. The latency from an echo to the wheels is 0 ms. The latency
-        from the end of an audio frame to the wheels is one tick, which the estimator
-        needs. There is no feedthrough.
+        - Acceleration of P: the block integrates the command to a velocity of P.
+        - Velocity of P: the command acts at once.
+        - Twist (forward speed and yaw rate) of the body: the command acts at once.
+
+        If P would exceed its top speed, the block reduces the speed of P and keeps its
+        direction. If a wheel would exceed its top speed, the block scales down both
+        wheel speeds. Both reductions keep the curvature of the body's path.
+
+        The discrete state has the velocity of P and the wheel speeds. They are the
+        outputs, so there is no feedthrough. The block updates the state every control
+        period (tick). An update at the time t uses the inputs at t and acts from t on.
+        The latency from an echo to the wheels is 0 ms. The latency from the end of an
+        audio frame to the wheels is one tick, which the sound-source estimator needs.
 
         Args:
             command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or
                 ``twist_B``.
             robot: Dimensions and top speed.
-            tick_s: Period of the command, s.
+            tick_s: Control period, s.
 
         Reference: ours. The papers do not say how an acceleration becomes wheel speeds.
         """

@@ -1,1 +1,1 @@
-"""Delays between channels: spectra, correlations, peaks, and errors."""
+"""Delays between channels of audio: spectra, correlations, peaks, and errors."""

@@ -1,8 +1,9 @@
-"""Finds channels that repeat another channel.
+"""Finds channels of a recording that repeat another channel.
 
 Two microphones may record the same sound at the same time. However, the noise of each
 microphone and of its converter is different. Two real channels therefore differ by at
-least this noise, even after the best gain and delay (whole samples) are applied.
+least this noise. The difference remains after the best gain and the best delay in whole
+samples are applied.
 """
 
 from __future__ import annotations
@@ -17,27 +18,31 @@ from scipy import fft
 
 from systems.framework.compiling import njit
 
-# Limits of the mean square difference between a channel and its copy. _ROUNDING is a
-# share of the squared step between two sample values. Rounding causes 1/12 of it.
-# _EXACT_SHARE is a share of the power of the copy. The larger limit counts.
+# The mean square difference between a channel and its copy is below the larger of two
+# limits.
+# First limit, as a share of the squared step between two sample values. Rounding alone
+# causes a share of 1/12.
 _ROUNDING = 0.1
+# Second limit, as a share of the power of the copy.
 _EXACT_SHARE = 1e-6
 
-# In any case, the difference must be below this share of the power of the copy, so that
-# an almost silent channel is no copy.
+# The mean square difference must also be below this share of the power of the copy. An
+# almost silent channel is therefore no copy.
 _LIKE_SHARE = 0.01
 
-# Two inputs of one microphone differ by the noise of their converters. During a sound,
-# their difference is below the share _SHARED_SOUND of its power. In a pause, their
-# difference is below the share _SHARED_PAUSE of the power in the pause. A pause has
-# less than the share _PAUSE of the power of the sound.
+# Two inputs of one microphone differ by the noise of their converters. Three limits
+# apply to this difference:
+# - _SHARED_SOUND: largest share of the power of a sound, during the sound.
+# - _SHARED_PAUSE: largest share of the power in a pause, during the pause.
+# - _PAUSE: largest ratio of the power in a pause to the power of a sound.
 _SHARED_SOUND, _SHARED_PAUSE, _PAUSE = 1e-3, 0.02, 0.01
 
-# First, only _PROBE samples in the middle of a frame are compared, which excludes most
-# pairs. The limit of their difference is _PROBE_MARGIN times that of the whole frame.
+# First, only _PROBE samples in the middle of a frame are compared. This comparison
+# excludes most pairs. The limit of the difference is _PROBE_MARGIN times the limit for
+# the whole frame.
 _PROBE, _PROBE_MARGIN = 128, 4.0
 
-# Lengths of the two sections that are examined, the loudest and the quietest one, s.
+# Length of the loudest section that is examined, then length of the quietest one, s.
 _LOUD_S, _PAUSE_S = 0.25, 0.05
 
 
@@ -47,17 +52,17 @@ def repeats(
     lag: int,
     step: float,
 ) -> bool:
-    """Returns whether one channel equals another one except for a gain and rounding.
+    """Returns whether one channel equals another channel, apart from gain and rounding.
 
     Args:
-        first: (n,) samples.
-        second: (n,) samples.
+        first: (n,) samples of the first channel.
+        second: (n,) samples of the second channel.
         lag: Delay of the second channel, samples.
         step: Smallest difference between two values of a sample, in the unit of the
             samples.
 
     Returns:
-        True if rounding explains the difference after the best gain.
+        True if rounding explains the difference that remains after the best gain.
     """
     left, power, other = _difference(first, second, lag)
     return bool(_is_copy(left, power, other, _ROUNDING * step**2))
@@ -71,17 +76,20 @@ def frame_repeats(
     *,
     noisy: bool,
 ) -> bool:
-    """Returns whether a channel of a frame repeats another one, with or without a lag.
+    """Returns whether a channel of an audio frame repeats another channel.
+
+    The repetition may have a lag.
 
     Args:
         frame: (n, samples) channels; integers are counts.
         pairs: (p, 2) channels to compare.
-        later: (n - 1,) delays of the channels relative to channel 0, samples.
-        at_once: (p,) whether to compare each pair at lag 0. It is False if the two
-            microphones may record the same signal at the same time.
+        later: (n - 1,) delays of the channels 1 ... n - 1 relative to channel 0,
+            samples.
+        at_once: (p,) Boolean values: whether to compare each pair at lag 0. The value
+            is False if the two microphones may record the same signal at the same time.
         noisy: Whether the frames contain noise. Without noise, a sound that arrives
-            later by whole samples looks like a copy, so pairs are compared only at lag
-            0.
+            later by whole samples looks like a copy. In this case, pairs are compared
+            only at lag 0.
 
     Returns:
         True if at least one pair contains a copy.
@@ -134,18 +142,18 @@ def _is_copy(
 def copied_pairs(
     samples: NDArray[np.float64], sample_rate_hz: float
 ) -> list[tuple[int, int]]:
-    """Finds the pairs of channels that repeat each other.
+    """Finds the pairs of channels of a recording that repeat each other.
 
     Each pair is compared at the lag of its highest correlation. A pair repeats if the
-    channels differ only by rounding in the loudest section. If the recording has a
-    pause, the function also finds two inputs of one microphone.
+    two channels differ only by rounding in the loudest section. If the recording has a
+    pause, the function also finds pairs that are two inputs of one microphone.
 
     Args:
         samples: (n, samples) channels that are not silent, without NaN.
         sample_rate_hz: Rate of the samples, Hz.
 
     Returns:
-        Channel numbers (i, j) of each such pair, counted from 0, with i < j.
+        Channel numbers (i, j) of each pair that repeats, counted from 0, with i < j.
     """
     loud, most = _block(samples, _LOUD_S, sample_rate_hz, np.argmax)
     pause, least = _block(samples, _PAUSE_S, sample_rate_hz, np.argmin)
@@ -176,12 +184,20 @@ def _block(
     sample_rate_hz: float,
     choose: Callable[[NDArray[np.float64]], np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Chooses a section by its power, and returns it with the power of each channel.
+    """Chooses a section of a recording by its power.
 
-    Sections in which a channel is constant (digital silence) are not chosen.
+    The function does not choose a section in which a channel is constant (digital
+    silence).
+
+    Args:
+        samples: (n, samples) channels.
+        seconds: Length of the section, s.
+        sample_rate_hz: Rate of the samples, Hz.
+        choose: Function that returns the index of the chosen section from the powers of
+            all sections.
 
     Returns:
-        (n, size) samples and (n,) power.
+        (n, size) samples of the section, and the (n,) powers of its channels.
     """
     size = min(round(seconds * sample_rate_hz), samples.shape[1])
     count = samples.shape[1] // size
@@ -210,11 +226,11 @@ def _shares(block: NDArray[np.float64], i: int, j: int, lag: int) -> float:
 def _difference(
     first: NDArray[Any], second: NDArray[Any], lag: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Computes how much the second channel differs from the first one.
+    """Computes how much the second channel differs from the first channel.
 
     Returns:
-        Variances of the difference after the best gain, of the second channel, and of
-        the first channel.
+        Three variances: of the difference after the best gain, of the second channel,
+        and of the first channel.
     """
     begin, end = max(0, lag), min(second.size, second.size + lag)
     count = end - begin

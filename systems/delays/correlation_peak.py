@@ -1,7 +1,7 @@
-"""Computes the peaks of weighted cross-correlations and their errors from spectra.
+"""Computes the peaks of weighted cross-correlations, and the errors of the peaks.
 
-All compiled functions that call each other are in this file. The cache of numba does
-not notice changes of functions in other files.
+The input is the cross-spectra of the channels. All compiled functions that call each
+other are in this file.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-# Largest number of steps. The search ends when a step is below _TOLERANCE samples.
+# Largest number of Newton steps.
 _ITERATIONS = 10
+# Step below which the search ends, samples.
 _TOLERANCE = 1e-6
 
 # Variance of an arrival due to rounding to whole samples, samples^2. The delay of a
@@ -32,10 +33,11 @@ def _turned(
     real: NDArray[np.float64],
     imaginary: NDArray[np.float64],
 ) -> None:  # pragma: no cover  (compiled)
-    """Computes real and imaginary part of a cross-spectrum (n,) times exp(j w t).
+    """Multiplies a cross-spectrum (n,) by exp(j w t), where w is the angular frequency.
 
-    Sines and cosines are evaluated only for bins whose number is a power of two. Sums
-    and products give the sines and cosines of the other bins.
+    The results are the real part and the imaginary part of the product. The function
+    evaluates sines and cosines only for bins whose number is a power of two. For the
+    other bins, it computes them from sums and products.
     """
     bins = cross.size
     cosine, sine = np.empty(bins), np.empty(bins)
@@ -63,8 +65,10 @@ def _slope_and_curve(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Computes the first and the negative second derivative of a correlation.
 
+    Let z be the cross-spectrum, W the weights, and w the angular frequency.
+
     Returns:
-        Sums of -w W Im(z) and of w^2 W Re(z).
+        Two sums over the bins: of -w W Im(z), and of w^2 W Re(z).
     """
     slope, curve = 0.0, 0.0
     for k in range(real.size):
@@ -107,20 +111,22 @@ def _refine(
 ]:  # pragma: no cover  (compiled)
     """Refines the peaks of weighted cross-correlations by Newton's method.
 
-    The function also computes sums for the errors of the peaks.
+    The function also computes sums for the errors of the peaks. In these sums, z is the
+    cross-spectrum after removal of the delay tau, W is the weight, and w is the angular
+    frequency.
 
     Args:
-        cross: (p, n) cross-spectra of the pairs.
+        cross: (p, n) cross-spectra of p pairs of channels.
         weights: (p, n) weights W.
         first: Angular frequency w of the first bin, rad per sample.
         step: Step of w from bin to bin, rad per sample.
         start: (p,) delays where the search begins, samples.
-        newton: Whether to search; otherwise the delays stay at ``start``.
+        newton: Whether to search. Otherwise the delays stay at ``start``.
 
     Returns:
-        (p,) delays tau, samples. Let z be the cross-spectrum after removal of tau. The
-        other results are (p,) sums of Re(z); (p,) ratios of the sum of W Re(z) to the
-        sum of W |z|; and (p, 3) sums of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
+        Four arrays. The first is the (p,) delays tau, samples. The second is the (p,)
+        sums of Re(z). The third is the (p,) ratios of the sum of W Re(z) to the sum of
+        W |z|. The fourth is the (p, 3) sums of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
     """
     pairs, bins = cross.shape
     tau, plain, agreement = np.empty(pairs), np.empty(pairs), np.empty(pairs)
@@ -158,10 +164,12 @@ def _arrival_variances(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the (n,) variance of each channel's time of arrival, samples^2.
 
-    Let n be the power of the noise per bin and s that of the signal. The variance of a
-    correlation's peak is sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W
-    s)^2. For equal weights and much signal, this is the bound of Knapp and Carter
-    (1976). The powers of each channel follow from the coherences of its pairs.
+    Each channel i has the noise power n_i and the signal power s_i per bin. The signal
+    power s of a pair is the geometric mean of the powers s_i and s_j. Let w be the
+    angular frequency and W the weight. The variance of the peak of a correlation is sum
+    w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2. For equal weights and
+    much signal, this is the bound of Knapp and Carter (1976). The coherences of the
+    pairs give the powers of each channel.
     """
     channels = energy.size
     # Share q of signal in the energy of each channel, from the coherences r.
@@ -192,11 +200,11 @@ def _reconcile(
     to_delays: NDArray[np.float64],
     reconciled: NDArray[np.float64],
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the arrivals that fit all delays best by least squares.
+    """Computes the arrival times that fit all delays best by least squares.
 
     Returns:
-        Largest change of an arrival, and largest disagreement between a delay and the
-        arrivals, samples.
+        Two values, samples: the largest change of an arrival, and the largest
+        disagreement between a delay and the arrivals.
     """
     moved, closure = 0.0, 0.0
     reconciled[0] = 0.0
@@ -223,21 +231,21 @@ def measure_peaks(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], float, float, float, float, float
 ]:  # pragma: no cover  (compiled)
-    """Computes the fields of ``Peaks``; without a peak, the correlation is 0.
+    """Computes the fields of ``Peaks``. If a pair has no peak, the correlation is 0.
 
     Args:
-        cross: (p, bins) cross-spectra of the pairs, units of the frame squared.
-        weights: (p, bins) weights.
-        energy: (n,) energies of the channels, units of the frame squared.
-        arrivals: (n,) arrivals to start from, see ``find_peaks``, samples.
-        tables: ``PairTables``.
-        sizes: First bin; length of the transform, samples; and length of the cut
-            channels minus the loss at their soft edges, samples.
+        cross: (p, bins) cross-spectra of the pairs, units of the audio frame squared.
+        weights: (p, bins) weights of the cross-spectra.
+        energy: (n,) energies of the channels, units of the audio frame squared.
+        arrivals: (n,) times of arrival to start from, see ``find_peaks``, samples.
+        tables: Pairs of channels and their matrices, see ``PairTables``.
+        sizes: Three numbers: the first bin; the length of the transform, samples; and
+            the length of the cut channels minus the loss at their soft edges, samples.
         newton: See ``find_peaks``.
 
     Returns:
-        (n,) arrivals, samples; their (n - 1, n - 1) covariance, samples^2; and the
-        floats ``correlation`` to ``closure``, in the order of ``Peaks``.
+        (n,) times of arrival, samples; their (n - 1, n - 1) covariance, samples^2; and
+        the fields ``correlation`` to ``closure`` of ``Peaks``, in their order.
     """
     pairs, to_delays, to_shares = tables
     first, length, cut_samples = sizes

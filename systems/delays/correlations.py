@@ -1,4 +1,4 @@
-"""Correlations of channels from their cross-spectra."""
+"""Computes correlations of channels from their cross-spectra."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-# The whitened spectrum decreases to zero where the cross-spectrum is below this share
-# of its mean. Otherwise bins of noise would count as much as bins of sound.
+# Share of the mean of the cross-spectrum. Where the cross-spectrum is below this share,
+# the whitened spectrum decreases to zero. Otherwise bins of noise would count as much
+# as bins of sound.
 _PHAT_FLOOR = 0.1
 
 
@@ -23,13 +24,13 @@ def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
 def correlations_at_lags(
     cross: NDArray[Any], band: slice, length: int, reach: int
 ) -> NDArray[Any]:
-    """Computes the correlations of pairs of channels up to a lag.
+    """Computes the correlations of pairs of channels up to a largest lag.
 
     Args:
         cross: (p, bins) cross-spectra within the band, single or double precision.
         band: Bins of the transform that ``cross`` contains. All other bins are zero.
-        length: Length of the transform, columns.
-        reach: Largest lag in either direction, columns.
+        length: Length of the transform, in columns of the result.
+        reach: Largest lag in either direction, in columns of the result.
 
     Returns:
         (p, 2 reach + 1) correlations of the same precision. Lag 0 is in the middle.

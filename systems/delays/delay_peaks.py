@@ -1,4 +1,4 @@
-"""Sub-sample peaks of the cross-correlations of channels, and their errors."""
+"""Finds sub-sample peaks of the cross-correlations of channels, and their errors."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def _pair_spectra(
     """Computes the cross-spectra of pairs of channels.
 
     Returns:
-        (p, bins) cross-spectra, (p, bins) weights of 1, and (n,) energies of the
-        channels.
+        Three arrays: (p, bins) cross-spectra, (p, bins) weights, which are all 1, and
+        (n,) energies of the channels.
     """
     channels, bins = spectra.shape
     energy = np.zeros(channels)
@@ -49,9 +49,10 @@ class PairTables(NamedTuple):
     """(n - 1, p) matrix that converts the delays of all pairs to the delays t_k - t_0
     by least squares."""
     to_shares: NDArray[np.float64]
-    """(n, p) matrix that converts logarithms by least squares, from the coherences of
-    the pairs to the shares of signal in the channels. A coherence is the geometric mean
-    of two shares. The conversion is exact for three channels."""
+    """(n, p) matrix that computes the shares of signal in the channels from the
+    coherences of the pairs. The matrix converts logarithms, by least squares. A
+    coherence is the geometric mean of two shares. The result is exact for three
+    channels."""
 
     @classmethod
     def of(cls, pairs: NDArray[np.int64]) -> PairTables:
@@ -71,7 +72,7 @@ class Peaks(NamedTuple):
     """Peaks of the correlations of all pairs."""
 
     arrivals: NDArray[np.float64]
-    """(n,) arrivals relative to channel 0 that fit all delays, samples."""
+    """(n,) times of arrival relative to channel 0 that fit all delays, samples."""
     covariance: NDArray[np.float64]
     """(n - 1, n - 1) covariance of the arrivals at channels 1 ... n - 1, samples^2."""
     correlation: float
@@ -80,8 +81,8 @@ class Peaks(NamedTuple):
     """Root mean square angular frequency of the sound that two channels share, rad per
     sample. It is the least value of all pairs."""
     noise_energy: float
-    """Energy within the band that a channel does not share with the other channels,
-    averaged over the channels, units of the frame squared."""
+    """Energy in a channel that the other channels do not share. It is taken within the
+    band and averaged over the channels, units of the frame squared."""
     moved: float
     """Largest difference between an arrival and the given one, samples."""
     closure: float
@@ -102,10 +103,10 @@ def find_peaks(
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrivals to start from, relative to channel 0, samples.
+        arrivals: (n,) times of arrival to start from, relative to channel 0, samples.
         tables: The pairs of channels.
-        length: Length of the Fourier transform, at least that of the frame.
-        band: Bins to use.
+        length: Length of the Fourier transform, at least that of the audio frame.
+        band: Bins of the transform to use.
         phat: Whether to whiten the cross-spectra.
         newton: Whether to refine the delays between samples by Newton's method.
 

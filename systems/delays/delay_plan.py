@@ -1,4 +1,4 @@
-"""Sizes of the transforms and pairs of channels for the measurement of delays."""
+"""Plans the measurement of delays: sizes of transforms, and pairs of channels."""
 
 from __future__ import annotations
 
@@ -20,14 +20,16 @@ _GRID_DENSITY = 5.0
 # The length of the transform is a multiple of this.
 _TWOS = 256
 
-# Least share of a frame that must remain after the cut. Longer delays cannot be
-# measured.
+# Least share of a frame that must remain after the channels are cut to their common
+# section. Delays that leave less cannot be measured.
 _LEAST_OVERLAP = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class DelayPlan:
-    """Quantities that can be computed before the first frame.
+    """Constants of the measurement of delays between channels of audio frames.
+
+    The constants are computed before the first frame.
 
     Raises:
         InputError: The band does not fit the sample rate, or the frames are too short
@@ -73,8 +75,8 @@ class DelayPlan:
         """(n - 1, 2) pairs of channels that form a tree from channel 0 to all channels.
 
         The microphones of each pair are close to each other, so that there are few lags
-        to search. The first channel of an edge is channel 0 or the second channel of an
-        earlier edge.
+        to search. The first channel of a pair is channel 0 or the second channel of an
+        earlier pair. The pairs are called the edges of the tree.
         """
         places = self.shape.p_AM
         gaps = np.linalg.norm(places[:, np.newaxis] - places, axis=2)

@@ -1,8 +1,9 @@
-"""Detects a sound in a frame and finds first values of its delays.
+"""Detects a sound in a frame of audio and finds first values of its delays.
 
-Noise in different channels is independent, whatever its color. The correlation of such
-channels at a lag is Gaussian, and the spectra of the channels give its variance. The
-height of the highest peak therefore gives the probability that noise alone reaches it.
+The noises of different channels are independent, whatever their color. The correlation
+of two noise channels at a lag is Gaussian. The spectra of the channels give its
+variance. The height of the highest peak therefore gives the probability that noise
+alone reaches this height.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from systems.framework.compiling import njit
 # Largest coherence that is assumed, because there is always some noise.
 _WHOLE = 0.99
 
-# Noise is assumed never to reach this height, standard deviations of the noise.
+# Height that noise is assumed never to reach, standard deviations of the noise.
 _HIGHEST = 38.0
 
 
@@ -31,13 +32,13 @@ class DelaySearch(NamedTuple):
     arrivals: NDArray[np.float64]
     """(n,) arrivals relative to channel 0, samples."""
     ambiguity: float
-    """Ratio of the second peak to the highest peak within the gate, 0 to 1. It is the
-    largest ratio of all edges of the plan."""
+    """Ratio of the second peak to the highest peak among the allowed lags, 0 to 1. It
+    is the largest ratio of all edges (pairs of channels) of the plan."""
     chance: float
     """Probability that noise alone has peaks as high as those of all edges."""
     weakest: float
-    """Probability that noise alone has a peak as high as the lowest peak of all edges.
-    It is near 1 if the sound has not reached all channels yet."""
+    """Probability that noise alone has a peak as high as the lowest peak of all edges
+    (pairs of channels). It is near 1 if the sound has not reached all channels yet."""
     energy: float
     """Energy of a channel within the band, averaged over the channels, units of the
     frame squared."""
@@ -50,13 +51,16 @@ def amdf(
     """Computes the average magnitude difference of two channels (Han 2019, eq. 4-6).
 
     The papers maximize 1 / sum_k |x_i(k) - x_j(k + lag)| over lag = 0 ... n-1. This
-    function differs in three ways. It returns the sum itself, so that equal signals
-    cause no division by zero. It includes both signs of the lag. It divides the sum by
-    the number of its terms, because the printed sum favors large lags.
+    function differs from the papers in three ways:
+
+    - It returns the sum itself, so that equal signals cause no division by zero.
+    - It includes both signs of the lag.
+    - It divides the sum by the number of its terms, because the printed sum favors
+      large lags.
 
     Args:
-        x_i: (n,) samples.
-        x_j: (n,) samples.
+        x_i: (n,) samples of channel i.
+        x_j: (n,) samples of channel j.
         max_lag: Largest lag, below n.
 
     Returns:
@@ -78,10 +82,10 @@ def amdf(
 def _peak(
     values: NDArray[Any],
 ) -> tuple[np.intp, float]:  # pragma: no cover  (compiled)
-    """Finds the highest value, and the ratio of the second peak to the highest one.
+    """Finds the highest value, and the ratio of the second peak to the highest peak.
 
-    The main lobe ends on each side where the values are at most half the peak. If the
-    highest value is at a border, it is no peak, and the ratio is 1.
+    On each side, the main lobe ends where the values are at most half the highest
+    value. If the highest value is at a border, it is no peak, and the ratio is 1.
     """
     best = np.argmax(values)
     top = values[best]
@@ -105,14 +109,15 @@ def _cross_spectra(
 ) -> tuple[
     NDArray[np.complex64], NDArray[np.float64], float
 ]:  # pragma: no cover  (compiled)
-    """Computes the cross-spectra of the edges.
+    """Computes the cross-spectra of pairs of channels (edges).
 
     The spectra begin at the bin ``first``. All other bins of the cross-spectra are
     zero.
 
     Returns:
-        (e, size) cross-spectra C; (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins
-        k; and the mean energy of the channels, which is 0 if a channel is silent.
+        Three values. The first is the (e, size) cross-spectra C. The second is the (e,
+        2) sums of |C|^2 and of k^2 |C|^2 over the bins k. The third is the mean energy
+        of the channels, which is 0 if a channel is silent.
     """
     channels, bins = spectra.shape
     cross = np.zeros((len(edges), size), dtype=spectra.dtype)
@@ -136,10 +141,10 @@ def _cross_spectra(
 def _gated_peak(
     correlation: NDArray[np.float32], gate: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Finds the highest peak within the gate.
+    """Finds the highest peak of a correlation among the lags from -gate to gate.
 
     Returns:
-        Lag of the highest peak, samples; ratio of the second peak to the highest one;
+        Lag of the highest peak, samples; ratio of the second peak to the highest peak;
         and height of the highest peak.
     """
     gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
@@ -159,13 +164,17 @@ def _gated_peak(
 def _chance_of_noise(
     heights: NDArray[np.float64], counts: NDArray[np.float64]
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the probabilities that noise reaches all peaks, and the lowest peak.
+    """Computes the probabilities that noise alone reaches peaks of given heights.
 
     Args:
         heights: (e,) heights of the peaks, in standard deviations of the noise.
-        counts: (e,) expected number of upward zero crossings of noise within the gate.
-            At the height z, the number of crossings is smaller by the factor
+        counts: (e,) expected number of upward zero crossings of noise among the allowed
+            lags. At the height z, the number of crossings is smaller by the factor
             exp(-z^2 / 2) (Rice 1944).
+
+    Returns:
+        Probability that noise reaches all peaks, and probability that it reaches the
+        lowest peak.
     """
     log_product, weakest = 0.0, 0.0
     for e in range(heights.size):
@@ -193,20 +202,24 @@ def _judge(
     padding: float,
     stretch: float,
 ) -> tuple[NDArray[np.float64], float, float, float]:  # pragma: no cover  (compiled)
-    """Computes arrivals, ambiguity, chance and weakest of ``DelaySearch``.
+    """Computes the fields arrivals, ambiguity, chance and weakest of ``DelaySearch``.
 
-    The highest peak in the correlation of each edge gives the lag of the edge. The sums
-    of the lags along the tree give the arrivals. The heights of the peaks relative to
-    the noise give the chance.
+    An edge is a pair of channels. The highest peak in the correlation of each edge
+    gives the lag of the edge. The edges form a tree, and the sums of the lags along the
+    tree give the arrivals. The heights of the peaks relative to the noise give the
+    chance.
 
     Args:
         cross: (e, grid // 2 + 1) cross-spectra of the edges.
         grid: Number of samples of each correlation.
         moments: (e, 2) sums of ``_cross_spectra``.
-        edges: (e, 2) channels of each edge. The edges form a tree.
+        edges: (e, 2) channels of each edge.
         gates: (e,) largest lags, samples of the correlation.
-        padding: Length of the transform divided by the length of the frame.
+        padding: Length of the transform divided by the length of the audio frame.
         stretch: Samples of the frame per sample of the correlation.
+
+    Returns:
+        The four fields, in the order above.
     """
     count = len(cross)
     correlation = np.empty((count, grid), dtype=np.float32)
@@ -229,16 +242,17 @@ def _judge(
 
 
 def weakest_sound(plan: DelayPlan, rate: float) -> float:
-    """Computes the level of the weakest sound that is distinguished from noise.
+    """Computes the level of the weakest sound that can be distinguished from noise.
 
-    A sound with the spectrum of the noise is the easiest to detect. It has the highest
-    correlation relative to noise of all sounds with the same energy (Cauchy-Schwarz).
-    The weakest sound that can be detected therefore has this spectrum.
+    The easiest sound to detect has the spectrum of the noise. This sound has the
+    highest correlation relative to noise of all sounds with the same energy
+    (Cauchy-Schwarz inequality). The weakest sound that can be detected therefore has
+    this spectrum.
 
     Args:
         plan: Rates, band and array.
-        rate: A correlation counts as a sound if noise reaches it with at most this
-            probability.
+        rate: Probability. A correlation counts as a sound if noise reaches it with at
+            most this probability.
 
     Returns:
         Ratio of the energy of the sound to the energy of the noise, within the band.
@@ -303,7 +317,7 @@ def search_delays(
     phat: bool = False,
     by_amdf: bool = False,
 ) -> DelaySearch | None:
-    """Searches for a sound in a frame.
+    """Searches a frame of audio for a sound.
 
     Args:
         frame: (n, frame_samples) channels, any unit.
@@ -311,11 +325,11 @@ def search_delays(
         plan: Rates and array.
         band: Bins of the transform that ``spectra`` contains.
         phat: Whether to whiten the cross-spectra.
-        by_amdf: Whether ``amdf`` gives the delays. Detection uses the correlation in
-            any case.
+        by_amdf: Whether ``amdf`` gives the delays. The detection always uses the
+            correlation.
 
     Returns:
-        First values of the arrivals, samples, and measures of their reliability; None
+        First values of the arrivals, samples, and measures of their reliability. None
         if a channel is silent.
     """
     size = plan.grid // 2 + 1

@@ -4,10 +4,11 @@ Independent sounds add up in the correlations. Each sound has a peak in the corr
 of every pair of channels. The height of the peak is the sound's share of the power. The
 lags of one sound add up to zero around every triangle of channels.
 
-In a room, each channel contains the direct sound and its echoes. The correlation of two
-channels has a peak for every pair of these arrivals. The peak of an echo may be the
-highest. The lags of the direct sound are consistent: the lag from channel i to k is the
-sum of the lags from i to j and from j to k.
+In a room, each channel contains the direct sound and its echoes. Each of these arrivals
+in one channel correlates with each arrival in the other channel. The correlation of two
+channels therefore has many peaks. The peak of an echo may be the highest. The lags of
+the direct sound are consistent: the lag from channel i to k is the sum of the lags from
+i to j and from j to k.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from systems.delays.delay_search import DelaySearch
 from systems.delays.delays import DelayEstimate, settled_delays
 from systems.delays.transforms import transform_rows
 
-# Largest number of peaks per pair, and of sets of lags, that the search keeps.
+# Largest number of peaks per pair, then largest number of sets of lags, that the search
+# keeps.
 _PEAKS, _SETS = 12, 48
 
 # Two sets are different if one of their lags differs by more than _APART columns. Lags
@@ -39,10 +41,10 @@ def estimate_delay_sets(
     seen: tuple[DelaySearch, slice],
     count: int,
 ) -> list[DelayEstimate]:
-    """Measures the delays of the sounds of a frame.
+    """Measures the delays of the sounds of an audio frame, one set of delays per sound.
 
-    The set with the greatest sum of correlations is found and refined. Its peaks are
-    then removed, and the search is repeated.
+    The function finds and refines the set with the greatest sum of correlations. It
+    then removes the peaks of this set and repeats the search.
 
     Args:
         frame: (n, frame_samples) channels, any unit.
@@ -52,8 +54,8 @@ def estimate_delay_sets(
         count: Number of sets to search for.
 
     Returns:
-        At most ``count`` estimates, the one with the greatest sum of correlations
-        first. The other sounds count as noise in the errors of each estimate.
+        At most ``count`` estimates. The estimate with the greatest sum of correlations
+        is first. In the errors of each estimate, the other sounds count as noise.
     """
     search, band = seen
     correlations, middle = _correlations(frame, plan, band)
@@ -92,7 +94,7 @@ def _correlations(
     """Computes the whitened correlations of all pairs on the grid of the plan.
 
     Returns:
-        (p, 2 m + 1) correlations, and m, which is the column of lag 0.
+        (p, 2 m + 1) correlations, and m, the index of the column of lag 0.
     """
     spectra = transform_rows(frame, plan.length)[:, band]
     i, j = plan.shape.pairs.T
@@ -111,13 +113,14 @@ def consistent_lags(
 ) -> list[NDArray[np.int64]]:
     """Finds the sets of lags with the greatest sum of correlations over all pairs.
 
-    The channels are added one after another. Each set is combined with each peak of the
-    next channel, and the best combinations are kept.
+    The function adds the channels one after another. It combines each set with each
+    peak of the next channel, and keeps the best combinations. The unit of a lag is one
+    column of the correlations.
 
     Args:
-        correlations: (p, 2 m + 1) correlation of each pair; lag 0 is in the middle.
-        pairs: (p, 2) channels i < j of n.
-        reach: (p,) longest lag of each pair in either direction, columns, at most m.
+        correlations: (p, 2 m + 1) correlation of each pair. Lag 0 is in the middle.
+        pairs: (p, 2) pairs i < j of the n channels.
+        reach: (p,) longest lag of each pair in either direction, at most m columns.
         count: Largest number of sets.
 
     Returns:

@@ -1,10 +1,13 @@
-"""Measures the delays between the channels of a frame.
+"""Measures the delays between the channels of a frame of audio.
 
-First, a search on a grid finds the delays between close microphones. The channels are
-then cut to the section that they share, so that the edges of the frame do not shift the
-result.
-Newton's method on the cross-spectrum finds the peak of the correlation of each pair.
-The coherence of the cut channels gives the errors of the delays.
+The measurement has four steps:
+
+1. A search on a grid finds the delays between close microphones.
+2. The channels are cut to the section that they share, so that the edges of the frame
+   do not shift the result.
+3. Newton's method on the cross-spectrum finds the peak of the correlation of each pair
+   of channels.
+4. The coherence of the cut channels gives the errors of the delays.
 """
 
 from __future__ import annotations
@@ -20,9 +23,9 @@ from systems.delays.delay_search import DelaySearch, search_delays
 from systems.delays.occupied_band import occupied_band
 from systems.delays.transforms import transform_rows
 
-# The channels are cut again if an arrival changes by _SETTLED samples or more. They are
-# cut at most _CUTS times.
+# Change of an arrival from which on the channels are cut again, samples.
 _SETTLED = 0.75
+# Largest number of cuts.
 _CUTS = 4
 
 
@@ -55,16 +58,16 @@ class DelayEstimate(NamedTuple):
     closure: float
     """Largest disagreement between the delay of a pair and ``tau``, s."""
     ambiguity: float
-    """Ratio of the second peak to the highest peak within the gate, 0 to 1. It is the
-    largest ratio of all edges of the plan."""
+    """Ratio of the second peak to the highest peak among the allowed lags, 0 to 1. It
+    is the largest ratio of all edges (pairs of channels) of the plan."""
     chance: float
     """Probability that noise alone has peaks as high as those of all edges."""
     angular_frequency: float
     """Root mean square angular frequency of the sound that the channels share,
     rad/s."""
     noise_energy: float
-    """Energy within the band that a channel does not share with the other channels,
-    averaged over the channels, units of the frame squared."""
+    """Energy in a channel that the other channels do not share. It is taken within the
+    band and averaged over the channels, units of the frame squared."""
     band: slice
     """Bins of the plan's transform that were used."""
 
@@ -76,16 +79,17 @@ def look(
     *,
     find_band: bool = False,
 ) -> tuple[DelaySearch, slice] | None:
-    """Searches a frame for a sound.
+    """Searches a frame of audio for a sound.
 
     Args:
         frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
         method: A key of METHODS.
-        find_band: Whether to use only the occupied part of the band.
+        find_band: Whether to use only the part of the band that the sound occupies.
 
     Returns:
-        The search and the bins that it used, or None if a channel is silent.
+        Result of the search, and the bins that the search used. None if a channel is
+        silent.
     """
     chosen = METHODS[method]
     spectra = transform_rows(frame, plan.length)[:, plan.band]
@@ -108,18 +112,18 @@ def estimate_delays(
     find_band: bool = False,
     seen: tuple[DelaySearch, slice] | None = None,
 ) -> DelayEstimate | None:
-    """Measures the delays of a frame.
+    """Measures the delays between the channels of an audio frame.
 
     Args:
         frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
         method: A key of METHODS.
-        find_band: Whether to use only the occupied part of the band.
-        seen: Result of ``look`` for this frame, if there is one.
+        find_band: Whether to use only the part of the band that the sound occupies.
+        seen: Result of ``look`` for this frame, if it is known.
 
     Returns:
-        The estimate, whatever its reliability. None if a channel is silent or the
-        correlation has no peak within the gate.
+        The estimate, whatever its reliability. None if a channel is silent, or if the
+        correlation of a pair has no peak among the allowed lags.
     """
     seen = seen or look(frame, plan, method, find_band=find_band)
     return None if seen is None else settled_delays(frame, plan, method, seen)
@@ -131,13 +135,14 @@ def settled_delays(
     method: str,
     seen: tuple[DelaySearch, slice],
 ) -> DelayEstimate | None:
-    """Measures the delays of a frame near those of a search.
+    """Measures the delays of an audio frame near the delays that a search has found.
 
     Args:
         frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
         method: A key of METHODS.
-        seen: Result of ``look``, or a copy of it with other arrivals to start from.
+        seen: Result of ``look``, or a copy of this result with other arrivals to start
+            from.
 
     Returns:
         The estimate or None, as for ``estimate_delays``.

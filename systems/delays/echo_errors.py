@@ -1,4 +1,4 @@
-"""Errors of delays due to echoes that remain after their suppression."""
+"""Computes errors of delays due to echoes that remain after their suppression."""
 
 from __future__ import annotations
 
@@ -9,34 +9,36 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-# Echoes that remain are mainly reflections off the floor. They shift each arrival
-# independently (standard deviation ``_ARRIVAL_S``) and turn the whole direction
-# (standard deviation ``_DIRECTION_RAD``). These values apply if at least the share
-# ``_NEWS`` of a frame's energy is no echo. For smaller shares, the errors are larger.
-# All values are from the trials in rooms, docs/results_hearing.md.
+# Echoes that remain are mainly reflections off the floor. The values below are from the
+# trials in rooms, docs/results_hearing.md.
+# Standard deviation of the independent shift of each arrival by echoes, s.
 _ARRIVAL_S = 1.2e-6
+# Standard deviation of the turn of the whole direction by echoes, rad.
 _DIRECTION_RAD = 2e-3
+# Least share of a frame's energy that is no echo, for which these standard deviations
+# apply. For smaller shares, the errors are larger.
 _NEWS = 0.12
 
-# An echo with the delay d shifts the peak of a correlation in proportion to 1 / (w^2
-# d). The phase of the echo varies with the frequency w within the band, so that most of
-# its effect cancels. The errors above apply at this root mean square frequency, rad/s.
+# Root mean square angular frequency at which the errors above apply, rad/s. An echo
+# with the delay d shifts the peak of a correlation in proportion to 1 / (w^2 d). The
+# phase of the echo varies with the frequency w within the band, so that most of its
+# effect cancels.
 _BAND = 2.0 * math.pi * 4.5e3
 
-# Number of parts of a frame. Fewer parts detect the start of a sound less well. With
-# more parts, noise in a narrow band causes more false detections.
+# Number of parts into which a frame is divided. Fewer parts detect the start of a sound
+# less well. With more parts, noise in a narrow band causes more false detections.
 _PARTS = 5
 
 
 def echo_errors(
     shape: ArrayShape, c: float, news: float, angular_frequency: float
 ) -> NDArray[np.float64]:
-    """Computes the covariance of the delays of a frame after the suppression of echoes.
+    """Computes the covariance of delays after the suppression of echoes.
 
     Args:
-        shape: The microphones.
+        shape: The n microphones.
         c: Speed of sound, m/s.
-        news: Share of the frame's energy that is no echo, above 0.
+        news: Share of the audio frame's energy that is no echo, above 0.
         angular_frequency: Root mean square angular frequency of the remaining sound,
             rad/s.
 
@@ -51,7 +53,7 @@ def echo_errors(
 
 
 def energy_spread(frame: NDArray[np.float32]) -> float:
-    """Computes the share of a frame over which its energy is spread.
+    """Computes the share of a frame of audio over which its energy is spread.
 
     The frame is divided into five parts. The result is the squared mean of their
     energies, divided by the mean of their squared energies. If a steady sound fills the

@@ -1,4 +1,4 @@
-"""Energy of a frame without rumble."""
+"""Computes the energy of a frame of audio without rumble (low frequencies)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-#: The mean of each block of this many samples is subtracted. At 100 kHz, this reduces
-#: rumble of 100 Hz by 19 dB, so that rumble of a motor does not hide a sound.
+#: Length of the blocks from which the mean is subtracted, samples. At 100 kHz, the
+#: subtraction reduces rumble of 100 Hz by 19 dB, so that rumble of a motor does not
+#: hide a sound.
 BLOCK_SAMPLES = 64
 
 

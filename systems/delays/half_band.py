@@ -1,9 +1,9 @@
-"""Halves the sample rate of frames, if the band allows it.
+"""Halves the sample rate of frames of audio, so that their transforms are faster.
 
-Transforms are then faster. The half-band filter has 19 taps. Every other tap is zero,
-except the middle one. The filter is flat to 0.02 dB up to ``PASSED`` times the sample
-rate. Frequencies that alias to this range are suppressed by 55 dB. The filter is
-symmetrical and the same for all channels, so that it does not change delays.
+The half-band filter has 19 taps. Every other tap is zero, except the middle tap. The
+filter is flat to 0.02 dB up to ``PASSED`` times the sample rate. It suppresses
+frequencies that alias to this range by 55 dB. The filter is symmetrical and the same
+for all channels, so that it does not change delays between channels.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ _TAPS = _taps()
 def halve_rate(
     frame: NDArray[Any],
 ) -> NDArray[np.float32]:  # pragma: no cover  (compiled)
-    """Filters a frame and keeps every other sample.
+    """Filters an audio frame and keeps every other sample.
 
     Args:
         frame: (n, samples) channels, floats or counts.
 
     Returns:
-        (n, samples // 2) float32 values of the filter at the second, fourth ... sample.
-        The filter assumes silence before and after the frame. The first and last four
-        or five values are therefore incomplete.
+        (n, samples // 2) float32 filtered values at the second, fourth ... sample. The
+        filter assumes silence before and after the frame. Therefore the first and last
+        four or five values are inexact.
     """
     channels, samples = frame.shape
     half = samples // 2
@@ -66,10 +66,10 @@ def _halve_row(
     odd: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
-    """Filters one channel.
+    """Filters one channel and keeps every other sample.
 
-    ``odd`` (half,) and the inside of ``even`` are scratch memory. The ends of ``even``
-    must be zero.
+    The array ``odd`` (half,) and the inside of ``even`` are scratch memory. The ends of
+    ``even`` must be zero.
     """
     inside = even[_PAIRS - 1 : _PAIRS - 1 + odd.size]
     for k in range(odd.size):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Width over which spectra are smoothed. The power in a bin of one frame scatters by
-# 100 %.
+# Width over which spectra are smoothed. Without smoothing, the power in a bin of one
+# frame scatters by 100 %.
 _SMOOTHING_HZ = 400.0
 
 # Least ratio of the power of a sound to the floor: 6 dB.
@@ -15,20 +15,22 @@ _ABOVE_FLOOR = 4.0
 # The floor is this quantile of the smoothed power in the band.
 _FLOOR_QUANTILE = 0.25
 
-# If a sound occupies less than this, as a tone does, the whole band is used.
+# Least width of the occupied part. If a sound occupies less, as a tone does, the whole
+# band is used.
 _LEAST_WIDTH_HZ = 500.0
 
 
 def occupied_band(spectra: NDArray[np.complex64], bin_hz: float) -> tuple[int, int]:
-    """Finds the range of bins from the first to the last one above the floor.
+    """Finds the range of frequency bins in which a sound is above the noise floor.
 
     Args:
         spectra: (channels, bins) spectra within the band.
         bin_hz: Width of a bin, Hz.
 
     Returns:
-        First bin of the range, and the bin after its last one. The range contains all
-        bins if the sound fills the band, or if too few bins are above the floor.
+        First bin of the range, and the bin after the last bin of the range. The range
+        contains all bins if the sound fills the band, or if too few bins are above the
+        floor.
     """
     bins = spectra.shape[1]
     width = max(1, round(_SMOOTHING_HZ / bin_hz))

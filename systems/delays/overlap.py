@@ -1,4 +1,4 @@
-"""Cuts channels to the section of a frame that they share."""
+"""Cuts the channels of a frame to the section of a sound that they share."""
 
 from __future__ import annotations
 
@@ -9,27 +9,29 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 
-#: Length of the raised-cosine edges of the cut channels, samples. Sharp edges shift a
-#: peak towards whole samples. The shift is inversely proportional to the length and to
-#: the squared bandwidth. For a 25 ms frame at 50 kHz, it is 2e-3 samples, as much as
-#: the error due to noise at 30 dB. Soft edges reduce the shift to a twentieth. If the
-#: edges also follow the fractions of a sample in the delays, the shift is zero.
+#: Length of the raised-cosine edges of the cut channels, samples. Sharp edges would
+#: shift the peak of a correlation towards whole samples. The shift is inversely
+#: proportional to the length of the frame and to the squared bandwidth. For a 25 ms
+#: frame at 50 kHz, the shift is 2e-3 samples, as much as the error due to noise at 30
+#: dB. Soft edges reduce the shift to a twentieth. If the edges also follow the
+#: fractions of a sample in the delays, the shift is zero.
 EDGE_SAMPLES = 16
 
 
 def cut_to_overlap(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Cuts the section that all channels share, with soft edges.
+    """Cuts the section of the sound that all channels share, with soft edges.
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrivals relative to channel 0, samples. The channels are cut at
-            whole samples. Their soft edges follow the remaining fractions of a sample.
+        arrivals: (n,) times of arrival relative to channel 0, samples. The channels are
+            cut at whole samples. Their soft edges follow the remaining fractions of a
+            sample.
 
     Returns:
-        (n, m) channels in the unit of the frame. Here m is the length of the frame
-        minus the largest difference between two arrivals, in whole samples.
+        (n, m) channels in the unit of the audio frame. Here m is the length of the
+        frame minus the largest difference between two arrivals, in whole samples.
     """
     cut, length = cut_rows(frame, arrivals, *frame.shape)
     return np.ascontiguousarray(cut[:, :length])
@@ -39,17 +41,17 @@ def cut_to_overlap(
 def cut_rows(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64], rows: int, columns: int
 ) -> tuple[NDArray[np.float32], int]:  # pragma: no cover  (compiled)
-    """Cuts like ``cut_to_overlap``, and adds columns and rows of zeros.
+    """Cuts channels like ``cut_to_overlap``, and adds columns and rows of zeros.
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrivals relative to channel 0, samples.
+        arrivals: (n,) times of arrival relative to channel 0, samples.
         rows: Rows of the output, at least n.
-        columns: Columns of the output, at least m.
+        columns: Columns of the output, at least the length m of the cut channels.
 
     Returns:
-        (rows, columns) array, which contains the section in its first n rows and m
-        columns; and m.
+        Two values. The first is the (rows, columns) array with the cut channels in its
+        first n rows and m columns. The second is m.
     """
     channels, samples = frame.shape
     whole = np.rint(arrivals)

@@ -1,11 +1,11 @@
 """Keeps the first wave front of every sound and suppresses its echoes.
 
 In a room, the direct sound arrives first. For some tens of milliseconds, further sound
-in the same band is more likely an echo than new sound. The short-time spectra of each
-channel are therefore weighted and whitened. The weight is the share of the power that
-exceeds a decaying memory of the past spectra. This is the precedence effect, as in the
-echo-free onsets of Huang, Ohnishi and Sugie (1995). All weights are real, so that the
-delays between the channels do not change.
+in the same band is more likely an echo than new sound. Therefore the module weights and
+whitens the short-time spectra of each channel. The weight is the share of the power
+that exceeds a decaying memory of the past spectra. This is the precedence effect, as in
+the echo-free onsets of Huang, Ohnishi and Sugie (1995). All weights are real, so that
+the delays between the channels do not change.
 """
 
 from __future__ import annotations
@@ -21,24 +21,26 @@ from systems.framework.compiling import njit
 # Length of the window of a spectrum, s. It is short compared with the delay of the
 # first echoes, and long compared with a period of the lowest band.
 _WINDOW_S = 2.56e-3
+# Number of windows that overlap at each sample.
 _HOPS_PER_WINDOW = 4
 
-# Time constant of the memory, s. A room with a reverberation time (60 dB) of 0.69 s has
-# the same time constant. In the trials in docs/results_hearing.md, values from 20 to
-# 100 ms give similar results.
+# Time constant of the memory, s. The sound in a room with a reverberation time (60 dB)
+# of 0.69 s decays with the same time constant. In the trials in
+# docs/results_hearing.md, values from 20 to 100 ms give similar results.
 _DECAY_S = 0.05
 
-# Power counts as new only above this many times the noise. Noise exceeds this limit in
-# one of exp(4) bins. Without the limit, whitening would raise noise to the level of the
+# Ratio to the noise above which power counts as new. Noise exceeds this ratio in one of
+# exp(4) bins. Without this limit, whitening would raise noise to the level of the
 # sound.
 _NOISE_MARGIN = 4.0
 
-# Whitening is limited for bins below this share of the strongest power of a channel.
+# Share of the strongest power of a channel. Whitening is limited for bins below this
+# share.
 _WHITENING_FLOOR = 0.01
 
 
 class EchoMemory:
-    """Sizes and decay of the memory, for frames of one sample rate."""
+    """Sizes and decay of the memory of past spectra, for frames of one sample rate."""
 
     def __init__(self, channels: int, sample_rate_hz: float) -> None:
         self.window = _HOPS_PER_WINDOW * max(
@@ -52,10 +54,10 @@ class EchoMemory:
         self.taper = (np.sin(np.pi * phase) * math.sqrt(0.5)).astype(np.float32)
 
     def faded(self, memory: NDArray[np.float32], samples: int) -> NDArray[np.float32]:
-        """Returns the memory after a silence.
+        """Returns the memory of past power after a silence.
 
         Args:
-            memory: (n, bins) power that echoes may still have, units of the frame
+            memory: (n, bins) power that echoes may still have, units of the audio frame
                 squared.
             samples: Length of the silence, samples.
 
@@ -77,11 +79,12 @@ def _weigh(
     floor: np.float32,
     noise: np.float32,
 ) -> float:  # pragma: no cover  (compiled)
-    """Weights spectra (n, instants, bins) in place and updates the memory.
+    """Weights spectra in place and updates the memory of past power.
 
-    New power is the excess of the power over the memory. The weight is the ratio of the
-    new power to the power. Division by the root of the power whitens the spectrum. The
-    new memory is the largest of the decayed memory, the present power and the noise.
+    The spectra have the shape (n, instants, bins). The new power is the excess of the
+    power over the memory. The weight is the ratio of the new power to the power.
+    Division by the root of the power whitens the spectrum. The updated memory is the
+    largest of three values: the decayed memory, the present power, and the noise.
 
     Returns:
         Share of the energy that is new.
@@ -132,18 +135,19 @@ def keep_first_wave_front(
     sizes: EchoMemory,
     noise_density: float = 0.0,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
-    """Suppresses possible echoes in a frame.
+    """Suppresses possible echoes in a frame of audio.
 
     Args:
         frame: (n, samples) channels, any unit.
-        memory: (n, bins) memory of the last frame; None after silence.
+        memory: (n, bins) memory of past power after the last frame; None after silence.
         sizes: Sizes of window and memory.
         noise_density: Mean square per sample of white noise that is as loud as the
             noise of the frame, units of the frame squared; 0 if it is unknown.
 
     Returns:
-        (n, samples) weighted and whitened channels, the new memory, and the share of
-        the frame's energy that is new, 0 to 1.
+        Three values. The first is the (n, samples) weighted and whitened channels. The
+        second is the new memory. The third is the share of the frame's energy that is
+        new, 0 to 1.
     """
     windows = np.lib.stride_tricks.sliding_window_view(frame, sizes.window, axis=1)
     spectra = fft.rfft(windows[:, :: sizes.hop] * sizes.taper)

@@ -1,7 +1,7 @@
-"""Fourier transforms of the channels of a frame, in compiled code.
+"""Computes Fourier transforms of the channels of an audio frame, in compiled code.
 
-The results are equal to those of SciPy to the last bit. SciPy needs as much time to
-select the function for a transform as for the transforms of a frame.
+The results are equal to those of SciPy to the last bit. For these short transforms,
+SciPy spends half of the time on the selection of the function.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from systems.framework.compiling import njit
 def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
     """Returns the number of rows to transform for a number of channels.
 
-    The library transforms rows of single precision four at a time. It transforms a
-    remainder of three rows one by one. A fourth row of zeros then saves a third of the
-    time for the transforms.
+    The library transforms rows of single precision four at a time. If three rows
+    remain, it transforms them one by one. A fourth row of zeros then saves a third of
+    the time for the transforms.
 
     Args:
         channels: Number of channels.
 
     Returns:
-        The number of channels, or one more.
+        The number of channels, or the number of channels plus 1.
     """
     return channels + (1 if channels % 4 == 3 else 0)
 
@@ -36,7 +36,7 @@ def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
 def transform_filled_rows(
     rows: NDArray[Any],
 ) -> NDArray[Any]:  # pragma: no cover  (compiled)
-    """Computes the spectra of rows.
+    """Computes the Fourier spectra of rows.
 
     Args:
         rows: (n, length) rows of single or double precision.
@@ -56,14 +56,14 @@ def transform_filled_rows(
 def transform_rows(
     frame: NDArray[np.float32], length: int
 ) -> NDArray[np.complex64]:  # pragma: no cover  (compiled)
-    """Computes the spectra of channels that are padded with zeros.
+    """Computes the Fourier spectra of channels that are padded with zeros.
 
     Args:
         frame: (n, samples) channels, any unit.
         length: Length of the transform, samples; at least that of the channels.
 
     Returns:
-        (n, length // 2 + 1) spectra in the unit of the frame.
+        (n, length // 2 + 1) spectra in the unit of the audio frame.
     """
     channels, samples = frame.shape
     rows = np.zeros((filled_rows(channels), length), dtype=np.float32)

@@ -1,13 +1,13 @@
-"""The base class of all blocks.
+"""Defines the base class of all blocks of the block diagrams.
 
-A block declares its ports, its state and its columns once. From this declaration,
-``Block`` creates:
+A block declares its ports, its state and its columns once. From this declaration, the
+class ``Block`` creates:
 
 - the Drake ports, the state and its update;
 - the check that all inputs are finite;
 - the table of ports in the docstring;
-- the columns in the table of a run;
-- the step of the compiled loop.
+- the columns in the results table of a run;
+- the step of the compiled simulation loop.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ class Port(NamedTuple):
     name: str
     size: int | str
     """Number of elements, or ``OBJECT``. A string such as ``sensors`` or ``3 bodies``
-    is a multiple of a size that the block receives when it is constructed."""
+    is a multiple of a named size. The block receives the named sizes when it is
+    constructed."""
     unit: str
     """Units of the elements, for example ``m, m, rad``, or the type of the object."""
     columns: str | tuple[str, ...] = ()
@@ -56,10 +57,10 @@ class Port(NamedTuple):
     ``range_2`` and so on. A port without columns is not in the table."""
 
     def elements(self, sizes: Mapping[str, int]) -> int:
-        """Number of elements of a port that carries numbers.
+        """Returns the number of elements of a port that carries numbers.
 
         Args:
-            sizes: The sizes of the block, by name.
+            sizes: Sizes that the block received when it was constructed, by name.
 
         Returns:
             The number of elements.
@@ -70,13 +71,13 @@ class Port(NamedTuple):
         return int(factor or 1) * sizes[name]
 
     def column_names(self, sizes: Mapping[str, int]) -> tuple[str, ...]:
-        """Names of the elements in the table of a run.
+        """Returns the names of the elements in the results table of a run.
 
         Args:
-            sizes: The sizes of the block, by name.
+            sizes: Sizes that the block received when it was constructed, by name.
 
         Returns:
-            One name per element; empty if the port is not in the table.
+            One name per element. The tuple is empty if the port is not in the table.
         """
         if isinstance(self.columns, str):
             count = self.elements(sizes)
@@ -85,57 +86,63 @@ class Port(NamedTuple):
 
 
 class Step(NamedTuple):
-    """The computation of a block in one tick, for Drake and for compiled loops.
+    """The computation of a block in one control period (tick).
 
-    ``step(tick, state, inputs, outputs, numbers)`` reads the inputs, fills the outputs
-    element by element, and replaces the state by the state of the next tick.
+    Drake and the compiled simulation loops use the same computation. The function
+    ``step(tick, state, inputs, outputs, numbers)`` does three things:
+
+    - It reads the inputs.
+    - It fills the outputs, element by element.
+    - It replaces the state by the state of the next tick.
 
     ``inputs`` and ``outputs`` have one entry per port, in the order of the declaration.
     An entry is a sequence of numbers or the object that the port carries. In compiled
-    code, the sequences are arrays. In Drake, they are lists of float or AutoDiffXd, or
-    arrays if the block declares this.
+    code, the sequences are arrays. In Drake, they are lists of float or AutoDiffXd. If
+    the block declares ``arrays``, they are arrays in Drake, too.
     """
 
     step: Callable[..., None]
     numbers: Any
-    """Constants of the step: a named tuple of numbers, arrays, functions and
-    parameters, or of tuples of these. If it has a field ``noise`` of the type
-    ``TickNoise``, each run replaces this field according to its seed."""
+    """Constants of the step, in a named tuple. Its fields are numbers, arrays,
+    functions, parameters, or tuples of these. If the named tuple has a field ``noise``
+    of the type ``TickNoise``, each run replaces this field according to its seed."""
     state: Any = ()
-    """State at the first tick: a sequence of numbers or a named tuple. The fields of
-    the named tuple are arrays or named tuples of arrays. The step changes the arrays in
-    place."""
+    """State at the first tick (control period): a sequence of numbers or a named tuple.
+    The fields of the named tuple are arrays or named tuples of arrays. The step changes
+    the arrays in place."""
     publish: Callable[..., None] | None = None
-    """``publish(state, outputs, numbers)`` fills the outputs of a block if they depend
-    only on its state. The step of such a block does not fill them."""
+    """Function ``publish(state, outputs, numbers)`` that fills the outputs of a block
+    whose outputs depend only on its state. The step of this block does not fill the
+    outputs."""
     host: Any = None
     """``HostCall`` of a step that calls Python. The loop keeps a reference to it."""
     carries: Mapping[str, Callable[[int], Any]] = {}
-    """For each output port that carries an object: a function that returns the object
-    at a tick."""
+    """Functions by the name of an output port that carries an object. Each function
+    returns the object at a tick (control period)."""
 
 
 class RunFacts(NamedTuple):
-    """Facts about a run that a step needs in a compiled loop.
+    """Facts about a run that a step needs in a compiled simulation loop.
 
-    Several runs share the same blocks, but differ in start, seed and layout. Therefore
-    these values replace the values with which a block was constructed.
+    Several runs use the same blocks, but differ in start, seed and layout of the
+    obstacles. Therefore these values replace the values with which a block was
+    constructed.
     """
 
     ticks: int
     tick_s: float
     initial_pose: tuple[float, float, float]
-    """x, y and heading of the robot in W at the start, m, m and rad."""
+    """x, y and heading of the robot in the world frame W at the start, m, m and rad."""
     step_s: float
     """Largest step of the integrator, s."""
     seed_of: Callable[[str], int]
     """Function that returns the seed of a block, given the name of the block."""
     carried: Mapping[str, Callable[[int], Any]]
-    """For each input port that carries an object, by name: a function that returns the
-    object at a tick."""
+    """Functions by the name of an input port that carries an object. Each function
+    returns the object at a tick (control period)."""
     mapped: Any = ()
-    """(n, 5) x, y, theta, length and width of the obstacles in the robot's map, m and
-    rad."""
+    """(n, 5) obstacles in the robot's map. The columns are x, y, theta, length and
+    width, m and rad."""
     goal: tuple[float, float] | None = None
     """Position of the goal of the robot in W, m, if the robot has a goal."""
 
@@ -152,7 +159,7 @@ def copied(state: Any) -> Any:
         state: The named tuple. Its fields may also be numbers.
 
     Returns:
-        A named tuple with the same values that shares no array with ``state``.
+        A named tuple with the same values. It shares no array with ``state``.
     """
     if has_arrays(state):
         return type(state)(*map(copied, state))
@@ -160,9 +167,10 @@ def copied(state: Any) -> Any:
 
 
 class _Declared:
-    """The declaration of a block, and the methods that evaluate it.
+    """The declaration of a block, and the methods that evaluate the declaration.
 
-    Its private names are mangled, so that blocks can use any name of their own.
+    The private names of this class start with two underscores. Python therefore renames
+    them, so that blocks can use any name of their own.
     """
 
     part: ClassVar[str] = ""
@@ -184,7 +192,8 @@ class _Declared:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        if {"inputs", "outputs"}.intersection(vars(cls)):
+        own = cls.__doc__ or ""
+        if (cls.inputs or cls.outputs) and ".. pydrake_system::" not in own:
             cls.__doc__ = _with_port_table(cls)
 
     def declare_ports(
@@ -195,7 +204,7 @@ class _Declared:
     ) -> list[Any]:
         """Declares the input ports and the columns of a block without a ``Step``.
 
-        Such a block declares its output ports with ``declare_output``.
+        The block must declare its output ports with ``declare_output``.
 
         Args:
             sizes: Sizes to which the ports refer, by name.
@@ -261,17 +270,18 @@ class _Declared:
     ) -> None:
         """Declares the ports, the state, the update and the outputs of a block.
 
-        A cache entry stores the result of the step, so that Drake computes it only once
-        for all output ports. If the step has ``publish``, a second cache entry stores
-        the outputs. It depends only on the state, so that these outputs have no direct
-        feedthrough. The form of the state of the step determines the Drake state:
+        A cache entry stores the result of the step. Drake therefore computes the step
+        only once for all output ports. If the step has the function ``publish``, a
+        second cache entry stores the outputs. This entry depends only on the state, so
+        that the outputs have no direct feedthrough. The form of the state of the step
+        determines the Drake state:
 
         - a sequence of numbers: a discrete state;
         - a named tuple of arrays: an abstract state;
         - an empty sequence: no Drake state.
 
         Args:
-            step: The computation of the block in one tick.
+            step: The computation of the block in one control period.
             tick_s: Period of the update, s.
             sizes: Sizes to which the ports refer, by name.
             omit: Names of ports that this block does not have.
@@ -312,7 +322,7 @@ class _Declared:
                 self.DeclarePeriodicDiscreteUpdateEvent(
                     period_sec=tick_s, offset_sec=0.0, update=self.__replace_published
                 )
-        elif len(step.state):
+        elif len(step.state) or step.publish is not None:
             self.DeclareDiscreteState([self._scalar(x) for x in step.state])
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=tick_s, offset_sec=0.0, update=self.__replace_state
@@ -342,7 +352,7 @@ class _Declared:
         self.declare_output(name, calc, {self.__computed.ticket()})
 
     def step_for(self: Any, run: RunFacts) -> Step:
-        """Returns the step of the block for one run of a compiled loop.
+        """Returns the step of the block for one run of a compiled simulation loop.
 
         Args:
             run: The facts about the run.
@@ -386,7 +396,7 @@ class _Declared:
         )
 
     def __read(self: Any, context: Any) -> list[Any]:
-        """One entry per input port; the entry of an unread port is empty."""
+        """Returns one entry per input port. The entry of an unread port is empty."""
         ports, objects = self.__read_ports, self.__objects
         read = read_arrays if self.__as_arrays else read_lists
         numbers = [port for k, port in enumerate(ports) if k not in objects]
@@ -396,13 +406,13 @@ class _Declared:
         return inputs + [[]] * (len(self.__input_ports) - len(inputs))
 
     def __blank_outputs(self: Any) -> list[Any]:
-        """One entry per output port that carries numbers."""
+        """Returns one entry per output port that carries numbers."""
         if self.__as_arrays:
             return [np.full(n, self._scalar(0.0)) for n in self.__output_sizes]
         return [[self._scalar(0.0)] * count for count in self.__output_sizes]
 
     def __compute(self: Any, context: Any) -> tuple[Any, Any]:
-        """The outputs, and the state of the next tick."""
+        """Returns the outputs, and the state of the next tick."""
         step: Step = self.step
         tick = round(float_of(context.get_time()) / self.__tick_s)
         outputs = () if step.publish is not None else self.__blank_outputs()

@@ -1,4 +1,4 @@
-"""A cache entry that several output ports share."""
+"""Declares a cache entry that several output ports of a block use."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def declare_cache(
 ) -> CacheEntry:
     """Declares a cache entry for the result of ``compute(context)``.
 
-    Ports that share the entry declare ``{entry.ticket()}`` as their prerequisite. They
-    read the result with ``entry.Eval(context)`` and must not change it.
+    A port that uses the entry declares ``{entry.ticket()}`` as its prerequisite. The
+    port reads the result with ``entry.Eval(context)`` and must not change it.
 
     Args:
         system: The block that owns the entry.

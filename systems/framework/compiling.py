@@ -1,17 +1,18 @@
-"""The cache of compiled functions.
+"""Manages the cache of functions that numba compiles.
 
 By default, numba reuses the cached code of a function until the file of this function
-changes. However, most of our compiled functions contain the code of functions from
-other files. Therefore ``njit`` below uses another key. The key is a hash of the file
-and of all our files that it imports, directly or indirectly. A change in one of these
-files gives a new key. Code of other versions and other clones stays in the cache until
-it has not been used for 30 days.
+changes. However, most compiled functions of this repository contain the code of
+functions from other files. Therefore the function ``njit`` below uses another key. The
+key is a hash of the file and of all files of this repository that it imports, directly
+or indirectly. If one of these files changes, the key changes. Code of other versions
+and other clones stays in the cache until it has not been used for 30 days.
 
 No function uses the option ``fastmath`` of numba. With this option, the compiler may
 reorder sums. The last bit of a sum would then depend on the machine, on the caller and
-on the order of compilation. In a run of 40 s, such a difference grows to centimeters
-(``tests/evals/test_compiled_code.py``). Without ``fastmath``, the compiled loop of a
-robot that listens takes 10 to 15 % longer, and the loop of Drake takes 5 % longer.
+on the order of compilation. In a run of 40 s, the difference grows to centimeters
+(``tests/evals/test_compiled_code.py``). Without ``fastmath``, the compiled simulation
+loop of a robot that listens takes 10 to 15 % longer, and the loop of Drake takes 5 %
+longer.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ from typing import Any
 #: The packages of this repository.
 _PACKAGES = ("systems", "diagrams", "analysis", "studies", "benchmarks")
 _ROOT = Path(__file__).resolve().parents[2]
-#: These files define how numba compiles functions of other files. The other files need
-#: not import these files. Therefore every digest includes them.
+#: Files that define how numba compiles functions of other files. The other files need
+#: not import them. Therefore every digest includes these files.
 OVERLOADS = (
     _ROOT / "systems" / "framework" / "scalar_math.py",
     _ROOT / "systems" / "world" / "geometry.py",
@@ -56,14 +57,14 @@ _IMPORT = re.compile(
 def provide_cache(folder: Path = _FOLDER) -> Path | None:
     """Creates a temporary cache folder if the usual folder is not writable.
 
-    The temporary folder exists until the process ends. Processes that this process
-    starts use it, too.
+    The temporary folder exists until the process ends. Child processes use this folder,
+    too.
 
     Args:
         folder: The usual folder of the cache.
 
     Returns:
-        The temporary folder, or None if the usual folder is writable or the user has
+        The temporary folder. None if the usual folder is writable, or if the user has
         chosen a folder.
     """
     if os.environ.get("NUMBA_CACHE_DIR") or _can_be_written(folder):
@@ -82,7 +83,7 @@ def cache_folder() -> Path:
 
 
 def njit(*arguments: Any, **options: Any) -> Any:
-    """Calls ``numba.njit`` with a cache whose key is the content of the sources.
+    """Compiles functions with ``numba.njit``, with a cache keyed by the source files.
 
     Args:
         *arguments: Positional arguments of ``numba.njit``.
@@ -111,7 +112,7 @@ def _keep_by_source() -> None:
 
 
 class SourceLocator:
-    """Determines where numba caches the code of one of our functions.
+    """Determines where numba caches the code of a function of this repository.
 
     The class has the methods of ``numba.core.caching._CacheLocator``.
     """
@@ -164,11 +165,11 @@ def _remove_unused(folder: Path) -> None:
 def source_digest(*files: Path) -> str:
     """Computes a hash of Python files and of all our files that they import.
 
-    A process reads each of our files only once, because later changes do not affect the
-    code that it has loaded.
+    Our files are those of this repository. A process reads each of them only once.
+    Later changes do not affect the code that the process has loaded.
 
     Args:
-        *files: Our files or files of a user.
+        *files: Files of this repository, or files of a user.
 
     Returns:
         Hexadecimal digits. They depend on the content of the files, not on the clone.
@@ -192,10 +193,10 @@ def _place(file: Path) -> str:
 
 
 def _read(file: Path) -> tuple[str, tuple[Path, ...]]:
-    """Returns the hash of a file, and our files that it imports.
+    """Returns the hash of a file, and the files of this repository that it imports.
 
-    A search of the text finds the imports, also in functions and in comments. A
-    superfluous file costs only a compilation. A missing file would give wrong results.
+    A text search finds the imports, also in functions and in comments. A superfluous
+    file costs only a compilation. A missing file would give wrong results.
     """
     try:
         text = file.read_bytes()

@@ -1,10 +1,10 @@
-"""Elementary functions of floats, arrays and AutoDiffXd.
+"""Computes elementary functions of floats, arrays and AutoDiffXd.
 
-For floats, the functions of ``math`` give the same results as those of
-``pydrake.math``, and take a third of their time. However, the functions of ``math``
-raise errors where a result is infinite or not a number. In these cases, and for
-AutoDiffXd, this module uses ``pydrake.math``. It uses numpy for the sine and cosine of
-arrays.
+For floats, the functions of the module ``math`` give the same results as those of
+``pydrake.math`` and take a third of their time. However, the functions of ``math``
+raise errors if a result is infinite or not a number. In these cases, and for
+AutoDiffXd, this module uses ``pydrake.math``. For the sine and cosine of arrays, it
+uses numpy.
 """
 
 from __future__ import annotations

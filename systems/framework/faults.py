@@ -35,19 +35,24 @@ class Fault(Parameters):
     """A sensor that fails during a run, and the kind of its fault."""
 
     sensor: FaultySensor
-    """Sensors to which the failing one belongs."""
+    """Kind of sensor that fails."""
     number: int = Field(default=1, ge=1, le=360)
-    """Number of the failing one, starting at 1. Microphones: their order in
-    ``robot.microphones_m``; ultrasonic: from left to right; gas sensors: 1 right front,
-    2 rear, 3 left front; contact switches: 1 left, 2 right; odometry: 1."""
+    """Number of the sensor that fails, starting at 1. Microphones: their order in
+    ``robot.microphones_m``. Ultrasonic sensors: from left to right. Gas sensors: 1
+    right front, 2 rear, 3 left front. Contact switches: 1 left, 2 right. Odometry:
+    1."""
     kind: FaultKind
-    """Microphones: ``dead`` (its counts are 0) or ``frozen`` (its counts stay at a
-    quarter of full scale). Ultrasonic: ``silent`` (it no longer fires), ``blind`` (it
-    never has an echo), ``frozen`` (it repeats its last reading) or ``noisy`` (the
-    standard deviation of its range is 0.3 m larger). Gas sensors: ``dead`` (its reading
-    is 1, clean air, without noise) or ``frozen`` (it repeats its last reading). Contact
-    switches: ``stuck_open`` (it never closes) or ``stuck_closed`` (it never opens).
-    Odometry: ``lost`` (its pose is reset to (0, 0, 0) once)."""
+    """Kind of the fault.
+
+    Microphones: ``dead`` (the counts are 0) or ``frozen`` (the counts stay at a quarter
+    of full scale). Ultrasonic sensors: ``silent`` (the sensor no longer fires),
+    ``blind`` (it never has an echo), ``frozen`` (it repeats its last reading) or
+    ``noisy`` (the standard deviation of its range is 0.3 m larger). Gas sensors:
+    ``dead`` (the reading is 1, clean air, without noise) or ``frozen`` (the sensor
+    repeats its last reading). Contact switches: ``stuck_open`` (the switch never
+    closes) or ``stuck_closed`` (it never opens). Odometry: ``lost`` (the estimated pose
+    is reset to (0, 0, 0) once).
+    """
     start_s: Time = 0.0
     """Start of the fault, s."""
 
@@ -68,18 +73,20 @@ Faults = Annotated[tuple[Fault, ...], Strict(False), Field(max_length=360)]
 def faults_of(
     faults: Iterable[Fault], sensor: FaultySensor, count: int
 ) -> dict[int, Fault]:
-    """Returns the faults of some sensors of a robot.
+    """Returns the faults of all sensors of one kind of a robot.
 
     Args:
         faults: All faults of the robot.
-        sensor: The sensors.
-        count: Number of these sensors.
+        sensor: Kind of the sensors.
+        count: Number of sensors of this kind.
 
     Returns:
-        The fault of each sensor that fails, by its index, counted from 0.
+        Faults by the index of the sensor, counted from 0. Sensors without a fault are
+        omitted.
 
     Raises:
-        InputError: A number is above ``count``, or one sensor has two faults.
+        InputError: The number of a sensor is above ``count``, or one sensor has two
+            faults.
     """
     found: dict[int, Fault] = {}
     for index, fault in enumerate(faults):
@@ -104,17 +111,17 @@ def faults_of(
 def fault_ticks(
     faults: Iterable[Fault], sensor: FaultySensor, count: int, tick_s: float
 ) -> NDArray[np.int64]:
-    """Returns the faults of some sensors as numbers, for compiled code.
+    """Returns the faults of all sensors of one kind as numbers, for compiled code.
 
     Args:
         faults: All faults of the robot.
-        sensor: The sensors.
-        count: Number of these sensors.
-        tick_s: Control period of the robot, s.
+        sensor: Kind of the sensors.
+        count: Number of sensors of this kind.
+        tick_s: Control period (tick) of the robot, s.
 
     Returns:
-        (count, 2) number of the kind of the fault of each sensor, 0 for none, and first
-        tick of the fault.
+        (count, 2) array, one row per sensor. The first column is the number of the kind
+        of fault, 0 for none. The second column is the first tick of the fault.
 
     Raises:
         InputError: See ``faults_of``.

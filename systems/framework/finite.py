@@ -1,9 +1,9 @@
 """Checks that all inputs and arguments of blocks are finite.
 
-A comparison with NaN is false and hides the error: an echo flag of NaN looks like no
-echo, and an obstacle at NaN looks out of reach. A sum is finite only if all its terms
-are finite, and its computation takes little time. Therefore each block sums all values
-that it reads.
+A comparison with NaN is false and hides the error. For example, an echo flag of NaN
+looks like no echo. An obstacle at NaN looks out of reach. Each block therefore sums all
+values that it reads, which takes little time. A sum is finite only if all its terms are
+finite.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.framework.scalar_math import float_of
 
-# Separates the template and the scalar type in the names of pydrake's classes.
+# Text between the template and the scalar type in the names of pydrake's classes.
 _SCALAR = "_\N{MATHEMATICAL BOLD SCRIPT CAPITAL T}"
 
 
 def read_list(context: Any, port: Any) -> list[Any]:
-    """Reads a vector input port.
+    """Reads a vector input port and checks that its elements are finite.
 
     Args:
         context: Context of the block.
@@ -45,7 +45,9 @@ def read_list(context: Any, port: Any) -> list[Any]:
 
 
 def read_lists(context: Any, ports: Sequence[Any]) -> list[list[Any]]:
-    """Reads several vector input ports, twice as fast as ``read_list``.
+    """Reads several vector input ports and checks that their elements are finite.
+
+    The function is twice as fast as several calls of ``read_list``.
 
     Args:
         context: Context of the block.
@@ -65,7 +67,7 @@ def read_lists(context: Any, ports: Sequence[Any]) -> list[list[Any]]:
 
 
 def read_arrays(context: Any, ports: Sequence[Any]) -> list[Any]:
-    """Reads several vector input ports as arrays.
+    """Reads several vector input ports as arrays and checks that they are finite.
 
     Args:
         context: Context of the block.
@@ -93,7 +95,7 @@ def check_record(context: Any, port: Any, record: Any) -> None:
     """Checks that all fields of a named tuple from an abstract port are finite.
 
     Args:
-        context: Context of the block, for the time in the message.
+        context: Context of the block. The message contains the time of this context.
         port: Abstract input port that carries the named tuple.
         record: Named tuple of numbers and arrays. Arrays of integers are not checked.
 
@@ -122,10 +124,10 @@ def check_port(context: Any, port: Any, values: Any, field: str = "") -> None:
     """Raises an error if a value from a port is not finite.
 
     Args:
-        context: Context of the block, for the time in the message.
+        context: Context of the block. The message contains the time of this context.
         port: Input port.
         values: Value of the port or of one of its fields: a number or an array.
-        field: Name of the field after a dot. Empty: ``values`` is the whole value.
+        field: A dot and the name of the field. Empty: ``values`` is the whole value.
 
     Raises:
         ValueError: An element is not finite. The message contains block, port, element
@@ -147,7 +149,7 @@ def check_finite(name: str, values: Any, end: str = "; give a finite number") ->
     Args:
         name: Name of the block and of the quantity, for the message.
         values: A number or an array of numbers, floats or AutoDiffXd.
-        end: End of the message: the time and the remedy.
+        end: End of the message, which states the remedy.
 
     Raises:
         ValueError: A number is not finite. The message contains the first such number.

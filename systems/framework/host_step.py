@@ -1,8 +1,9 @@
-"""Steps in Python that a compiled loop calls.
+"""Makes steps of blocks in Python that a compiled simulation loop calls.
 
-Blocks that process frames of sound use libraries (transforms, room responses). Compiled
-code cannot call these libraries. Therefore the compiled loop calls a Python function
-for such a block. A call takes one or two microseconds.
+Blocks that process frames of sound use libraries, for example for Fourier transforms
+and room responses. Compiled code cannot call these libraries. Therefore the compiled
+simulation loop calls a Python function for each of these blocks. A call takes one or
+two microseconds.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 
 from systems.framework.block import Step
 
-#: ``function(tick, inputs, outputs)`` reads the inputs of a tick and fills the outputs
-#: of the next tick. Each array contains the elements of all ports, in their order.
+#: Type of ``function(tick, inputs, outputs)``. The function reads the inputs of a tick
+#: (control period) and fills the outputs of the next tick. Each array contains the
+#: elements of all ports, in their order.
 HostFunction = Callable[[int, NDArray[np.float64], NDArray[np.float64]], None]
 
 
@@ -31,12 +33,14 @@ class HostError(Exception):
 class HostCall:
     """A Python function that compiled code calls by its address.
 
-    An exception cannot pass through compiled code. Therefore ``error`` stores it, and
-    the loop ends with ``HostError``. The address is valid while this object exists.
+    An exception cannot pass through compiled code. If the function raises an exception,
+    ``error`` stores the exception, and the compiled simulation loop ends with
+    ``HostError``. The address is valid while this object exists.
 
     Args:
         function: The function, see ``HostFunction``.
-        inputs: Number of inputs. All numbers after the inputs are outputs.
+        inputs: Number of inputs. In the memory that the function receives, all numbers
+            after the inputs are outputs.
     """
 
     def __init__(self, function: HostFunction, inputs: int) -> None:
@@ -122,8 +126,9 @@ def host_step(
         function: The function, see ``HostFunction``.
         inputs: Number of elements of all input ports.
         outputs: Number of elements of all output ports. The step publishes these
-            elements for the next tick. If there are none, the loop calls the function
-            before the steps that publish outputs.
+            elements at the next tick (control period). If there are no outputs, the
+            compiled simulation loop calls the function before the steps that publish
+            outputs.
         period_ticks: Period of the calls, ticks.
 
     Returns:

@@ -1,4 +1,4 @@
-"""The error that all invalid input raises."""
+"""Defines the error that all invalid input raises."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _LONGEST_FIELD = 100
 
 
 class InputError(ValueError):
-    """Invalid input, with the field, the fault and the remedy.
+    """Invalid input. The error states the field, the fault and the remedy.
 
     The text is one line of at most 280 printable characters, whatever the input
-    contains. If the field or the message is longer, its middle is omitted.
+    contains. If the field or the message is too long, its middle is omitted.
 
     Args:
         field: Dotted path of the field, name of the option, or name of the block.
@@ -40,11 +40,11 @@ class InputError(ValueError):
         """Combines several errors into one error, without duplicates.
 
         Args:
-            errors: One error or more.
-            below: Path that precedes the field of each error.
+            errors: At least one error.
+            below: Path that is put before the field of each error.
 
         Returns:
-            The first error, with all others as its further errors.
+            The first error. All others are its further errors.
         """
         texts = {
             (".".join(filter(None, (below, each.field))), each.message): None
@@ -67,8 +67,8 @@ def shortened(text: str, length: int) -> str:
         length: Largest number of characters of the result, more than 10.
 
     Returns:
-        The whole line if it is short enough, else its two ends with `` ... `` between
-        them.
+        The whole line, if it is short enough. Otherwise its two ends with `` ... ``
+        between them.
     """
     # A text that is far too long is cut first, because escape sequences need memory.
     if len(text) > 8 * length:

@@ -8,7 +8,9 @@ from systems.framework.input_error import InputError
 
 
 def require_file(path: str | Path, field: str, kind: str) -> Path:
-    """Checks that a path is a file, before libraries that could read it are loaded.
+    """Checks that a path is a file.
+
+    The check runs before the libraries that could read the file are loaded.
 
     Args:
         path: Path of the file.

@@ -1,6 +1,6 @@
-"""The meanings of the fields of a parameter model, read from their docstrings.
+"""Reads the meanings of the fields of a parameter model from their docstrings.
 
-This module reads the docstrings of a model only on request. Pydantic would read them
+The docstrings are read only on request. Pydantic could read them, but it would do so
 whenever a model is imported. This would take a quarter of the time that it takes to
 load a scenario.
 """
@@ -22,7 +22,7 @@ def meanings(model: type[Parameters]) -> dict[str, str]:
         model: The model.
 
     Returns:
-        The docstrings without indentation, by field. Fields without docstring are
+        The docstrings without indentation, by field. Fields without a docstring are
         omitted.
     """
     found: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Random numbers that depend only on a seed and a tick."""
+"""Makes random numbers that depend only on a seed and a tick (control period)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _STEP = np.uint64(0x9E3779B97F4A7C15)
 
 @njit(cache=True)
 def _scrambled(word: int | np.uint64) -> np.uint64:  # pragma: no cover  (compiled)
-    """The finalizer of splitmix64. Each output bit depends on all input bits."""
+    """Applies the finalizer of splitmix64, which mixes all bits of a word."""
     word = np.uint64(word) + _STEP
     word = (word ^ (word >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     word = (word ^ (word >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -55,7 +55,7 @@ class _TickSeed(ISeedSequence):
 
 
 def tick_generator(seed: int, tick: int) -> Generator:
-    """Makes a new generator for one tick of one block.
+    """Makes a generator of random numbers for one control period (tick) of a block.
 
     Blocks store no generator. Therefore the noise is the same if Drake evaluates a
     block twice or runs a context again. SFC64 is the fastest generator of numpy. It
@@ -88,9 +88,10 @@ def _add_quantiles(
     quantiles: NDArray[np.float32],
     out: NDArray[np.float64],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out with normal numbers, two from each word of splitmix64.
+    """Fills out with normal numbers, two from each random word of splitmix64.
 
-    Each number is the sum of two quantiles, and 16 bits of the word select a quantile.
+    Each number is the sum of two quantiles. Sixteen bits of the word select each
+    quantile.
     """
     state, low = _tick_word(seed, tick), np.uint64(0xFFFF)
     for k in range(0, out.size, 2):
@@ -106,12 +107,12 @@ def _add_quantiles(
 def standard_normals(
     shape: tuple[int, int], seed: int, tick: int
 ) -> NDArray[np.float64]:
-    """Draws a few normal numbers for one tick of one block.
+    """Draws a few normal numbers for one control period (tick) of one block.
 
-    Each number is the sum of two entries of a table with 65 536 quantiles. The numbers
-    are normally distributed up to 5.9 standard deviations. No number is larger. The
+    Each number is the sum of two entries of a table with 65 536 quantiles. The
     generator splitmix64 selects the entries. Its initial state is a hash of seed and
-    tick. For many numbers, use ``frame_noise``.
+    tick. The numbers are normally distributed up to 5.9 standard deviations. No number
+    is larger. If many numbers are needed, use ``frame_noise``.
 
     Args:
         shape: Numbers of rows and columns.
@@ -135,13 +136,14 @@ class TickNoise(NamedTuple):
 
 
 def tick_noise(seed: int) -> TickNoise:
-    """Makes the ``TickNoise`` of a block.
+    """Makes the source of random numbers of a block for compiled code.
 
     Args:
         seed: Seed of the block.
 
     Returns:
-        The argument ``noise`` of ``tick_normals``.
+        Seed and table of quantiles. They are the argument ``noise`` of
+        ``tick_normals``.
     """
     return TickNoise(np.uint64(seed & _WORD), _QUANTILES)
 
@@ -150,11 +152,11 @@ def tick_noise(seed: int) -> TickNoise:
 def tick_normals(
     noise: TickNoise, tick: int, rows: int, columns: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Draws the ``standard_normals`` of a tick in compiled code.
+    """Draws the ``standard_normals`` of a control period (tick) in compiled code.
 
-    The numbers have double precision. With single precision, the two engines would
-    differ: the product of such a number and a Python float has single precision in
-    numpy, but double precision in compiled code.
+    The numbers have double precision. With single precision, compiled code and Drake
+    would give different results. The product of a single-precision number and a Python
+    float has single precision in numpy, but double precision in compiled code.
 
     Args:
         noise: Seed and table of the block.
@@ -177,9 +179,10 @@ def _polynomial(function: Any, low: float, high: float, degree: int) -> tuple[An
     return tuple(coefficients.astype(np.float32))
 
 
-# Three polynomials, accurate to single precision: ln(1 + f) / f as a function of f, for
-# 1 + f between sqrt(1/2) and sqrt(2); sin(a) / a and cos(a) as functions of a^2, for a
-# up to 45 degrees.
+# Three polynomials, accurate to single precision:
+# - ln(1 + f) / f as a function of f, for 1 + f between sqrt(1/2) and sqrt(2)
+# - sin(a) / a as a function of a^2, for a up to 45 degrees
+# - cos(a) as a function of a^2, for a up to 45 degrees
 _LN = _polynomial(lambda f: np.log1p(f) / f, 2.0**-0.5 - 1.0, 2.0**0.5 - 1.0, 8)
 _SINC = _polynomial(lambda y: np.sinc(np.sqrt(y) / np.pi), 0.0, (np.pi / 4.0) ** 2, 3)
 _COS = _polynomial(lambda y: np.cos(np.sqrt(y)), 0.0, (np.pi / 4.0) ** 2, 4)
@@ -201,17 +204,22 @@ def _normal_pairs(
 ) -> None:  # pragma: no cover  (compiled)
     """Fills out (2 n,) with normal numbers (Box and Muller, 1958).
 
-    One word of splitmix64 gives one pair: radius times cosine and radius times sine of
-    an angle. The radius is sqrt(-2 ln u), where 23 bits of the word give u. Further 24
-    bits give an angle between -45 and 45 deg. The last three bits swap the two numbers
-    and choose their signs, so that the angles cover the whole circle. Polynomials
-    replace the functions of ``math``, because the compiler can vectorize them.
+    One random word of splitmix64 gives one pair of numbers: radius times cosine and
+    radius times sine of an angle. The bits of the word are used as follows:
+
+    - 23 bits give u, and the radius is sqrt(-2 ln u).
+    - 24 bits give an angle between -45 and 45 deg.
+    - The last three bits swap the two numbers and choose their signs, so that the
+      angles cover the whole circle.
+
+    Polynomials replace the functions of ``math``, because the compiler can vectorize
+    them.
 
     Args:
-        state: State of splitmix64 before these words.
-        uniform: (n,) float32, scratch.
-        angle: (n,) float32, scratch, rad.
-        turn: (n,) int32, scratch.
+        state: State of splitmix64 before the first word.
+        uniform: (n,) float32, scratch memory.
+        angle: (n,) float32, scratch memory, rad.
+        turn: (n,) int32, scratch memory.
         out: The first numbers of the n pairs, then the second numbers.
     """
     n, half = uniform.size, np.float32(0.5)
@@ -268,11 +276,11 @@ def _fill_with_normals(
 
 
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
-    """Draws white Gaussian noise for one tick of one block.
+    """Draws white Gaussian noise for one control period (tick) of one block.
 
     This function is nine times as fast as numpy's generator. No number is larger than
-    5.8 standard deviations. The words come from splitmix64. Its initial state is a hash
-    of seed and tick.
+    5.8 standard deviations. The random words come from the generator splitmix64. Its
+    initial state is a hash of seed and tick.
 
     Args:
         shape: Numbers of rows (channels) and columns (samples).

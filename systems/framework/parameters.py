@@ -1,10 +1,10 @@
-"""The base class of all parameter models, and the types of their fields.
+"""Defines the base class of all parameter models, and the types of their fields.
 
-The parameters of a block are one frozen pydantic model in the file ``parameters.py`` of
-its folder. These files import neither Drake nor compiled code, so that a scenario can
-be checked without them. A scenario is a tree of such models. Therefore each quantity
-has one name, one default and one range, and an error message contains the full path of
-the field.
+The parameters of a block are one frozen pydantic model. The model is in the file
+``parameters.py`` of the folder of the block. These files import neither Drake nor
+compiled code, so that a scenario can be checked without them. A scenario is a tree of
+parameter models. Therefore each quantity has one name, one default and one range. An
+error message contains the full path of the field.
 """
 
 from __future__ import annotations
@@ -50,9 +50,10 @@ Size = Annotated[tuple[Length, Length], Strict(False)]
 
 
 class Parameters(BaseModel):
-    """A frozen model with strict types, without unknown keys, NaN or infinity.
+    """A frozen pydantic model with strict types.
 
-    The docstring of a field states its meaning and its unit, see ``meanings``.
+    The model accepts no unknown keys, no NaN and no infinity. The docstring of a field
+    states its meaning and its unit, see ``meanings``.
     """
 
     model_config = ConfigDict(
@@ -70,8 +71,8 @@ class Parameters(BaseModel):
         The copy computes its cached properties again.
 
         Args:
-            update: New values by field. They are not validated.
-            deep: Whether to copy the values, too.
+            update: New values by field. The new values are not validated.
+            deep: Whether to copy the values of the fields, too.
 
         Returns:
             A model of the same class.
@@ -83,7 +84,9 @@ class Parameters(BaseModel):
 
 
 def with_preset(data: Any, presets: Mapping[str, Mapping[str, Any]]) -> Any:
-    """Completes the input of a model with the values of its field ``preset``.
+    """Adds the values of a named preset to the input of a parameter model.
+
+    The field ``preset`` of the input names the preset.
 
     Args:
         data: Input of a validator with the mode ``before``.

@@ -1,6 +1,6 @@
-"""The functions of ``systems.framework.elementary``, for use in compiled code, too.
+"""Makes the functions of ``systems.framework.elementary`` usable in compiled code.
 
-This module defines numba overloads for these functions and for the same functions of
+The module defines numba overloads for these functions and for the same functions of
 ``pydrake.math``. For floats, compiled code calls the functions of ``math``.
 """
 

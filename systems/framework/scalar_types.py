@@ -1,4 +1,4 @@
-"""Templates of blocks for floats and for automatic differentiation (AutoDiffXd)."""
+"""Makes templates of blocks for floats and automatic differentiation (AutoDiffXd)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 class _Template(TemplateSystem):
     """A template that creates classes without a search for their module.
 
-    Drake adds methods to each new class, and these methods are templates, too. For each
-    of these methods, Drake searches all loaded modules once per stack frame. The result
-    is always the same module of Drake. With nested imports, the search takes 0.25 s per
-    block.
+    Drake adds methods to each new class. These methods are templates, too. For each of
+    them, Drake searches all loaded modules once per stack frame. The result is always
+    the same module of Drake. With nested imports, the search takes 0.25 s per block.
+    This class omits the search.
     """
 
     def __init__(self, name: str, scalars: Any, pairs: Any, scope: ModuleType) -> None:
@@ -59,15 +59,15 @@ def _make_copyable(cls: Any) -> None:
 
 
 def define_for_scalars(name: str, module: str) -> Any:
-    """Returns a decorator for a function ``name(T)`` that defines the class of a block.
+    """Returns a decorator that makes a template of a block for two scalar types.
 
-    The decorator turns the function into a template with the scalar types float and
-    AutoDiffXd.
+    The decorator is applied to a function ``name(T)`` that defines the class of a block
+    for the scalar type T. The scalar types of the template are float and AutoDiffXd.
 
     Args:
         name: Name of the template, with an underscore at its end.
-        module: ``__name__`` of the module. Without it, Drake would search all loaded
-            modules, which takes 0.1 s per block.
+        module: ``__name__`` of the module. Without this name, Drake would search all
+            loaded modules, which takes 0.1 s per block.
 
     Returns:
         The decorator. It returns the template, and ``template[T]`` is a class.

@@ -1,4 +1,4 @@
-"""The objects on abstract ports (emitted sound, recorded audio) and basic rates."""
+"""Defines the objects on abstract ports (sound and audio) and the basic rates."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-#: Default period of the control and of the audio frames, s (Han 2019, section 4.1;
-#: printed "25 m/s").
+#: Default period of the control and of the audio frames, s (Han 2019, section 4.1,
+#: which prints "25 m/s").
 TICK_S = 0.025
 
 
@@ -32,11 +32,11 @@ def read_only(*arrays: NDArray[Any]) -> None:
 
 
 class Emission(NamedTuple):
-    """Emitted sound, and the path of the loudspeaker that emitted it.
+    """Emitted sound, and the path of the loudspeaker that emitted this sound.
 
-    The loudspeaker emitted sample ``n`` at ``start_time + n / sample_rate_hz``. The
-    path has knots with position and velocity. Cubic Hermite polynomials connect the
-    knots.
+    The loudspeaker emitted sample ``n`` at the time ``start_time + n /
+    sample_rate_hz``. The path has knots with position and velocity. Cubic Hermite
+    polynomials connect the knots.
     """
 
     samples: NDArray[np.float32]
@@ -52,7 +52,8 @@ class Emission(NamedTuple):
     v_WS: NDArray[np.float64]
     """(k, 2) velocity of the loudspeaker in W, m/s."""
     level_pa: float
-    """RMS pressure at 1 m while the source sounds, Pa. Noise levels refer to it."""
+    """RMS pressure at 1 m while the source sounds, Pa. Noise levels refer to this
+    pressure."""
     sounding: bool
     """False if all samples are zero, so that listeners may skip them."""
 

@@ -18,10 +18,13 @@ _NORTH_RAD = math.radians(90.0)
 
 @register_jitable
 def wrapped_deg(angle: float) -> float:
-    """Wraps an angle to (-180, 180] deg.
+    """Wraps an angle to the range above -180 and up to 180 deg.
 
     Args:
-        angle: Angle, deg.
+        angle: Any angle, deg.
+
+    Returns:
+        The wrapped angle, deg.
     """
     return 180.0 - (180.0 - angle) % 360.0
 
@@ -48,17 +51,19 @@ def magnetic_heading_step(
 
 
 class MagneticHeading(Block):
-    """Measures the heading from the magnetic field of the earth.
+    """Measures the heading of a robot from the magnetic field of the earth.
 
-    The headings of Song 2011 are clockwise from north. Angles in W are
-    counterclockwise. Iron in the robot does not distort the field.
+    The measured heading is clockwise from north, as in Song 2011. Angles in the world
+    frame W are counterclockwise. The model contains no distortion of the field by iron
+    in the robot.
 
-    The block has no state. It draws new noise every tick. There is no latency.
+    The block has no state. It draws new noise at every tick (control period). There is
+    no latency.
 
     Args:
-        parameters: Noise.
+        parameters: Standard deviation of the noise.
         seed: Seed of the noise.
-        tick_s: Period of the robot, s.
+        tick_s: Control period of the robot, s.
 
     Reference: Song 2011, eq. 7, with an arctangent of two arguments.
     """

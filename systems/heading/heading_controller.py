@@ -17,12 +17,12 @@ PROPORTIONAL = 2.0
 INTEGRAL_1_S = 0.5
 #: K_D, gain of the differential part, s.
 DIFFERENTIAL_S = 0.01
-#: L, output beyond which the robot turns on the spot, deg.
+#: L, output of the PID controller beyond which the robot turns on the spot, deg.
 TURNING_BEYOND_DEG = 50.0
 #: Deviation below which the integral part accumulates, deg. At larger deviations, the
 #: integral part is 0.
 _INTEGRAL_WITHIN_DEG = 20.0
-#: Limits of the integral part and of the differential part, deg.
+#: Limits of the absolute values of the integral part and of the differential part, deg.
 _LARGEST_INTEGRAL_DEG, _LARGEST_DIFFERENTIAL_DEG = 30.0, 20.0
 #: Limit of the output, deg. The text states this limit, but table 1 does not.
 _LARGEST_OUTPUT_DEG = 100.0
@@ -37,16 +37,18 @@ def _limited(value: float, largest: float) -> float:
 def heading_error(
     deviation: float, change: float, integral: float, tick_s: float
 ) -> tuple[float, float]:
-    """Computes the output of the PID controller (Song 2011, table 1).
+    """Computes the output of the PID controller for the heading (Song 2011, table 1).
 
     Args:
         deviation: gamma, expected heading minus present heading, (-180, 180] deg.
-        change: Change of the deviation since the last tick, wrapped, deg.
+        change: Change of the deviation since the last tick (control period), wrapped,
+            deg.
         integral: I, integral part at the last tick, deg.
-        tick_s: Period of the control, s.
+        tick_s: Control period, s.
 
     Returns:
-        The output epsilon, deg, and the new integral part I, deg.
+        Two values: the output epsilon of the controller, deg; and the new integral part
+        I, deg.
     """
     if abs(deviation) < _INTEGRAL_WITHIN_DEG:
         integral += INTEGRAL_1_S * deviation * tick_s
@@ -61,17 +63,19 @@ def heading_error(
 
 @register_jitable
 def motor_duties(error: float) -> tuple[float, float]:
-    """Computes the duties of the motors (Song 2011, table 2, corrected).
+    """Computes the duties of the two motors (Song 2011, table 2, corrected).
 
-    The left duty is v + w and the right duty is v - w, with v = max(0, 1 - |e|/L) and
-    w = 0.01 e. Therefore the duties change without a jump from full speed ahead to
-    turning on the spot. docs/errata.md states what is wrong in the printed table.
+    e is the output epsilon of the PID controller, deg, and L is ``TURNING_BEYOND_DEG``.
+    The left duty is v + w and the right duty is v - w, with v = max(0, 1 - |e|/L) and w
+    = 0.01 e. The duties therefore change without a jump between driving at full speed
+    and turning on the spot. docs/errata.md states the errors in the printed table.
 
     Args:
         error: epsilon, output of the PID controller, clockwise, deg.
 
     Returns:
-        The left and the right duty. They are not limited to -1 to 1.
+        Two values: the left duty and the right duty. They are not yet limited to the
+        range -1 to 1.
     """
     ahead, turn = max(0.0, 1.0 - abs(error) / TURNING_BEYOND_DEG), 0.01 * error
     return ahead + turn, ahead - turn
@@ -87,10 +91,13 @@ class HeadingNumbers(NamedTuple):
 def heading_controller_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: HeadingNumbers
 ) -> None:
-    """Computes the duties of the motors.
+    """Computes the duties of the two motors in one tick (control period).
 
-    The state holds three numbers: the integral part, deg; the deviation at the last
-    tick, deg; and whether the robot moved at the last tick, 0 or 1.
+    The state holds three numbers, in this order:
+
+    - the integral part, deg;
+    - the deviation of the heading at the last tick, deg;
+    - whether the robot moved at the last tick, 0 or 1.
     """
     expected, heading, move = inputs
     duty = outputs[0]
@@ -107,22 +114,22 @@ def heading_controller_step(
 
 
 class HeadingController(Block):
-    """Turns the robot to the expected heading, and drives it in this direction.
+    """Turns the robot to the expected heading, and drives the robot in this direction.
 
     A PID controller computes an output from the deviation of the heading. The block
     then converts this output to the duties of the motors. The smaller the deviation,
-    the faster the robot drives. While ``move`` is 0, the duties are 0.
+    the faster the robot drives. While the input ``move`` is 0, the duties are 0.
 
-    At the first tick of a move, the integral part starts at 0. The differential part is
-    also 0 at this tick, so that it does not jump.
+    At the first tick (control period) of a move, the integral part starts at 0. The
+    differential part is 0 at this tick, so that the output does not jump.
 
     The discrete state holds the integral part, the last deviation, and whether the
-    robot moved at the last tick. It is updated every tick. There is no latency. The
-    paper uses a period of 10 ms. Our tick of 25 ms reduces the phase margin by one
-    degree (``analysis.linear.heading_loop``).
+    robot moved at the last tick. The block updates the state at every tick. There is no
+    latency. The paper uses a control period of 10 ms. Our control period of 25 ms
+    reduces the phase margin by one degree (``analysis.linear.heading_loop``).
 
     Args:
-        tick_s: Period of the control, s.
+        tick_s: Control period, s.
 
     Reference: Song 2011, 2.3.2, tables 1 to 3, with the errata in docs/errata.md.
     """

@@ -38,13 +38,14 @@ def _publish(state: Any, outputs: Any, numbers: MotorNumbers) -> None:
 class MotorDriver(Block):
     """Computes the commanded wheel speeds from the duties of the motors.
 
-    The discrete state is the output, and is updated every tick. A new output is valid
-    after the update. The plant models the lag of the motors.
+    The discrete state has the same values as the output. The block updates the state at
+    every tick (control period). A new output is valid after the update. The lag of the
+    motors is not part of this block, but of the model of the robot (plant).
 
     Args:
-        parameters: Speed at full duty.
+        parameters: Rim speed of a wheel at full duty.
         robot: Radius and top speed of the wheels. The top speed limits the command.
-        tick_s: Period of the update, s.
+        tick_s: Control period, s.
 
     Reference: Song 2011, 2.3.2.
     """

@@ -1,18 +1,24 @@
-"""Maximum likelihood: finds the position at which the channels add up best.
+"""Refines the position of a source by maximum likelihood.
 
 A sound s of unknown waveform reaches microphone m at the time t_m with the gain a_m, in
-white noise. If s is replaced by its best estimate, the likelihood of a position grows
-with sum_k |Y_k|^2 / sum_m a_m^2, where Y_k = sum_m a_m X_m(w_k) exp(j w_k t_m).
+white noise. The sound s is replaced by its best estimate. The likelihood of a position
+then increases with sum_k |Y_k|^2 / sum_m a_m^2, where Y_k = sum_m a_m X_m(w_k) exp(j
+w_k t_m). Here X_m is the spectrum of channel m, and w_k is the angular frequency of bin
+k.
 
-Newton's method maximizes this expression. At each position, the slope and curvature of
-the expression with respect to the times of arrival give a set of delays with a
-covariance. The position that fits these delays (``systems.hearing.multilateration``) is
-the next one. With the least number of microphones, the result is the maximum over all
-delays. With more microphones, it is the maximum over those delays that belong to a
-position.
+Newton's method maximizes this expression. Each step has two parts:
 
-The gains are those of the channels: the principal component of their cross-spectra.
-They are proportional to 1/R_m if the microphones are alike.
+1. The slope and the curvature with respect to the times of arrival give a set of delays
+   with a covariance.
+2. The position that fits these delays (``systems.hearing.multilateration``) is the next
+   position.
+
+With the least number of microphones, the result is the maximum over all delays. With
+more microphones, the result is the maximum over all delays that belong to a position.
+
+The gains are estimated as the principal component of the cross-spectra of the channels.
+If the microphones are alike, the gains are proportional to 1/R_m, where R_m is the
+distance of microphone m.
 """
 
 from __future__ import annotations
@@ -29,16 +35,17 @@ from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# Largest number of Newton steps. They end when all delays change by less than _SETTLED
-# samples.
+# Largest number of Newton steps.
 _STEPS = 8
+# Largest change of a delay in the last Newton step, samples.
 _SETTLED = 1e-4
 
-# The channels are cut again if a delay differs from that of the cut by more than this,
-# samples.
+# Difference between a delay and the delay of the cut above which the channels are cut
+# again, samples.
 _RECUT = 0.02
 
-# Least share of a frame that must remain after the cut.
+# Least share of a frame that must remain after the channels are cut to their common
+# section.
 _LEAST_OVERLAP = 0.25
 
 
@@ -57,15 +64,16 @@ def _ranges(
 
 
 def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.float64]:
-    """Returns the delays of sound that comes from an estimated source.
+    """Returns the delays between the microphones for sound from an estimated source.
 
     Args:
-        fix: Position in A, or the direction to a plane wave if its range is not valid.
+        fix: Estimated position relative to the array. If the range is not valid, the
+            direction of a plane wave is used.
         shape: The n microphones.
         c: Speed of sound, m/s.
 
     Returns:
-        (n - 1,) delays t_k - t_0, s.
+        (n - 1,) delays t_k - t_0 of the channels k = 1 ... n - 1, s.
     """
     if fix.range_valid:
         ranges = _ranges(shape.p_AM, fix.p_AS)
@@ -83,7 +91,7 @@ def refine_source(
     sample_rate_hz: float,
     band_hz: tuple[float, float],
 ) -> SourceFix | None:
-    """Finds the most likely position near a first estimate.
+    """Finds the most likely position of a source near a first estimate.
 
     Args:
         frame: (n, samples) channels, any unit.
@@ -91,12 +99,12 @@ def refine_source(
             the highest frequency of the sound.
         shape: The n microphones.
         c: Speed of sound, m/s.
-        sample_rate_hz: Sample rate of the frame, Hz.
+        sample_rate_hz: Sample rate of the audio frame, Hz.
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        The estimate, with errors from signal and noise in the frame; None if the
-        likelihood has no maximum nearby.
+        The refined estimate. Its errors follow from signal and noise in the frame. None
+        if the likelihood has no maximum nearby.
     """
     fix, cut_at = start, np.full(shape.count - 1, np.inf)
     for _ in range(_STEPS):
@@ -137,11 +145,12 @@ def _cut(
 def _spectra(
     cut: NDArray[np.float32], sample_rate_hz: float, band_hz: tuple[float, float]
 ) -> tuple[NDArray[np.complex64], float, float, float]:
-    """Computes the spectra within the band.
+    """Computes the spectra of cut channels within the band.
 
     Returns:
-        (n, bins) spectra; angular frequency w of the first bin, rad per sample; step of
-        w from bin to bin, rad per sample; and the padding. The padding is the number of
+        Four values. The first is the (n, bins) spectra. The second is the angular
+        frequency w of the first bin, rad per sample. The third is the step of w from
+        bin to bin, rad per sample. The fourth is the padding, which is the number of
         adjacent bins over which the noise of one independent bin is spread.
     """
     length = int(fft.next_fast_len(cut.shape[1], real=True))
@@ -165,14 +174,15 @@ def _pair_sums(
     """Sums the products of the channels over the bins, after removal of their delays.
 
     Args:
-        spectra: (n, bins) spectra of the channels.
+        spectra: (n, bins) spectra X_m of the channels.
         first: Angular frequency w of the first bin, rad per sample.
         step: Step of w from bin to bin, rad per sample.
-        rest: (n,) delays, samples.
+        rest: (n,) delays to remove, samples.
 
     Returns:
-        Three (n, n) matrices for the products X_m X_j^*: sums of the real part, of w
-        times the imaginary part, and of w^2 times the real part; and the sum of w^2.
+        Four sums over the bins. The first three are (n, n) matrices for the products
+        X_m X_j^*. The first sums the real part, the second w times the imaginary part,
+        and the third w^2 times the real part. The fourth is the sum of w^2.
     """
     n, bins = spectra.shape
     aligned = np.empty((bins, n), dtype=np.complex128)
@@ -212,9 +222,9 @@ def _newton_step(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Computes one Newton step of the delays.
 
-    The gains are the principal eigenvector of the cross powers. Slope and curvature of
-    the likelihood then give the step. The other eigenvalues give the noise, which
-    determines the covariance.
+    The gains of the channels are the principal eigenvector of the cross powers. The
+    slope and the curvature of the likelihood give the step. The other eigenvalues give
+    the noise, which determines the covariance.
 
     Returns:
         (n - 1,) change of the delays, samples, and (n - 1, n - 1) covariance of the

@@ -1,4 +1,4 @@
-"""Locates a source from spectra gathered while the robot stands still and listens."""
+"""Locates a source from spectra that are summed while the robot rests and listens."""
 
 from __future__ import annotations
 
@@ -35,22 +35,23 @@ from systems.sound.parameters import MicArrayParameters
 _LOW_HZ, _HIGH_HZ = 200.0, 8_000.0
 #: Least bandwidth of a sound, Hz. With less bandwidth, the correlation repeats within
 #: the delays of the array, so that any bearing fits. A steady tone has a bandwidth of
-#: up to 310 Hz because of its ends and of echoes. A siren has some thousand
-#: Hz.
+#: up to 310 Hz because of its ends and of echoes. A siren has a bandwidth of some
+#: thousand Hz.
 _LEAST_BANDWIDTH_HZ = 600.0
 #: A channel counts as silent up to this share of the power of the median channel.
 _DEAF = 1e-4
-#: The response must exceed this share of the sum that the occupied bins of all pairs
-#: would have if they came from one position. Otherwise nothing is heard.
+#: Least response for a sound, as a share of a reference sum. The reference is the sum
+#: that the occupied bins of all pairs would have if they came from one position. If the
+#: response is lower, nothing is heard.
 _COHERENT = 0.15
-#: The response must also exceed this many times the root of 2 n, where n is the number
+#: Least response for a sound, as a multiple of the root of 2 n, where n is the number
 #: of occupied bins. In 60 recordings of silence, chance reached at most 5.1 times this
 #: root.
 _CHANCE = 5.5
-#: Fewer frames than this give no estimate.
+#: Least number of frames for an estimate.
 LEAST_FRAMES = 4
-#: The result is ambiguous if the response of another direction is at least this share
-#: of the strongest response.
+#: Share of the strongest response. If the response of another direction is at least
+#: this share, the result is ambiguous.
 _AMBIGUOUS_SHARE = 0.9
 
 
@@ -62,8 +63,8 @@ class Direction(NamedTuple):
     range_status: int
     """Whether there is a range, or why there is none (``range_status``)."""
     place: NDArray[np.float64] | None = None
-    """(2,) position from the middle microphone in B axes, m; None if only the bearing
-    is known."""
+    """(2,) position relative to the middle microphone in the axes of the body frame B,
+    m. None if only the bearing is known."""
     ambiguous: bool = False
     """Whether other directions fit about equally well."""
     other: float = 0.0
@@ -71,12 +72,12 @@ class Direction(NamedTuple):
 
 
 class ArrayListener:
-    """Gathers spectra and estimates directions, without a Drake context.
+    """Sums spectra and estimates directions, without a Drake context.
 
     Args:
-        robot: Positions of the microphones, the middle one first.
+        robot: Positions of the microphones, the middle microphone first.
         c: Speed of sound, m/s.
-        microphones: Sample rate and length of the frames.
+        microphones: Sample rate and length of the audio frames.
 
     Raises:
         InputError: There are fewer than four microphones.
@@ -111,28 +112,29 @@ class ArrayListener:
         """Returns the channels that are silent.
 
         Args:
-            sound: Spectra gathered while the source sounded.
+            sound: Sums of spectra from the time in which the source sounded.
 
         Returns:
-            Numbers of the channels, from 0.
+            Numbers of the silent channels, from 0.
         """
         power = sound.own.sum(axis=1)
         return np.flatnonzero(power <= _DEAF * np.median(power)).tolist()
 
     def direction(self, sound: CrossPowers, noise: CrossPowers) -> Direction | None:
-        """Estimates where the sound comes from.
+        """Estimates the direction from which the sound comes.
 
-        The cross powers of the noise are subtracted, and the rest is whitened. The
-        correlations of all pairs are then added up for a grid of positions. The
-        strongest position gives the bearing. The peaks of the correlations near the
-        delays of this position give a range.
+        The function subtracts the cross powers of the noise and whitens the remaining
+        cross powers. It then adds up the correlations of all pairs of channels for a
+        grid of positions. The position with the largest sum gives the bearing. The
+        peaks of the correlations near the delays of this position give a range.
 
         Args:
-            sound: Spectra gathered while the source sounded.
-            noise: Spectra gathered before the sound. They may contain no frame.
+            sound: Sums of spectra from the time in which the source sounded.
+            noise: Sums of spectra from before the sound. They may contain no audio
+                frame.
 
         Returns:
-            The direction, or None if nothing is heard or fewer than three microphones
+            The direction. None if nothing is heard, or if fewer than three microphones
             work.
         """
         lost, facts = self.lost(sound), self.facts
@@ -169,11 +171,14 @@ class ArrayListener:
         return Direction(bearing, status, place, ambiguous, found.other)
 
     def bearing_of(self, steered: float, interpolated: float) -> float:
-        """Returns the bearing of a sound, rad.
+        """Returns the bearing of a sound, chosen from two estimates, rad.
 
         Args:
-            steered: Bearing of the strongest position of the grid, rad.
+            steered: Bearing of the position with the largest sum of correlations, rad.
             interpolated: Bearing from the delays of the peaks, rad.
+
+        Returns:
+            Bearing, rad.
         """
         return steered
 
@@ -202,7 +207,7 @@ class ArrayListener:
         delays: NDArray[np.float64],
         lost: list[int],
     ) -> tuple[float, NDArray[np.float64] | None, int]:
-        """Returns bearing, position and status of the range.
+        """Computes bearing, position and status of the range from delays.
 
         Args:
             pairs: Pairs (i, j) of working microphones.
@@ -210,8 +215,9 @@ class ArrayListener:
             lost: Silent channels.
 
         Returns:
-            Bearing, rad; (2,) position from the middle microphone, m, or None; and the
-            status of the range (``range_status``).
+            Three values. The first is the bearing, rad. The second is the (2,) position
+            relative to the middle microphone, m, or None. The third is the status of
+            the range (``range_status``).
         """
         others = [k for k in range(self.facts.channels) if k not in lost]
         base, *rest = others
@@ -229,7 +235,7 @@ class ArrayListener:
         return near_or_far(p_RM, d)
 
 
-#: What ``listening`` requests.
+#: Values of the input ``listening``: what the search wants the estimator to gather.
 _NOTHING, _NOISE, _SOUND = range(3)
 
 
@@ -247,26 +253,32 @@ class _Memory(NamedTuple):
 
 
 class CrossPowerEstimator(FrameBlock):
-    """Estimates where the source is while the search listens.
+    """Estimates where the source is while the robot searches, rests and listens.
 
-    The block gathers cross-power spectra while ``listening`` requests them. The sums
-    for noise and for sound are separate. When ``listening`` no longer requests sound,
-    the estimate appears at the outputs. It stays there until sound is requested again.
-    All outputs then become zero. If nothing was heard, all outputs are zero except
-    ``lost_microphone``. ``lost_microphone`` is the number of the first silent channel,
-    counted from 1, or 0 if no channel is silent.
+    The search block sets the input ``listening``. While ``listening`` requests noise or
+    sound, the block sums cross-power spectra of frames of audio. The sums for noise and
+    for sound are separate. When ``listening`` no longer requests sound, the estimate
+    appears at the outputs. It stays there until sound is requested again. All outputs
+    then become zero.
 
-    Bearing and range refer to the middle microphone, which is the first. ``p_PS_B``
-    refers to P. It is a unit vector if the range is unknown, and ``range_status`` gives
-    the reason (``systems.hearing.source_fix``). ``ambiguous`` is 1 if another
-    direction, ``alternative_bearing``, fits about equally well. It is also 1 if the
-    bandwidth of the sound is so small that any direction fits.
+    The outputs have these meanings:
 
-    ``audio`` is evaluated only while ``listening`` requests it.
+    - ``lost_microphone`` is the number of the first silent channel, counted from 1, or
+      0 if no channel is silent. If nothing was heard, all other outputs are zero.
+    - Bearing and range refer to the middle microphone, which is the first microphone.
+    - ``p_PS_B`` is the position of the source relative to the control point P. If the
+      range is unknown, it is a unit vector, and ``range_status`` gives the reason
+      (``systems.hearing.source_fix``).
+    - ``ambiguous`` is 1 if another direction, ``alternative_bearing``, fits about
+      equally well. It is also 1 if the bandwidth of the sound is so small that any
+      direction fits.
+
+    The block evaluates the input ``audio`` only while ``listening`` requests noise or
+    sound.
 
     State: the outputs, the last frame, and the sums of spectra.
     Rate and latency: the block updates every ``frame_s`` of the microphones. The
-    outputs change one tick later.
+    outputs change one control period later.
 
     Args:
         robot: Positions of the microphones.
@@ -276,8 +288,8 @@ class CrossPowerEstimator(FrameBlock):
     Raises:
         InputError: As for ``ArrayListener``.
 
-    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17. The paper takes delays in whole
-    samples; the bearing of the strongest position of a grid is not in it.
+    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17. The paper measures delays in whole
+    samples. The bearing from a grid of positions is not in the paper.
     """
 
     part, stage = "hearing", "hearing"
@@ -321,9 +333,9 @@ class CrossPowerEstimator(FrameBlock):
         audio: Callable[[], AudioFrame],
         memory: _Memory,
     ) -> tuple[NDArray[np.float64], _Memory]:
-        """Gathers one frame or estimates, see ``FrameBlock.hear``.
+        """Adds an audio frame to the sums or estimates, see ``FrameBlock.hear``.
 
-        ``audio`` is called only if the frame is required.
+        The function calls ``audio`` only if it needs the frame.
         """
         after = self._gathered(round(float(inputs[0])), audio, memory)
         return after.outputs, after

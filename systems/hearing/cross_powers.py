@@ -1,4 +1,4 @@
-"""Cross-power spectra that are summed over many frames."""
+"""Computes cross-power spectra of channels, summed over many frames."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-#: A bin is occupied if its cross power exceeds three limits. The first limit is this
-#: share of the power of the two channels.
+#: A bin is occupied by sound if its cross power exceeds three limits. The first limit
+#: is this share of the power of the two channels.
 _LEAST_SHARE = 0.25
 #: The second limit is this share of the power of the noise. The cross power of noise
 #: changes by about as much from one second to the next.
@@ -81,10 +81,10 @@ def gather_frame(
     before: NDArray[np.float64],
     now: NDArray[np.float64],
 ) -> CrossPowers:
-    """Adds the spectra of a frame and the previous one to the sums.
+    """Adds the spectra of an audio frame and of the previous frame to the sums.
 
     Args:
-        facts: How frames become spectra.
+        facts: Sizes of frames and spectra.
         sums: Sums so far.
         before: (channels, samples) previous frame.
         now: (channels, samples) present frame.
@@ -109,20 +109,22 @@ def signal_powers(
     noise: CrossPowers | None,
     band_hz: tuple[float, float],
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
-    """Computes the cross powers of the sound alone, and the bins that it occupies.
+    """Computes the cross powers of the sound alone, and the bins of the sound.
+
+    A bin is occupied if its cross power exceeds three limits: a share of the power of
+    both channels, a share of the power of the noise, and a share of the cross power of
+    the strongest bin.
 
     Args:
-        facts: How frames became spectra.
+        facts: Sizes of audio frames and spectra.
         sound: Sums of at least one frame while the source sounded.
         noise: Sums from before the sound, which are subtracted. None: nothing is
             subtracted.
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        (pairs, bins) mean cross powers, and (pairs, bins) whether a bin is occupied.
-        The cross power of an occupied bin is a large share of the power of both
-        channels. It is not far below that of the strongest bin, and it is above the
-        uncertainty of the noise.
+        Two arrays. The first is the (pairs, bins) mean cross powers. The second has the
+        (pairs, bins) Boolean values: whether a bin is occupied.
     """
     mean, own = sound.pairs / sound.frames, sound.own / sound.frames
     steady = np.zeros_like(own)
@@ -145,12 +147,12 @@ def signal_powers(
 def cross_correlations(
     facts: FrameSpectra, weighted: NDArray[np.complex128], fine: int = FINE
 ) -> NDArray[np.float64]:
-    """Computes the correlations of weighted cross powers.
+    """Computes the cross-correlations of channels from weighted cross powers.
 
     Args:
-        facts: How frames became spectra.
+        facts: Sizes of audio frames and spectra.
         weighted: (pairs, bins) weighted cross powers.
-        fine: Number of values per sample.
+        fine: Number of correlation values per sample.
 
     Returns:
         (pairs, fine * length) correlations over the delay t_j - t_i. Delay 0 is first,

@@ -1,21 +1,21 @@
-"""Fits a position to the delays at an array of any shape: compiled kernels.
+"""Fits a position to the delays at a microphone array of any shape (compiled kernels).
 
-Let u be the direction of the source from the centroid of the microphones, and w its
-inverse range. The distance from the source to microphone m exceeds the distance to the
-centroid by
+Let p_m be the position of microphone m relative to the centroid of the microphones. Let
+u be the direction of the source from the centroid, and w the inverse range. The
+distance from the source to microphone m exceeds the distance to the centroid by
 
     g_m = (w |p_m|^2 - 2 p_m . u) / (sqrt(1 - 2 w p_m . u + w^2 |p_m|^2) + 1).
 
-This function is smooth at infinite range (w = 0) and beyond. The delays are c tau_m =
-g_m - g_0. The fit has two stages.
+This function is smooth at infinite range (w = 0), and also for w below 0. The delays
+tau_m relative to microphone 0 satisfy c tau_m = g_m - g_0, where c is the speed of
+sound. The fit has two stages:
 
-The start is a linear problem. The squared ranges are linear in the direction and the
-inverse range from microphone 0 (Smith and Abel, 1987).
-
-Gauss-Newton steps in (u, w) on the whitened delays follow. The coordinates of u depend
-on the array. For a row, and for a plane array in space, they are the components of u
-within the span of the array. For other arrays, they are rotations of u perpendicular to
-itself.
+1. A linear problem gives the start. The squared ranges are linear in the direction and
+   the inverse range from microphone 0 (Smith and Abel, 1987).
+2. Gauss-Newton steps in (u, w) on the whitened delays give the result. The coordinates
+   of u depend on the array. For a row, and for a plane array in space, they are the
+   components of u within the span of the array. For other arrays, they are rotations of
+   u perpendicular to itself.
 
 All kernels are written as loops. For arrays of this size, loops are faster than array
 expressions, and numba compiles them ten times as fast.
@@ -32,14 +32,17 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.hearing.source_fix import RANGED, range_status
 
+# Largest number of Gauss-Newton steps.
 _STEPS = 30
+# Largest change of a coordinate in the last step.
 _SETTLED = 1e-9
 
-# Two positions explain the delays equally well if their chi-squares differ by less than
-# this.
+# Limit of the difference between two chi-squares. If the chi-squares of two positions
+# differ by less, both positions explain the delays equally well.
 _SAME_CHI_SQUARE = 9.0
 
-# Keeps the slopes finite for directions along a row or in the plane of a plane array.
+# Least cosine that keeps the slopes finite for directions along a row or in the plane
+# of a plane array.
 _LEAST_COSINE = 0.05
 
 
@@ -47,7 +50,8 @@ class DelayProblem(NamedTuple):
     """Delays and the array that measured them."""
 
     d: NDArray[np.float64]
-    """(n - 1,) range from each other microphone minus range from microphone 0, m."""
+    """(n - 1,) range differences, m. An element is the range of another microphone
+    minus the range of microphone 0."""
     root: NDArray[np.float64]
     """(n - 1, n - 1) lower triangular matrix that whitens d: the errors become
     independent with variance 1."""
@@ -70,14 +74,14 @@ def _whitened(
     r: NDArray[np.float64],
     J: NDArray[np.float64],
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the whitened residuals r and their slopes J.
+    """Computes the whitened residuals r of the delays, and the slopes J of the model.
 
     Args:
         problem: Delays and array.
-        basis: (d, k) derivatives of u with respect to its coordinates.
+        basis: (d, k) derivatives of the direction u with respect to its coordinates.
         k: Number of coordinates of the direction.
-        u: (d,) direction.
-        w: Inverse range, 1/m.
+        u: (d,) direction of the source.
+        w: Inverse range of the source, 1/m.
         r: (n - 1,) output, residuals.
         J: (n - 1, k + 1) output, slopes of the model with respect to the coordinates of
             u and to w.
@@ -123,9 +127,10 @@ def _whitened(
 def _factor(
     J: NDArray[np.float64], size: int, damping: float, prior: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the Cholesky factor of J^T J.
+    """Computes the Cholesky factor of J^T J with damping.
 
-    The diagonal is damped (Marquardt). ``prior`` is added to the last diagonal element.
+    The diagonal is damped (Marquardt). The number ``prior`` is added to the last
+    diagonal element.
     """
     N = np.zeros((size, size))
     trace = 0.0
@@ -208,11 +213,11 @@ def across(u: NDArray[np.float64]) -> NDArray[np.float64]:  # pragma: no cover
 def _coordinates(
     problem: DelayProblem, u: NDArray[np.float64], bound: Any
 ) -> tuple[NDArray[np.float64], int]:  # pragma: no cover  (compiled)
-    """Computes the derivatives of a direction with respect to its coordinates.
+    """Computes the derivatives of a direction u with respect to its coordinates.
 
-    If ``bound``, u keeps unit length within the span. The coordinates are then
-    rotations of u perpendicular to itself. Otherwise they are the components of u in
-    the span.
+    If ``bound`` is set, u keeps unit length within the span of the array. The
+    coordinates are then rotations of u perpendicular to itself. Otherwise the
+    coordinates are the components of u in the span.
 
     Returns:
         (d, 3) derivatives, of which the first k columns are used, and k.
@@ -272,21 +277,22 @@ def _within(
 def _descend(
     problem: DelayProblem, u: NDArray[np.float64], w: float, bound: Any, far: Any
 ) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
-    """Runs Gauss-Newton steps with Marquardt damping.
+    """Minimizes the squared residuals by Gauss-Newton steps with Marquardt damping.
 
-    A step that does not increase the cost is accepted, and the damping decreases.
-    Otherwise the step is discarded, and the damping increases. The steps end when the
-    largest change is below ``_SETTLED``.
+    If a step does not increase the cost, the step is accepted, and the damping
+    decreases. Otherwise the step is discarded, and the damping increases. The steps end
+    when the largest change is below ``_SETTLED``.
 
     Args:
         problem: Delays and array.
         u: (d,) direction to start from.
         w: Inverse range to start from, 1/m.
-        bound: Whether u keeps unit length within the span.
-        far: Whether w stays as it is.
+        bound: Whether u keeps unit length within the span of the array.
+        far: Whether w is held constant.
 
     Returns:
-        The final u and w, and the sum of the squared residuals at this position.
+        The final direction u; the final inverse range w, 1/m; and the sum of the
+        squared residuals at this position.
     """
     m = problem.d.size
     basis, k = _coordinates(problem, u, bound)
@@ -332,10 +338,11 @@ def _descend(
 def _descend_within(
     problem: DelayProblem, u: NDArray[np.float64], w: float, far: Any
 ) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
-    """Runs ``_descend`` with the constraints w >= 0 and |u| = 1.
+    """Runs ``_descend`` with the constraints w >= 0 and |u| <= 1.
 
-    If a result violates a constraint, the steps are repeated with this constraint as an
-    equation.
+    Here u is the direction within the span of the array, and w is the inverse range. If
+    a result violates a constraint, the function repeats the steps with this constraint
+    as an equation.
     """
     bound = _is_bound(problem)
     cost = 0.0
@@ -367,14 +374,15 @@ def _starts(
 ]:  # pragma: no cover  (compiled)
     """Computes positions to start from, by linear equations relative to microphone 0.
 
-    Let v be the components of the direction in the span. For each microphone b, let
-    q = p_b - p_0, and let d be the range difference. The equation is then
+    Let v be the components of the direction in the span of the array, and w the inverse
+    range. For each microphone b, let q = p_b - p_0, and let d be the range difference.
+    The equation of this microphone is
 
         q . v - w (q^2 - d^2) / 2 = -d.
 
     The first start is a plane wave (w = 0). If v must have unit length, v is a linear
-    function of w, and |v| = 1 gives up to two further starts. Otherwise least squares
-    for v and w give one further start if there are enough delays.
+    function of w, and |v| = 1 gives up to two further starts. Otherwise, if there are
+    enough delays, least squares for v and w give one further start.
 
     Returns:
         (3, r) components v, (3,) inverse ranges, and the number of starts.
@@ -445,13 +453,14 @@ def _search(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Finds the two positions with the lowest costs.
+    """Finds the two positions that fit the delays best.
 
-    ``_descend_within`` refines each start. The plane wave is the last start. It is left
-    out if another start already fits.
+    The function refines each start by ``_descend_within``. The plane wave is the last
+    start. If another start already fits, the plane wave is omitted.
 
     Returns:
-        (2, d) directions, (2,) inverse ranges and (2,) chi-squares, the best one first.
+        (2, d) directions, (2,) inverse ranges and (2,) chi-squares. The best position
+        is first.
     """
     n, dim = problem.p.shape
     unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
@@ -481,17 +490,18 @@ def _covariance(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], int
 ]:  # pragma: no cover  (compiled)
-    """Computes the errors of a position.
+    """Computes the covariance of a position.
 
     Args:
         problem: Delays and array.
-        u: (d,) direction.
-        w: Inverse range, 1/m.
-        prior: Prior information on w, which is the inverse of the variance of w, m^2.
+        u: (d,) direction of the source.
+        w: Inverse range of the source, 1/m.
+        prior: Prior information on w, m^2. It is the inverse of the variance of w.
 
     Returns:
-        (k + 1, k + 1) covariance of the coordinates of u and of w; (d, 3) derivatives
-        of u with respect to its coordinates; and k.
+        Three values. The first is the (k + 1, k + 1) covariance of the coordinates of u
+        and of w. The second is the (d, 3) derivatives of u with respect to its
+        coordinates. The third is the number k of coordinates.
     """
     bound = _is_bound(problem)
     basis, k = _coordinates(problem, u, bound)
@@ -547,24 +557,30 @@ def fit_delays(
     NDArray[np.float64],
     int,
 ]:  # pragma: no cover  (compiled)
-    """Computes the position, its errors and its twin.
+    """Computes the position that fits the delays, its errors, and its twin.
 
     The search gives up to two positions. If both fit about equally well, the farther
-    one is the result and the nearer one its twin. The range is valid if the inverse
-    range exceeds its standard deviation. Otherwise the direction is fitted again for a
-    plane wave. Its covariance then includes the unknown range, with the standard
-    deviation ``prior_w`` of w.
+    position is the result, and the nearer position is its twin. If the inverse range
+    exceeds its standard deviation, the range is valid. Otherwise the function fits the
+    direction again for a plane wave. The covariance of this direction includes the
+    unknown range, with the standard deviation ``prior_w`` of the inverse range.
 
     Args:
-        problem: ``DelayProblem``.
+        problem: Delays, and the array that measured them.
         prior_w: Standard deviation of the inverse range without measurement, 1/m. It is
             used if the delays give no range.
 
     Returns:
-        (d,) direction u; w; variance of w, infinite without a range; (d, d) covariance
-        of u; (d, d) covariance of the position, or that of u again without a range;
-        chi-square; (d,) position of the twin, zeros without a twin; and the status of
-        the range (``range_status``).
+        Eight values, in this order:
+
+        - (d,) direction u;
+        - inverse range w, 1/m;
+        - variance of w, infinite without a range;
+        - (d, d) covariance of u;
+        - (d, d) covariance of the position, or covariance of u without a range;
+        - chi-square of the fit;
+        - (d,) position of the twin, zeros without a twin;
+        - status of the range (``range_status``).
     """
     us, ws, costs = _search(problem)
     n, dim = problem.p.shape

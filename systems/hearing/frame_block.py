@@ -1,4 +1,4 @@
-"""Blocks that process frames of sound in Python."""
+"""Defines the base class of blocks that process frames of audio in Python."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from systems.sound.parameters import MicArrayParameters
 
 
 def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
-    """Returns the frame on a port.
+    """Reads the frame of audio on an input port.
 
     Args:
         context: Context of the block.
@@ -29,7 +29,7 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
         The frame.
 
     Raises:
-        TypeError: The port carries something else.
+        TypeError: The value on the port is not a frame of audio.
         InputError: A value of the frame is not finite.
     """
     audio = port.Eval(context)
@@ -43,7 +43,7 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
-    """Raises an error if a frame has another sample rate.
+    """Raises an error if the sample rate of a frame is not the expected rate.
 
     Args:
         audio: The frame.
@@ -75,20 +75,20 @@ class _Heard(NamedTuple):
 
 
 class FrameBlock(Block):
-    """The base class of blocks that process frames of sound in Python.
+    """The base class of blocks that process frames of audio in Python.
 
     The first input port of a subclass is ``audio``. All other ports carry numbers. A
-    subclass defines ``hear``.
+    subclass defines the method ``hear``.
 
-    State: the memory (abstract), and the values of the output ports (discrete), which
-    change one tick after the end of a frame.
+    State: the memory of ``hear`` is an abstract state. The values of the output ports
+    are a discrete state. They change one control period after the end of a frame.
     """
 
     def declare_frames(self, memory: Any, microphones: MicArrayParameters) -> None:
         """Declares the ports, the state and the update.
 
         Args:
-            memory: Memory before the first frame.
+            memory: Memory before the first audio frame.
             microphones: Sample rate and length of the frames.
         """
         self._microphones, self._blank = microphones, memory
@@ -113,7 +113,7 @@ class FrameBlock(Block):
     def hear(
         self, inputs: NDArray[np.float64], audio: Callable[[], AudioFrame], memory: Any
     ) -> tuple[NDArray[np.float64], Any]:
-        """Processes one frame.
+        """Processes one frame of audio.
 
         Args:
             inputs: Elements of the input ports after ``audio``, in order.
@@ -146,10 +146,10 @@ class FrameBlock(Block):
         discrete_state.set_value(0, heard.values)
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step of the block for the frames of a compiled loop.
+        """Returns the step of the block for the frames of a compiled simulation loop.
 
         Args:
-            run: Provides the frames.
+            run: Facts about the run, which provide the frames.
 
         Returns:
             The step, which calls Python.

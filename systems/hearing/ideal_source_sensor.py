@@ -1,4 +1,4 @@
-"""Ideal hearing, which replaces loudspeaker, microphones and estimator."""
+"""Simulates ideal hearing, which replaces loudspeaker, microphones and estimator."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ from systems.world.geometry import control_point, rotate, safe_norm
 
 @register_jitable
 def relative_position(pose_WB: Any, pose_WS: Any, control_point_m: Any) -> Any:
-    """Computes the position of the source relative to the robot.
+    """Computes the position of the source relative to the control point P of the robot.
 
     Args:
-        pose_WB: x, y, theta of the robot in W, m and rad; floats or AutoDiffXd.
-        pose_WS: x, y, theta of the source in W; theta has no effect.
+        pose_WB: x, y, theta of the body frame B in the world frame W, m and rad; floats
+            or AutoDiffXd.
+        pose_WS: x, y, theta of the source in W, m and rad. The angle theta has no
+            effect.
         control_point_m: Distance of P ahead of the origin of B, m.
 
     Returns:
-        x and y of p_PS_B, the position of the source relative to P, in B axes, m.
+        x and y of the position relative to P, in the axes of B, m.
     """
     x_P, y_P = control_point(pose_WB, control_point_m)
     return rotate(-pose_WB[2], pose_WS[0] - x_P, pose_WS[1] - y_P)
@@ -41,16 +43,17 @@ def relative_position(pose_WB: Any, pose_WS: Any, control_point_m: Any) -> Any:
 
 @register_jitable
 def disturbed(x: Any, y: Any, numbers: Any, hearing: Any) -> Any:
-    """Adds noise of bearing and range to a position.
+    """Adds noise of bearing and range to the position of a source.
 
     Args:
-        x: x of p_PS_B, m.
-        y: y of p_PS_B, m.
+        x: x of the position relative to the control point P, in the axes of the body
+            frame B, m.
+        y: y of this position, m.
         numbers: Two standard normal numbers.
-        hearing: ``IdealHearingParameters``.
+        hearing: Standard deviations of bearing and range.
 
     Returns:
-        x and y, m.
+        x and y of the disturbed position, m.
     """
     bearing = math.atan2(y, x) + numbers[0] * math.radians(hearing.bearing_noise_deg)
     factor = 1.0 + numbers[1] * hearing.range_noise_fraction
@@ -60,15 +63,16 @@ def disturbed(x: Any, y: Any, numbers: Any, hearing: Any) -> Any:
 
 @register_jitable
 def stated_covariance(x: Any, y: Any, hearing: Any) -> Any:
-    """Computes the covariance of a position for the noise in the parameters.
+    """Computes the covariance of a position that has noise of bearing and range.
 
     Args:
-        x: x of p_PS_B, m; float or AutoDiffXd.
-        y: y of p_PS_B, m.
-        hearing: ``IdealHearingParameters``.
+        x: x of the position relative to the control point P, in the axes of the body
+            frame B, m; float or AutoDiffXd.
+        y: y of this position, m.
+        hearing: Standard deviations of bearing and range.
 
     Returns:
-        xx, xy, yx, yy, m^2.
+        Elements xx, xy, yx, yy of the covariance, m^2.
     """
     bearing = atan2(y, x)
     across = math.radians(hearing.bearing_noise_deg) ** 2 * (x * x + y * y)
@@ -87,7 +91,7 @@ class _PerFrame:
     """Table with one row per measurement. Each row is computed when it is read.
 
     Args:
-        row: Function that returns the row of a measurement.
+        row: Function that returns the row for the number of a measurement.
     """
 
     def __init__(self, row: Callable[[int], Any]) -> None:
@@ -118,9 +122,10 @@ class IdealSourceNumbers(NamedTuple):
 def ideal_source_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Measures the source in one tick.
+    """Measures the position of the source in one control period.
 
-    The state contains x and y of p_PS_B, m, and whether anything is heard.
+    The state has three numbers: x and y of the position of the source relative to the
+    control point P, m, and whether anything is heard.
     """
     if tick % numbers.frame_ticks != 0:
         return
@@ -154,19 +159,21 @@ def _publish_ideal_source(state, outputs, numbers):
 @define_for_scalars("IdealSourceSensor_", __name__)
 def IdealSourceSensor_(T):
     class Impl(Block_[T]):
-        """Measures where the source is, exactly or with the noise in the parameters.
+        """Measures where the source is, exactly or with noise.
 
-        The block replaces ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator``, and it
-        has the outputs of ``TDOAEstimator``. Its discrete state, updated every frame,
-        is p_PS_B and ``detected``. Its latency is one tick, like that of the estimator,
-        so that the control loop is the same with either block. Like sound, it reaches
-        30 m. Unlike the estimator
-        with a row of microphones, the block distinguishes front from back.
+        The block replaces ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator``. It has
+        the outputs of ``TDOAEstimator``. Its discrete state has the position of the
+        source relative to the control point P, and ``detected``. The block updates the
+        state every audio frame. Its latency is one control period, like that of the
+        estimator, so that the control loop is the same with either block. Like sound,
+        the block reaches 30 m. Unlike the estimator with a row of microphones, the
+        block distinguishes front from back.
 
         Args:
-            robot: Position of P.
-            hearing: ``IdealHearingParameters``.
-            sound: ``SoundParameters``; its gate defines when there is sound.
+            robot: Distance of P ahead of the axle.
+            hearing: Noise of bearing and range, and whether the sensor hears between
+                bursts.
+            sound: Schedule of the sound, which defines when there is sound.
             frame_s: Period of the measurements, s.
             seed: Seed of the noise.
 
@@ -222,12 +229,15 @@ def IdealSourceSensor_(T):
             self.declare(step, tick_s=frame_s)
 
         def _sounds(self, frame: Any) -> Any:
-            """Returns whether there is sound in the middle of a measured frame.
+            """Returns whether there is sound in the middle of a measured audio frame.
 
-            The frame ends at the measurement.
+            The frame ends at the time of the measurement.
 
             Args:
                 frame: Number of the measurement, or an array of numbers.
+
+            Returns:
+                A Boolean value, or an array of Boolean values.
             """
             sounds = self._sound.sounds((frame - 0.5) * self._frame_s)
             return sounds | (not self.step.numbers.hearing.burst_gaps)

@@ -1,4 +1,4 @@
-"""Locates the source of sound in each frame, with a memory from frame to frame."""
+"""Locates the source of sound in each frame of audio, with a memory between frames."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_fix import NEAREST_M, SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# A frame with at least this correlation contains almost nothing but direct sound. The
-# second value applies until the first frame without a sound. Until then, the noise
-# level is unknown, and noise may explain the rest of the energy.
+# Least correlation of a frame that contains almost nothing but direct sound.
 _DIRECT_CORRELATION = 0.98
+# The same limit until the first frame without a sound. Until then, the noise level is
+# unknown, and noise may explain the rest of the energy.
 _FIRST_CORRELATION = 0.9
 
-# Energy that the channels do not share counts as noise up to this many times the energy
-# between the sounds. Otherwise it counts as echoes.
+# Largest ratio of energy that counts as noise to the energy between the sounds. The
+# ratio applies to energy that the channels do not share. If this energy is larger, it
+# counts as echoes.
 _NOISE_MARGIN = 3.0
 
 # Number of frames over which the noise level is averaged.
@@ -43,9 +44,9 @@ _NOISE_FRAMES = 8.0
 # frame.
 _LOUDEST_NOISE = 1.5
 
-# After the suppression of echoes, a frame is accepted if it has at least this
-# correlation and at most this ambiguity.
+# Least correlation of a frame that is accepted after the suppression of echoes.
 _ECHO_CORRELATION = 0.4
+# Largest ambiguity of a frame that is accepted after the suppression of echoes.
 _ECHO_AMBIGUITY = 0.7
 
 # The first frame of a sound may contain the sound in some channels only. The localizer
@@ -53,21 +54,21 @@ _ECHO_AMBIGUITY = 0.7
 # probability.
 _SHARED_CHANCE = 1e-3
 
-# One percent of the frames with the weakest detectable sound are quieter than expected
-# by more than this number of standard deviations.
+# Number of standard deviations by which a quiet frame may be below its expected energy.
+# One percent of the frames with the weakest detectable sound are quieter.
 _QUIET = 2.33
 
-# Number of sets of delays that are examined if sounds overlap, and least correlation of
-# a set. Some sets occur by chance. If two sounds of 0.5-8 kHz overlap, one in twenty
-# such sets has a higher correlation.
+# Number of sets of delays that are examined if sounds overlap.
 _SETS = 4
+# Least correlation of a set of delays. Some sets occur by chance. If two sounds of
+# 0.5-8 kHz overlap, one in twenty of the sets by chance has a higher correlation.
 _SET_CORRELATION = 0.1
 
 # No set that occurs by chance has a correlation as high as this.
 _SURE_CORRELATION = 0.25
 
-# The delays of the pairs in a set may disagree by this many standard deviations in
-# addition to the usual limit.
+# Number of standard deviations by which the delays of the pairs in a set may disagree,
+# in addition to the usual limit.
 _SET_CLOSURE = 2.0
 
 # Two sets belong to one sound if each of their delays differs by at most this, s.
@@ -82,7 +83,8 @@ _ALIKE_M = 1e-3
 _WHOLE_FRAME = 0.8
 
 
-# Limits of the delays and of the position of a sound. The papers have no such limits.
+# The following limits of the delays and of the position of a sound are not in the
+# papers.
 # Largest disagreement between the delay of a pair and the delays of all pairs, s.
 _LARGEST_CLOSURE_S = 5e-6
 # Largest ratio of the second peak of a correlation to its highest peak.
@@ -103,14 +105,14 @@ class HearingMemory(NamedTuple):
     """Values that the localizer keeps from one frame to the next one."""
 
     energy: float
-    """Average energy of a frame without a sound, rumble excluded, in units of the frame
-    squared. It is 0 before the first such frame."""
+    """Average energy of a frame without a sound, in units of the frame squared. Rumble
+    is excluded. The value is 0 before the first frame without a sound."""
     noise_energy: float
-    """Average energy of one channel of a frame without a sound, within the band, at the
-    sample rate of the plan."""
+    """Average energy of one channel of a frame without a sound. It is taken within the
+    band, at the sample rate of the plan."""
     echoes: NDArray[np.float32] | None = None
-    """(n, bins) memory of ``systems.delays.precedence``; None if it is below the
-    noise."""
+    """(n, bins) memory of past spectra in ``systems.delays.precedence``. None if the
+    memory is below the noise."""
     heard: bool = False
     """Whether the frame contained a sound."""
 
@@ -152,10 +154,11 @@ def _is_doubtful(delays: DelayEstimate) -> bool:
 
 
 class Localiser:
-    """Locates the sources of sound in successive frames.
+    """Locates the sources of sound in successive frames of audio.
 
-    The frames have the form that ``MicArray`` publishes. They are processed at half
-    their sample rate if the band allows it. Delays are not restricted to whole samples.
+    The frames have the form that ``MicArray`` publishes. If the band allows it, the
+    frames are processed at half their sample rate. Delays are not restricted to whole
+    samples.
 
     Args:
         parameters: Method, band and rate of false alarms.
@@ -228,19 +231,19 @@ class Localiser:
     def localise(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[SourceFix | None, HearingMemory]:
-        """Locates the dominant sound of a frame.
+        """Locates the dominant sound of an audio frame.
 
         Args:
             frame: (n, samples) channels, in any unit, for example counts.
             memory: Memory after the previous frame.
 
         Returns:
-            The source on the side of ``ArrayShape.ahead``, or None if there is no
-            estimate; and the new memory.
+            Two values. The first is the source on the side of ``ArrayShape.ahead``, or
+            None if there is no estimate. The second is the new memory.
 
         Raises:
-            InputError: The frame has another shape than this array needs, or is not
-                finite.
+            InputError: The shape of the frame does not fit this array, or a value of
+                the frame is not finite.
         """
         sound, after = self._sound(frame, memory)
         if sound is None:
@@ -253,15 +256,16 @@ class Localiser:
     def candidates(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[list[Candidate], HearingMemory]:
-        """Locates each of the sounds of a frame.
+        """Locates each of the sounds of an audio frame.
 
         Args:
             frame: (n, samples) channels, in any unit, for example counts.
             memory: Memory after the previous frame.
 
         Returns:
-            The sound that ``localise`` finds, if any, then further sounds in the order
-            of ``estimate_delay_sets``; and the new memory.
+            Two values. The first is the list of sounds. It begins with the sound that
+            ``localise`` finds, if any. Further sounds follow in the order of
+            ``estimate_delay_sets``. The second is the new memory.
 
         Raises:
             InputError: As for ``localise``.
@@ -286,10 +290,13 @@ class Localiser:
         return [c for c in found if not self._is_copied(frame, c.fix, memory)], after
 
     def _one_of_several(self, delays: DelayEstimate) -> Candidate | None:
-        """Returns the position that explains a set of delays, or None.
+        """Locates one of several sounds from the set of its delays.
 
         The other sounds act as noise. The delays of the pairs may therefore disagree by
         an additional multiple of their standard deviation.
+
+        Returns:
+            The candidate, or None if the delays or the position are rejected.
         """
         scatter = math.sqrt(float(np.diag(delays.covariance).max()))
         closure = max(0.0, delays.closure - _SET_CLOSURE * scatter)
@@ -298,14 +305,16 @@ class Localiser:
     def _sound(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[_Sound | None, HearingMemory]:
-        """Detects a sound in a frame.
+        """Detects a sound in an audio frame by three tests.
 
-        Three tests follow one another. The energy must be above that of noise. The
-        correlation peaks must be too high for noise alone. In the first frame of a
-        sound, all channels must contain it.
+        1. The energy must be above the energy of noise.
+        2. The correlation peaks must be too high for noise alone.
+        3. If the frame is the first frame of a sound, all channels must contain the
+           sound.
 
         Returns:
-            The frame, or None if a test fails; and the new memory.
+            Two values. The first is the frame, or None if a test fails. The second is
+            the new memory.
         """
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):
@@ -354,15 +363,15 @@ class Localiser:
         *,
         begins: bool,
     ) -> tuple[Candidate | None, HearingMemory]:
-        """Locates the sound that ``look`` found in a frame.
+        """Locates the sound that ``look`` found in an audio frame.
 
         If the channels share almost all of their energy, the delays of the frame are
         used as they are. Otherwise echoes are suppressed, and the delays are measured
-        again. The errors of echoes that remain are then added to the covariance.
+        again. The errors of the remaining echoes are then added to the covariance.
 
         A sound that begins within the frame may include a reflection off the floor,
-        which no single channel reveals. Its delays therefore always get the errors of
-        echoes.
+        which no single channel reveals. The errors of echoes are therefore always added
+        for this sound.
         """
         delays = self._delays(frame, seen)
         direct = delays is not None and self._is_direct(delays, memory)
@@ -420,11 +429,11 @@ class Localiser:
         fix: SourceFix,
         memory: HearingMemory,
     ) -> bool:
-        """Returns whether two channels of a frame with a fix repeat each other.
+        """Returns whether two channels of an audio frame repeat each other.
 
         Without noise, microphones at equal distances from the source record equal
-        samples. In frames without noise, only uneven pairs are therefore compared at
-        lag 0.
+        samples. Therefore, in frames without noise, pairs of microphones at equal
+        distances from the centroid are not compared at lag 0.
         """
         shape = self.plan.shape
         # A fix without range has the delays of a plane wave. They may differ from those
@@ -448,12 +457,15 @@ class Localiser:
     def _after_noise(
         self, memory: HearingMemory, energy: float, noise_energy: float | None = None
     ) -> HearingMemory:
-        """Returns the memory after a frame of noise.
+        """Returns the memory after an audio frame of noise.
 
         Args:
             memory: Memory after the previous frame.
             energy: Energy of the frame without rumble.
             noise_energy: Energy within the band; None if it was not measured.
+
+        Returns:
+            The new memory.
         """
         echoes = memory.echoes
         if echoes is not None:
@@ -488,12 +500,12 @@ class Localiser:
         frame: NDArray[np.float32] | None = None,
         echoes: NDArray[np.float64] | None = None,
     ) -> Candidate | None:
-        """Returns the position that explains the delays of a frame.
+        """Returns the position that explains the delays of an audio frame.
 
         Args:
             delays: Delays of the sound.
-            frame: The frame, in which the method ``ml`` refines the position. None: the
-                position is not refined.
+            frame: The frame, which the method ``ml`` uses to refine the position. None:
+                the position is not refined.
             echoes: (n - 1, n - 1) additional covariance of the delays after the
                 suppression of echoes, s^2.
 

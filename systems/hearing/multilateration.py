@@ -1,7 +1,8 @@
 """Locates a source from the delays at microphones in any arrangement.
 
-Three equally spaced microphones in a row have a closed form
-(``systems.hearing.near_field``). ``systems.hearing.delay_fit`` serves all other arrays.
+For three equally spaced microphones in a row, the module uses a closed form
+(``systems.hearing.near_field``). For all other arrays, it uses
+``systems.hearing.delay_fit``.
 """
 
 from __future__ import annotations
@@ -23,7 +24,12 @@ def locate_source(
     shape: ArrayShape,
     c: float,
 ) -> SourceFix:
-    """Computes where a sound comes from.
+    """Computes the position or the direction from which a sound comes.
+
+    If the range exceeds its standard deviation, the range is valid. Otherwise the
+    direction is that of a source far away. For arrays without a closed form, the error
+    of this direction includes the effect of the unknown range. For this purpose, the
+    standard deviation of the inverse range is assumed to be 1 / (2 apertures).
 
     Args:
         tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
@@ -32,11 +38,7 @@ def locate_source(
         c: Speed of sound, m/s.
 
     Returns:
-        The source on the side of ``shape.ahead``. Its range is valid if it exceeds its
-        standard deviation. Otherwise the direction is that of a source far away. For
-        arrays without a closed form, the error of this direction includes the effect of
-        the unknown range. The standard deviation of the inverse range is then assumed
-        to be the inverse of two apertures.
+        The source on the side of ``shape.ahead``.
     """
     if shape.equal_row is not None and shape.angles == ("bearing",):
         fix = near_field.locate_in_row(tau, covariance, shape.equal_row, c)
@@ -77,17 +79,18 @@ def whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 def angles_of(
     u: NDArray[np.float64], of_u: NDArray[np.float64], shape: ArrayShape
 ) -> tuple[float, float | None, float | None]:
-    """Computes the angles of a direction and their errors.
+    """Computes the elevation of a direction, and the errors of its angles.
 
     Args:
-        u: (d,) unit vector.
+        u: (d,) unit vector of the direction.
         of_u: (d, d) covariance of u.
         shape: The array, which may not measure every angle.
 
     Returns:
-        Standard deviation of the azimuth; elevation; and standard deviation of the
-        elevation, rad. The last two are None if there is no elevation. A standard
-        deviation is infinite if the array does not measure the angle.
+        Three values, rad: the standard deviation of the azimuth, the elevation, and the
+        standard deviation of the elevation. If there is no elevation, the last two are
+        None. If the array does not measure an angle, its standard deviation is
+        infinite.
     """
     level = math.hypot(u[0], u[1])
     x, y = (u[0] / level, u[1] / level) if level > 0.0 else (1.0, 0.0)

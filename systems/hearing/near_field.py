@@ -1,10 +1,11 @@
 """Computes range and bearing of a source from the delays at three microphones in a row.
 
-M1, M2 and M3 are at y = l, 0, -l, and the source is ahead, x > 0. Let a = c tau_12 and
-b = c tau_13, where tau_ij = t_j - t_i. Apollonius' theorem gives R1 = (2 l^2 + 2 a^2 -
-b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; in Han 2019, eq. 9 is not consistent with
-eq. 7). Then R2 = R1 + a, R3 = R1 + b and sin(bearing) = (R3^2 - R1^2) / (4 l R2). These
-equations are exact at any distance.
+The microphones M1, M2 and M3 are at y = l, 0, -l, and the source is ahead, at x > 0.
+R_i is the distance from the source to M_i. The delays are tau_ij = t_j - t_i. Let a = c
+tau_12 and b = c tau_13, where c is the speed of sound. Apollonius' theorem gives R1 =
+(2 l^2 + 2 a^2 - b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; in Han 2019, eq. 9 is not
+consistent with eq. 7). Then R2 = R1 + a, R3 = R1 + b and sin(bearing) = (R3^2 - R1^2) /
+(4 l R2). These equations are exact at any distance.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from systems.hearing.delay_fit import carried
 from systems.hearing.source_fix import RANGED, SourceFix, range_status
 from systems.sound.array_shape import EqualRow
 
-# If b - 2 a is at most this, it consists mainly of rounding errors. It then counts as
-# zero, and the wave is a plane wave.
+# Limit of b - 2 a. If b - 2 a is at most this, it consists mainly of rounding errors.
+# It then counts as zero, and the wave is a plane wave.
 _LEAST_GAP_M = 1e-9
 
-#: Keeps errors finite for a source on the line of the microphones, or straight above
-#: an array.
+#: Least cosine that keeps errors finite for a source on the line of the microphones, or
+#: straight above an array.
 LEAST_COSINE = 1e-3
 
 
@@ -45,18 +46,21 @@ def _ranges(
 def source_from_delays(
     tau_12: float, tau_13: float, spacing: float, c: float
 ) -> tuple[float, float, int]:  # pragma: no cover  (compiled)
-    """Computes bearing and range of the source from M2.
+    """Computes bearing and range of a source seen from the middle of three microphones.
+
+    The microphones M1, M2 and M3 form a row from left to right.
 
     Args:
         tau_12: Time by which the sound reaches M2 later than M1, s.
         tau_13: Time by which the sound reaches M3 later than M1, s.
-        spacing: Distance l between adjacent microphones, m.
+        spacing: Distance between adjacent microphones, m.
         c: Speed of sound, m/s.
 
     Returns:
-        Bearing in [-pi/2, pi/2], rad, positive to the left; range, m; and status of the
-        range (``range_status``). If there is no range, the value of the range is 0, and
-        the bearing is that of a source far away.
+        Three values. The first is the bearing in [-pi/2, pi/2], rad, positive to the
+        left. The second is the range, m. The third is the status of the range
+        (``range_status``). If there is no range, the second value is 0, and the bearing
+        is that of a source far away.
     """
     a, b = c * tau_12, c * tau_13
     status, r1, r2, r3 = _ranges(a, b, spacing)
@@ -69,9 +73,10 @@ def source_from_delays(
 def _slopes(
     bearing: float, r2: float, a: float, b: float, spacing: float, c: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the (4, 2) derivatives of range, bearing, x and y.
+    """Computes the (4, 2) derivatives of range, bearing, x and y of the source.
 
-    They are derivatives with respect to the delays tau_12 and tau_13.
+    The derivatives are with respect to the delays tau_12 and tau_13. The delay tau_1j
+    is the time by which the sound reaches microphone j later than microphone 1.
     """
     sine, cosine = math.sin(bearing), math.cos(bearing)
     r1, r3 = r2 - a, r2 - a + b
@@ -99,11 +104,12 @@ def _locate(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], float, float, int, float
 ]:  # pragma: no cover  (compiled)
-    """Computes the position in the array's axes, with errors.
+    """Computes the position of the source in the array's axes, with errors.
 
     Returns:
-        Position and its covariance; standard deviation of the bearing; range, its
-        status, and its standard deviation.
+        Six values, in this order: position; covariance of the position; standard
+        deviation of the bearing; range; status of the range; and standard deviation of
+        the range.
     """
     tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
     tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]
@@ -133,10 +139,10 @@ def locate_in_row(
     row: EqualRow,
     c: float,
 ) -> SourceFix:
-    """Locates a source by ``source_from_delays``, with errors.
+    """Locates a source by ``source_from_delays``, and computes the errors.
 
     Args:
-        tau: (2,) delays t_k - t_0 in the order of the channels, s.
+        tau: (2,) delays t_k - t_0 of the channels k = 1 and 2, s.
         covariance: (2, 2) covariance of the delays, s^2.
         row: The microphones.
         c: Speed of sound, m/s.

@@ -18,10 +18,10 @@ from systems.framework.signals import SAMPLE_RATE_HZ
 
 
 class TDOAParameters(Parameters):
-    """How delays are measured and when they are accepted."""
+    """Parameters of the measurement of delays, and of the acceptance of delays."""
 
     method: Literal["gcc", "gcc_phat", "ml", "amdf"] = "gcc"
-    """How delays are measured. ``gcc``: cross-correlation. ``gcc_phat``:
+    """Method that measures delays. ``gcc``: cross-correlation. ``gcc_phat``:
     cross-correlation of the whitened spectrum. ``ml``: maximum likelihood, started from
     cross-correlation. ``amdf``: the average magnitude difference function of the
     papers."""
@@ -30,24 +30,24 @@ class TDOAParameters(Parameters):
     high_hz: float = Field(default=15_000.0, ge=1.0, le=SAMPLE_RATE_HZ / 2)
     """Upper end of the band, Hz."""
     band: Literal["set", "found"] = "set"
-    """``set``: use the whole band. ``found``: use the part of the band that the sound
-    of each frame occupies."""
+    """Part of the band to use. ``set``: the whole band. ``found``: the part of the band
+    that the sound of each frame occupies."""
     false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
     """Largest share of frames of steady noise in which a sound is detected by
     mistake."""
     suppress_echoes: bool = True
     """Whether to suppress echoes in favor of the first wave front."""
     schedule_known: bool = False
-    """Whether the estimator knows the schedule of the source. The estimator then
+    """Whether the estimator knows the schedule of the source. If so, the estimator
     ignores frames that cannot contain sound of the source. This separates the source
     from sources that sound at other times, and from the robot's own loudspeaker."""
     choose: Literal["loudest", "followed"] = "loudest"
-    """Which of several overlapping sounds to use. ``loudest``: the loudest sound.
+    """Choice of the sound if several sounds overlap. ``loudest``: the loudest sound.
     ``followed``: the sound of the source that was followed so far."""
     first_bearing_deg: Angle | None = None
-    """Bearing of the source to follow, seen from the centroid of the microphones at the
-    start, deg CCW. Unset: the first source that is heard alone. It requires ``choose:
-    followed``."""
+    """Bearing of the source to follow at the start, deg CCW, seen from the centroid of
+    the microphones. Unset: the first source that is heard alone is followed. The field
+    requires ``choose: followed``."""
 
     @model_validator(mode="after")
     def _check(self) -> TDOAParameters:
@@ -68,9 +68,9 @@ class TrackerParameters(Parameters):
     """How the position of the source is tracked."""
 
     hold: Literal["world", "robot", "motion"] = "motion"
-    """What the target does between bursts. ``world``: it stays at its place in W.
-    ``robot``: it moves with the robot. ``motion``: it moves on with its own velocity,
-    which fades."""
+    """Motion of the target between bursts of sound. ``world``: the target stays at its
+    place in the world frame W. ``robot``: the target moves with the robot. ``motion``:
+    the target moves on with its own velocity, which fades."""
     maximum_age_s: Duration = 6.0
     """Longest time since the target was last heard, s. After a longer time, the target
     is lost. The default is three periods of the sound."""
@@ -80,8 +80,8 @@ class IdealHearingParameters(Parameters):
     """Imperfections of ideal hearing."""
 
     burst_gaps: bool = True
-    """Whether the sensor hears only while the source sounds. Off: it hears in every
-    tick."""
+    """Whether the sensor hears only while the source sounds. Off: the sensor hears in
+    every control period."""
     bearing_noise_deg: NonNegative = 0.0
     """Standard deviation of a bearing, deg."""
     range_noise_fraction: NonNegative = 0.0

@@ -1,15 +1,17 @@
-"""Chooses the sound of the followed source among the sounds of a frame.
+"""Chooses the sound of the followed source among the sounds of an audio frame.
 
-Each source has a position in W with a covariance. The tracker gives the position of the
-followed source. Every other source has the position at which it was last heard.
+Each known source has a position in the world frame W with a covariance. The tracker
+gives the position of the followed source. The position of every other source is the
+position at which it was last heard.
 
-The position of each source is converted to expected delays (third-degree cubature,
-Arasaratnam and Haykin 2009). The expected delays are compared with those of each sound.
-Positions on both sides of a row have the same delays, so both sides are compared. An
-unknown range is represented by a large covariance.
+The method has three steps:
 
-Each sound is assigned to at most one source, so that the total likelihood is greatest
-(global nearest neighbors). A sound that belongs to no known source is a new source.
+1. Convert the position of each source to expected delays (third-degree cubature,
+   Arasaratnam and Haykin 2009). An unknown range is represented by a large covariance.
+2. Compare the expected delays with the delays of each sound. Positions on both sides of
+   a row of microphones have the same delays, so both sides are compared.
+3. Assign each sound to at most one source, so that the total likelihood is greatest
+   (global nearest neighbors). A sound that belongs to no known source is a new source.
 """
 
 from __future__ import annotations
@@ -27,21 +29,23 @@ from systems.hearing.localise import Candidate
 from systems.hearing.tracking.target_filter import NEVER_HEARD_S, SPEED_STD
 from systems.sound.array_shape import ArrayShape
 
-# Number of other sources that are remembered, and time until they are forgotten, s.
+# Largest number of other sources that are remembered.
 _OTHERS = 4
+# Time without sound until another source is forgotten, s.
 _FORGOTTEN_S = 6.0
 
-# Another source that was never heard together with the followed source may be the
-# followed source at a wrong position. The other source is dropped once the followed
-# source has been silent for this long, s.
+# Silence of the followed source after which a doubtful other source is dropped, s.
+# Another source is doubtful if it was never heard together with the followed source. It
+# may then be the followed source at a wrong position.
 _DOUBTED_S = 3.0
 
-# A sound that is not sure may be due to chance, but chance does not repeat. Another
-# source is confirmed once it was heard _TIMES times with gaps of at most _GAP_S
-# seconds. After a silence of more than _SILENCE_S seconds, the followed source is
-# confirmed once it is heard a second time.
+# A sound that is not sure may be due to chance, but chance does not repeat. Therefore
+# sources must be confirmed.
+# Number of times that another source must be heard until it is confirmed.
 _TIMES = 3
+# Largest gap between these times, s.
 _GAP_S = 0.06
+# Silence after which the followed source must be heard twice until it is confirmed, s.
 _SILENCE_S = 0.2
 
 # Share of the frames in which the delays of the right source are outside the gate.
@@ -70,21 +74,21 @@ _BEARING = math.radians(4.0)
 
 
 class Belief(NamedTuple):
-    """Estimate of the followed source by the tracker, and odometry of the robot."""
+    """Tracker's estimate of the followed source, and odometry pose of the robot."""
 
     p_WS: NDArray[np.float64]
     """(2,) position of the source in W, m."""
     covariance: NDArray[np.float64]
     """(2, 2) covariance of the position, m^2."""
     age: float
-    """Time since the source was last heard, s. It is at least ``NEVER_HEARD_S`` if the
-    source was never heard."""
+    """Time since the source was last heard, s. If the source was never heard, the time
+    is at least ``NEVER_HEARD_S``."""
     pose: NDArray[np.float64]
     """(3,) x, y, theta of B in W, m and rad."""
 
 
 class _Line(NamedTuple):
-    """Line of a row of microphones, at which sources are mirrored."""
+    """Line of a row of microphones, at which the positions of sources are mirrored."""
 
     p: NDArray[np.float64]
     """(2,) point of the line in W, m."""
@@ -140,10 +144,10 @@ class ChoiceMemory(NamedTuple):
 
 
 class SourceChoice:
-    """Chooses among the sounds of successive frames.
+    """Chooses the sound of the followed source in successive audio frames.
 
     Args:
-        shape: The microphones, in a plane, in axes of B.
+        shape: The microphones, in a plane, in the axes of the body frame B.
         c: Speed of sound, m/s.
         p_BA: (2,) centroid of the microphones relative to the origin of B, m.
         frame_s: Period of the frames, s.
@@ -178,22 +182,21 @@ class SourceChoice:
         *,
         may_sound: bool = True,
     ) -> tuple[int | None, ChoiceMemory]:
-        """Returns the sound of the followed source.
+        """Chooses the sound of the followed source, and updates the other sources.
 
-        The costs of all sounds are computed for the followed source (``own``) and for
-        the other known sources (``costs``). Assignments that are not credible then get
-        infinite costs. The assignment with the least total cost gives the sound of the
-        followed source. It also updates the other sources.
+        The function computes the cost of each sound for the followed source and for
+        each other known source. Assignments that are not credible get infinite costs.
+        The assignment with the least total cost gives the sound of the followed source.
 
         Args:
-            candidates: Sounds of a frame.
+            candidates: Sounds of an audio frame.
             memory: Memory after the previous frame.
             belief: Present estimate of the source, and pose of the robot.
             may_sound: Whether the schedule of the source permits a sound in this frame.
 
         Returns:
-            Index of the sound in ``candidates``, or None if the source is not heard;
-            and the new memory.
+            Two values. The first is the index of the sound in ``candidates``, or None
+            if the source is not heard. The second is the new memory.
         """
         doubted = belief.age > _DOUBTED_S
         others = [_aged(o, self._frame_s, doubted=doubted) for o in memory.others]
@@ -283,10 +286,11 @@ class SourceChoice:
         place: _Place | None,
         microphones: NDArray[np.float64],
     ) -> float:
-        """Returns twice the negative log-likelihood of a sound from a source.
+        """Returns twice the negative log-likelihood that a sound comes from a source.
 
-        The value is computed for both sides of the row, and the smaller one counts. It
-        is infinite if the delays are outside the gate on both sides.
+        The function computes the value for both sides of the row of microphones. The
+        smaller value counts. It is infinite if the delays differ too much from the
+        expected delays on both sides.
         """
         if place is None:
             return math.inf
@@ -322,11 +326,12 @@ def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
     """Assigns sounds to sources with the least total cost.
 
     Args:
-        costs: (sounds, sources), infinite if a sound cannot be that of the source.
+        costs: (sounds, sources) costs. A cost is infinite if the sound cannot come from
+            the source.
 
     Returns:
-        Index of the source for each sound, or None if the sound belongs to no known
-        source. Each source has at most one sound.
+        One entry per sound: the index of its source, or None if the sound belongs to no
+        known source. Each source has at most one sound.
     """
     sounds, places = costs.shape
     finite = np.where(np.isfinite(costs), costs, 1e9)
@@ -371,7 +376,7 @@ def _remember(others: list[_Other | None], number: int | None, place: _Place) ->
     """Stores the position of another source that was heard.
 
     Args:
-        others: Other sources, changed.
+        others: Other sources. The function changes this list.
         number: Number of the known source, from 1. None: a new source, which replaces
             the source with the longest silence.
         place: Position of the sound.
@@ -400,10 +405,13 @@ def _expected_delays(
     covariance: NDArray[np.float64],
     microphones: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Computes mean and covariance of the range differences to microphone 0.
+    """Computes mean and covariance of the range differences for an uncertain source.
+
+    A range difference is the range of another microphone minus the range of microphone
+    0.
 
     Args:
-        p: (2,) position of the source in W, m.
+        p: (2,) position of the source in the world frame W, m.
         covariance: (2, 2) covariance of the position, m^2.
         microphones: (n, 2) positions in W, m.
 

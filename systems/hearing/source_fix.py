@@ -1,4 +1,4 @@
-"""Estimated position or direction of a source."""
+"""Defines the estimated position of a source, and the status of its range."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-#: A source nearer to the centroid than this is rejected, m.
+#: Least distance of a source from the centroid of the microphones, m. A nearer source
+#: is rejected.
 NEAREST_M = 0.2
 
-#: Statuses of a range.
-#: The frame has no sound.
+#: Status of a range: the audio frame has no sound.
 NOTHING_HEARD = 0
-#: There is a range.
+#: Status: there is a range.
 RANGED = 1
-#: The delays are those of a plane wave: no finite range fits.
+#: Status: the delays are those of a plane wave, so no finite range fits.
 PLANE_WAVE = 2
-#: No position has these delays.
+#: Status: no position has these delays.
 NO_PLACE = 3
-#: The error of the range is too large.
+#: Status: the error of the range is too large.
 UNCERTAIN = 4
-#: There are too few microphones for a range in addition to the direction.
+#: Status: there are too few microphones for a range in addition to the direction.
 TOO_FEW_MICROPHONES = 5
-#: The frame has a sound, but the estimator rejects it.
+#: Status: the frame has a sound, but the estimator rejects the sound.
 REJECTED = 6
 
 
@@ -41,11 +41,11 @@ def range_status(
     """Returns whether the delays of a sound have a range, or why they have none.
 
     Args:
-        inverse_range: Best fit, 1/m; 0 or less for a plane wave, NaN if no position has
-            these delays.
+        inverse_range: Inverse range that fits best, 1/m. It is 0 or less for a plane
+            wave, and NaN if no position has these delays.
         error: Error of the range, in any measure.
-        largest_error: Limit of the error in the same measure; the error must be below
-            it.
+        largest_error: Limit of the error in the same measure. The error must be below
+            the limit.
         enough: Whether there are enough microphones for a range.
 
     Returns:
@@ -65,21 +65,21 @@ def range_status(
 class SourceFix:
     """Estimated source relative to the microphones' centroid, with first-order errors.
 
-    The errors are those of the delays alone. They include no errors of the microphone
+    The errors are those that the delays cause. They include no errors of the microphone
     positions or of the speed of sound.
     """
 
     bearing: float
     """Azimuth in the x-y plane, CCW from +x, in (-pi, pi], rad."""
     bearing_std: float
-    """Standard deviation of the bearing, rad; infinite if the array cannot measure
-    it."""
+    """Standard deviation of the bearing, rad. It is infinite if the array cannot
+    measure the bearing."""
     elevation: float | None
-    """Elevation from the x-y plane, rad. None for positions in the plane, and for a
-    level row, which cannot measure it."""
+    """Elevation from the x-y plane, rad. None for positions in the plane. Also None for
+    a level row of microphones, which cannot measure the elevation."""
     elevation_std: float | None
-    """Standard deviation of the elevation, rad; infinite if the array cannot measure
-    it."""
+    """Standard deviation of the elevation, rad. It is infinite if the array cannot
+    measure the elevation."""
     range: float
     """Distance from the centroid, m; 0 if it is not valid."""
     range_status: int
@@ -87,15 +87,16 @@ class SourceFix:
     range_std: float
     """Standard deviation of the range, m; infinite if the range is not valid."""
     p_AS: NDArray[np.float64]
-    """(d,) position of the source from the centroid, m; a unit vector if the range is
-    not valid."""
+    """(d,) position of the source relative to the centroid, m. If the range is not
+    valid, it is a unit vector."""
     covariance: NDArray[np.float64]
-    """(d, d) covariance of p_AS, m^2; of the unit vector if the range is not valid."""
+    """(d, d) covariance of p_AS, m^2. If the range is not valid, it is the covariance
+    of the unit vector."""
     chi_square: float = 0.0
     """Sum of the squared residuals of the delays, whitened by the covariance of the
     delays. Its mean is ``ArrayShape.freedom`` if the geometry is right."""
     twin: NDArray[np.float64] | None = None
-    """(d,) another position, m, that fits about equally well and is no mirror image."""
+    """(d,) another position that fits about equally well and is no mirror image, m."""
 
     @property
     def range_valid(self) -> bool:
@@ -121,10 +122,11 @@ class SourceFix:
         """Returns the same estimate, but without a range that is too uncertain.
 
         Args:
-            share: The error of the range must be below this share of the range.
+            share: Limit of the error of the range, as a share of the range.
 
         Returns:
-            This estimate, or one without a range.
+            This estimate if the error of its range is below the limit. Otherwise the
+            same direction without a range.
         """
         if not self.range_valid:
             return self

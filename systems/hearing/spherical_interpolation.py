@@ -19,20 +19,21 @@ AGREEMENT_DEG = 15.0
 def interpolate_sphere(
     p_RM: ArrayLike, d: ArrayLike
 ) -> tuple[NDArray[np.float64], float]:
-    """Computes the least-squares position of a source.
+    """Computes the least-squares position of a source from range differences.
 
     See Song 2011, eq. 14 to 17; Smith, Abel 1987.
 
     Args:
         p_RM: (n, k) positions of the other microphones relative to the reference
-            microphone, m; n is at least k + 1. With n = k + 1, the equations are exact.
-        d: (n,) range differences, m: the range from each microphone minus the range
-            from the reference microphone.
+            microphone, m. The number n is at least k + 1. With n = k + 1, the equations
+            are exact.
+        d: (n,) range differences, m. A range difference is the range of another
+            microphone minus the range of the reference microphone.
 
     Returns:
-        (k,) position of the source relative to the reference microphone, m, and its
-        range, m. The range is negative or infinite if no position has these range
-        differences.
+        Two values. The first is the (k,) position of the source relative to the
+        reference microphone, m. The second is its range, m. The range is negative or
+        infinite if no position has these range differences.
     """
     S, d = np.asarray(p_RM, dtype=float), np.asarray(d, dtype=float)
     inverse = np.linalg.pinv(S)
@@ -46,11 +47,13 @@ def interpolate_sphere(
 
 
 def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:
-    """Computes the bearing of a source far away.
+    """Computes the bearing of a source on the assumption that the source is far away.
 
     Args:
-        p_RM: (n, 2) positions relative to the reference microphone, m.
-        d: (n,) range differences, m.
+        p_RM: (n, 2) positions of the other microphones relative to the reference
+            microphone, m.
+        d: (n,) range differences, m. A range difference is the range of another
+            microphone minus the range of the reference microphone.
 
     Returns:
         Bearing CCW from x, rad. The bearing is never on the wrong side. For a source at
@@ -63,19 +66,23 @@ def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:
 def near_or_far(
     p_RM: ArrayLike, d: ArrayLike
 ) -> tuple[float, NDArray[np.float64] | None, int]:
-    """Computes the bearing, and the position if it is credible.
+    """Computes the bearing of a source, and its position if the position is credible.
 
     Errors can change the sign of the sum of the range differences. Spherical
-    interpolation then turns the bearing by 180 deg. The position is therefore used only
-    up to 4 m, and only if its bearing is within 15 deg of that of the plane wave.
+    interpolation then turns the bearing by 180 deg. Therefore the position is used only
+    if its range is at most 4 m, and if its bearing is near that of the plane wave
+    (within 15 deg).
 
     Args:
-        p_RM: (n, 2) positions relative to the reference microphone, m.
-        d: (n,) range differences, m.
+        p_RM: (n, 2) positions of the other microphones relative to the reference
+            microphone, m.
+        d: (n,) range differences, m. A range difference is the range of another
+            microphone minus the range of the reference microphone.
 
     Returns:
-        Bearing, rad; (2,) position relative to the reference microphone, m, or None;
-        and the status of the range (``range_status``).
+        Three values. The first is the bearing, rad. The second is the (2,) position
+        relative to the reference microphone, m, or None. The third is the status of the
+        range (``range_status``).
     """
     plane = plane_wave_bearing(p_RM, d)
     place, distance = interpolate_sphere(p_RM, d)

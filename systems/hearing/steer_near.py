@@ -1,4 +1,4 @@
-"""Estimates a bearing by steering the array to positions around it."""
+"""Estimates a bearing from the sums of correlations for positions around an array."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from systems.delays.correlations import parabola_vertex
 
-#: Ranges of the grid, m, one near and one far. More ranges would find more echoes.
+#: Ranges of the grid, m: a near range and a far range. More ranges would find more
+#: echoes.
 _RANGES_M = (0.4, 3.0)
 #: Step of the bearings of the grid, deg. The peak is refined between them.
 _STEP_DEG = 2.0
-#: A peak counts as another direction if it is more than this from the strongest one,
-#: deg.
+#: Least difference between the bearings of the strongest peak and of another direction,
+#: deg. Nearer peaks do not count as another direction.
 _APART_DEG = 15.0
 
 
@@ -46,15 +47,16 @@ class Steered(NamedTuple):
 def near_grid(
     p_RM: NDArray[np.float64], pairs: list[tuple[int, int]], c: float
 ) -> NearGrid:
-    """Makes the grid of an array.
+    """Makes the grid of positions around an array.
 
     Args:
-        p_RM: (n, 2) microphones from the reference microphone, m.
+        p_RM: (n, 2) positions of the microphones relative to the reference microphone,
+            m.
         pairs: Pairs of microphones.
         c: Speed of sound, m/s.
 
     Returns:
-        The grid.
+        The grid, with the delays of sound from its positions.
     """
     bearings = np.radians(np.arange(-180.0, 180.0, _STEP_DEG))
     unit = np.stack([np.cos(bearings), np.sin(bearings)])
@@ -72,17 +74,19 @@ def _wrapped(angle: Any) -> Any:
 def steer(
     grid: NearGrid, correlations: NDArray[np.float64], fine_rate_hz: float
 ) -> Steered:
-    """Finds the strongest position of a grid.
+    """Finds the position of a grid with the largest sum of correlations.
+
+    The sum is called the response of the position.
 
     Args:
-        grid: The grid.
+        grid: Positions, and delays of sound from there.
         correlations: (pairs, n) correlations over the delay, in the order of
             ``cross_correlations``: delay 0 is first, negative delays are at the end.
         fine_rate_hz: Correlation values per second, Hz.
 
     Returns:
-        The strongest position and the strongest other peak. A parabola refines the
-        strongest bearing between the bearings of the grid.
+        The position with the strongest response, and the strongest other peak. A
+        parabola refines the strongest bearing between the bearings of the grid.
     """
     response = np.zeros(grid.delays.shape[1:])
     length = correlations.shape[1]

@@ -1,4 +1,4 @@
-"""Estimates bearing and range of the source from the microphone frames."""
+"""Estimates bearing and range of the source from the frames of the microphones."""
 
 from __future__ import annotations
 
@@ -31,17 +31,18 @@ def robot_localiser(
     *,
     limited: bool = True,
 ) -> tuple[Localiser, NDArray[np.float64]]:
-    """Makes the localizer of the robot's own microphones.
+    """Makes the sound localizer for the microphones of a robot.
 
     Args:
         parameters: Parameters of the estimator.
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound that the robot assumes, m/s.
-        microphones: Sample rate and length of the frames.
+        microphones: Sample rate and length of the audio frames.
         limited: See ``Localiser``.
 
     Returns:
-        The localizer, and (2,) centroid of the microphones from P in B axes, m.
+        The localizer, and the (2,) centroid of the microphones relative to the control
+        point P, in the axes of the body frame B, m.
     """
     shape = ArrayShape.of(robot.microphones_m)
     localiser = Localiser(
@@ -65,9 +66,10 @@ def robot_choice(
 
     Args:
         localiser: Localizer that ``robot_localiser`` returns.
-        robot: Position of P.
-        p_PA_B: (2,) centroid of the microphones from P in B axes, m.
-        frame_s: Period of the frames, s.
+        robot: Distance of the control point P ahead of the axle.
+        p_PA_B: (2,) centroid of the microphones relative to P, in the axes of the body
+            frame B, m.
+        frame_s: Period of the audio frames, s.
 
     Returns:
         The choice. Its first bearing is that of the localizer's parameters.
@@ -85,7 +87,7 @@ def robot_choice(
 def may_sound(
     sound: SoundParameters, time: float, longest_way: float, frame_s: float
 ) -> bool:
-    """Returns whether the schedule of a source permits direct sound in a frame.
+    """Returns whether the schedule of a source permits direct sound in an audio frame.
 
     Args:
         sound: Schedule of the source.
@@ -94,7 +96,8 @@ def may_sound(
         frame_s: Length of the frame, s.
 
     Returns:
-        False if the frame can contain only noise and reverberation.
+        True if the frame can contain direct sound. False if the frame can contain only
+        noise and reverberation.
     """
     phase = time - sound.start_s
     # A frame that ends when a burst begins contains nothing of the burst.
@@ -121,40 +124,45 @@ class _Memory(NamedTuple):
 
 
 class TDOAEstimator(FrameBlock):
-    """Estimates where the source is.
+    """Estimates where the sound source is from the audio frames of the microphones.
 
-    ``systems.hearing.localise`` measures the delays of all pairs of channels, finds the
-    position that explains them, and computes its errors.
+    The module ``systems.hearing.localise`` measures the delays of all pairs of
+    channels. It finds the position that explains the delays, and the errors of this
+    position.
 
-    Range and bearing refer to the centroid of the microphones. For the default row,
-    this is M2 = P. ``p_PS_B`` refers to P. A row of microphones cannot distinguish
-    front from back, so the source is reported in the front half plane.
+    The outputs have these meanings:
 
-    If there is no estimate, all outputs except ``range_status`` are zero. If there is
-    an estimate without range, the range is 0, and ``p_PS_B`` is the unit vector along
-    the bearing. ``range_status`` gives the reason (``systems.hearing.source_fix``).
-    ``covariance`` is that of ``p_PS_B``, in row-major order. It includes noise and
-    echoes, but no errors of microphone positions or of the speed of sound.
+    - Range and bearing refer to the centroid of the microphones. For the default row,
+      this is the middle microphone, which is at the control point P.
+    - ``p_PS_B`` is the position of the source relative to P. A row of microphones
+      cannot distinguish front from back, so the source is reported in the front half
+      plane.
+    - If there is an estimate without range, the range is 0, and ``p_PS_B`` is the unit
+      vector along the bearing. ``range_status`` gives the reason
+      (``systems.hearing.source_fix``).
+    - ``covariance`` is that of ``p_PS_B``, in row-major order. It includes noise and
+      echoes, but no errors of microphone positions or of the speed of sound.
+    - If there is no estimate, all outputs except ``range_status`` are zero.
 
-    With ``choose: followed``, the block locates each of the sounds of a frame. It
+    If ``choose: followed`` is set, the block locates each of the sounds of a frame. It
     chooses the sound that comes from the expected position of the source
     (``systems.hearing.source_choice``). The block then has four further input ports:
     p_WS_estimated [m], covariance_W [m^2], age [s] and pose_WB_estimated [m, m, rad].
     ``SourceTracker`` publishes the first three, and ``WheelOdometry`` publishes the
     pose. The four ports affect only the state, so there is no algebraic loop.
 
-    State: ``HearingMemory``, ``ChoiceMemory`` with ``choose: followed``, and the
-    outputs.
+    State: ``HearingMemory``, the outputs, and with ``choose: followed`` also
+    ``ChoiceMemory``.
     Rate and latency: the block updates once per ``frame_s`` of the microphones (25 ms).
-    It then processes the frame that ends at this moment. The outputs change one tick
-    later, which models the computing time.
+    It then processes the frame that ends at this moment. The outputs change one control
+    period later, which models the computing time.
 
     Args:
         parameters: Method, band and rate of false alarms.
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound that the robot assumes, m/s.
-        sound: The sound of the source. Its gate is the schedule, which has an effect
-            only if ``schedule_known`` is set.
+        sound: The sound of the source. Its schedule has an effect only if
+            ``schedule_known`` is set.
         microphones: Sample rate and length of the frames.
         limited: See ``Localiser``.
 
@@ -243,17 +251,25 @@ def _belief(values: NDArray[np.float64]) -> Belief:
 def port_values(
     fix: SourceFix | None, p_PA_B: NDArray[np.float64], *, heard: bool = False
 ) -> tuple[NDArray[np.float64], ...]:
-    """Returns the values of the output ports in order.
+    """Returns the values of the output ports of the estimator, in order.
 
     Args:
         fix: Estimate of the source, or None.
-        p_PA_B: (2,) centroid of the microphones from P in B axes, m.
-        heard: Whether the frame contains a sound although there is no estimate.
+        p_PA_B: (2,) centroid of the microphones relative to the control point P, in the
+            axes of the body frame B, m.
+        heard: Whether the audio frame contains a sound although there is no estimate.
 
     Returns:
-        Bearing (1,), rad; range (1,), m; p_PS_B (2,), m, or a unit vector without a
-        range; its covariance (4,), m^2; flags ``detected`` and ``range_valid`` (1,), 0
-        or 1; and the status of the range (1,).
+        Seven arrays, in this order:
+
+        - bearing (1,), rad;
+        - range (1,), m;
+        - position (2,) of the source relative to P, in the axes of B, m, or a unit
+          vector without a range;
+        - covariance (4,) of this position, m^2;
+        - flag ``detected`` (1,), 0 or 1;
+        - flag ``range_valid`` (1,), 0 or 1;
+        - status of the range (1,).
     """
     if fix is None:
         sizes = (port.elements({}) for port in TDOAEstimator.outputs)

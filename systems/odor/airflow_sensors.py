@@ -21,12 +21,14 @@ _ALONG = 0.04
 
 @register_jitable
 def airflow_reading(angle: float, side: int, crosswind: bool) -> float:  # noqa: FBT001
-    """Computes the relative reading of a sensor.
+    """Computes the reading of an airflow sensor, relative to its largest reading.
 
     Args:
-        angle: Direction from which the wind comes, CCW from the x axis of B, rad.
+        angle: Direction from which the wind comes, in the body frame B of the robot,
+            CCW from the x axis (ahead), rad.
         side: 0 left sensor, 1 right sensor.
-        crosswind: Whether the sensor has the lobe ``crosswind``, else ``cosine``.
+        crosswind: True: the directional sensitivity is ``crosswind``. False: the
+            sensitivity is ``cosine``.
 
     Returns:
         Reading divided by the wind speed and the gain, 0 to 1.
@@ -62,19 +64,21 @@ def airflow_step(
 
 
 class AirflowSensors(Block):
-    """Measures the wind on the left and on the right of the robot.
+    """Measures the wind with two airflow sensors on the left and right of the robot.
 
-    With the lobe ``cosine``, F1 points 45 deg to the left and F2 45 deg to the right.
-    Both sensors measure the wind at the origin of B.
+    With the directional sensitivity ``cosine``, the left sensor F1 points 45 deg to the
+    left, and the right sensor F2 points 45 deg to the right. Both sensors measure the
+    wind at the origin of the body frame B.
 
-    The block has no state. It draws new noise every tick. There is no latency.
+    The block has no state. It draws new noise at every tick (control period). There is
+    no latency.
 
     Args:
-        parameters: Gain and lobe.
+        parameters: Gain and directional sensitivity (lobe).
         seed: Seed of the noise.
-        tick_s: Period of the robot, s.
+        tick_s: Control period of the robot, s.
 
-    Reference: Song 2011, 2.1, 2.3.3. The lobes are ours.
+    Reference: Song 2011, 2.1 and 2.3.3. The directional sensitivities are ours.
     """
 
     part, stage = "airflow", "obstacle sensing"

@@ -25,9 +25,11 @@ from systems.framework.signals import TICK_S
 from systems.odor.odor_plume import PLUME_SIZE, concentration
 from systems.odor.parameters import GAS_EXPONENT, GAS_SENSORS, GasSensorParameters
 
-#: For each preset: time constant while the concentration grows, and while it falls, s.
+#: Two time constants for each preset, s: the first applies while the concentration
+#: grows, and the second while it falls.
 _TIMES_S = {"song2011": (2.5, 5.8), "tgs2620": (2.96, 15.71)}
-#: Mismatch of the exponents, divided by the mismatch of R0.
+#: Standard deviation of the exponents between sensors, divided by that of R0 (both
+#: relative).
 _EXPONENT_MISMATCH = 3.0
 
 
@@ -65,9 +67,10 @@ def _concentrations(
 def gas_sensor_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: GasNumbers
 ) -> None:
-    """Computes the readings of the sensors.
+    """Computes the readings of three gas sensors in one tick (control period).
 
-    The state holds the three ratios without noise, then the three last readings.
+    A reading is the resistance ratio Rs/R0. The state has six numbers. The first three
+    numbers are the ratios without noise, and the other three are the last readings.
     """
     ratios, truths = outputs
     gas = np.empty(3)
@@ -91,24 +94,28 @@ def gas_sensor_step(
 
 
 class GasSensorArray(Block):
-    """Measures the concentration of gas at three positions.
+    """Measures the concentration of gas at three positions on the robot.
 
-    A reading is the ratio Rs/R0. It is 1 in clean air, and smaller in gas. It follows
-    (1 + C/C1)^-exponent with a first-order lag. The lag is shorter when the
-    concentration grows than when it falls. The sensors are on the floor, as the source
-    is. ``gas_concentration`` is the true C/C1.
+    A reading is the ratio Rs/R0 of resistances. The reading is 1 in clean air, and
+    smaller in gas. In steady gas, the ratio is (1 + C/C1)^-exponent. C is the
+    concentration, and C1 is a constant of the sensors. The reading follows this value
+    with a first-order lag. The lag is shorter when the concentration grows than when it
+    falls. The sensors are at the height of the floor, as the odor source is. The output
+    ``gas_concentration`` is the true C/C1.
 
-    The discrete state holds the ratio and the last reading of each sensor, and is
-    updated every tick. There is no latency apart from the lag.
+    The discrete state holds the ratio and the last reading of each sensor. The block
+    updates the state at every tick (control period). There is no latency apart from the
+    lag.
 
     Args:
-        parameters: Positions, lag and errors.
-        faults: Faults of the robot; those of ``gas_sensors`` apply.
-        seed: Seed of noise and mismatch.
-        tick_s: Period of the robot, s.
+        parameters: Positions, lag and errors of the sensors.
+        faults: Faults of all sensors of the robot. Only faults of ``gas_sensors`` have
+            an effect.
+        seed: Seed of the noise, and of the differences between the sensors.
+        tick_s: Control period of the robot, s.
 
-    Reference: Song 2011, 2.1, 2.3.3. The power law and the times of the TGS2620 are
-    from GADEN.
+    Reference: Song 2011, 2.1 and 2.3.3. The power law and the time constants of the
+    TGS2620 sensor are from the simulator GADEN.
     """
 
     part, stage = "gas", "obstacle sensing"
@@ -150,7 +157,7 @@ class GasSensorArray(Block):
         )
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step, with the noise and the mismatch of the run."""
+        """Returns the step with the noise and the sensor mismatch of the run."""
         numbers = self._numbers_of(run.seed_of(self.get_name()))
         return self.step._replace(numbers=numbers)
 

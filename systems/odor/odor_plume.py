@@ -20,20 +20,21 @@ from systems.odor.wind import WIND_PERIOD_S, WIND_SIZE, initial_wind, wind_veloc
 
 #: Number of puffs released per second, 1/s.
 _PUFFS_PER_S = 16.0
-#: Largest number of puffs, which are those of 20 s. The plume drops the oldest puffs
-#: first.
+#: Largest number of puffs. The source releases this number in 20 s. The plume drops the
+#: oldest puffs first.
 MOST_PUFFS = 320
-#: Growth of the horizontal and of the vertical spread of a puff per distance traveled.
-#: The second is also gamma_2 / u of the steady plume.
+#: ``_LEVEL_GROWTH``: growth of the horizontal spread of a puff per distance traveled.
+#: ``_UPRIGHT_GROWTH``: growth of the vertical spread per distance traveled. It is also
+#: gamma_2 / u of the steady plume.
 _LEVEL_GROWTH, _UPRIGHT_GROWTH = 0.12, 0.13
-#: Standard deviation of each component of a puff's own velocity, divided by the wind
-#: speed, and correlation time of this velocity, s.
+#: ``_OWN_INTENSITY``: standard deviation of each component of a puff's own velocity,
+#: divided by the wind speed. ``OWN_TIME_S``: correlation time of this velocity, s.
 _OWN_INTENSITY, OWN_TIME_S = 0.1, 2.0
 #: Distance from the source beyond which puffs are removed, m.
 _REACH_M = 6.0
-#: gamma_1 / u, growth of the horizontal spread of the steady plume. It is the value of
-#: the puffs in the default wind near the source. The value of the puffs 2 m downwind is
-#: about 0.19.
+#: gamma_1 / u, growth of the horizontal spread of the steady plume per distance. Near
+#: the source, the puffs spread at this rate in the default wind. At 2 m downwind, the
+#: rate of the puffs is about 0.19.
 _MEAN_INTENSITY = 0.197
 
 
@@ -115,13 +116,14 @@ def _mean_concentration(
 
 
 def release_rate(ratio_at_2_m: float) -> float:
-    """Computes the release rate from the reading of a gas sensor 2 m downwind.
+    """Computes the release rate of a source from a gas sensor's reading 2 m downwind.
 
     Args:
         ratio_at_2_m: Mean ratio Rs/R0 of the sensor in a wind of 1 m/s.
 
     Returns:
-        Release rate Q, in units of the concentration C1 of the sensor, m^3/s.
+        Release rate Q divided by C1, m^3/s. C1 is a constant of the gas sensors, and
+        has the unit of a concentration.
     """
     wanted = ratio_at_2_m ** (-1.0 / GAS_EXPONENT) - 1.0
     return wanted / float(_mean_concentration(2.0, 0.0, 1.0, 1.0))
@@ -131,19 +133,20 @@ def release_rate(ratio_at_2_m: float) -> float:
 def concentration(
     plume: Any, x: float, y: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the concentration at a point of the floor.
+    """Computes the concentration of odor at a point of the floor.
 
-    A puff is a Gaussian distribution around its center on the floor, and the floor
-    reflects it. The concentration is the sum over all puffs. A steady plume has a
-    closed form.
+    A puff is a Gaussian distribution of odor around its center on the floor. The floor
+    reflects the odor. The concentration is the sum over all puffs. A steady plume has a
+    closed form instead of puffs.
 
     Args:
         plume: (PLUME_SIZE,) value of the port ``plume``.
-        x: x coordinate of the point in W, m.
+        x: x coordinate of the point in the world frame W, m.
         y: y coordinate of the point in W, m.
 
     Returns:
-        Concentration of plume and background, in units of the C1 of the gas sensors.
+        Concentration of plume and background, in units of C1, a constant of the gas
+        sensors.
     """
     total = plume[_AT.background]
     if plume[_AT.steady] > 0.5:
@@ -188,14 +191,16 @@ class PlumeNumbers(NamedTuple):
 def _advance(
     plume: Any, wind: Any, tick: int, numbers: PlumeNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves all puffs by one period, and releases new puffs.
+    """Moves all odor puffs by one period of the plume, and releases new puffs.
 
-    Each puff moves with the wind at its center and with its own velocity. The own
-    velocity is an Ornstein-Uhlenbeck process. Its standard deviation is proportional to
-    the wind speed. The spreads grow with the distance that the wind covers. Puffs
-    beyond ``_REACH_M`` are removed. If there are more than ``MOST_PUFFS`` puffs, the
-    oldest are removed. The port contains the puffs in the order of their age, with the
-    oldest first.
+    - Motion: Each puff moves with the wind at its center and with its own velocity. The
+      own velocity is an Ornstein-Uhlenbeck process. Its standard deviation is
+      proportional to the wind speed.
+    - Growth: The spreads of a puff grow with the distance that the wind covers.
+    - Removal: Puffs farther than ``_REACH_M`` from the source are removed. If there are
+      more than ``MOST_PUFFS`` puffs, the oldest puffs are removed.
+
+    The port ``plume`` contains the puffs in the order of their age, oldest first.
     """
     dt = numbers.period_s
     plume[_AT.age] += dt
@@ -260,9 +265,9 @@ def _advance(
 def plume_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlumeNumbers
 ) -> None:
-    """Updates the plume once per period.
+    """Updates the odor plume once per period of the plume.
 
-    The state is the output port ``plume``.
+    The state has the same values as the output port ``plume``.
     """
     if tick % numbers.period == 0:
         _advance(state, inputs[0], tick, numbers)
@@ -282,25 +287,26 @@ def _publish(state: Any, outputs: Any, numbers: PlumeNumbers) -> None:
 
 
 class OdorPlume(Block):
-    """Models the odor plume over the whole floor.
+    """Models the odor plume of a source over the whole floor.
 
-    The function ``concentration`` computes the concentration at a point. A puff moves
-    with the wind at its center and with its own velocity. It grows with the distance
-    that the wind carries it. The floor reflects the odor. Walls and robots do not
-    affect it. At the beginning of a run, the source has released odor for ``age_s``.
+    The plume consists of puffs, or is steady. A puff moves with the wind at its center
+    and with its own velocity. The puff grows with the distance that the wind carries
+    it. The floor reflects the odor. Walls and robots do not affect the odor. At the
+    start of a run, the source has already released odor for ``age_s``. The function
+    ``concentration`` computes the concentration at a point.
 
-    The discrete state is the output. It changes every 0.1 s, and depends on the wind
-    0.1 s before the change.
+    The discrete state has the same values as the output. It changes every 0.1 s, and
+    depends on the wind 0.1 s before the change.
 
     Args:
         parameters: Position, kind and strength of the source.
-        wind: Wind before the run, and wind of a steady plume.
+        wind: Wind before the run. A steady plume has this wind during the run, too.
         seed: Seed of the puffs' own velocities.
-        tick_s: Period of the robots, s. The period of the plume, 0.1 s, is a multiple
-            of it.
+        tick_s: Control period of the robots, s. The period of the plume, 0.1 s, is a
+            multiple of the control period.
 
     Raises:
-        InputError: A steady plume has no wind.
+        InputError: The plume is steady, but there is no wind.
 
     Reference: Song 2011, 2.2, eq. 1 to 6. The puffs and all numbers are ours.
     """

@@ -27,8 +27,8 @@ class WindParameters(Parameters):
 
     kind: Literal["uniform", "meandering", "jet"] = "meandering"
     """``uniform``: constant wind. ``meandering``: the velocity changes slowly, in the
-    same way everywhere. ``jet``: the jet of a fan at (-2.2, 0) m in W, which also
-    meanders, and becomes wider and slower along its axis."""
+    same way everywhere. ``jet``: the jet of a fan at (-2.2, 0) m in W. The jet also
+    meanders. It becomes wider and slower along its axis."""
     speed_m_s: float = Field(default=1.0, ge=0.0, le=20.0)
     """Mean speed, m/s. For a jet: mean speed at its outlet."""
     direction_deg: Angle = 0.0
@@ -61,10 +61,10 @@ class GasSensorParameters(Parameters):
     """Three TGS2620 sensors on arms of 20 cm, 120 deg apart (Song 2011, 2.1)."""
 
     preset: Literal["song2011", "tgs2620"] = "song2011"
-    """Time constants of the readings. ``song2011``: 2.5 s while the concentration grows
-    and 5.8 s while it falls, so that a reading reaches 95 % of its change in 7.5 s and
-    in 17.4 s (2.3.3 prints 5 to 10 s and 15 to 20 s). ``tgs2620``: 2.96 s and 15.71 s,
-    for the TGS2620 and ethanol in the table of GADEN."""
+    """Time constants of the readings while the concentration grows and while it falls.
+    ``song2011``: 2.5 s and 5.8 s. A reading then reaches 95 % of its change in 7.5 s
+    and in 17.4 s (2.3.3 prints 5 to 10 s and 15 to 20 s). ``tgs2620``: 2.96 s and
+    15.71 s, for the TGS2620 and ethanol in the table of GADEN."""
     positions_m: Annotated[tuple[Point, Point, Point], Strict(False)] = (
         (0.1, -0.1732),
         (-0.2, 0.0),
@@ -74,8 +74,9 @@ class GasSensorParameters(Parameters):
     noise: float = Field(default=0.003, ge=0.0, le=1.0)
     """Standard deviation of a reading, divided by the reading."""
     mismatch: float = Field(default=0.01, ge=0.0, le=0.05)
-    """Relative standard deviation of R0 between sensors. The exponent of the power law
-    deviates three times as much. Each sensor has constant values."""
+    """Relative standard deviation of R0 between sensors. The relative standard
+    deviation of the power law's exponent is three times as large. Each sensor has
+    constant values."""
 
 
 class AirflowParameters(Parameters):

@@ -52,17 +52,18 @@ def _kernel(s: float, cut: float) -> float:  # pragma: no cover  (compiled)
 def steady_concentration(
     x: float, y: float, rate: float, speed: float, spreads: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the mean concentration of growing puffs on the floor (Song 2011, eq. 6).
+    """Computes the mean concentration of odor in a steady wind (Song 2011, eq. 6).
 
+    The source is on the floor (H = 0). It releases puffs that grow while the wind
+    carries them. The floor reflects the odor, and thereby doubles the concentration.
     The result is the integral of eq. 1 over the time t since the release of a puff. The
-    spreads are sigma_x = a t, sigma_y = b t and sigma_z = c t. Only these spreads lead
-    to eq. 6, where a = b = gamma_1 and c = gamma_2. The source is on the floor (H = 0),
-    which reflects the odor and thereby doubles the concentration.
+    spreads of a puff are sigma_x = a t, sigma_y = b t and sigma_z = c t. Only these
+    spreads lead to eq. 6, where a = b = gamma_1 and c = gamma_2.
 
     Args:
         x: Distance downwind of the source, m. Negative: upwind.
-        y: Distance across the wind, m.
-        rate: Q, amount per second.
+        y: Distance from the axis of the plume, across the wind, m.
+        rate: Q, amount of odor released per second.
         speed: u, speed of the wind, above 0, m/s.
         spreads: (a, b, c), growth of the spreads, m/s.
 

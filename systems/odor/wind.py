@@ -59,15 +59,19 @@ _CORE = 6.0
 def wind_velocity(
     wind: Any, x: float, y: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the wind at a point.
+    """Computes the velocity of the wind at a point of the floor.
 
-    Upwind of the outlet of a jet, there is no wind. Downwind, the speed on the axis is
-    constant along ``_CORE`` diameters, and then falls with the distance. Across the
-    jet, the speed is a Gaussian function.
+    If the wind is not a jet, its velocity is the same everywhere. If the wind is the
+    jet of a fan, the velocity depends on the point:
+
+    - Upwind of the outlet of the fan, there is no wind.
+    - On the axis of the jet, the speed is constant along ``_CORE`` diameters of the
+      outlet. Farther downwind, the speed falls with the distance.
+    - Across the jet, the speed is a Gaussian function of the distance from the axis.
 
     Args:
         wind: (WIND_SIZE,) value of the port ``wind``.
-        x: x coordinate of the point in W, m.
+        x: x coordinate of the point in the world frame W, m.
         y: y coordinate of the point in W, m.
 
     Returns:
@@ -103,9 +107,9 @@ class WindNumbers(NamedTuple):
 def wind_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: WindNumbers
 ) -> None:
-    """Updates the unsteady velocity once per period.
+    """Updates the unsteady velocity of the wind once per period of the wind.
 
-    The state is the output port ``wind``.
+    The state has the same values as the output port ``wind``.
     """
     if tick % numbers.period != 0 or numbers.spread == 0.0:
         return
@@ -124,9 +128,10 @@ def _publish(state: Any, outputs: Any, numbers: WindNumbers) -> None:
 
 
 def initial_wind(own: WindParameters, seed: int) -> NDArray[np.float64]:
-    """Computes the port ``wind`` at the start of a run.
+    """Computes the value of the port ``wind`` at the start of a run.
 
-    The initial unsteady velocity has the stationary distribution of the process.
+    The wind is the sum of a mean velocity and an unsteady velocity. The initial
+    unsteady velocity is drawn from its stationary distribution.
 
     Args:
         own: Parameters of the wind.
@@ -154,17 +159,18 @@ def _spread(own: WindParameters) -> float:
 class WindField(Block):
     """Models the wind over the whole floor.
 
-    The function ``wind_velocity`` computes the wind at a point. Each component of the
-    unsteady velocity is an Ornstein-Uhlenbeck process, with an exact discretization.
-    Obstacles and robots do not affect the wind.
+    The wind is the sum of a mean velocity and an unsteady velocity. Each component of
+    the unsteady velocity is an Ornstein-Uhlenbeck process, with an exact
+    discretization. Obstacles and robots do not affect the wind. The function
+    ``wind_velocity`` computes the wind at a point.
 
-    The discrete state is the output. It changes every 0.1 s.
+    The discrete state has the same values as the output. It changes every 0.1 s.
 
     Args:
         parameters: Kind, mean and unsteadiness of the wind.
         seed: Seed of the unsteady velocity.
-        tick_s: Period of the robots, s. The period of the wind, 0.1 s, is a multiple of
-            it.
+        tick_s: Control period of the robots, s. The period of the wind, 0.1 s, is a
+            multiple of the control period.
 
     Reference: Song 2011, 4.1, for the speeds. The rest is ours.
     """

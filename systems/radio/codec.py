@@ -50,16 +50,20 @@ def _is_flag(function: int) -> bool:
 def write_frame(
     out: Any, first: int, address: int, function: int, value: float
 ) -> None:
-    """Writes the nine bytes of a frame.
+    """Writes a radio frame of nine bytes.
+
+    The value is coded as follows:
+
+    - Angles are in deg. They are sent as 0 to 359.9, with one decimal.
+    - Flags are 0 or 1.
+    - All other values are limited to 0 to 99.99, and are sent with two decimals.
 
     Args:
         out: Sequence that receives the bytes as floats.
-        first: Index of the first byte.
-        address: Address of the sender, 1 to 3.
+        first: Index in ``out`` of the first byte of the frame.
+        address: Radio address of the sender, 1 to 3.
         function: Number of the function, see ``FRAME_NAMES``.
-        value: The value. Angles are in deg and are sent as 0 to 359.9, with one
-            decimal. Flags are 0 or 1. All other values are limited to 0 to 99.99, with
-            two decimals.
+        value: Value to send.
     """
     out[first], out[first + 1] = float(_FIRST_BYTE), float(_SECOND_BYTE)
     out[first + 2], out[first + 3] = float(address), float(function)
@@ -83,15 +87,18 @@ def write_frame(
 
 @register_jitable
 def read_frame(data: Any, first: int) -> tuple[int, int, float]:
-    """Decodes a frame.
+    """Decodes a radio frame of nine bytes.
+
+    The direction of the sound (function 13) is above -180 and up to 180 deg. All other
+    values have the range that ``write_frame`` states.
 
     Args:
         data: Sequence that contains the bytes.
-        first: Index of the first byte.
+        first: Index in ``data`` of the first byte of the frame.
 
     Returns:
-        Address, function and value, as for ``write_frame``. The direction of the sound
-        (function 13) is above -180 and up to 180 deg.
+        Three values, in this order: the radio address of the sender, the number of the
+        function, and the value.
     """
     address, function = int(data[first + 2]), int(data[first + 3])
     if _is_flag(function):

@@ -38,10 +38,12 @@ def _share(number: float) -> float:
 def _send(
     state: Any, place: int, frames: Any, numbers: Any, random: Any, sent: int
 ) -> int:
-    """Appends the frames of one robot to the bytes that are sent in this tick.
+    """Appends the radio frames of one robot to the bytes that are sent in this tick.
 
-    Each frame has its own random number, even if it is lost. Returns the number of
-    frames sent so far.
+    Each frame uses one random number, whether the frame is lost or not.
+
+    Returns:
+        Number of frames that all robots have sent so far in this tick (control period).
     """
     for frame in range(int(frames[0])):
         row, sent = sent, sent + 1
@@ -58,10 +60,10 @@ def _send(
 def radio_channel_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: ChannelNumbers
 ) -> None:
-    """Shifts the bytes in transit by one tick, and adds the frames of this tick.
+    """Shifts the bytes in transit by one tick (control period), and adds new frames.
 
-    The state has ``delay`` rows with the size of the port ``air``. The first row
-    arrives next.
+    The new frames are those that the robots send in this tick. The state has ``delay``
+    rows. Each row has the size of the port ``air``. The first row arrives next.
     """
     for k in range((numbers.delay - 1) * AIR_SIZE):
         state[k] = state[k + AIR_SIZE]
@@ -86,22 +88,23 @@ def _publish(state: Any, outputs: Any, numbers: ChannelNumbers) -> None:
 
 
 class RadioChannel(Block):
-    """Transmits the frames of each robot to all radios.
+    """Transmits the radio frames of each robot to all radios.
 
-    For each robot that sends, the block has an input port ``frames_<robot>`` (number of
-    frames, and nine bytes per frame). All radios receive the same bytes. A robot also
-    receives its own frames. The addresses in the frames identify the senders. A frame
-    is lost with the probability ``loss``, independently of other frames. All other
-    frames arrive without errors.
+    For each robot that sends, the block has an input port ``frames_<robot>``. The port
+    carries the number of frames, and nine bytes per frame. All radios receive the same
+    bytes, so a robot also receives its own frames. The address in a frame identifies
+    the sender. A frame is lost with the probability ``loss``, independently of other
+    frames. All other frames arrive without errors.
 
-    The discrete state holds the bytes in transit, and is updated every tick. The
-    latency is ``latency_s``, rounded to ticks, and at least one tick.
+    The discrete state holds the bytes in transit. The block updates the state at every
+    tick (control period). The latency is ``latency_s``, rounded to ticks, and at least
+    one tick.
 
     Args:
-        parameters: Latency and losses.
+        parameters: Latency and probability of losses.
         robots: Names of the robots that send.
         seed: Seed of the losses.
-        tick_s: Period of the update, s.
+        tick_s: Control period, s.
 
     Reference: Song 2011, 3.3. Latency and losses are ours.
     """

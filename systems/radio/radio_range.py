@@ -15,8 +15,8 @@ from systems.framework.signals import TICK_S
 _PERIOD_S = 0.1
 #: Smallest distance in the path loss, m.
 _LEAST_M = 0.01
-#: -A in eq. 8, level at a distance of 1 m, dBm (example in the data sheet of the
-#: CC2431).
+#: -A in eq. 8, level at a distance of 1 m, dBm. The value is an example in the data
+#: sheet of the radio chip CC2431.
 _LEVEL_AT_1_M_DBM = -42.4
 #: n in eq. 8, exponent of the path loss.
 _EXPONENT = 2.5
@@ -26,23 +26,26 @@ _FADING_DB = 4.0
 
 @register_jitable
 def radio_level(distance: float) -> float:
-    """Computes the level at a distance (path loss of Song 2011, eq. 8).
+    """Computes the received radio level at a distance (path loss of Song 2011, eq. 8).
 
     Args:
         distance: d, distance between the antennas, m.
 
     Returns:
-        Level R = -(10 n lg d + A), dBm.
+        Received level R = -(10 n lg d + A), dBm. n is the exponent of the path loss,
+        and -A is the level at 1 m.
     """
     return _LEVEL_AT_1_M_DBM - 10.0 * _EXPONENT * math.log10(max(distance, _LEAST_M))
 
 
 @register_jitable
 def radio_distance(level: float) -> float:
-    """Computes the distance from a level, as the inverse of ``radio_level``.
+    """Computes the distance between two antennas from the received radio level.
+
+    The function is the inverse of ``radio_level``.
 
     Args:
-        level: R, dBm.
+        level: R, received level, dBm.
 
     Returns:
         Distance, m.
@@ -62,7 +65,7 @@ class RangeNumbers(NamedTuple):
 def radio_range_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: RangeNumbers
 ) -> None:
-    """Measures the level once per period.
+    """Measures the received radio level once per period of the measurements.
 
     The state is the last measured level, dBm.
     """
@@ -85,7 +88,7 @@ class RadioRange(Block):
 
     Args:
         seed: Seed of the errors.
-        tick_s: Period of the update, s.
+        tick_s: Control period, s.
 
     Reference: Song 2011, eq. 8.
     """

@@ -47,9 +47,10 @@ class SinkNumbers(NamedTuple):
 def sink_monitor_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SinkNumbers
 ) -> None:
-    """Updates the status of each robot with the frames of this tick.
+    """Updates the status of each robot in one tick (control period).
 
-    The state is the output.
+    The function reads the radio frames that arrive in this tick. The state has the same
+    values as the output port ``sink_status``.
     """
     air, robots = inputs[0], len(numbers.addresses)
     for robot in range(robots):
@@ -76,14 +77,15 @@ def _publish(state: Any, outputs: Any, numbers: SinkNumbers) -> None:
 
 
 class SinkMonitor(Block):
-    """Receives all frames, and stores the last frame of each robot.
+    """Receives the radio frames of all robots, and stores the last frame of each robot.
 
-    The discrete state is the output, and is updated every tick. The latency is one
-    tick.
+    The block models the computer of the operator. The discrete state has the same
+    values as the output. The block updates the state at every tick (control period).
+    The latency is one tick.
 
     Args:
-        robots: Addresses of the robots, by name.
-        tick_s: Period of the update, s.
+        robots: Radio address of each robot, by name of the robot.
+        tick_s: Control period, s.
 
     Reference: Song 2011, 3.3 and 4.1.
     """

@@ -32,14 +32,13 @@ from systems.routes.seen_points import (
 )
 from systems.world.geometry import control_point
 
-#: Indices of ``PlannerState.progress``: number of new routes; time of the last advance
-#: of P, s; and position of P along the route at that time, m.
+#: Indices of ``PlannerState.progress``. REPLANS: number of new routes. SINCE_S: time of
+#: the last advance of P, s. FROM_M: arc length of P at that time, m.
 REPLANS, SINCE_S, FROM_M = range(3)
-#: The robot stalls if P advances by less than the first number, m, along the route
-#: within the second number, s.
+#: The robot stalls if P advances along the route by less than ``_STALL_M``, m, within
+#: ``_STALLED_S``, s.
 _STALL_M, _STALLED_S = 0.1, 6.0
-#: Distance from the goal, m. Within this distance, the robot has arrived and does not
-#: stall.
+#: Distance from the goal within which the robot has arrived and does not stall, m.
 _ARRIVED_M = 0.15
 
 
@@ -84,10 +83,10 @@ def _find_route_again(
 def planner_step(
     tick: int, state: PlannerState, inputs: Any, outputs: Any, numbers: PlannerNumbers
 ) -> None:
-    """Computes the route of the next tick.
+    """Computes the route of the next tick (tick = control period).
 
-    The planner remembers the objects in view. If the robot stalls, the planner plans
-    a new route.
+    The planner remembers the objects that the sensors see. If the robot stalls, the
+    planner plans a new route.
     """
     if not numbers.replans:
         return
@@ -120,32 +119,36 @@ def _publish_route(state: PlannerState, outputs: Any, numbers: PlannerNumbers) -
 
 
 class GlobalPlanner(Block):
-    """Plans the route to the goal, and a new one when the robot stalls.
+    """Plans the route to the goal, and plans a new route when the robot stalls.
 
-    The first route leads from the initial position of P past the known obstacles
-    (``plan_route``). The planner remembers the nearest points of objects that are not
-    known to move, one per cell of the grid. The robot stalls if P advances by less than
-    10 cm along the route in 6 s, and is farther from the goal than 15 cm. Then the
-    block plans a new route from the position of P. The new route also avoids the
-    remembered points and robots at rest. If there is no such route, the old route
-    stays. The block tries again after 6 s.
+    A route is a curve for P, the control point ahead of the wheel axle. The first route
+    leads from the initial position of P past the known obstacles (``plan_route``). The
+    planner remembers the nearest points of objects that are not known to move. It
+    remembers at most one point per cell of its grid.
 
-    State, every tick: ``PlannerState``. An update at t reads the inputs at t. The block
-    publishes the resulting route from t on, so other blocks read it in their next
-    update. The outputs are state; there is no feedthrough.
+    The robot stalls if P advances by less than 10 cm along the route in 6 s, and is
+    farther from the goal than 15 cm. Then the block plans a new route from the position
+    of P. The new route also avoids the remembered points and robots at rest. If there
+    is no such route, the block keeps the old route and tries again after 6 s.
+
+    The discrete state is ``PlannerState``. The block updates the state at every tick
+    (control period). An update at time t reads the inputs at t. The block publishes the
+    resulting route from t on, so other blocks read this route in their next update. The
+    outputs are parts of the state; there is no feedthrough.
 
     Args:
-        parameters: ``RouteParameters``.
-        known: (k, 5) known obstacles in W, see ``systems.world.geometry``.
-        initial_pose: (x, y, theta) of the robot at the start, m and rad.
+        parameters: Goal, clearance, and whether the block plans new routes.
+        known: (k, 5) known obstacles in the world frame W. Each row is (x, y, theta,
+            length, width), m and rad.
+        initial_pose: (x, y, theta) of the robot at the start in W, m and rad.
         robot: Position of P on the robot.
-        tick_s: Period of the robot, s.
+        tick_s: Control period of the robot, s.
 
     Raises:
         InputError: There is no route.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), sec. 2: A* plans the path. The
-    replanning is ours.
+    Reference: Engelbrecht, Steyn and Djouani (2021), sec. 2, plan the path with A*.
+    Planning again after a stall is our addition.
     """
 
     part = "global_planner"

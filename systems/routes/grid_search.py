@@ -59,22 +59,22 @@ def _pop(bounds: Any, cells: Any, count: int) -> int:  # pragma: no cover  (comp
 def search_cells(
     blocked: Any, start: tuple[int, int], goal: tuple[int, int]
 ) -> Any:  # pragma: no cover  (compiled)
-    """Searches for a shortest path with A* on 8 neighbors.
+    """Searches for a shortest path on a grid with A*, where each cell has 8 neighbors.
 
-    A diagonal step costs sqrt(2) times as much as a straight step. It is possible only
-    if both cells beside it are free. The priority queue is a binary heap of cells,
-    sorted by the cost so far plus the octile distance to the goal. When a cheaper way
-    to a cell is found, the cell enters the heap again, and its older entries are
-    skipped.
+    A diagonal step costs sqrt(2) times as much as a straight step. The path takes a
+    diagonal step only if both cells beside this step are free. The priority queue is a
+    binary heap of cells. The heap is sorted by the cost so far plus the octile distance
+    to the goal. When the search finds a cheaper path to a cell, the cell enters the
+    heap again. The search then skips the older entries of this cell.
 
     Args:
-        blocked: (n, m) cells that cannot be entered.
-        start: Cell, numbers along both axes.
-        goal: Cell, numbers along both axes.
+        blocked: (n, m) whether each cell is blocked.
+        start: Start cell as (i, j), the indices along both axes of the grid.
+        goal: Goal cell as (i, j).
 
     Returns:
-        (k, 2) cells from start to goal, empty if start or goal is blocked, or if no
-        path connects them.
+        (k, 2) indices of the cells from start to goal. The array is empty if start or
+        goal is blocked, or if no path connects them.
     """
     n, m = blocked.shape
     si, sj = start

@@ -1,4 +1,4 @@
-"""A grid of an arena: the center of a disc must not be in the blocked cells."""
+"""A grid of cells; the center of a disc-shaped robot must not be in a blocked cell."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.world.geometry import beyond_rectangle, rectangle_corners
 
-#: Side of a cell, m. Its ratio to the least clearance is 1/3. With this ratio, the
-#: distance of a step between two free cells from an obstacle is at least 97 % of the
-#: clearance.
+#: Side of a cell, m. The side is 1/3 of the least possible clearance. A straight step
+#: between two free cells therefore keeps at least 97 % of the clearance.
 CELL_M = 0.05
-#: Margin around the smallest rectangle that contains start, goal and known obstacles,
-#: m. Routes stay within this area.
+#: Margin of the grid, m. The grid covers start, goal, known obstacles, and this margin
+#: around them. Routes stay on the grid.
 ARENA_MARGIN_M = 2.0
-#: Largest number of cells of a grid: a search among them takes 40 MB.
+#: Largest number of cells of a grid. A search on such a grid takes 40 MB of memory.
 _MOST_CELLS = 1_000_000
-#: (n, 3) positions and radii of discs, m; compiled code has no type for it.
+#: Type of (n, 3) discs: x, y and radius, m. Compiled code has no static type for it.
 Discs = Any
 
 
@@ -29,8 +28,8 @@ class OccupancyGrid(NamedTuple):
     """Square cells that cover a rectangle of the floor, parallel to the axes of W."""
 
     blocked: NDArray[np.bool_]
-    """(n, m) whether the middle of each cell, along x and y, is too near to an
-    obstacle."""
+    """(n, m) whether each cell is blocked, because its middle is too near to an
+    obstacle. The axes are x and y."""
     low: tuple[float, float]
     """Least x and y, m."""
 
@@ -38,18 +37,20 @@ class OccupancyGrid(NamedTuple):
 def map_grid(
     points: ArrayLike, rectangles: ArrayLike, clearance_m: float
 ) -> OccupancyGrid:
-    """Makes the grid of a map.
+    """Makes the grid of a map, in which cells near known obstacles are blocked.
 
     Args:
-        points: (n, 2) start and goal, m.
-        rectangles: (k, 5) known obstacles in W, see ``systems.world.geometry``.
-        clearance_m: Distance from obstacles below which cells are blocked, m.
+        points: (n, 2) start and goal in the world frame W, m.
+        rectangles: (k, 5) known obstacles in W. Each row is (x, y, theta, length,
+            width), m and rad.
+        clearance_m: Distance, m. A cell is blocked if its middle is nearer to an
+            obstacle than this distance.
 
     Returns:
-        The grid of the area that contains points and obstacles, plus a margin.
+        The grid. It covers all points and obstacles, plus a margin of 2 m.
 
     Raises:
-        InputError: There are too many cells.
+        InputError: The grid would have too many cells.
     """
     boxes = np.asarray(rectangles, dtype=float).reshape(-1, 5)
     places = [np.asarray(points, dtype=float), *map(rectangle_corners, boxes)]
@@ -61,16 +62,17 @@ def map_grid(
 
 
 def make_occupancy_grid(arena: tuple[float, float, float, float]) -> OccupancyGrid:
-    """Makes a grid of free cells.
+    """Makes a grid of free cells that covers a rectangle of the floor.
 
     Args:
-        arena: Least x and y, and greatest x and y, m.
+        arena: Rectangle (least x, least y, greatest x, greatest y) in the world frame
+            W, m.
 
     Returns:
         The grid.
 
     Raises:
-        InputError: There are too many cells.
+        InputError: The grid would have too many cells.
     """
     low_x, low_y, high_x, high_y = arena
     size = [
@@ -91,15 +93,16 @@ def make_occupancy_grid(arena: tuple[float, float, float, float]) -> OccupancyGr
 def cell_of(
     grid: OccupancyGrid, x: float, y: float
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Returns the cell of a place.
+    """Returns the cell that contains a point of the floor.
 
     Args:
         grid: The grid.
-        x: Position of the place, m.
-        y: Position of the place, m.
+        x: x coordinate of the point in the world frame W, m.
+        y: y coordinate of the point in W, m.
 
     Returns:
-        Numbers of the cell along x and y. They are (-1, -1) outside the grid.
+        (i, j), indices of the cell along x and y. They are (-1, -1) if the point is
+        outside the grid.
     """
     i = math.floor((x - grid.low[0]) / CELL_M)
     j = math.floor((y - grid.low[1]) / CELL_M)
@@ -115,11 +118,11 @@ def cell_middle(
 
     Args:
         grid: The grid.
-        i: Number of the cell along x.
-        j: Number of the cell along y.
+        i: Index of the cell along x.
+        j: Index of the cell along y.
 
     Returns:
-        (x, y) m.
+        (x, y) of the middle in the world frame W, m.
     """
     return grid.low[0] + (i + 0.5) * CELL_M, grid.low[1] + (j + 0.5) * CELL_M
 
@@ -128,9 +131,10 @@ def cell_middle(
 def _span(
     low: float, high: float, first: float, count: int
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Return the range of cells whose middles may lie in an interval.
+    """Return the range of cells along one axis whose middles may lie in an interval.
 
-    The function returns the first cell of this range, and the cell after its last one.
+    Returns:
+        Index of the first cell in the range, and index after the last cell.
     """
     begin = math.floor((low - first) / CELL_M - 0.5)
     end = math.ceil((high - first) / CELL_M - 0.5) + 1
@@ -141,16 +145,20 @@ def _span(
 def block_rectangles(
     grid: OccupancyGrid, rectangles: Any, radius: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Blocks the cells whose middles are nearer to a rectangle than a radius.
+    """Marks cells as blocked if their middles are too near to a rectangle.
 
-    The function computes exact distances. A distance transform is unsuitable for two
-    reasons. It measures between middles of cells, so its error is up to 0.7 cells. In
-    addition, compiled steps cannot call it.
+    The function computes exact distances. A distance transform would be unsuitable for
+    two reasons:
+
+    - A distance transform measures between middles of cells, so its error is up to 0.7
+      cells.
+    - Compiled steps of blocks cannot call a distance transform.
 
     Args:
-        grid: Modified in place.
-        rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
-        radius: Radius by which the rectangles are enlarged, m.
+        grid: The grid, modified in place.
+        rectangles: (k, 5) obstacles in the world frame W. Each row is (x, y, theta,
+            length, width), m and rad.
+        radius: Distance from the rectangles below which cells are blocked, m.
     """
     n, m = grid.blocked.shape
     for k in range(len(rectangles)):
@@ -174,12 +182,12 @@ def block_rectangles(
 def block_discs(
     grid: OccupancyGrid, discs: Discs, radius: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Blocks the cells whose middles are nearer to a disc than a radius.
+    """Marks cells as blocked if their middles are too near to a disc.
 
     Args:
-        grid: Modified in place.
-        discs: (n, 3) positions and radii, m.
-        radius: Radius by which the discs are enlarged, m.
+        grid: The grid, modified in place.
+        discs: (n, 3) discs. Each row is (x, y, radius), m, in the world frame W.
+        radius: Distance from the edges of the discs below which cells are blocked, m.
     """
     n, m = grid.blocked.shape
     for k in range(len(discs)):

@@ -10,19 +10,19 @@ from systems.framework.parameters import Acceleration, Parameters, Point
 
 
 class RouteParameters(Parameters):
-    """Where the robot goes, how its route is planned, and how the target moves.
+    """Fields of a route: goal, clearance, and motion of the target along the route.
 
-    All values are our choice. Engelbrecht, Steyn and Djouani (2021) give none.
+    All values are our choice. Engelbrecht, Steyn and Djouani (2021) give no values.
     """
 
     speed_m_s: float = Field(default=0.15, ge=0.02, le=100.0)
-    """Speed of the target along the route, m/s. The planner takes a slower robot for a
-    robot that stalls."""
+    """Speed of the target along the route, m/s. If the speed were lower than the limit,
+    the planner would treat the robot as stalled."""
     acceleration_m_s2: Acceleration = 0.15
     """Acceleration of the target from rest and to rest, m/s^2."""
     timing: Literal["timed", "waiting"] = "timed"
-    """Whether the target moves by the clock, as in the paper, or waits for the robot
-    when it is 0.5 m ahead of P."""
+    """Motion of the target. ``timed``: the motion depends only on time, as in the
+    paper. ``waiting``: when the target is 0.5 m ahead of P, it waits for the robot."""
     goal_m: Point = (4.0, 0.0)
     """Goal of P in W, m."""
     clearance_m: float = Field(default=0.35, ge=0.15, le=1_000.0)

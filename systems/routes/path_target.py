@@ -16,12 +16,13 @@ from systems.routes.parameters import RouteParameters
 from systems.routes.route import ROUTE_SIZE, ROUTE_UNIT
 from systems.world.geometry import control_point
 
-#: Indices of the state: position of the target along the route, m; its speed, m/s;
-#: position of P along the route, m; and first of four numbers that identify the route.
+#: Indices of the state. ALONG: arc length of the target, m. SPEED: speed of the target,
+#: m/s. REACHED: arc length of P, m. FINGERPRINT: first of four numbers that identify
+#: the route.
 ALONG, SPEED, REACHED, FINGERPRINT = range(4)
-#: The point nearest to P is searched only on a part of the route, because a route may
-#: come near to itself. The part begins at the first distance, m, behind both the last
-#: nearest point and the target. It ends at the second distance, m, ahead of both.
+#: The block searches the point nearest to P only on a part of the route, because a
+#: route may come near to itself. The part begins ``_BEHIND_M``, m, behind both the last
+#: nearest point and the target. It ends ``_AHEAD_M``, m, ahead of both.
 _BEHIND_M, _AHEAD_M = 1.0, 0.5
 #: Largest lead of a waiting target over P along the route, m (our choice).
 LEAD_M = 0.5
@@ -45,9 +46,10 @@ class TargetNumbers(NamedTuple):
 def route_fingerprint(
     route: Any,
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Computes four numbers that identify a route.
+    """Computes four numbers that identify a route, to detect a new route.
 
-    These numbers are the count and spacing of its points, and moments of x and y.
+    The numbers are the count of the route's points, the spacing of these points, a
+    weighted sum of their x coordinates, and a weighted sum of their y coordinates.
     """
     count, x, y = int(route[0]), 0.0, 0.0
     for k in range(count):
@@ -60,17 +62,18 @@ def route_fingerprint(
 def nearest_on_route(
     route: Any, x: float, y: float, low: float, high: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Finds the point on a part of a route that is nearest to a place.
+    """Finds the point of a route that is nearest to a given position.
 
-    The function projects the place on each segment of the part. It limits each
-    projection to the segment and to the part. Then it keeps the nearest projection.
+    The function searches only a part of the route, given by two arc lengths. It
+    projects the position on each segment of this part, and limits the projection to the
+    segment and to the part. It returns the projection with the least distance.
 
     Args:
-        route: (ROUTE_SIZE,) numbers of ``Route``.
-        x: Position of the place, m.
-        y: Position of the place, m.
-        low: Start of the part along the route, m.
-        high: End of the part along the route, m.
+        route: (ROUTE_SIZE,) value of the port ``route``.
+        x: x coordinate of the position in the world frame W, m.
+        y: y coordinate of the position in W, m.
+        low: Arc length at which the searched part begins, m.
+        high: Arc length at which the searched part ends, m.
 
     Returns:
         Arc length of the nearest point, m.
@@ -102,17 +105,18 @@ def nearest_on_route(
 def point_on_route(
     route: Any, along: float
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Returns a point of a route and its derivative with respect to arc length.
+    """Returns a point of a route, and the direction of the route at this point.
 
-    The route is interpolated with cubic Hermite polynomials (Catmull and Rom), so its
-    direction is continuous.
+    The function interpolates the route with cubic Hermite polynomials (Catmull and
+    Rom). The direction is therefore continuous.
 
     Args:
-        route: (ROUTE_SIZE,) numbers of ``Route``.
-        along: Arc length, m.
+        route: (ROUTE_SIZE,) value of the port ``route``.
+        along: Arc length s of the point, m.
 
     Returns:
-        x, y, m, and dx/ds, dy/ds.
+        Four numbers: the position x and y in the world frame W, m; and the derivatives
+        dx/ds and dy/ds.
     """
     count, spacing = int(route[0]), route[1]
     along = min(max(along, 0.0), (count - 1) * spacing)
@@ -138,17 +142,18 @@ def next_speed(
 ) -> float:
     """Returns the largest next speed that still permits a stop within a distance.
 
-    The speed changes uniformly within a tick, at most by the acceleration.
+    The speed changes uniformly within a tick (control period). The change per second is
+    at most the given acceleration.
 
     Args:
-        speed: Speed now, m/s.
-        way: Remaining distance, m. It is negative if the target is already too far.
-        top: Largest speed, m/s.
-        acceleration: m/s^2.
+        speed: Present speed, m/s.
+        way: Remaining distance to the stop, m. It is negative if the stop was missed.
+        top: Largest permitted speed, m/s.
+        acceleration: Largest acceleration and deceleration, m/s^2.
         tick_s: Duration of a tick, s.
 
     Returns:
-        m/s, at least 0.
+        Speed at the end of the tick, m/s, at least 0.
     """
     # Solution v' of (v + v') T/2 + v'^2/(2 a) = way.
     root = 0.25 * tick_s * tick_s + (2.0 * way - speed * tick_s) / acceleration
@@ -161,10 +166,14 @@ def next_speed(
 def path_target_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TargetNumbers
 ) -> None:
-    """Computes the target in one tick.
+    """Computes the position and velocity of the target in one tick (control period).
 
-    State: arc length, m, and speed, m/s, of the target; arc length of the point nearest
-    to P, m; and fingerprint of the route.
+    The state contains, in this order:
+
+    - the arc length of the target along the route, m;
+    - the speed of the target, m/s;
+    - the arc length of the route's point nearest to the control point P, m;
+    - four numbers that identify the route (``route_fingerprint``).
     """
     route, (target, progress, valid) = np.asarray(inputs[0]), outputs
     valid[0] = 1.0
@@ -207,30 +216,37 @@ def path_target_step(
 
 
 class PathTarget(Block):
-    """Moves a target along the route. It starts from rest and stops at the goal.
+    """Moves a target point along a route, from rest at the start to rest at the goal.
 
-    ``target_state`` is the position and velocity of the target in W. ``route_progress``
-    has two numbers: the arc length of the target, and the arc length of the route's
-    point nearest to P. A route may come near to itself. The block therefore searches
-    for the nearest point only around and between the last nearest point and the target.
+    P is the control point of the robot, ahead of its axle. The output ``target_state``
+    is the position and velocity of the target in the world frame W. The output
+    ``route_progress`` has two arc lengths along the route. The first belongs to the
+    target, and the second to the point of the route nearest to P.
 
-    With ``timing: timed`` the speed of the target depends only on the time, whatever
-    the robot does. The speed rises, stays constant, and falls. With ``waiting`` the
-    target brakes so that it leads P by at most ``LEAD_M``, unless P goes back. On a new
-    route, the target begins at rest at the point nearest to P.
+    A route may come near to itself. The block therefore searches for the nearest point
+    only on a part of the route. This part contains the previous nearest point and the
+    target.
 
-    Discrete state: arc length and speed of the target, arc length of P, and four
-    numbers that identify the route. Rate and latency: a function of state and present
-    inputs, in every tick; no latency.
+    The field ``timing`` selects how the target moves:
+
+    - ``timed``: The speed of the target depends only on time. The speed rises, stays
+      constant, and falls, whatever the robot does.
+    - ``waiting``: The target brakes so that its lead over P is at most ``LEAD_M`` along
+      the route. The lead can be larger only if P moves back.
+
+    When a new route arrives, the target begins at rest at the route's point nearest to
+    P. The discrete state is described at ``path_target_step``. The outputs are
+    functions of the state and the present inputs at every control period. There is no
+    latency.
 
     Args:
-        parameters: Motion of the target, ``RouteParameters``.
+        parameters: Speed, acceleration and timing of the target.
         robot: Position of P on the robot.
-        tick_s: Period of the robot, s.
+        tick_s: Control period of the robot, s.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021). Their eq. 2 contains the position
-    and velocity of the target. They do not describe the timing of the target. The
-    waiting is ours.
+    Reference: Eq. 2 of Engelbrecht, Steyn and Djouani (2021) contains the position and
+    velocity of the target. The paper does not describe how the target moves in time.
+    The option ``waiting`` is ours.
     """
 
     part = "tracker"

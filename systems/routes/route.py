@@ -1,6 +1,7 @@
-"""A smooth route from a place to a goal, past known rectangles and seen discs.
+"""Finds smooth routes from a start to a goal, past known rectangles and seen discs.
 
-``find_route`` searches a path of cells, pulls it taut, and rounds its corners.
+``find_route`` searches a path of grid cells, pulls this path taut, and rounds its
+corners.
 """
 
 from __future__ import annotations
@@ -26,26 +27,27 @@ from systems.routes.occupancy_grid import (
 )
 from systems.world.geometry import beyond_rectangle, segment_clearance
 
-#: Largest number of points of a route, and number of values of the port ``route``:
-#: number of points, their spacing, and x and y of each.
+#: Largest number of points of a route.
 ROUTE_POINTS = 200
+#: Number of values of the port ``route``: the number of points, the spacing of the
+#: points, and x and y of each point.
 ROUTE_SIZE = 2 + 2 * ROUTE_POINTS
-#: Units of these values.
+#: Units of the values of the port ``route``.
 ROUTE_UNIT = "number of points, then in m their spacing, and x and y of each"
 
 #: Spacing of the points of a taut path when it is rounded, m.
 _FINE_M = 0.01
-#: Half of the window of the moving averages, as a number of fine points. The values are
-#: tried in this order until the route keeps off obstacles.
+#: Half widths of the window of the moving averages, in fine points. The planner tries
+#: them in this order until the route keeps enough distance from obstacles.
 _HALF_WINDOWS = (15, 10, 7, 5, 3, 2, 1, 0)
-#: Number of successive averages: after two the curvature is continuous.
+#: Number of successive averages. After two averages, the curvature is continuous.
 _AVERAGES = 2
-#: A rounded route may come nearer to obstacles than the taut path, by at most the first
-#: number, m, and at most the second number times the clearance.
+#: Rounding may bring a route nearer to obstacles, by at most ``_ROUNDING_M``, m, and by
+#: at most ``_ROUNDING_SHARE`` times the clearance.
 _ROUNDING_M, _ROUNDING_SHARE = 0.015, 0.05
-#: A straight way out may come nearer to obstacles than its start, by at most the first
-#: number, m, and at most the second number times the clearance. Both shares and the 3 %
-#: of ``CELL_M`` leave at least 92 % of the clearance.
+#: A segment from the start or to the goal may come nearer to obstacles than this end,
+#: by at most ``_WAY_OUT_M``, m, and by at most ``_WAY_OUT_SHARE`` times the clearance.
+#: Both shares and the 3 % of ``CELL_M`` leave at least 92 % of the clearance.
 _WAY_OUT_M, _WAY_OUT_SHARE = 0.01, 0.03
 #: A goal may be nearer to obstacles than the clearance by this rounding error, m.
 _GRAZE_M = 1e-9
@@ -96,8 +98,8 @@ def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compile
     """Writes a route in the format of the port ``route``.
 
     Args:
-        numbers: (ROUTE_SIZE,) modified in place.
-        points: (n, 2) with equal spacing, m.
+        numbers: (ROUTE_SIZE,) array that receives the route, modified in place.
+        points: (n, 2) points of the route with equal spacing in the world frame W, m.
     """
     for k in range(ROUTE_SIZE):
         numbers[k] = 0.0
@@ -110,10 +112,10 @@ def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compile
 def _clearance(
     a: Any, b: Any, rectangles: Any, discs: Discs, least: float, most: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Return the distance of a segment from the nearest obstacle, limited to ``most``.
+    """Return the distance of a segment from the nearest obstacle, at most ``most``.
 
-    The function stops at the first obstacle that is nearer than ``least``, and returns
-    its distance.
+    If the function finds an obstacle nearer than ``least``, it stops the search and
+    returns the distance of this obstacle.
     """
     best = most
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -143,13 +145,14 @@ def _clearance(
 def place_clearance(
     x: float, y: float, rectangles: Any, discs: Discs
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance of a place from the nearest obstacle.
+    """Computes the distance of a point from the nearest obstacle.
 
     Args:
-        x: Position of the place, m.
-        y: Position of the place, m.
-        rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
-        discs: (n, 3) positions and radii, m.
+        x: x coordinate of the point in the world frame W, m.
+        y: y coordinate of the point in W, m.
+        rectangles: (k, 5) obstacles in W. Each row is (x, y, theta, length, width), m
+            and rad.
+        discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
 
     Returns:
         Distance, m. It is 0 inside a rectangle, negative inside a disc, and infinite
@@ -203,7 +206,7 @@ def _spaced(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
 def _sees(
     a: Any, b: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Return whether a segment keeps a clearance."""
+    """Return whether all points of a segment keep a clearance from obstacles."""
     found = _clearance(a, b, rectangles, discs, clearance, clearance)
     return bool(found >= clearance)
 
@@ -212,11 +215,13 @@ def _sees(
 def _pulled(
     points: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> Any:  # pragma: no cover  (compiled)
-    """Pull a path taut: connect each kept point with the last point that it sees.
+    """Remove points of a path so that the remaining path is taut.
 
-    A point sees another if the segment between both keeps the clearance. The search
-    from a kept point ends at the first point that it does not see. Consecutive points
-    always count as seeing each other.
+    Two points see each other if the segment between them keeps the clearance. The
+    function starts at the first point and keeps this point. From each kept point, it
+    checks the following points in order. It stops before the first point that the kept
+    point does not see. The point before this one is the next kept point. The direct
+    neighbor of a kept point always counts as seen.
     """
     kept = np.empty_like(points)
     kept[0] = points[0]
@@ -235,9 +240,10 @@ def _pulled(
 
 @njit(cache=True)
 def _averaged(points: Any, half: int) -> Any:  # pragma: no cover  (compiled)
-    """Return the moving average of points.
+    """Return the moving average of the points of a path.
 
-    The window shrinks towards the ends, so that the end points do not move.
+    The window becomes shorter toward the ends of the path, so that the end points do
+    not move.
     """
     out = np.empty_like(points)
     for k in range(len(points)):
@@ -254,11 +260,12 @@ def _averaged(points: Any, half: int) -> Any:  # pragma: no cover  (compiled)
 def _rounded(
     pulled: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> Any:  # pragma: no cover  (compiled)
-    """Round a taut path as smoothly as the clearance permits.
+    """Round the corners of a taut path as far as the clearance permits.
 
-    The function divides the path into fine points, and applies the moving averages. It
-    tries the widest window first, and no averaging last. It stops when the route keeps
-    the clearance of the taut path minus a small allowance.
+    The function divides the path into fine points, and applies moving averages to these
+    points. It tries the widest window first, and then narrower ones; the last attempt
+    does not average. The function accepts the first route that keeps the clearance of
+    the taut path, minus a small allowance.
     """
     count = max(math.ceil(_length(pulled) / _FINE_M), 1) + 1
     fine = _spaced(pulled, count)
@@ -285,15 +292,16 @@ def _way_out(
     discs: Discs,
     clearance: float,
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Return the nearest free cell that a straight way reaches safely.
+    """Return the nearest free grid cell that a safe straight segment joins to ``end``.
 
-    On this way, the distance from obstacles is at least the distance at ``end``, minus
-    a small allowance. If the distance at ``end`` exceeds the clearance, the clearance
-    counts instead.
+    ``end`` is the start or the goal of a route. A segment is safe if it keeps a least
+    distance from obstacles. If ``end`` is nearer to an obstacle than the clearance, the
+    least distance is the distance of ``end``, minus a small allowance. Otherwise, the
+    least distance is the clearance, minus this allowance.
 
     Returns:
-        Numbers of the cell along x and y. They are (-1, -1) if there is no such cell
-        within two clearances.
+        (i, j), indices of the cell along x and y. They are (-1, -1) if there is no such
+        cell within about two clearances.
     """
     here = place_clearance(end[0], end[1], rectangles, discs)
     least = min(here, clearance)
@@ -324,26 +332,31 @@ def find_route(
     discs: Discs,
     clearance: float,
 ) -> Any:  # pragma: no cover  (compiled)
-    """Finds a route from a start to a goal.
+    """Finds a smooth route from a start to a goal, for planning during a run.
 
-    Start and goal may be nearer to obstacles than the clearance. A straight way
-    connects the start with a free cell, and another one connects the goal with a free
-    cell. Both ways lead at most slightly nearer to obstacles. A* then finds a path of
-    cells between the two free cells. The path is pulled taut and rounded. This function
-    is for compiled code and for planning during a run.
+    The function does these steps:
+
+    1. It connects the start with a free grid cell by a straight segment, and the goal
+       with another free cell. Start and goal may be nearer to obstacles than the
+       clearance. Both segments come only slightly nearer to obstacles.
+    2. A* finds a path of cells between the two free cells.
+    3. The function pulls this path taut and rounds its corners.
+
+    Compiled code can call this function.
 
     Args:
         grid: Grid in which the cells nearer to obstacles than the clearance are
             blocked.
-        start: (x, y) m.
-        goal: (x, y) m.
-        rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
-        discs: (n, 3) positions and radii of other obstacles, m.
-        clearance: Distance to be kept, m.
+        start: (x, y) in the world frame W, m.
+        goal: (x, y) in W, m.
+        rectangles: (k, 5) obstacles in W. Each row is (x, y, theta, length, width), m
+            and rad.
+        discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
+        clearance: Distance that the route keeps from obstacles, m.
 
     Returns:
-        (p, 2) at most ``ROUTE_POINTS`` points with equal spacing from start to goal, m.
-        The array is empty if there is no route.
+        (p, 2) points with equal spacing from start to goal in W, m. There are at most
+        ``ROUTE_POINTS`` points. The array is empty if there is no route.
     """
     none = np.empty((0, 2))
     if math.hypot(goal[0] - start[0], goal[1] - start[1]) < _SHORTEST_M:
@@ -371,7 +384,7 @@ def find_route(
 
 @njit(cache=True)
 def _with_corners(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
-    """Return points along a line, including those that define it."""
+    """Return points along a polyline, including the vertices of the polyline."""
     out = np.empty((count + 2 * len(points), 2))
     step, used = _length(points) / (count - 1), 0
     for k in range(len(points) - 1):
@@ -392,31 +405,36 @@ def plan_route(
     *,
     clearance_m: float = 0.35,
 ) -> Route:
-    """Plans a short and smooth route for the center of a disc.
+    """Plans a short and smooth route for the center of a disc-shaped robot.
 
-    A* searches a grid of cells whose middles keep the clearance. The function pulls the
-    path taut where straight legs also keep the clearance. Two moving averages over 0.3
-    m then round the path. The rounded route may come nearer to an obstacle than the
-    clearance by at most 15 mm, and at most 5 % of the clearance. If it comes nearer,
-    the function uses shorter averages. The route keeps at least 92 % of the clearance
-    from all known obstacles. A route longer than 30 m may come nearer at sharp corners:
-    its ``ROUTE_POINTS`` points are then too far apart to follow the arc.
+    The function does these steps:
+
+    1. A* searches a grid. The middles of the free cells keep the clearance.
+    2. The function pulls the path of cells taut, where the straight segments also keep
+       the clearance.
+    3. Two moving averages over 0.3 m round the path. Rounding may reduce the distance
+       from an obstacle by at most 15 mm and at most 5 % of the clearance. If the
+       reduction would be larger, the function uses shorter averages.
+
+    The route keeps at least 92 % of the clearance from all known obstacles. A route
+    longer than 30 m may come nearer at sharp corners. Its ``ROUTE_POINTS`` points are
+    then too far apart to follow the arc.
 
     Args:
-        start: (x, y) in W, m. If the start is nearer to an obstacle than the clearance,
-            the route first leads away from this obstacle.
+        start: (x, y) in the world frame W, m. If the start is nearer to an obstacle
+            than the clearance, the route first leads away from this obstacle.
         goal: (x, y) in W, m.
-        rectangles: (k, 5) known obstacles in W, see ``systems.world.geometry``.
-        clearance_m: Clearance from known obstacles, m. The route keeps at least 92 % of
-            this distance.
+        rectangles: (k, 5) known obstacles in W. Each row is (x, y, theta, length,
+            width), m and rad.
+        clearance_m: Desired distance from known obstacles, m.
 
     Returns:
         The route.
 
     Raises:
-        InputError: Start or goal lies in an obstacle; the goal is too near to an
-            obstacle or to the start; there is no route; or the grid is too large. The
-            error names the field.
+        InputError: Start or goal lies in an obstacle.
+        InputError: The goal is too near to an obstacle or to the start.
+        InputError: There is no route, or the grid would have too many cells.
 
     Reference: Engelbrecht, Steyn and Djouani (2021) name A* in sec. 2, but describe no
     grid. Hart, Nilsson and Raphael (1968) describe A*.

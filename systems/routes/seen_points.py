@@ -51,17 +51,18 @@ def _moves(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
 def remember_objects(
     seen: SeenPoints, grid: OccupancyGrid, rectangles: Any, objects: Any, p_WP: Any
 ) -> None:  # pragma: no cover  (compiled)
-    """Remembers the nearest points of objects that are not known to move.
+    """Remembers the nearest points of the objects that are not known to move.
 
-    The function ignores robots, because they will move sooner or later. It also ignores
-    points near known obstacles.
+    The function ignores other robots, because they will move sooner or later. It also
+    ignores points near known obstacles.
 
     Args:
-        seen: Modified in place.
-        grid: The grid. The function remembers at most one point per cell.
-        rectangles: (k, 5) known obstacles in W.
-        objects: (64,) value of the port ``objects_W``.
-        p_WP: (x, y) of P, m.
+        seen: Memory of points, modified in place.
+        grid: Grid of the floor. The function remembers at most one point per cell.
+        rectangles: (k, 5) known obstacles in the world frame W. Each row is (x, y,
+            theta, length, width), m and rad.
+        objects: (64,) value of the port ``objects_W``, which lists the seen objects.
+        p_WP: (x, y) of the control point P in W, m.
     """
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE
@@ -94,11 +95,12 @@ def discs_to_avoid(
 
     Args:
         seen: Remembered points.
-        objects: (64,) value of the port ``objects_W``.
-        p_WP: (x, y) of P, m.
+        objects: (64,) value of the port ``objects_W``, which lists the seen objects.
+        p_WP: (x, y) of the control point P in the world frame W, m.
 
     Returns:
-        (n, 3) positions and radii of discs, m. Seen points have the radius 0.
+        (n, 3) discs. Each row is (x, y, radius), m, in W. Seen points have the radius
+        0.
     """
     count = min(seen.added[0], len(seen.points))
     discs = np.zeros((count + OBJECT_SLOTS, 3))

@@ -32,14 +32,14 @@ class SoundSearchParameters(Parameters):
     """Radio addresses, and end of the search by sound."""
 
     await_call: bool = True
-    """Whether the robot starts only after the robot with the radio address 1 has
-    reported that it has found the odor source. Off: the robot starts at once."""
+    """Whether the robot waits for a call before it starts. The robot with the radio
+    address 1 calls when it has found the odor source. Off: the robot starts at
+    once."""
     address: int = Field(default=2, ge=1, le=3)
     """Address of this robot in its radio frames."""
     waits_for: int = Field(default=0, ge=0, le=3)
-    """Radio address of a robot that goes first. If this robot is within 1.2 m of the
-    caller, it waits until the other robot reports its result. 0: no robot goes
-    first."""
+    """Radio address of another robot that goes first. Within 1.2 m of the caller, this
+    robot waits until the other robot reports its result. 0: no robot goes first."""
     noise_s: Time = 0.5
     """Time at the start in which the robot listens only to the noise, s. 0: none."""
     listen_s: Duration = 2.0

@@ -36,9 +36,9 @@ from systems.search.upwind_gradient import RULE_MEMORY, upwind_gradient_turn
 #: Averaging time of the readings, s (Song 2011, 4.2). The mean excludes the largest and
 #: the smallest reading.
 SENSE_S = 2.0
-#: An object smells if the lowest gas ratio is below this. Clean air has the ratio 1.
-#: This lowest ratio is the minimum of the mean ratios of the last two stops and of all
-#: readings since the last stop.
+#: A touched object smells if the lowest gas ratio is below this value. The ratio of
+#: clean air is 1. The lowest ratio is the minimum over the mean ratios of the last two
+#: stops and over all readings since the last stop.
 _GATE_SHARE = 0.95
 #: Number of readings that a stop averages: R1, R2, R3, F1, F2.
 _SENSED = 5
@@ -53,13 +53,13 @@ class _Places(NamedTuple):
     readings: int
     """Number of readings in this stop."""
     smelt: int
-    """Lowest gas ratio among the means of the last two stops and the readings since
-    then."""
+    """Lowest gas ratio. It is the minimum over the mean ratios of the last two stops
+    and over all readings since the last stop."""
     before: int
     """Lowest mean gas ratio at the last stop."""
     sum: int
-    """Sums of the five readings in this stop. The next three fields are the indices of
-    the smallest readings, the largest readings and the mean readings."""
+    """Sums of the five readings in this stop. The next three fields are the first
+    indices of the smallest, the largest and the mean readings."""
     least: int
     most: int
     mean: int
@@ -121,10 +121,11 @@ def _sense(state: Any, gas: Any, airflow: Any) -> None:
 
 @register_jitable
 def _average(state: Any) -> int:
-    """Computes the mean readings of a stop, and detects dead gas sensors.
+    """Computes the mean readings of a stop, in which the robot rests and measures.
 
-    The means exclude the largest and the smallest reading. A dead gas sensor gets the
-    mean of the other gas sensors.
+    Each mean excludes the largest and the smallest reading. The function also detects
+    dead gas sensors. It replaces the mean of a dead gas sensor by the mean of the other
+    gas sensors.
 
     Returns:
         Number of gas sensors that work.
@@ -192,10 +193,10 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
 
 @register_jitable
 def _check_switches(state: Any, contact: Any) -> bool:
-    """Returns whether the robot touches an object.
+    """Returns whether the robot touches an object, according to its contact switches.
 
-    A switch that is closed at the first tick is stuck, and the search ignores it. If
-    both switches are stuck, the search ends.
+    If a switch is closed at the first tick (control period), the switch is stuck, and
+    the search ignores it. If both switches are stuck, the search ends.
     """
     if state[AT.started] < 0.5:
         state[AT.started] = 1.0
@@ -247,10 +248,11 @@ def _add_frames(
 def plume_search_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlumeSearchNumbers
 ) -> None:
-    """Computes one tick of the search.
+    """Computes one tick (control period) of the search by smell.
 
-    The activities of a step are wait, sense and move. ``AT.left`` counts the ticks of
-    the present activity. A touch ends the search in any activity.
+    Each step of the search has three activities: wait, sense and move. ``AT.left``
+    counts the remaining ticks of the present activity. If the robot touches an object,
+    the search ends in any activity.
     """
     gas, airflow, headings, contact = inputs
     heading = headings[0]
@@ -285,33 +287,36 @@ def _publish(state: Any, outputs: Any, numbers: PlumeSearchNumbers) -> None:
 
 
 class PlumeSearch(Block):
-    """Searches for an odor source in steps.
+    """Searches for an odor source with a robot that stops, smells and moves in steps.
 
     Each step has three activities. First, the robot rests for ``wait_s``, until the gas
-    sensors have settled. Then it averages the readings for ``SENSE_S``. The rules
-    choose a heading from the averages. Finally, the robot turns and drives for
-    ``MOVE_S``.
+    sensors have settled. Then the robot averages its readings for ``SENSE_S``, and the
+    selected rules choose a heading from the averages. Finally, the robot turns and
+    drives for ``MOVE_S``.
 
-    A touch ends the search at once. If the touched object smells, it is the odor
-    source, and the robot calls. Otherwise the robot gives up the search. The numbers of
-    the endings and faults are in ``systems.search.search_ending``.
+    If the robot touches an object, the search ends at once. If the touched object
+    smells, the object counts as the odor source, and the robot calls other robots by
+    sound. Otherwise the robot gives up the search. ``systems.search.search_ending``
+    lists the numbers of the endings and faults.
 
     If the readings of a gas sensor do not change during a whole stop, the sensor is
-    dead. The block then uses the mean of the other sensors instead. If a switch is
-    closed at the start, it is stuck, and the block ignores it. The block does not
-    detect a switch that is stuck open.
+    dead. The block then uses the mean of the other gas sensors instead. If a contact
+    switch is closed at the start, the switch is stuck, and the block ignores it. The
+    block does not detect a switch that is stuck open.
 
-    The phases of ``song2011`` are those of the paper. The phases of ``upwind_gradient``
-    are 1 upwind and 2 across.
+    The rules ``song2011`` have the four phases of the paper. The rules
+    ``upwind_gradient`` have two phases: 1 upwind and 2 across the wind.
 
     The discrete state holds the outputs, the measurements of the stop, and the memory
-    of the rules. It is updated every tick. The latency is one tick.
+    of the rules. The block updates the state at every tick (control period). The
+    latency is one tick.
 
     Args:
-        parameters: Rules, and end of the search.
-        tick_s: Period of the update, s.
+        parameters: Rules, and conditions that end the search.
+        tick_s: Control period, s.
 
-    Reference: Song 2011, 2.3.3 and 4.2. The gate and ``upwind_gradient`` are ours.
+    Reference: Song 2011, 2.3.3 and 4.2. The rules ``upwind_gradient`` and the test
+    whether a touched object smells are ours.
     """
 
     part = "controller"

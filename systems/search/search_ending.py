@@ -53,7 +53,8 @@ def fault_names(fault: float) -> list[str]:
     """Returns the faults that a searching robot has detected.
 
     Args:
-        fault: Last column of ``search_report``.
+        fault: Last value of the port ``search_report``: the sum of the bits of all
+            detected faults.
 
     Returns:
         One text per fault.

@@ -42,11 +42,11 @@ AT = SearchPlaces(*range(10))
 
 
 def ticks_of(time_s: float, tick_s: float, least: int = 1) -> int:
-    """Converts a time to a number of ticks.
+    """Converts a time to a number of ticks (control periods).
 
     Args:
         time_s: Time, s.
-        tick_s: Period of a tick, s.
+        tick_s: Duration of a tick, s.
         least: Smallest result.
 
     Returns:
@@ -56,14 +56,14 @@ def ticks_of(time_s: float, tick_s: float, least: int = 1) -> int:
 
 
 def search_ports(flag: str, unit: str) -> tuple[Port, ...]:
-    """Makes the output ports of a search.
+    """Makes the output ports of a block that searches.
 
     Args:
         flag: Name of the third port, ``calling`` or ``listening``.
-        unit: Unit of this port.
+        unit: Unit of the third port.
 
     Returns:
-        The ports, in the order of ``publish_search``.
+        The ports, in the order in which ``publish_search`` fills them.
     """
     return (
         Port(
@@ -86,12 +86,13 @@ def search_ports(flag: str, unit: str) -> tuple[Port, ...]:
 
 @register_jitable
 def publish_search(state: Any, outputs: Any, first: int) -> None:
-    """Copies the outputs from the state of a search.
+    """Copies the outputs of a search from its state.
 
     Args:
         state: State of the search.
-        outputs: Heading, move, flag, report and frames. The function fills them.
-        first: Index of the frames in the state.
+        outputs: Output arrays: heading, move, flag, report and radio frames. The
+            function fills them.
+        first: Index in the state at which the radio frames begin.
     """
     expected, move, flag, report, frames = outputs
     expected[0], move[0], flag[0] = state[AT.expected], state[AT.moves], state[AT.flag]
@@ -105,14 +106,18 @@ def publish_search(state: Any, outputs: Any, first: int) -> None:
 def add_frame(
     state: Any, first: int, address: int, function: int, value: float
 ) -> None:
-    """Adds a frame, unless the tick already has ``MOST_FRAMES`` frames.
+    """Adds a radio frame to the frames that the robot sends in this tick.
+
+    If the tick (control period) already has ``MOST_FRAMES`` frames, the function does
+    nothing.
 
     Args:
-        state: State of the search. It contains the number of frames, then their bytes.
-        first: Index of the number of frames.
+        state: State of the search. A part of the state holds the number of frames, and
+            then the bytes of the frames.
+        first: Index of the number of frames in the state.
         address: Radio address of the sender.
         function: Fn, number of the function (Song 2011, table 5).
-        value: Value, in the unit of ``write_frame``.
+        value: Value to send, in the unit that ``write_frame`` states.
     """
     count = int(state[first])
     if count >= MOST_FRAMES:

@@ -9,15 +9,16 @@ from numba.extending import register_jitable
 from systems.search.search_ending import UNDECIDED
 
 # Thresholds and angles of the four phases (Song 2011, 4.2).
-#: R_init. The robot is in the plume if all three ratios Rs/R0 are below this.
+#: R_init. The robot is in the plume if all three ratios Rs/R0 are below this value.
 _INITIAL_THRESHOLD = 0.95
-#: F_thresh, in the unit of the port ``airflow``. The paper prints no unit, so that
-#: ``airflow_sensors.gain_s_m`` defines the meaning of this value.
+#: F_thresh, reading above which an airflow sensor has wind, in the unit of the port
+#: ``airflow``. The paper prints no unit. ``airflow_sensors.gain_s_m`` therefore defines
+#: which wind speed corresponds to this value.
 AIRFLOW_THRESHOLD = 1.0
-#: R_turning. In phase 3, the robot turns if R1 or R3 is below this.
+#: R_turning. In phase 3, the robot turns if R1 or R3 is below this value.
 _TURNING_THRESHOLD = 0.75
-#: R_reverse. In phase 3, the robot turns back if R2 is the smallest ratio and below
-#: this. The paper prints no value. This value is our choice.
+#: R_reverse. In phase 3, the robot turns back if R2 is the smallest ratio and is below
+#: this value. The value is our choice, because the paper prints none.
 _REVERSE_THRESHOLD = 0.9
 #: Turning angles in the phases 1 (toward a front sensor), 2, 3 and 4, deg.
 _INITIAL_TURN_DEG, _UPWIND_TURN_DEG = 60.0, 45.0
@@ -29,19 +30,25 @@ def song2011_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, int, int]
     """Computes the turning angle after a stop (Song 2011, 2.3.3 and 4.2).
 
     Phase 1 lasts until the robot is in the plume for the first time. Afterwards, the
-    airflow sensors determine the phase: phase 2 if one sensor has wind, phase 3 if
-    neither sensor has wind, and phase 4 if both sensors have wind. Phase 4 compares R1
-    with R3, as phase 3 does. For point G, section 4.2 prints "output of R1 was less
-    than R2", but the text can only mean R3.
+    airflow sensors determine the phase:
+
+    - phase 2 if one sensor has wind;
+    - phase 3 if no sensor has wind;
+    - phase 4 if both sensors have wind.
+
+    Phases 3 and 4 both compare R1 with R3. Section 4.2 of the paper prints for point G
+    "output of R1 was less than R2". This text can only mean R3.
 
     Args:
-        gas: (R1, R2, R3), the ratios Rs/R0 right front, rear and left front.
-        airflow: (F1, F2), left and right reading.
-        memory: The first number is 1 after the robot was in the plume, else 0. The
-            function changes it.
+        gas: (R1, R2, R3), ratios Rs/R0 of the gas sensors at the right front, the rear
+            and the left front. A ratio is 1 in clean air, and smaller in gas.
+        airflow: (F1, F2), readings of the left and the right airflow sensor.
+        memory: Array that the function changes. Its first number is 1 once the robot
+            has been in the plume, and 0 before.
 
     Returns:
-        Turning angle, clockwise, deg; phase, 1 to 4; and ``UNDECIDED``.
+        Three values, in this order: the turning angle, clockwise, deg; the phase, 1 to
+        4; and ``UNDECIDED``, because the rules never end the search.
     """
     right, rear, left = gas
     least = min(right, rear, left)

@@ -56,8 +56,8 @@ class _Places(NamedTuple):
     called: int
     """Report of the caller: 1 found, -1 found nothing, 0 none yet."""
     arrived: int
-    """Whether the robot that goes first has reported a result, or ``HOLD_S`` are over,
-    0 or 1."""
+    """0 or 1. 1: the robot that goes first has reported a result, or ``HOLD_S`` are
+    over."""
     bearing: int
     """Bearing of the source, CCW, deg."""
     distance: int
@@ -79,20 +79,21 @@ _LOST_MICROPHONE = 32
 _NOTHING, _NOISE, _SOUND = 0.0, 1.0, 2.0
 #: Computing time of a step, s (Song 2011, 4.3).
 COMPUTE_S = 5.0
-#: Distance from the caller within which the robot waits for another robot, m, and
-#: longest time for which it waits, s.
+#: ``_HOLD_WITHIN_M``: distance from the caller within which the robot waits for the
+#: robot that goes first, m. ``HOLD_S``: longest time for which it waits, s.
 _HOLD_WITHIN_M, HOLD_S = 1.2, 200.0
 #: Time without a call after which the robot gives up, s.
 CALL_WITHIN_S = 1800.0
-#: Distance from the caller below which the heard range counts, m. The robot computes
-#: the distance from the radio level.
+#: Distance from the caller below which the robot uses the range that it hears, m. The
+#: robot computes the distance from the radio level.
 _RADIO_GATE_M = 1.2
 #: Number of consecutive steps without a unique direction of the sound after which the
 #: robot gives up.
 _TRIES = 3
-#: Approximate duration of a turn, s/deg, and lag of the motors, s.
+#: ``_TURN_S_DEG``: approximate duration of a turn per degree, s/deg. ``_LAG_S``: lag of
+#: the motors, s.
 _TURN_S_DEG, _LAG_S = 1.0 / 90.0, 0.1
-#: The last step ends at this multiple of ``stop_range_m``.
+#: The last move ends at this multiple of ``stop_range_m`` from the caller.
 _SHORT_OF = 0.93
 #: Shortest duration of a move, s.
 _SHORTEST_S = 0.5
@@ -176,12 +177,15 @@ def _missed(state: Any, ended: int, numbers: SoundSearchNumbers) -> None:
 def _decide(
     state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
 ) -> None:
-    """Decides after a step whether the robot moves, listens again or stops.
+    """Decides at the end of a step whether the robot moves, listens again or stops.
 
-    The radio level gives a distance. The microphones give a bearing and perhaps a
-    range. The robot has arrived if the distance or the range is below its threshold.
-    The range counts only near the caller. Without a unique bearing, the robot listens
-    again. Near the caller, the next move is shorter than ``MOVE_S``.
+    The radio level gives the distance from the caller. The microphones give a bearing,
+    and sometimes a range. The function decides as follows:
+
+    - If the distance or the range is below its threshold, the robot has arrived and
+      stops. The range counts only if the distance is small.
+    - If the bearing is missing or not unique, the robot listens again.
+    - Otherwise, the robot moves. Near the caller, the move is shorter than ``MOVE_S``.
     """
     bearing, distance, detected, ranged, ambiguous, lost = heard
     own = numbers.own
@@ -269,10 +273,11 @@ def _end_activity(
 def sound_search_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SoundSearchNumbers
 ) -> None:
-    """Computes one tick of the search.
+    """Computes one tick (control period) of the search by sound.
 
-    The robot first waits for the call. Then each step consists of the activities
-    listen, compute and move. ``AT.left`` counts the ticks of the present activity.
+    The robot first waits for the call. Then each step of the search has three
+    activities: listen, compute and move. ``AT.left`` counts the remaining ticks of the
+    present activity.
     """
     bearing, distance, detected, ranged, ambiguous, lost, levels, headings, air = inputs
     heard = bearing[0], distance[0], detected[0], ranged[0], ambiguous[0], lost[0]
@@ -302,29 +307,33 @@ def _publish(state: Any, outputs: Any, numbers: SoundSearchNumbers) -> None:
 
 
 class SoundSearch(Block):
-    """Searches for a calling robot in steps.
+    """Searches for a calling robot in steps of listening, computing and moving.
 
-    First, the robot listens to the noise for ``noise_s``. Then it waits for the call of
-    ``CALLER``: a frame with the message that the odor source is found. In each step,
-    the robot listens for ``listen_s`` and computes for ``COMPUTE_S``. Then it turns and
-    drives for ``MOVE_S``, or for a shorter time near the source.
+    First, the robot listens to the noise for ``noise_s``. Then the robot waits for the
+    call. The call is a radio frame from the robot with the address ``CALLER``. The
+    frame says that this robot has found the odor source. In each step, the robot
+    listens for ``listen_s`` and computes for ``COMPUTE_S``. Then it turns and drives
+    for ``MOVE_S``, or for a shorter time near the caller.
 
-    Two robots approach the same caller one after the other. The second robot has the
-    address of the first robot in ``waits_for``. It waits near the caller until the
-    first robot has reported its result, or until ``HOLD_S`` are over.
+    Two robots approach the same caller one after the other. In the second robot,
+    ``waits_for`` is the address of the first robot. The second robot waits near the
+    caller until the first robot has reported its result, or until ``HOLD_S`` are over.
 
-    The robot does not follow a sound that fits several directions. It listens again,
-    and gives up after three such steps. The numbers of the endings and faults are in
-    ``systems.search.search_ending``. The phase is the activity: 1 waiting for the call,
-    2 waiting for the first robot, 3 listening, 4 computing, 5 moving, 6 finished.
+    If the sound fits several directions, the robot does not move, but listens again.
+    After three such steps in a row, the robot gives up.
+    ``systems.search.search_ending`` lists the numbers of the endings and faults.
 
-    The discrete state holds the outputs and the measurements of the step. It is updated
-    every tick. The latency is one tick.
+    The phase in the report is the activity: 1 waiting for the call, 2 waiting for the
+    first robot, 3 listening, 4 computing, 5 moving, 6 finished.
+
+    The discrete state holds the outputs and the measurements of the step. The block
+    updates the state at every tick (control period). The latency is one tick.
 
     Args:
-        parameters: Radio addresses, times of listening, and end of the search.
-        speed_m_s: Speed of the robot at full duty, m/s.
-        tick_s: Period of the update, s.
+        parameters: Radio addresses, times of listening, and conditions that end the
+            search.
+        speed_m_s: Speed of the robot at full motor duty, m/s.
+        tick_s: Control period, s.
 
     Reference: Song 2011, 3.2.3 and 4.3. The stop by range and ``waits_for`` are ours.
     """

@@ -26,9 +26,9 @@ class _Places(NamedTuple):
 _AT = _Places(*range(4))
 #: Number of values that the rules store from stop to stop.
 RULE_MEMORY = len(_AT)
-#: Gain of the angle from upwind toward the front sensor with more gas, deg. The angle
-#: is this gain times the natural logarithm of the quotient of the two front ratios
-#: Rs/R0.
+#: Gain of the angle between the upwind direction and the heading, deg. The angle is
+#: this gain times the natural logarithm of R3/R1, the quotient of the ratios Rs/R0 of
+#: the two front sensors. It points toward the front sensor with more gas.
 _GAIN_DEG = 20.0
 #: Largest angle from upwind toward the side with more gas, deg.
 _LARGEST_LEAN_DEG = 45.0
@@ -36,7 +36,7 @@ _LARGEST_LEAN_DEG = 45.0
 #: largest value so far.
 _LOST_SHARE = 0.35
 #: Angle from upwind at which the robot searches for a lost plume, deg. The robot goes
-#: to the two sides alternately, and each time one step farther.
+#: to the left and to the right alternately, and each time one step farther.
 _CAST_DEG = 110.0
 #: There is no wind if both airflow sensors read less than this, in their unit.
 _STILL_AIR = 0.05
@@ -56,13 +56,15 @@ _CALM_STOPS = 3
 def upwind_angle(airflow: Any) -> float:
     """Computes the upwind direction from two sensors at 45 deg to the left and right.
 
+    If the readings are proportional to the cosine of the angle between wind and sensor,
+    the result is exact up to 39 deg. At larger angles, the result is 80 deg to the side
+    from which the wind comes.
+
     Args:
         airflow: (F1, F2), left and right reading.
 
     Returns:
-        Turning angle to the upwind direction, clockwise, deg. If the readings are
-        proportional to the cosine of the angle, the result is exact up to 39 deg. At
-        larger angles, the result is 80 deg to the side of the wind.
+        Turning angle to the upwind direction, clockwise, deg.
     """
     left, right = airflow
     larger = max(left, right)
@@ -73,22 +75,27 @@ def upwind_angle(airflow: Any) -> float:
 
 @register_jitable
 def upwind_gradient_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, int, int]:
-    """Computes the turning angle after a stop.
+    """Computes the turning angle of a robot after a stop, from gas and wind.
 
-    In the plume, the robot goes upwind, with an angle toward the side with more gas.
-    After it has lost the plume, it crosses the wind to find the plume again: one step
-    to the side of the last angle, two steps to the other side, three steps back, and so
-    on. Without wind, it turns by 180 deg, and ends the search after ``_CALM_STOPS``
-    such stops.
+    There are three cases:
+
+    - In the plume, the robot goes upwind. The function adds an angle toward the side
+      with more gas.
+    - After the robot has lost the plume, it crosses the wind to find the plume again.
+      It goes one step to the side of the last angle, two steps to the other side, three
+      steps back, and so on.
+    - Without wind, the robot turns by 180 deg. The search ends after ``_CALM_STOPS``
+      consecutive stops without wind.
 
     Args:
-        gas: (R1, R2, R3), ratios Rs/R0: right front, rear, left front.
-        airflow: (F1, F2), left and right reading.
+        gas: (R1, R2, R3), ratios Rs/R0 of the gas sensors at the right front, the rear
+            and the left front. A ratio is 1 in clean air, and smaller in gas.
+        airflow: (F1, F2), readings of the left and the right airflow sensor.
         memory: ``RULE_MEMORY`` numbers, initially 0. The function changes them.
 
     Returns:
-        Turning angle, clockwise, deg; phase, 1 upwind or 2 across; and ``NO_WIND`` if
-        the search ends, else ``UNDECIDED``.
+        Three values, in this order: the turning angle, clockwise, deg; the phase, 1
+        upwind or 2 across; and ``NO_WIND`` if the search ends, else ``UNDECIDED``.
     """
     if max(airflow[0], airflow[1]) < _STILL_AIR:
         memory[_AT.calm] += 1.0

@@ -7,5 +7,5 @@ SOUND_SPEED_M_S = 340.0
 
 
 def sound_speed(temperature_c: float) -> float:
-    """Speed of sound in m/s at a temperature in deg C (Han 2019, eq. 23)."""
+    """Returns the speed of sound, m/s, at a temperature in deg C (Han 2019, eq. 23)."""
     return 331.5 + 0.6 * temperature_c

@@ -40,7 +40,7 @@ def convert(
     parameters: MicArrayParameters,
     gains: NDArray[np.float64] | None = None,
 ) -> NDArray[np.int16]:
-    """Counts of the converter, rounded to nearest and clipped.
+    """Converts sound pressure to counts of the A/D converter, rounded and clipped.
 
     Args:
         pressure: (m, n) sound pressure, Pa; None for silence.
@@ -53,8 +53,8 @@ def convert(
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
 
     Raises:
-        ValueError: Pressure, noise or a gain is not finite; the counts would not show
-            this.
+        ValueError: A pressure, a noise value, or a gain is not finite. The counts would
+            not show this error.
     """
     if gains is None:
         gains = np.ones(len(noise))

@@ -1,4 +1,4 @@
-"""Shape of a microphone array, and the ambiguities of its delays."""
+"""Determines the shape of a microphone array and the ambiguities of its delays."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from systems.framework.input_error import InputError
 # Smallest distance between two microphones, m.
 _LEAST_DISTANCE_M = 1e-3
 
-# A microphone counts as on a line or a plane up to this distance from it, as a share of
-# the aperture.
+# A microphone counts as on a line or a plane if its distance from the line or plane is
+# at most this share of the aperture.
 _FLATNESS = 0.01
 
 _UPRIGHT = ("above", "below")
@@ -27,8 +27,9 @@ class EqualRow(NamedTuple):
     spacing_m: float
     """Distance between adjacent microphones, m."""
     to_delays: NDArray[np.float64]
-    """(2, 2) matrix that maps the delays t_k - t_0, in the order of the array, to
-    tau_12 and tau_13."""
+    """(2, 2) matrix that converts delays relative to the first channel to tau_12 and
+    tau_13. The delays to convert are in the order of the channels of the array. The
+    delay tau_ij is the time by which the sound reaches Mj later than Mi."""
     axes: NDArray[np.float64]
     """(d, 2) unit vectors ahead and to the left, as columns."""
 
@@ -37,22 +38,25 @@ class EqualRow(NamedTuple):
 class ArrayShape:
     """Positions of microphones relative to their centroid, in the frame A of the array.
 
-    The axes of A are those in which the positions were given. Its origin is the
-    centroid. Use ``ArrayShape.of`` to make a shape.
+    The axes of A are the axes in which the positions were given. The origin of A is the
+    centroid. To make a shape, call ``ArrayShape.of``.
     """
 
     p_AM: NDArray[np.float64]
     """(n, d) positions of the microphones, m; d is 2 or 3."""
     kind: Literal["row", "plane", "space"]
-    """What the microphones span: a line, a plane, or space."""
+    """Kind of set that the microphones span: a line, a plane, or space."""
     span: NDArray[np.float64]
     """(r, d) orthonormal vectors in A that span the array. The vector of a row points
     to the left as seen in the direction ``ahead``."""
     ahead: NDArray[np.float64] | None
     """(d,) unit vector that is perpendicular to the line or plane and points to the
-    reported side. By default, it points towards +x for a row, or towards +y if the row
-    is along x. For a plane in space, it points towards +z by default; if the plane is
-    upright, the rule for rows applies. None if no side is ambiguous."""
+    reported side. None if no side is ambiguous.
+
+    By default, the vector points towards +x for a row of microphones. If the row is
+    along x, the vector points towards +y. For a plane in space, the vector points
+    towards +z. If the plane is upright, the rule for rows applies.
+    """
     aperture_m: float
     """Largest distance between two microphones, m."""
     side: Literal["ahead", "behind", "above", "below"] | None = None
@@ -60,7 +64,7 @@ class ArrayShape:
 
     @classmethod
     def of(cls, positions: ArrayLike, flat_m: float | None = None) -> ArrayShape:
-        """Shape of the array with the given microphones.
+        """Makes the shape of an array from the positions of its microphones.
 
         Args:
             positions: (n, 2) or (n, 3) positions in any frame, m; n is at least 3.
@@ -68,11 +72,12 @@ class ArrayShape:
                 counts as on it, m. None: 1 % of the aperture.
 
         Returns:
-            The microphones relative to their centroid, and what they span.
+            The microphones relative to their centroid, and the line, plane, or space
+            that they span.
 
         Raises:
-            InputError: There are too few positions, or positions that coincide or are
-                not finite.
+            InputError: There are fewer than 3 positions, two positions coincide, or a
+                position is not finite.
         """
         p = np.array(positions, dtype=np.float64)
         if p.ndim != 2 or p.shape[1] not in (2, 3):
@@ -109,10 +114,12 @@ class ArrayShape:
 
     @property
     def ambiguity(self) -> Literal["none", "front_back", "mirror"]:
-        """Directions with equal delays: none, front and back, or mirror images.
+        """Directions that the delays of the array cannot distinguish.
 
-        A row in space has a larger ambiguity: all positions on a circle around the row
-        have equal delays.
+        ``none``: there are no such directions. ``front_back``: a direction and its
+        mirror image behind the row have equal delays. ``mirror``: a direction and its
+        mirror image at the plane have equal delays. A row in space has a larger
+        ambiguity: all positions on a circle around the row have equal delays.
         """
         if self.ahead is None or self.side is not None:
             return "none"
@@ -130,7 +137,7 @@ class ArrayShape:
 
     @cached_property
     def angles(self) -> tuple[Literal["bearing", "elevation"], ...]:
-        """Angles of a direction that the delays determine.
+        """Angles of a direction that the delays of the array determine.
 
         A slanted row determines neither bearing nor elevation. It determines only the
         angle between the direction and the row.
@@ -155,14 +162,14 @@ class ArrayShape:
         return _distances(self.p_AM)[tuple(self.pairs.T)]
 
     def facing(self, side: Literal["ahead", "behind", "above", "below"]) -> ArrayShape:
-        """Same array, with all sources known to be on one side.
+        """Returns the same array, with all sources known to be on one side.
 
         Args:
-            side: ``ahead`` is towards +x, or +y for a row along x; ``above`` is towards
-                +z.
+            side: ``ahead`` is towards +x, or towards +y for a row along x. ``above`` is
+                towards +z. ``behind`` and ``below`` are the opposite sides.
 
         Returns:
-            The shape that faces this side; its ``ambiguity`` is ``none``.
+            The shape that faces this side. Its ``ambiguity`` is ``none``.
 
         Raises:
             InputError: The array does not distinguish these sides, or has no ambiguity.
@@ -188,12 +195,12 @@ class ArrayShape:
         )
 
     def max_delay(self, c: float) -> float:
-        """Longest time that sound takes from one microphone to another, s."""
+        """Returns the longest travel time of sound between two microphones, s."""
         return self.aperture_m / c
 
     @cached_property
     def equal_row(self) -> EqualRow | None:
-        """The row, if it has three equally spaced microphones; otherwise None."""
+        """Returns a row of three equally spaced microphones; None for other arrays."""
         ahead = self.ahead
         if ahead is None or self.kind != "row" or self.count != 3:
             return None
@@ -239,7 +246,7 @@ def _distances(p: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _upward(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Normal that points up; if it is level, it points forward, or else to the left."""
+    """Returns the normal that points up; a level normal points to +x or +y."""
     for part in normal[::-1] if abs(normal[2]) > _FLATNESS else normal:
         if abs(part) > _FLATNESS:
             return normal * np.sign(part)
@@ -249,7 +256,7 @@ def _upward(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 def _row_axes(
     along: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Unit vector ahead of a row, and unit vector along the row to the left."""
+    """Returns the unit vector ahead of a row, and the one along the row to the left."""
     ahead = np.zeros(along.size)
     level = np.hypot(along[0], along[1])
     if level < _FLATNESS:  # an upright row: any level direction can be ahead

@@ -1,4 +1,4 @@
-"""Errors of a real microphone array: positions, delays and gains."""
+"""Draws errors of a real microphone array: positions, delays and gains."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from systems.sound.parameters import MicArrayParameters, channel_skew
 
-# Largest spacing of knots, s. Within this time, the delay deviates from a cubic
-# polynomial by less than 1e-4 sample, even if the robot turns at 4 rad/s.
+# Largest spacing of the knots of a delay polynomial, s. Between two knots, the delay
+# deviates from a cubic polynomial by less than 1e-4 sample. This bound holds even if
+# the robot turns at 4 rad/s.
 _SPACING_S = 0.0025
 
 
@@ -22,7 +23,8 @@ class Tolerances:
     """Errors of the n channels of an array."""
 
     position_errors: NDArray[np.float64]
-    """(n, 2) true minus stated positions of the microphones, in B axes, m."""
+    """(n, 2) true minus stated positions of the microphones, in the axes of the body
+    frame B, m."""
     channel_delays: NDArray[np.float64]
     """(n,) times by which the channels are sampled later than stated, s."""
     gains: NDArray[np.float64]
@@ -41,8 +43,7 @@ def draw_tolerances(
         generator: Source of the random numbers.
 
     Returns:
-        (n, 2) errors of positions, m; (n,) errors of delays, s; and (n,) factors of the
-        gain.
+        Errors of n positions, delays, and gains.
     """
     places = generator.uniform(-1.0, 1.0, (count, 2))
     delays = generator.uniform(-1.0, 1.0, count)
@@ -73,20 +74,21 @@ def real_array(
     tolerances: Tolerances,
     c: float,
 ) -> RealArray:
-    """Computes the true array from the stated array and its errors.
+    """Computes the true properties of an array from the stated array and its errors.
 
     Args:
-        p_BM: (n, 2) stated positions of the microphones in B, m.
-        parameters: Stated skew of the channels, and length of a frame.
+        p_BM: (n, 2) stated positions of the microphones in the body frame B, m.
+        parameters: Stated skew (sampling delays) of the channels, and length of an
+            audio frame.
         tolerances: Errors of positions, delays and gains.
         c: Speed of sound, m/s.
 
     Returns:
-        True positions in B, m; instants of the knots of each channel, s; gains; and the
-        speed of sound, m/s.
+        The true array: positions, sampling times of the knots, gains, and speed of
+        sound.
 
     Raises:
-        ValueError: The skew is given for another number of channels.
+        ValueError: The number of skew values differs from the number of microphones.
     """
     late = channel_skew(parameters, len(p_BM)) + tolerances.channel_delays
     spans = math.ceil(parameters.frame_s / _SPACING_S - 1e-9)

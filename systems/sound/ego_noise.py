@@ -20,13 +20,14 @@ FADE_S = 0.05
 
 
 class EgoNoise:
-    """Noise of motors and fans that is added to each channel, always at the same level.
+    """Noise of the robot's motors and fans, which is added to each channel.
 
-    The recording is resampled to the sample rate, limited to the band of the
-    microphones, and repeated without a seam. A recording with one channel per
-    microphone is played as it is, so that the channels stay coherent. A recording with
-    a single channel is played to all microphones. Each microphone then starts at its
-    own position, drawn from the seed, so that the channels are incoherent.
+    The level of the noise is constant. The recording is resampled to the sample rate,
+    limited to the band of the microphones, and repeated without a seam. A recording
+    with one channel per microphone is played as it is, so that the channels stay
+    coherent. A recording with a single channel is played to all microphones. Each
+    microphone then starts at its own random position in the recording, so that the
+    channels are incoherent.
 
     Args:
         parameters: File and level of the noise.
@@ -48,7 +49,7 @@ class EgoNoise:
         self._starts = self._drawn_starts(seed)
 
     def _drawn_starts(self, seed: int) -> NDArray[np.int64]:
-        """(n,) positions in the recording at which the channels start."""
+        """Draws the (n,) positions in the recording at which the channels start."""
         count = len(self._rows)
         starts = tick_generator(seed, BEFORE_THE_RUN + 1).integers(
             self._loops.shape[1], size=count
@@ -56,16 +57,16 @@ class EgoNoise:
         return np.full(count, starts[0]) if len(self._loops) > 1 else starts
 
     def of_seed(self, seed: int) -> EgoNoise:
-        """Same recording with other start positions."""
+        """Returns the noise of the same recording with other start positions."""
         other = copy(self)
         other._starts = self._drawn_starts(seed)
         return other
 
     def frame(self, number: int) -> NDArray[np.float32]:
-        """Noise in one frame.
+        """Returns the noise in one audio frame.
 
         Args:
-            number: Number of the frame; frame 0 ends at time zero.
+            number: Number of the frame. Frame 0 ends at time zero.
 
         Returns:
             (n, samples) pressure divided by the RMS pressure of the source at 1 m.
@@ -76,7 +77,7 @@ class EgoNoise:
 
 
 def _read_loops(file: str, count: int, rate_hz: float) -> NDArray[np.float32]:
-    """(1 or n, length) samples at ``rate_hz``, of unit RMS over all channels."""
+    """Reads (1 or n, length) samples at ``rate_hz``, of unit RMS over all channels."""
     field = "microphones.ego_noise_file"
     channels, rate = read_noise(file, count, field)
     centred = channels - channels.mean(axis=1, keepdims=True)

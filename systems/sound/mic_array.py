@@ -1,4 +1,4 @@
-"""The microphones of the robot, with their converter."""
+"""Simulates the microphones of the robot, with their converter."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
 
 def microphone_reach(room: RoomParameters | None, sound_speed_m_s: float) -> float:
-    """Longest distance for which emissions must be stored, m.
+    """Returns the longest distance that sound travels to the microphones, m.
+
+    A loudspeaker must store its emissions for the travel time of this distance.
 
     Args:
         room: Room whose reflections are also heard; None for the free field.
@@ -51,49 +53,54 @@ def microphone_reach(room: RoomParameters | None, sound_speed_m_s: float) -> flo
 class MicArray(Block):
     """Records the sound at the microphones of the robot.
 
-    A frame published at t covers [t - frame_s, t); ``frame_s`` is 25 ms by default.
-    Within a frame, the robot follows a cubic Hermite polynomial. Sound travels as in
-    ``systems.sound.propagation``. In two cases, the state does not hold the pose of one
-    frame ago: before the first frame, and if the output is evaluated between the ends
-    of two frames. The block then assumes that the robot has moved at its present
-    velocity.
+    The block publishes one frame of audio every ``frame_s`` (by default 25 ms). A frame
+    published at the time t covers the interval [t - frame_s, t). The module
+    ``systems.sound.propagation`` describes how the sound travels.
 
-    A room does not change the direct sound. For the reflections, the block assumes that
-    robot and source are at rest. It uses their positions at the last update, every
-    ``UPDATE_PERIOD_S`` (0.1 s). The geometry is therefore older than the sound by up to
-    this period plus the travel time of the sound. The frame that ends at an update
-    fades from the previous positions to the new positions.
+    Within a frame, the robot moves along a cubic Hermite polynomial. The polynomial
+    starts at the pose at the end of the last frame. In two cases, the block has no pose
+    from exactly one frame ago: before the first frame, and if the output is evaluated
+    between the ends of two frames. The block then assumes that the robot has moved at
+    its present velocity.
 
-    A trial may set these numeric parameters in its context before the first tick. For
-    each parameter, the class has a constant of the same name with the index of the
-    parameter:
+    In a room, the direct sound is the same as without a room. For the reflections, the
+    block assumes that robot and source are at rest. It uses their positions at the last
+    update, every ``UPDATE_PERIOD_S`` (0.1 s). These positions are therefore older than
+    the sound by up to this period plus the travel time of the sound. The frame that
+    ends at an update fades from the previous positions to the new positions.
+
+    A trial may set these numeric parameters in its context before the first control
+    period (tick). For each parameter, the class has a constant of the same name with
+    the index of the parameter:
 
     - ``POSITION_ERRORS``: (2 n,) x and y of one microphone after the other, m;
     - ``CHANNEL_DELAYS``: (n,) delays, s;
     - ``GAINS``: (n,) factors, where 1 means no error;
     - ``SOUND_SPEED``: (1,) speed of sound in the air, m/s.
 
-    The first three are explained in ``systems.sound.array_tolerances``. Their defaults
-    are drawn from the seed, within the tolerances of the parameters.
+    The first three parameters are explained in ``systems.sound.array_tolerances``.
+    Their defaults are drawn from the seed, within the tolerances of the parameters.
 
-    The state holds time, pose and velocity of the robot at the end of the last frame.
-    In a room, the state also holds time, pose of the robot and position of each source
-    at the last update of the reflections. The state is updated every ``frame_s``. The
-    output is a function of the state and the present inputs; there is no latency.
+    The state has the time, the pose and the velocity of the robot at the end of the
+    last frame. In a room, the state also has the values at the last update of the
+    reflections: the time, the pose of the robot, and the position of each source. The
+    block updates the state every ``frame_s``. The output is a function of the state and
+    the present inputs, without latency.
 
     Args:
         parameters: Microphones, amplifier and converter.
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound, m/s.
         room: Walls, if there are any.
-        faults: Faults of the robot; those of ``microphones`` apply.
+        faults: Faults of the robot. The block applies only the faults of
+            ``microphones``.
         others: Names of further sources that the robot does not follow. Each name adds
             an input port ``emission_<name>`` [Emission].
         seed: Seed of the noise and of the errors of the array.
 
     Raises:
-        ValueError: The skew is given for another number of channels, the room is not
-            possible, or the file of the ego noise cannot be used.
+        ValueError: The number of skew values differs from the number of microphones,
+            the room is not possible, or the file of the ego noise cannot be used.
     """
 
     part, stage = "microphones", "hearing"
@@ -215,14 +222,14 @@ class MicArray(Block):
         output.set_value(frame)
 
     def step_for(self, run: RunFacts) -> Step:
-        """Step that the block takes at each frame of a compiled loop.
+        """Returns the step for each audio frame of a compiled simulation loop.
 
         Args:
             run: Seed and period of the run, and emissions of the sources.
 
         Returns:
-            The step. It carries the audio, which is computed only when a block reads
-            it.
+            The step. It provides the audio as a function of the tick (control period).
+            The audio of a frame is computed only when another block reads it.
         """
         recorder = self._recorder.of_seed(run.seed_of(self.get_name()))
         emitted = [run.carried[port.get_name()] for port in self._sources]
@@ -239,7 +246,7 @@ class MicArray(Block):
 
         @lru_cache(maxsize=1)
         def audio(tick: int) -> AudioFrame:
-            """Frame that ends at a tick, computed once, when a block reads it."""
+            """Returns the frame that ends at a tick. Computes the frame only once."""
             emissions = [emission(tick) for emission in emitted]
             time = tick * run.tick_s
             return recorder.record(emissions, time, now, before, recorder.array)

@@ -24,13 +24,13 @@ from systems.framework.parameters import (
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, whole
 
 #: Frequencies that the microphones pass, Hz (Han 2019, 4.1). The filter is applied to
-#: the waveform: a linear filter common to all microphones commutes with propagation,
-#: apart from a Doppler shift of about 0.1 %.
+#: the waveform of the loudspeaker. A linear filter that is the same for all microphones
+#: commutes with propagation, apart from a Doppler shift of about 0.1 %.
 MICROPHONE_BAND_HZ = (50.0, 18_000.0)
 
-#: Sound pressure at full scale, Pa: the sensitivity of the microphones is -23 dB re 1
-#: V/Pa, the gain of the preamplifier is 40 dB (Han 2019, 4.1), and the converter clips
-#: at 1.65 V (our choice).
+#: Sound pressure at full scale, Pa. The sensitivity of the microphones is -23 dB re 1
+#: V/Pa. The gain of the preamplifier is 40 dB (Han 2019, 4.1). The converter clips at
+#: 1.65 V (our choice).
 FULL_SCALE_PA = 1.65 / 10.0 ** ((-23.0 + 40.0) / 20.0)
 
 #: Length of the raised-cosine edges of every burst, s. The edges prevent clicks.
@@ -43,8 +43,8 @@ class SoundParameters(Parameters):
     kind: Literal["chirp", "band_noise", "tone", "horn", "siren", "wav"] = "chirp"
     """Waveform; ``wav`` plays the sound file ``file``."""
     file: str | None = None
-    """Sound file (WAV, FLAC ...) with one channel and any sample rate and bit depth;
-    only for ``kind: wav``."""
+    """Sound file (WAV, FLAC ...) with one channel and any sample rate and bit depth.
+    Used only for ``kind: wav``."""
     low_hz: Frequency = 500.0
     """Lower end of the band of chirp and band noise, Hz."""
     high_hz: Frequency = 8_000.0
@@ -53,8 +53,8 @@ class SoundParameters(Parameters):
     """Frequency of the tone and fundamental of the horn, Hz."""
     level_pa: Positive = 0.05
     """RMS pressure at 1 m while the source sounds, Pa (0.05 Pa is 68 dB). The
-    loudspeaker limits peaks to four times this value; a sound with higher peaks is
-    played at a lower level."""
+    loudspeaker limits peaks to four times this value. If a sound has higher peaks, it
+    is played at a lower level."""
     on_s: float = Field(default=0.5, ge=2 * EDGE_S, le=60.0)
     """Length of a burst, s."""
     period_s: Duration = 2.0
@@ -93,7 +93,7 @@ class SoundParameters(Parameters):
         return self
 
     def sounds(self, time: Any) -> Any:
-        """Whether the source sounds at a time in s, or at each time of an array."""
+        """Returns whether the source sounds at a time, s, or at an array of times."""
         phase = time - self.start_s
         return (phase >= 0.0) & (phase % self.period_s < self.on_s)
 
@@ -102,10 +102,11 @@ class MicArrayParameters(Parameters):
     """Microphones, amplifier and converter (Han 2019, 4.1)."""
 
     sample_rate_hz: float = Field(default=100_000.0, ge=1_000.0, le=SAMPLE_RATE_HZ)
-    """Sample rate of the converter, Hz; at most the rate at which sound is computed.
+    """Sample rate of the converter, Hz. It is at most the rate at which the sound is
+    computed.
 
-    There is no filter before the converter: sound above half the sample rate is
-    aliased.
+    There is no filter before the converter. Sound above half the sample rate is
+    therefore aliased.
     """
     frame_s: Period = TICK_S
     """Length of a frame, and time from one frame to the next, s. The robot hears once
@@ -121,14 +122,16 @@ class MicArrayParameters(Parameters):
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
     channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
-    """Delay with which each channel is sampled, s; shorter than one sample.
+    """Delay with which each channel is sampled, s. Each delay is shorter than one
+    sample.
 
-    Give one time for each microphone, or an empty list if all channels are sampled at
-    once.
+    Give one time for each microphone. If all channels are sampled at once, give an
+    empty list.
     """
 
     ego_noise_file: str | None = None
-    """Recording of the noise of the robot itself (WAV, FLAC ...), repeated forever.
+    """Recording of the noise of the robot itself (WAV, FLAC ...). The recording is
+    repeated without end.
 
     The recording has one channel for all microphones, or one channel for each
     microphone.
@@ -144,7 +147,8 @@ class MicArrayParameters(Parameters):
     delay_tolerance_s: float = Field(default=0.0, ge=0.0, le=1e-4)
     """Largest time by which each channel is sampled earlier or later, s."""
     gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
-    """Largest error of the gain of each channel, noise included, dB."""
+    """Largest error of the gain of each channel, dB. The gain applies to sound and
+    noise."""
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
@@ -179,17 +183,17 @@ class MicArrayParameters(Parameters):
 
 
 def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
-    """Delays with which the channels are sampled.
+    """Returns the delays with which the channels are sampled.
 
     Args:
-        parameters: Parameters with the skew. If the skew is empty, all delays are 0.
+        parameters: Parameters with the delays. If the list is empty, all delays are 0.
         count: Number of microphones.
 
     Returns:
         (count,) delays, s.
 
     Raises:
-        InputError: The skew is given for another number of channels.
+        InputError: The number of delays differs from the number of microphones.
     """
     skew = parameters.channel_skew_s
     if len(skew) not in (0, count):
@@ -201,7 +205,8 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
     return np.array(skew) if skew else np.zeros(count)
 
 
-#: Largest allowed order of reflections. It leads to more than four million images.
+#: Largest allowed number of reflections of one sound. It leads to more than four
+#: million image sources.
 GREATEST_ORDER = 150
 
 #: Height of all loudspeakers and microphones above the floor of a room, m.
@@ -222,26 +227,27 @@ class RoomParameters(Parameters):
     )
     """Extents along x and y of W, and height, m."""
     corner_m: Point | None = None
-    """Corner of smallest x and y, in W, m.
+    """Corner of smallest x and y, in the world frame W, m.
 
-    If unset, the origin of W is in the middle of the floor.
+    If the corner is not set, the origin of W is in the middle of the floor.
     """
     reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
     """Time in which sound decays by 60 dB according to Sabine's formula, s.
 
-    The simulated decay agrees with this time in compact rooms that absorb little. For
-    example, set 0.25, 0.4 or 0.6 s in a room of 7 x 7 x 3 m. The decay from -5 to -35
-    dB then corresponds to 0.25, 0.45 or 0.72 s.
+    The simulated decay agrees with this time in compact rooms that absorb little. As an
+    example, take a room of 7 x 7 x 3 m and the settings 0.25, 0.4 and 0.6 s. The decay
+    from -5 to -35 dB then corresponds to 0.25, 0.45 and 0.72 s.
     """
     absorption: float | None = Field(default=None, gt=0.0, le=1.0)
-    """Share of the energy that the walls, floor and ceiling absorb.
+    """Share of the energy that the walls, floor and ceiling absorb at each reflection.
 
-    If set, the reverberation time follows from it.
+    If the absorption is set, it determines the reverberation time.
     """
     maximum_order: int | None = Field(default=None, ge=1, le=GREATEST_ORDER)
     """Largest number of reflections of one sound.
 
-    If unset, all reflections that arrive within the reverberation time are computed.
+    If the number is not set, all reflections that arrive within the reverberation time
+    are computed.
     """
 
     @model_validator(mode="after")
@@ -256,28 +262,29 @@ class RoomParameters(Parameters):
 
     @property
     def corner(self) -> NDArray[np.float64]:
-        """(2,) corner of smallest x and y in W, m."""
+        """(2,) corner of smallest x and y, in the world frame W, m."""
         if self.corner_m is None:
             return np.array(self.size_m[:2]) / -2.0
         return np.array(self.corner_m)
 
     def contains(self, p_W: ArrayLike) -> bool:
-        """Whether all points (..., 2) in W lie between the walls."""
+        """Returns whether all points (..., 2) in W are between the walls."""
         inside = np.asarray(p_W) - self.corner
         return bool(np.all((inside > 0.0) & (inside < self.size_m[:2])))
 
     def walls(self, c: float) -> tuple[float, float, int]:
-        """Absorption, reverberation time, and largest order of reflections.
+        """Computes the acoustic properties of the walls.
 
         Args:
             c: Speed of sound, m/s.
 
         Returns:
-            Absorbed share of the energy, reverberation time, s, and largest order.
+            Share of the energy that is absorbed at each reflection; reverberation time,
+            s; and largest number of reflections of one sound.
 
         Raises:
             InputError: The reverberation time is too short for the size of the room, or
-                needs reflections of an order above ``GREATEST_ORDER``.
+                it needs more reflections than ``GREATEST_ORDER``.
         """
         size = np.array(self.size_m)
         sabine = float(12.0 * math.log(10.0) / (c * np.sum(1.0 / size)))

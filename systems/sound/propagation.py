@@ -1,9 +1,10 @@
-"""Sound from a moving source to moving microphones in the free field.
+"""Computes sound from a moving source at moving microphones in the free field.
 
-Each microphone hears the sound that left the source at the retarded time t_e, with c (t
-- t_e) = |p_M(t) - p_S(t_e)|. The Doppler shifts (Han 2019, eq. 1) follow from this
-equation. Sound pressure falls as 1/R. The text of the paper says that it falls with the
-square of the distance, which is true of intensity.
+A microphone at p_M hears at the time t the sound that left the source at the retarded
+time t_e. The equation is c (t - t_e) = |p_M(t) - p_S(t_e)|, where p_S is the position
+of the source. The Doppler shifts (Han 2019, eq. 1) follow from this equation. Sound
+pressure falls as 1/R, where R is the distance. The text of the paper says that it falls
+with the square of the distance, which is true of intensity.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from systems.framework.signals import Emission
 #: Number of samples that the interpolation kernel uses on either side.
 KERNEL_REACH = 6
 
-#: Below this distance, 1/R no longer grows, m, because a microphone is not a point.
+#: Distance below which the factor 1/R no longer grows, m. The reason is that a
+#: microphone is not a point.
 MINIMUM_RANGE_M = 0.01
 
-# A step that differs from a whole number of samples by less than this is rounded.
+# If a step differs from a whole number of samples by less than this, it is rounded.
 _SAME_RATE = 1e-9
 
 # A Kaiser window of 12 taps with this beta has an error of 1e-5 up to 18 kHz. At
@@ -33,12 +35,12 @@ _BETA = 10.0
 
 
 def _interpolation_kernel() -> NDArray[np.float32]:
-    """Fits polynomials to a windowed sinc, with an error of 1e-6.
+    """Fits polynomials to a windowed sinc function, with an error of 1e-6.
 
     Returns:
-        (pairs, 2, 4) coefficients of the taps n and 11 - n. The polynomials depend on
-        the fraction of a sample. With u = fraction - 1/2, the weights of the two taps
-        are E + O and E - O, where E = sum_k e_k u^2k and O = u sum_k o_k u^2k.
+        (pairs, 2, 4) polynomial coefficients of the taps n and 11 - n. The polynomials
+        depend on the fraction of a sample. Let u = fraction - 1/2. The weights of the
+        two taps are E + O and E - O, where E = sum_k e_k u^2k and O = u sum_k o_k u^2k.
     """
     u = np.linspace(-0.5, 0.5, 257)
     x = np.arange(_TAPS) - (KERNEL_REACH - 0.5) - u[:, None]
@@ -60,7 +62,7 @@ INTERPOLATION_KERNEL = _interpolation_kernel()
 def _hermite(
     s: float, h: float, a: float, b: float, da: float, db: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Value and derivative of the cubic between two knots, at the position s.
+    """Evaluates the cubic Hermite polynomial between two knots, and its derivative.
 
     Args:
         s: Position in the interval, as a share of its length, 0 to 1.
@@ -69,6 +71,9 @@ def _hermite(
         b: Value at the second knot.
         da: Derivative at the first knot, per second.
         db: Derivative at the second knot, per second.
+
+    Returns:
+        Value at the position, and derivative per second.
     """
     s2, s3 = s * s, s * s * s
     value = (
@@ -94,22 +99,23 @@ def microphone_paths(
     velocity_1: NDArray[np.float64],
     p_BM: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Positions and velocities of the microphones of a moving robot.
+    """Computes positions and velocities of the microphones of a moving robot.
 
-    The pose follows the cubic Hermite polynomial between two ticks.
+    Between two given poses, the robot moves along a cubic Hermite polynomial.
 
     Args:
-        times: (m, k) instants of each microphone, s.
+        times: (m, k) times for each microphone, s.
         begin: Time of the first pose, s.
-        pose_0: (3,) first pose x, y, theta in W, m and rad.
+        pose_0: (3,) first pose x, y, theta in the world frame W, m and rad.
         velocity_0: (3,) vx, vy in W and omega at the first pose, m/s and rad/s.
         end: Time of the second pose, s.
-        pose_1: (3,) second pose, in the form of pose_0; theta may be wrapped.
+        pose_1: (3,) second pose, in the form of pose_0. Its theta may be wrapped.
         velocity_1: (3,) velocity at the second pose, in the form of velocity_0.
-        p_BM: (m, 2) microphones in B, m.
+        p_BM: (m, 2) positions of the microphones in the body frame B, m.
 
     Returns:
-        p_WM, (m, k, 2) m, and v_WM, (m, k, 2) m/s.
+        Two arrays. The first has the (m, k, 2) positions in W, m. The second has the
+        (m, k, 2) velocities in W, m/s.
     """
     h = end - begin
     turn = pose_1[2] - pose_0[2]
@@ -143,23 +149,25 @@ def retarded_delays(
     v_WS: NDArray[np.float64],
     c: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Travel times of the sound that arrives at given instants.
+    """Computes the travel times of sound that arrives at given times.
 
-    Newton's method solves c d = |p_M(t) - p_S(t - d)|. The solution is unique because
-    the source is slower than sound. The solution at one instant is the start value for
-    the next instant.
+    Newton's method solves c d = |p_M(t) - p_S(t - d)| for the travel time d. Here p_M
+    is the position of the microphone and p_S that of the source. The solution is unique
+    because the source is slower than sound. The solution at one time is the start value
+    for the next time.
 
     Args:
-        times: (m, k) instants of arrival, s.
-        p_WM: (m, k, 2) microphones at those instants, m.
-        v_WM: (m, k, 2) velocities of the microphones, m/s.
+        times: (m, k) times of arrival, s.
+        p_WM: (m, k, 2) positions of the microphones at the times of arrival, m.
+        v_WM: (m, k, 2) velocities of the microphones at the times of arrival, m/s.
         knot_times: (n,) knots of the motion of the source, ascending, s.
-        p_WS: (n, 2) source at the knots, m.
-        v_WS: (n, 2) velocity of the source at the knots, m/s.
+        p_WS: (n, 2) positions of the source at the knots, m.
+        v_WS: (n, 2) velocities of the source at the knots, m/s.
         c: Speed of sound, m/s.
 
     Returns:
-        (m, k) travel times d, s, and (m, k) rates of change of d, s/s.
+        Two arrays. The first has the (m, k) travel times d, s. The second has the (m,
+        k) rates of change of d, s/s.
     """
     delays = np.empty(times.shape)
     rates = np.empty(times.shape)
@@ -209,21 +217,22 @@ def _sample_delays(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float
 ]:  # pragma: no cover  (compiled)
-    """Delays of ``retarded_delays``, in the units of ``_interpolate``.
+    """Computes the delays of ``retarded_delays`` in units of emitted samples.
 
     Args:
-        times: (m, k) instants of arrival, s.
-        p_WM: (m, k, 2) microphones at those instants, m.
-        v_WM: (m, k, 2) velocities of the microphones, m/s.
+        times: (m, k) times of arrival, s.
+        p_WM: (m, k, 2) positions of the microphones at the times of arrival, m.
+        v_WM: (m, k, 2) velocities of the microphones at the times of arrival, m/s.
         knot_times: (n,) knots of the motion of the source, s.
-        p_WS: (n, 2) source at the knots, m.
-        v_WS: (n, 2) velocity of the source at the knots, m/s.
+        p_WS: (n, 2) positions of the source at the knots, m.
+        v_WS: (n, 2) velocities of the source at the knots, m/s.
         c: Speed of sound, m/s.
         samples: Time of the first emitted sample, s, and rate of the samples, Hz.
 
     Returns:
-        (m,) positions of the first instants among the emitted samples; (m, k) delays in
-        samples; (m, k) rates of change of the delays; and the position of the earliest
+        Four values. The first is the (m,) positions of the first times among the
+        emitted samples. The second is the (m, k) delays, samples. The third is the (m,
+        k) rates of change of the delays. The fourth is the position of the earliest
         sample that is heard.
     """
     delays, rates = retarded_delays(times, p_WM, v_WM, knot_times, p_WS, v_WS, c)
@@ -273,15 +282,15 @@ def _interpolate(
 
     All times are in units of emitted samples. Between two knots, the delay is a cubic
     polynomial. The function computes the position of each output sample among the
-    emitted samples, and the amplitude 1 / (c d). It then interpolates runs of output
-    samples at once. Within a run, the whole part of the position increases by one from
-    each output sample to the next.
+    emitted samples, and the amplitude 1 / (c d), where d is the delay. It then
+    interpolates runs of output samples at once. Within a run, the whole part of the
+    position increases by one from each output sample to the next.
 
     Args:
         samples: Emitted samples.
         kernel: ``INTERPOLATION_KERNEL``.
-        first: (m,) first instant of each channel, as a position among the emitted
-            samples.
+        first: (m,) time of the first output sample of each channel, as a position among
+            the emitted samples.
         delays: (m, k) delays at evenly spaced knots.
         rates: (m, k) rates of change of the delays.
         units: Time from one output sample to the next; speed of sound, m per sample;
@@ -363,12 +372,12 @@ def sampled_at(
 def check_reach(
     emission: Emission, time: float, p_WL: NDArray[np.float64], c: float
 ) -> None:
-    """Refuses a listener that is too far away for the stored emission.
+    """Raises an error if a listener is too far away for the stored emission.
 
     Args:
         emission: Stored sound and motion of the source.
         time: Time at which the listening begins, s.
-        p_WL: (2,) listener, m.
+        p_WL: (2,) position of the listener, m.
         c: Speed of sound, m/s.
 
     Raises:
@@ -397,20 +406,19 @@ def propagate(
     count: int,
     c: float,
 ) -> NDArray[np.float32]:
-    """Sound pressure at moving microphones over one frame.
+    """Computes the sound pressure at moving microphones over one audio frame.
 
-    The sample rate of the microphones may differ from that of the emission.
-
-    The delay is exact at the knots and follows cubic polynomials between them. With
-    knots every 2.5 ms and the bodies of this model, the errors of delays are at most
-    1e-3 sample from 0.1 to 18 kHz. The errors of amplitudes are at most 1e-4.
+    The sample rate of the microphones may differ from that of the emission. The delay
+    is exact at knots and follows cubic polynomials between them. With knots every 2.5
+    ms and the bodies of this model, the errors of delays are at most 1e-3 sample from
+    0.1 to 18 kHz. The errors of amplitudes are at most 1e-4.
 
     Args:
         emission: Stored sound and motion of the source.
-        times: (m, k) evenly spaced instants, s. For each channel, they begin at its
-            first sample and end one sample after its last sample.
-        p_WM: (m, k, 2) microphones at those instants, m.
-        v_WM: (m, k, 2) velocities of the microphones, m/s.
+        times: (m, k) evenly spaced times of the knots, s. For each channel, they begin
+            at its first sample and end one sample after its last sample.
+        p_WM: (m, k, 2) positions of the microphones at the knots, m.
+        v_WM: (m, k, 2) velocities of the microphones at the knots, m/s.
         count: Number of samples per channel, a multiple of k - 1.
         c: Speed of sound, m/s.
 

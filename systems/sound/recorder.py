@@ -1,4 +1,4 @@
-"""Recording of a microphone array, frame by frame."""
+"""Records the sound at a microphone array, frame by frame."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from systems.sound.parameters import (
 from systems.sound.propagation import check_reach, microphone_paths, propagate
 from systems.sound.reverberation import Reverberation
 
-# Instants closer than this are the same instant, s.
+# Two times closer than this count as the same time, s.
 _SAME_INSTANT_S = 1e-6
 
 
@@ -41,18 +41,18 @@ def record_frame(
     ego_noise: NDArray[np.float32] | None = None,
     faults: Mapping[int, Fault] | None = None,
 ) -> AudioFrame:
-    """Frame that ends now.
+    """Records the frame of audio that ends at the present time.
 
     Args:
-        emissions: Sounds of the sources; the noise level refers to the first one.
+        emissions: Sounds of the sources. The noise level refers to the first sound.
         time: Present time, s.
         before: Pose and velocity of the robot one frame ago, (3,) each.
         now: Present pose and velocity of the robot, (3,) each.
         array: True array, from ``real_array``.
         parameters: Microphones, amplifier, converter and length of the frame.
         seed: Seed of the noise.
-        reflections: For each source: (n, samples) sound pressure of its reflections,
-            Pa, or None if the source is silent.
+        reflections: One entry per source: (n, samples) sound pressure of its
+            reflections, Pa, or None if the source is silent.
         ego_noise: (n, samples) ego noise divided by the level of the first source at 1
             m.
         faults: Fault of each microphone that fails, by its index.
@@ -92,7 +92,7 @@ def _direct_sound(
     array: RealArray,
     parameters: MicArrayParameters,
 ) -> list[NDArray[np.float32]]:
-    """(n, samples) direct sound pressure of each sounding source, Pa."""
+    """Computes the (n, samples) direct sound pressure of each sounding source, Pa."""
     begin = time - parameters.frame_s
     sounding = [emission for emission in emissions if emission.sounding]
     for emission in emissions:
@@ -109,7 +109,7 @@ def _direct_sound(
 def _total(
     pressures: Sequence[NDArray[np.float32] | None],
 ) -> NDArray[np.float32] | None:
-    """Sum of the pressures, written into the first one; None if all are silent."""
+    """Adds the pressures in place of the first one. Returns None if all are silent."""
     heard = [pressure for pressure in pressures if pressure is not None]
     for pressure in heard[1:]:
         heard[0] += pressure
@@ -122,12 +122,12 @@ class MicMemory(NamedTuple):
     last: NDArray[np.float64]
     """(7,) time, pose and velocity of the robot at the end of the last frame."""
     places: NDArray[np.float64] | None = None
-    """Time, pose of the robot and position of each source at the last update of the
-    reflections; None in the free field."""
+    """Values at the last update of the reflections: time, pose of the robot, and
+    position of each source. None in the free field."""
 
 
 class Recorder:
-    """Records frame by frame, as a ``MicArray`` does, but without a context.
+    """Records audio frames as a ``MicArray`` does, but without a Drake context.
 
     Args:
         parameters: Microphones, amplifier and converter.
@@ -136,7 +136,7 @@ class Recorder:
         room: Walls, if there are any.
         sources: Number of sources.
         seed: Seed of the noise and of the errors of the array.
-        faults: Faults of the robot; those of ``microphones`` apply.
+        faults: Faults of the robot. Only the faults of ``microphones`` apply.
 
     Raises:
         ValueError: See ``MicArray``.
@@ -179,7 +179,7 @@ class Recorder:
         """Array with these errors."""
 
     def of_seed(self, seed: int) -> Recorder:
-        """Same recorder with other noise and other errors of the array."""
+        """Returns the same recorder with other noise and other errors of the array."""
         other = copy(self)
         if self._ego_noise is not None:
             other._ego_noise = self._ego_noise.of_seed(seed)
@@ -193,7 +193,7 @@ class Recorder:
         now: tuple[NDArray[np.float64], NDArray[np.float64]],
         memory: MicMemory,
     ) -> MicMemory:
-        """State after a frame.
+        """Returns the state of the recorder after an audio frame.
 
         Args:
             emissions: Sounds of the sources, the followed source first.
@@ -212,13 +212,13 @@ class Recorder:
         return MicMemory(last, places)
 
     def updates(self, time: float) -> bool:
-        """Whether the reflections get new positions at a time, s."""
+        """Returns whether the reflections get new positions at a time, s."""
         return round(time / self._parameters.frame_s) % self._update_frames == 0
 
     def _places(
         self, pose: NDArray[np.float64], emissions: Sequence[Emission]
     ) -> NDArray[np.float64]:
-        """Pose of the robot and positions of the sources, one after the other."""
+        """Returns the pose of the robot and then the positions of the sources."""
         now = [emission.p_WS[-1] for emission in emissions]
         return np.concatenate([pose, *now])
 
@@ -245,7 +245,7 @@ class Recorder:
         memory: MicMemory,
         array: RealArray,
     ) -> AudioFrame:
-        """Frame that ends now.
+        """Records the frame of audio that ends at the present time.
 
         Args:
             emissions: Sounds of the sources, the followed source first.

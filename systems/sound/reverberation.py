@@ -1,4 +1,4 @@
-"""Reflections from the walls of a room, frame by frame."""
+"""Computes the reflections from the walls of a room, frame by frame."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from systems.sound.propagation import KERNEL_REACH, sampled_at
 from systems.sound.room import room_images, room_impulse_responses
 from systems.world.geometry import rotate
 
-# Number of stored responses. Each is a spectrum of at most half a megabyte per channel;
-# a source needs two at a time.
+# Number of room responses in the cache. Each response is a spectrum of at most half a
+# megabyte per channel. A source needs two responses at a time.
 _KEPT = 8
 
 
 def _place(places: NDArray[np.float64], source: int) -> tuple[float, ...]:
-    """x, y and theta of the robot, then x and y of one source."""
+    """Returns x, y and theta of the robot, then x and y of one source."""
     return (*places[:3], *places[3 + 2 * source : 5 + 2 * source])
 
 
 class Reverberation:
     """Computes the sound of the reflections in a room.
 
-    The sound of a source is convolved with the response of the room. The response
-    assumes that robot and source are at rest in given positions. When the positions
-    change, a frame fades from the response for the old positions to the response for
-    the new positions. The class stores the last responses. Therefore it computes only
-    one response while robot and source are at rest.
+    The class convolves the sound of each source with the impulse response of the room.
+    A response assumes that robot and source are at rest in given positions. If the
+    positions change, an audio frame fades from the response for the old positions to
+    the response for the new positions. The class keeps the most recent responses in a
+    cache. Therefore it computes only one response while robot and source are at rest.
 
     Args:
         room: Size and walls of the room.
@@ -73,20 +73,20 @@ class Reverberation:
         new: NDArray[np.float64],
         array: RealArray,
     ) -> list[NDArray[np.float32] | None]:
-        """Sound pressure of the reflections over the frame that ends now.
+        """Computes the sound pressure of the reflections over one audio frame.
 
         Args:
             emissions: Sounds of the k sources. Each must reach back by the length of
                 the response.
-            time: Present time, s.
-            old: (3 + 2 k,) pose of the robot in W, then x and y of each source, at the
-                beginning of the frame, m and rad.
-            new: (3 + 2 k,) the same quantities at the end of the frame, m and rad.
+            time: End of the frame, s.
+            old: (3 + 2 k,) values at the beginning of the frame: x, y, theta of the
+                robot in the world frame W, then x and y of each source, m and rad.
+            new: (3 + 2 k,) values at the end of the frame, in the same order.
             array: Array with its errors.
 
         Returns:
-            For each source: (m, samples) sound pressure, Pa, or None if the source is
-            silent.
+            One entry per source: (m, samples) sound pressure, Pa, or None if the source
+            is silent.
 
         Raises:
             InputError: A microphone or a source is outside the room, or an emission
@@ -105,7 +105,7 @@ class Reverberation:
         new: tuple[float, ...],
         array: RealArray,
     ) -> NDArray[np.float32] | None:
-        """Reflections of one source over the frame, or None if it is silent."""
+        """Computes the reflections of one source in a frame; None if it is silent."""
         end = round((time - emission.start_time) * SAMPLE_RATE_HZ) + self._margin
         if end < self._needed:
             longest_m = self._images.length / SAMPLE_RATE_HZ * self._c
@@ -135,7 +135,7 @@ class Reverberation:
         places: tuple[float, ...],
         array: RealArray,
     ) -> NDArray[np.float32]:
-        """Sound convolved with the response of the room, for the frame and margins."""
+        """Convolves sound with the room response, for the frame and its margins."""
         late = array.instants[:, 0]
         key = (array.p_BM.tobytes(), late.tobytes(), array.c)
         heard = fft.irfft(sent * self._spectrum(places, *key), self._size)
@@ -144,9 +144,9 @@ class Reverberation:
     def _compute_spectrum(
         self, places: tuple[float, ...], p_BM: bytes, late: bytes, c: float
     ) -> NDArray[np.complex64]:
-        """Spectrum of the response for given positions.
+        """Computes the spectrum of the room response for given positions.
 
-        Arrays are given as bytes, which can be keys of the cache.
+        The arrays are passed as bytes, because bytes can be keys of the cache.
         """
         x, y, theta, *p_WS = places
         dx, dy = rotate(theta, *np.frombuffer(p_BM).reshape(-1, 2).T)

@@ -1,8 +1,8 @@
-"""Impulse responses of a shoebox room.
+"""Computes impulse responses of a shoebox room.
 
-The image sources (Allen and Berkley 1979) come from pyroomacoustics. The walls, the
-floor and the ceiling absorb the same share of the energy at every frequency. They do
-not scatter sound.
+The image sources (Allen and Berkley 1979) come from the library pyroomacoustics. The
+walls, the floor and the ceiling absorb the same share of the energy at every frequency.
+They do not scatter sound.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ class RoomImages:
     gains: NDArray[np.float64]
     """(n,) factor of the amplitude after all reflections."""
     length: int
-    """Number of samples of a response. It ends at the reverberation time, or with the
-    last image."""
+    """Number of samples of a response. The response ends at the reverberation time, or
+    with the last image."""
 
 
 @lru_cache(maxsize=4)
 def room_images(room: RoomParameters, c: float) -> RoomImages:
-    """Image sources of a room that are heard within its reverberation time.
+    """Computes the image sources that are heard within the reverberation time.
 
     Args:
         room: Size and walls of the room.
@@ -49,7 +49,7 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
             response.
 
     Returns:
-        Signs, offsets in m and gains of k images, and the length of the response in
+        Signs, offsets in m, and gains of the images; and the length of the response in
         samples.
 
     Raises:
@@ -99,21 +99,21 @@ def _add_arrivals(
     kernel: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
-    """Adds the impulse of each image at each microphone to ``out``.
+    """Adds the impulse of each image source at each microphone to ``out``.
 
     The function computes the distance and the time of arrival for each pair of image
     and microphone. It then adds the interpolation kernel, scaled by gain over distance.
 
     Args:
         images: Signs, offsets and gains of the images.
-        p_S: (3,) source from the corner of the room, m.
-        p_M: (m, 3) microphones from the corner of the room, m.
+        p_S: (3,) position of the source from the corner of the room, m.
+        p_M: (m, 3) positions of the microphones from the corner of the room, m.
         early: (m,) number of samples by which the impulses appear earlier in each
             channel.
         per_m: Number of samples in which sound travels one meter.
         nearest: Distance below which the amplitude no longer grows, m.
         kernel: ``INTERPOLATION_KERNEL``.
-        out: (m, length) responses, changed.
+        out: (m, length) responses. The function changes this array.
     """
     signs, offsets, gains = images
     pairs = kernel.shape[0]
@@ -152,15 +152,15 @@ def room_impulse_responses(
     direct: bool = True,
     images: RoomImages | None = None,
 ) -> NDArray[np.float32]:
-    """Impulse responses from a source at rest to microphones at rest.
+    """Computes impulse responses from a source at rest to microphones at rest.
 
-    Delays are exact below 18 kHz, as in ``systems.sound.propagation``. Amplitudes are
-    the gain of the reflections over the distance.
+    Delays are exact below 18 kHz, as in ``systems.sound.propagation``. Each amplitude
+    is the gain of the reflections divided by the distance.
 
     Args:
         room: Size and walls of the room.
-        p_WS: (2,) source in W, m.
-        p_WM: (m, 2) microphones in W, m.
+        p_WS: (2,) position of the source in the world frame W, m.
+        p_WM: (m, 2) positions of the microphones in W, m.
         c: Speed of sound, m/s.
         late: Delay with which the channels are sampled, s: one number for all channels,
             or (m,) one number per channel.

@@ -1,4 +1,4 @@
-"""The loudspeaker on the leader."""
+"""Simulates the loudspeaker on the leader."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from systems.sound.waveforms import make_waveform
 #: Largest distance that sound travels if there is no room, m.
 MAXIMUM_RANGE_M = 30.0
 
-#: Start time of a loudspeaker that has not been called yet, s.
+#: Start time of the sound of a loudspeaker that has not been called yet, s.
 _NEVER_S = 86_400.0
 
 #: Number of additional samples at the end of an emission, for the interpolation.
@@ -34,17 +34,17 @@ def emitted_samples(
     first: int,
     count: int,
 ) -> NDArray[np.float32] | None:
-    """Samples that the loudspeaker plays.
+    """Returns the samples that the loudspeaker plays in an interval.
 
     Args:
-        waveform: Bursts end to end, from ``make_waveform``.
+        waveform: Bursts of sound, end to end, from ``make_waveform``.
         sound: Schedule of the bursts.
-        first: Number of the first sample; sample n is emitted at n / 100 kHz.
+        first: Number of the first sample. Sample n is emitted at n / 100 kHz.
         count: Number of samples.
 
     Returns:
-        (count,) Pa at 1 m. The array is a view of the waveform if a single burst covers
-        all samples. None if all samples are zero.
+        (count,) sound pressure at 1 m, Pa. If a single burst covers all samples, the
+        array is a view of the waveform. None if all samples are zero.
     """
     burst, period, start = _gate(sound.on_s, sound.period_s, sound.start_s)
     bursts = len(waveform) // burst
@@ -66,7 +66,7 @@ def emitted_samples(
 
 @cache
 def _gate(on_s: float, period_s: float, start_s: float) -> tuple[int, int, int]:
-    """Number of samples of a burst, of a period, and before the first burst."""
+    """Returns the samples in a burst, in a period, and before the first burst."""
     burst, period, start = (
         round(time * SAMPLE_RATE_HZ) for time in (on_s, period_s, start_s)
     )
@@ -81,14 +81,14 @@ def make_emission(
     v_WS: NDArray[np.float64],
     tick_s: float = TICK_S,
 ) -> Emission:
-    """Sound that has left the loudspeaker up to a time.
+    """Makes the record of the sound that has left the loudspeaker up to a time.
 
     Args:
         time: Present time, a multiple of 10 us, s.
-        waveform: Bursts end to end, from ``make_waveform``.
+        waveform: Bursts of sound, end to end, from ``make_waveform``.
         sound: Schedule of the bursts.
-        p_WS: (k, 2) positions of the source in W at the last k ticks, m. The last row
-            is the present tick.
+        p_WS: (k, 2) positions of the source in the world frame W at the last k control
+            periods (ticks), m. The last row is the present tick.
         v_WS: (k, 2) velocities of the source in W at these ticks, m/s.
         tick_s: Time from one tick to the next, s.
 
@@ -116,7 +116,7 @@ def make_emission(
 
 @cache
 def _history(ticks: int, tick_s: float) -> tuple[NDArray[np.float64], int]:
-    """Ages of the last ticks, s, and the number of samples of an emission."""
+    """Returns the ages of the last ticks, s, and the samples of an emission."""
     ages = tick_s * np.arange(ticks - 1.0, -1.0, -1.0)
     return ages, round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
 
@@ -128,14 +128,15 @@ def _silence(count: int) -> NDArray[np.float32]:
 
 @cache
 def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParameters:
-    """Sound of a loudspeaker that is called, with a fixed start time.
+    """Returns the sound of a loudspeaker that sounds only after the robot calls it.
 
     Args:
-        sound: Sound of the loudspeaker; its first burst is ``start_s`` after the call.
+        sound: Sound of the loudspeaker. Its first burst is ``start_s`` after the call.
         on_since_s: Time of the call, s; None before the call.
 
     Returns:
-        The sound with its start time. Before the call, the start time is one day.
+        The sound with a fixed start time. Before the call, the start time is one day,
+        so that the loudspeaker stays silent.
     """
     since = _NEVER_S if on_since_s is None else on_since_s + sound.start_s
     return sound.model_copy(update={"start_s": since})
@@ -144,19 +145,19 @@ def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParam
 def history_ticks(
     maximum_range_m: float, c: float, frame_s: float = TICK_S, tick_s: float = TICK_S
 ) -> int:
-    """Number of ticks for which the motion of the source must be stored.
+    """Returns the number of control periods (ticks) of the source's motion to store.
 
-    Sound that arrives in the present frame from the maximum range left the source after
-    the first of these ticks.
+    Sound needs time to travel. The stored motion must therefore begin before the
+    emission of the earliest sound that can arrive in the present audio frame.
 
     Args:
         maximum_range_m: Largest distance that sound travels, m.
         c: Speed of sound, m/s.
-        frame_s: Longest frame of a listener, s.
+        frame_s: Longest audio frame of a listener, s.
         tick_s: Time from one tick to the next, s.
 
     Returns:
-        Number of ticks, the present one included.
+        Number of ticks, including the present tick.
     """
     return math.ceil((frame_s + maximum_range_m / c) / tick_s) + 1
 
@@ -164,22 +165,22 @@ def history_ticks(
 class SoundEmitter(Block):
     """Plays the sound at the position of the source.
 
-    The discrete state is updated every tick. It holds the positions and velocities of
-    the source at the last ticks. It reaches back to the time at which sound from the
-    maximum range was emitted. Before time zero, the source is silent and at rest at its
-    initial position. The output is a function of time, state and present input; there
-    is no latency.
+    The discrete state has the positions and velocities of the source at the last
+    control periods (ticks). The state reaches back to the time at which sound from the
+    maximum range was emitted. The block updates the state every tick. Before time zero,
+    the source is silent and at rest at its initial position. The output is a function
+    of time, state and present input, without latency.
 
-    With ``called``, the block has a further input port ``calling`` (0 or 1). It stores
-    the tick at which this port is 1 for the first time, and plays from this tick on.
-    The schedule of the sound starts at this tick.
+    If ``called`` is set, the block has a further input port ``calling`` (0 or 1). The
+    block stores the tick at which this port is 1 for the first time, and plays from
+    this tick on. The schedule of the sound then starts at this tick.
 
     Args:
         sound: Waveform, level and schedule of the sound.
         sound_speed_m_s: Speed of sound, m/s.
         maximum_range_m: Largest distance that sound travels to a listener, including
             reflections, m.
-        frame_s: Longest frame of a listener, s.
+        frame_s: Longest audio frame of a listener, s.
         seed: Seed of the waveforms with noise.
         tick_s: Period of the update, s.
         called: Whether the loudspeaker is silent until its input ``calling`` is 1.
@@ -246,7 +247,7 @@ class SoundEmitter(Block):
             discrete_state.set_value(1, np.array([context.get_time()]))
 
     def _on_since(self, context: Any) -> float | None:
-        """Time of the call, s; None before the call."""
+        """Returns the time of the call, s; None before the call."""
         since = float(context.get_discrete_state(1).value()[0])
         return None if since < 0.0 else since
 
@@ -263,13 +264,16 @@ class SoundEmitter(Block):
         )
 
     def step_for(self, run: RunFacts) -> Step:
-        """Step that remembers the motion at each tick of a compiled loop.
+        """Returns the step of the block for a compiled simulation loop.
+
+        The step stores the motion of the source.
 
         Args:
             run: Seed and period of the run.
 
         Returns:
-            The step. It carries the emission, which is made when a block reads it.
+            The step. It provides the emission as a function of the tick (control
+            period). The emission is made only when another block reads it.
 
         Raises:
             InputError: The sound file cannot be played.

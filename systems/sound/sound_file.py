@@ -1,4 +1,4 @@
-"""Reading of sound files, with error messages that state the problem and the remedy."""
+"""Reads sound files, with error messages that state the problem and the remedy."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 
-# Programs that write to a pipe do not know the length of the file. They write one of
-# these numbers instead.
+# Numbers that stand for an unknown length of a WAV file. Programs that write to a pipe
+# do not know the length of the file, and write one of these numbers instead.
 _UNKNOWN_SIZES = (0, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 
 # Number of frames that libsndfile reports for a FLAC file of unknown length.
 _UNKNOWN_FRAMES = 2**63 - 1
 
-#: Largest number of samples in all channels together; they need 1 GB.
+#: Largest number of samples in all channels together. That many samples need 1 GB.
 MOST_SAMPLES = 2**27
 
 #: Shortest loop of noise, s. A shorter loop would sound like a tone.
@@ -45,11 +45,11 @@ def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
         field: Name of the parameter that holds the path, for the messages.
 
     Returns:
-        (channels, n) samples, where 1 is full scale, and the rate in Hz.
+        (channels, n) samples, where 1 is full scale, and the sample rate in Hz.
 
     Raises:
         InputError: The file is missing, not a sound file, empty, truncated, or silent
-            in every channel. Or a sample is not finite, the file holds more than
+            in every channel. Or a sample is not finite, the file has more than
             ``MOST_SAMPLES`` samples, or its rate is outside 1 to 400 kHz.
     """
     path = require_file(path, field, "WAV or FLAC")
@@ -117,7 +117,7 @@ def read_noise(
         field: Name of the parameter that holds the path, for the messages.
 
     Returns:
-        (1 or count, n) samples, where 1 is full scale, and the rate in Hz.
+        (1 or count, n) samples, where 1 is full scale, and the sample rate in Hz.
 
     Raises:
         InputError: ``read_sound`` refuses the file, the number of its channels is
@@ -142,9 +142,9 @@ def read_noise(
 class _Stream(soundfile.SoundFile):
     """A sound file that is read once from beginning to end.
 
-    soundfile queries the position of a seekable file after each block. This query fails
-    at the end of a FLAC file of unknown length. Therefore this class states that the
-    file is not seekable.
+    The library soundfile queries the position of a seekable file after each block. At
+    the end of a FLAC file of unknown length, this query fails. Therefore this class
+    states that the file is not seekable.
     """
 
     def seekable(self) -> bool:
@@ -180,7 +180,7 @@ def _too_long(field: str, where: str) -> InputError:
 def _read_all(
     sound: soundfile.SoundFile, field: str, where: str
 ) -> NDArray[np.float64]:
-    """(channels, n) samples."""
+    """Reads all samples as an array (channels, samples)."""
     blocks, count = [], 0
     while len(block := sound.read(_BLOCK, dtype="float64", always_2d=True)):
         blocks.append(block)
@@ -212,10 +212,10 @@ def _check_samples(samples: NDArray[np.float64], field: str, where: str) -> None
 def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
     """Returns the path, or a copy of the file with a repaired header, for libsndfile.
 
-    libsndfile reads a truncated WAV file without an error message. It reads nothing
-    from a file whose recorder left 0 as the length of the samples. This function
-    refuses truncated files, and replaces a length of 0 by the mark of an unknown
-    length.
+    The library libsndfile reads a truncated WAV file without an error message. If a
+    recorder left 0 as the length of the samples, libsndfile reads nothing. This
+    function refuses truncated files. It replaces a length of 0 by the mark of an
+    unknown length.
     """
     file_size = path.stat().st_size
     with path.open("rb") as file:
@@ -240,9 +240,12 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
 
 
 def _data_size(file: BinaryIO) -> int | None:
-    """Stated number of bytes of the samples of a WAV file; None if no samples follow.
+    """Reads the stated number of bytes of the samples of a WAV file.
 
     Afterwards, the position in the file is the beginning of the samples.
+
+    Returns:
+        Number of bytes; None if no samples follow.
     """
     while len(chunk := file.read(8)) == 8:
         name, size = struct.unpack("<4sI", chunk)

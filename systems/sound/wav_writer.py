@@ -1,4 +1,4 @@
-"""Continuous writing of sound into WAV files that can be read at any time."""
+"""Writes sound continuously into WAV files that can be read at any time."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ LARGEST_WAV_BYTES = 2**32 - 1000
 
 
 def pcm_of_counts(counts: NDArray[np.int16], full_scale: int) -> NDArray[np.int16]:
-    """Samples of 16 bits for counts of a converter.
+    """Converts counts of an A/D converter to samples of 16 bits.
 
     Args:
         counts: (channels, n) counts from -full_scale to full_scale - 1.
-        full_scale: A power of two, up to 2^15.
+        full_scale: Full scale of the converter in counts; a power of two, up to 2^15.
 
     Returns:
         (channels, n) counts multiplied by a power of two. Full scale remains full
@@ -34,7 +34,7 @@ def pcm_of_counts(counts: NDArray[np.int16], full_scale: int) -> NDArray[np.int1
 
 
 def loudest_pa(level_pa: float) -> float:
-    """Full-scale sound pressure of a file with the sound of a loudspeaker.
+    """Returns the full-scale sound pressure of a file with a loudspeaker's sound.
 
     Args:
         level_pa: RMS pressure at 1 m while the source sounds, Pa.
@@ -48,10 +48,10 @@ def loudest_pa(level_pa: float) -> float:
 def pcm_of_pressure(
     pressure: NDArray[np.float32], full_scale_pa: float
 ) -> NDArray[np.int32]:
-    """Samples of 32 bits for sound pressure.
+    """Converts sound pressure to samples of 32 bits.
 
     Args:
-        pressure: (n,) Pa.
+        pressure: (n,) sound pressure, Pa.
         full_scale_pa: Pressure that corresponds to full scale, Pa.
 
     Returns:

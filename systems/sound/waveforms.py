@@ -1,4 +1,4 @@
-"""The sound that the loudspeaker plays: synthetic, or from a file."""
+"""Makes the sound that the loudspeaker plays: synthetic, or from a file."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.parameters import EDGE_S, MICROPHONE_BAND_HZ, SoundParameters
 from systems.sound.sound_file import read_played
 
-#: A file is played from its first sample above this level on. The level is relative to
-#: the peak, dB.
+#: Level relative to the peak that ends the silence at the beginning of a file, dB. A
+#: file is played from its first sample above this level on.
 SILENCE_DB = -50.0
 #: Largest ratio of the peak to the requested RMS level.
 LARGEST_CREST = 4.0
@@ -21,16 +21,18 @@ _NOISE_SECONDS = 2.0
 
 
 def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
-    """Sound pressure at 1 m while the source sounds, bursts end to end.
+    """Makes the waveform of the loudspeaker: sound pressure at a distance of 1 m.
+
+    The source sounds in bursts. The waveform has whole bursts, end to end.
 
     Args:
         sound: Waveform, level and length of the bursts.
         seed: Seed of the noise.
 
     Returns:
-        (m n,) sound pressure at 100 kHz, Pa. It consists of m whole bursts of n
-        samples, and each burst has its edges. The k-th burst of a run plays burst k mod
-        m of the waveform. A file continues from burst to burst. After its end, it
+        (m n,) sound pressure at 100 kHz, Pa: m whole bursts of n samples. Each burst
+        has soft edges. The k-th burst of a run plays burst k mod m of the waveform. The
+        sound of a file continues from burst to burst. After the end of the file, it
         starts again.
 
     Raises:
@@ -71,7 +73,7 @@ _SWEEP_S = 0.025
 
 
 def _chirp(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
-    """Sweeps of 25 ms, so that every frame of 25 ms holds the whole band."""
+    """Makes sweeps of 25 ms, so that every frame of 25 ms has the whole band."""
     import scipy.signal
 
     time = _time(_SWEEP_S)
@@ -90,7 +92,7 @@ def _tone(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 
 
 def _horn(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
-    """Two reeds a major third apart, with many harmonics and a slight tremolo."""
+    """Makes the sound of two reeds a major third apart, with a slight tremolo."""
     time = _time(sound.on_s)
     tremble = 0.004 / 11.0 * np.sin(2.0 * np.pi * 11.0 * time)
     total = np.zeros_like(time)
@@ -102,7 +104,7 @@ def _horn(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 
 
 def _siren(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
-    """A square wave that sweeps from 600 to 1500 Hz and back twice a second."""
+    """Makes a square wave that sweeps from 600 to 1500 Hz and back twice per second."""
     import scipy.signal
 
     time = _time(max(sound.on_s, 1.0))
@@ -124,7 +126,7 @@ def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 def band_limited(
     samples: NDArray[np.float64], low_hz: float, high_hz: float
 ) -> NDArray[np.float64]:
-    """Samples after a zero-phase Butterworth band-pass filter.
+    """Filters samples with a zero-phase Butterworth band-pass filter.
 
     Args:
         samples: (n,) samples at 100 kHz, any unit.

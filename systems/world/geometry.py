@@ -1,8 +1,8 @@
-"""Planar geometry of points, rectangles, and sensor cones.
+"""Computes planar geometry of points, rectangles, and sensor cones.
 
-A rectangle is (x, y, theta, length, width) in m and rad. The center (x, y) and the
-heading theta are in the frame of the caller. The length and the width are along the
-rectangle's own x and y axes.
+A rectangle is a tuple (x, y, theta, length, width) in m and rad. The center (x, y) and
+the heading theta are given in any frame that the caller chooses. The length is along
+the rectangle's own x axis. The width is along its own y axis.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from systems.world.plane import (
     side_normals,
 )
 
-#: Floor that keeps the gradient of the norm finite at zero. It is far below any length
-#: of interest.
+#: Small number that keeps the gradient of the norm finite at zero. It is far below any
+#: length of interest.
 _NORM_FLOOR = 1e-12
 
-#: ``first_overlap`` may miss overlaps within a step up to this depth, m.
+#: ``first_overlap`` may miss overlaps up to this depth within a step, m.
 _SHALLOW_M = 1e-4
 
 for _function in (
@@ -50,33 +50,34 @@ rectangle_clearance = njit(cache=True)(plane.rectangle_clearance)
 
 @register_jitable
 def safe_norm(x: Any, y: Any) -> Any:
-    """Computes the length of (x, y). Its gradient at zero is zero instead of NaN.
+    """Computes the length of a vector (x, y).
 
-    The function accepts floats and AutoDiffXd. The result differs from the exact norm
-    by at most 1e-12.
+    The gradient at (0, 0) is zero instead of NaN. The function accepts floats and
+    AutoDiffXd. The result differs from the exact norm by at most 1e-12.
 
     Args:
         x: First component, in any unit.
         y: Second component, in the same unit.
 
     Returns:
-        Length in the unit of x, above 0; AutoDiffXd if a component is AutoDiffXd.
+        Length in the unit of x, above 0. The type is AutoDiffXd if a component is
+        AutoDiffXd.
     """
     return sqrt(x * x + y * y + _NORM_FLOOR**2)
 
 
 @register_jitable
 def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[Any, Any]:
-    """Computes the velocity v_WP of the control point of a body.
+    """Computes the velocity of a point P that is fixed ahead of the origin of a body.
 
     Args:
-        theta: Heading of the body frame in W, rad; a number or an array.
-        velocity: (vx, vy, omega) of the body frame in W, m/s and rad/s, each of the
-            shape of theta.
-        offset: Distance epsilon of P ahead of the origin of the body frame, m.
+        theta: Heading of the body in the world frame W, rad; a number or an array.
+        velocity: (vx, vy, omega) of the origin of the body in W, m/s and rad/s. Each
+            component has the shape of theta.
+        offset: Distance of P ahead of the origin of the body, m.
 
     Returns:
-        (vx, vy) in W, m/s, each of the shape of theta.
+        Velocity (vx, vy) of P in W, m/s. Each component has the shape of theta.
     """
     vx, vy, omega = velocity
     turning = omega * offset
@@ -89,11 +90,12 @@ def nearest_point_on_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
 
     Args:
         point: (x, y), m; floats, AutoDiffXd, or arrays.
-        rectangle: (x, y, theta, length, width), m and rad; each component may be an
-            array.
+        rectangle: (x, y, theta, length, width) in the same frame, m and rad. Each
+            component may be an array.
 
     Returns:
-        (dx, dy) in the frame of the arguments, m; (0, 0) if the point is inside.
+        (dx, dy) in the frame of the arguments, m. The vector is (0, 0) if the point is
+        inside the rectangle.
     """
     du, dv = beyond_rectangle(point, rectangle)
     return rotate(rectangle[2], -du, -dv)
@@ -144,23 +146,24 @@ def _nearest_on_segment(
 def cone_range(
     x: float, y: float, axis: float, half_angle: float, rectangles: NDArray[np.float64]
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance to the nearest surface inside a sensor's cone.
+    """Computes the distance from a sensor to the nearest surface inside its cone.
 
     The function cuts each edge of each rectangle to the part inside the cone. Then it
-    computes the exact distance to the nearest point of this part. The range is the
-    least of these distances. Hidden surfaces need no special case, because only the
-    nearest surface counts.
+    computes the exact distance from the sensor to this part. The range is the least of
+    these distances. Hidden surfaces need no special case, because only the nearest
+    surface counts.
 
     Args:
-        x: Position of the sensor, first component, m.
-        y: Position of the sensor, second component, m.
+        x: First component of the position of the sensor, m.
+        y: Second component of the position of the sensor, m.
         axis: Direction of the axis of the cone, rad.
         half_angle: Half of the opening angle, rad, below pi/2.
-        rectangles: (n, 5) rectangles in the same frame.
+        rectangles: (n, 5) rectangles (x, y, theta, length, width) in the same frame, m
+            and rad.
 
     Returns:
-        Range, m; 0 if the sensor is inside a rectangle, infinite if no surface is
-        inside the cone.
+        Range, m. It is 0 if the sensor is inside a rectangle. It is infinite if no
+        surface is inside the cone.
     """
     best = np.inf
     ca, sa = math.cos(axis), math.sin(axis)
@@ -208,18 +211,19 @@ def fan_ranges(
     half_angles: NDArray[np.float64],
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes ``cone_range`` for each sensor of a body.
+    """Computes the range of each range sensor of a body by ``cone_range``.
 
     Args:
-        pose_WB: (3,) x, y, theta of the body in W, m and rad.
-        rectangles: (m, 5) rectangles in W.
+        pose_WB: (3,) x, y, theta of the body frame B in the world frame W, m and rad.
+        rectangles: (m, 5) rectangles (x, y, theta, length, width) in W, m and rad.
         axes: (n,) directions of the cones in B, rad.
-        places: (n, 2) positions of the sensors relative to P in the axes of B, m.
+        places: (n, 2) positions of the sensors relative to the control point P, in the
+            axes of B, m.
         half_angles: (n,) halves of the opening angles, rad.
         control_point_m: Distance of P ahead of the origin of B, m.
 
     Returns:
-        (n,) ranges, m; infinite if no surface is inside the cone.
+        (n,) ranges, m. A range is infinite if no surface is inside the cone.
     """
     x, y, theta = pose_WB
     c, s = math.cos(theta), math.sin(theta)
@@ -246,12 +250,12 @@ def segment_clearance(
     rectangle, the nearest point is an end of the segment or a corner of the rectangle.
 
     Args:
-        start: (x, y), m.
-        end: (x, y), m.
-        box: (x, y, theta, length, width) in the same frame, m and rad.
+        start: Start (x, y) of the segment, m.
+        end: End (x, y) of the segment, m.
+        box: Rectangle (x, y, theta, length, width) in the same frame, m and rad.
 
     Returns:
-        Distance, m; 0 if the segment meets the rectangle.
+        Distance, m. It is 0 if the segment meets the rectangle.
     """
     c, s = math.cos(box[2]), math.sin(box[2])
     dx, dy = start[0] - box[0], start[1] - box[1]
@@ -287,7 +291,7 @@ def segment_clearance(
 def contact_time(
     a: NDArray[np.float64], b: NDArray[np.float64], vx: float, vy: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the time until two rectangles touch. Neither rectangle turns.
+    """Computes the time until two rectangles touch, if they move without turning.
 
     The function projects both rectangles onto the normal of each side. On each normal,
     the two projections overlap during one interval of time. The rectangles are in
@@ -295,13 +299,14 @@ def contact_time(
     start of the intersection of all intervals.
 
     Args:
-        a: (5,) first rectangle.
+        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
         b: (5,) second rectangle in the same frame.
         vx: Velocity of a relative to b, x component, m/s.
         vy: Velocity of a relative to b, y component, m/s.
 
     Returns:
-        Time, s; 0 if the rectangles overlap now, infinite if they never touch.
+        Time, s. It is 0 if the rectangles overlap now. It is infinite if they never
+        touch.
     """
     enter, leave = 0.0, np.inf
     for nx, ny, ahead, touching in side_normals(a, b):
@@ -320,29 +325,35 @@ def contact_time(
 def first_overlap(
     before: Any, now: Any, size: Any, poses: NDArray[np.float64], other_size: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes when two moving rectangles first overlap during a step.
+    """Computes when two moving rectangles first overlap during a time step.
 
-    The first rectangle moves straight and turns evenly during the whole step. The
-    poses of the second rectangle divide the step into equal parts. In each part, the
-    second rectangle moves straight and turns evenly from one pose to the next. If the
-    rectangles overlap at the end of a part, the function returns the time of that end.
+    The first rectangle moves straight and turns evenly during the whole step. The poses
+    of the second rectangle divide the step into equal parts. In each part, the second
+    rectangle moves straight and turns evenly from one pose to the next.
 
-    Otherwise the function uses conservative advancement within the part. It computes
-    the clearance, and the time in which no two points can approach each other by more
-    than the clearance. The rectangles cannot touch in this time. Therefore the function
-    advances by this time and repeats. Each advance allows at least 0.1 mm of approach.
-    Therefore the function misses no overlap deeper than 0.1 mm at any speed.
+    If the rectangles overlap at the end of a part, the function returns the time of
+    that end. Otherwise the function searches within the part by conservative
+    advancement:
+
+    1. Compute the clearance between the rectangles.
+    2. Compute the time in which no two of their points can approach each other by more
+       than the clearance. The rectangles cannot touch in this time.
+    3. Advance by this time and repeat.
+
+    Each advance allows at least 0.1 mm of approach. Therefore the function finds every
+    overlap deeper than 0.1 mm, at any speed.
 
     Args:
         before: (x, y, theta) of the first rectangle before the step, m and rad.
         now: (x, y, theta) of the first rectangle after the step, m and rad.
         size: Length and width of the first rectangle, m.
         poses: (n + 1, 3) x, y, theta of the second rectangle at equal intervals over
-            the step, m and rad. With one pose the second rectangle is at rest.
+            the step, m and rad. With one pose, the second rectangle is at rest.
         other_size: Length and width of the second rectangle, m.
 
     Returns:
-        Elapsed share of the step, 0 to 1; infinite if the rectangles do not overlap.
+        Elapsed share of the step, 0 to 1. It is infinite if the rectangles do not
+        overlap.
     """
     a, b = np.zeros(5), np.zeros(5)
     a[3], a[4], b[3], b[4] = size[0], size[1], other_size[0], other_size[1]

@@ -18,8 +18,9 @@ def Obstacles_(T):
     class Impl(Block_[T]):
         """Publishes the poses, velocities, and sizes of the obstacles.
 
-        The ports list the obstacles one after the other. The outputs are functions of
-        time only, without state and without latency.
+        Each output port lists the values of all obstacles, one obstacle after the
+        other. The outputs are functions of time only, without state and without
+        latency.
 
         Args:
             obstacles: A sequence of ``ObstacleParameters``.

@@ -37,8 +37,8 @@ class ObstacleParameters(Parameters):
     start_time_s: Time = 0.0
     """Time until which the obstacle rests at its first waypoint, s."""
     at_end: AtEnd = "stop"
-    """Behavior at the last waypoint: ``stop`` rests there, ``shuttle`` goes back and
-    forth."""
+    """Behavior at the last waypoint. ``stop``: the obstacle rests there. ``shuttle``:
+    the obstacle goes back and forth."""
     known: bool = True
     """Whether the map for planned routes contains this obstacle. The map contains only
     obstacles at rest."""

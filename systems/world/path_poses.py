@@ -14,15 +14,16 @@ from systems.framework.compiling import njit
 def poses_on(
     pieces: NDArray[np.float64], elapsed: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the poses at many times.
+    """Computes the poses on a path at many times.
 
     Args:
-        pieces: (m, 7) start time, x, y, theta, curvature, speed, and acceleration of
-            each piece of the path, in s, m, and rad.
+        pieces: (m, 7) pieces of the path. The columns are start time, s; x and y at the
+            start, m; theta at the start, rad; curvature, 1/m; speed at the start, m/s;
+            and acceleration, m/s^2.
         elapsed: (n,) times since the start of the first piece, s.
 
     Returns:
-        (n, 3) poses in W, m and rad.
+        (n, 3) poses in the world frame W, m and rad.
     """
     poses = np.empty((elapsed.size, 3))
     begins = np.ascontiguousarray(pieces[:, 0])

@@ -1,9 +1,9 @@
-"""Path of a body that moves through waypoints.
+"""Describes the path of a body that moves through waypoints.
 
-Circular arcs replace the corners. The speed rises and falls with a limited
-acceleration. Position and velocity are continuous and have closed forms. The yaw rate
-jumps at the ends of an arc. The yaw rate of a robot with wheels cannot jump, so
-``systems/base/carrier.py`` computes the motion of such a robot.
+Circular arcs replace the corners between the waypoints. The speed rises and falls with
+a limited acceleration. Position and velocity are continuous and have closed forms. The
+yaw rate jumps at the ends of an arc. The yaw rate of a robot with wheels cannot jump,
+so ``systems/base/carrier.py`` computes the motion of such a robot.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from systems.framework.input_error import InputError
 AtEnd = Literal["stop", "shuttle"]
 
 #: Default acceleration of obstacles and of the leader, m/s^2 (not printed, our choice).
-#: It is a tenth of the acceleration at which wheels slip on a floor. A body reaches
-#: 0.3 m/s after 45 mm. It is then 0.15 s behind a body that starts with 0.3 m/s.
+#: It is a tenth of the acceleration at which wheels slip on a floor. A body that starts
+#: with this acceleration reaches 0.3 m/s after 45 mm. At that moment, it is 0.15 s
+#: behind a body that started with 0.3 m/s.
 ACCELERATION_M_S2 = 1.0
 
 #: Speed below which a body is at rest, m/s.
@@ -56,14 +57,14 @@ class _Piece(NamedTuple):
 
 
 class WaypointPath:
-    """Pose and velocity on a path through waypoints.
+    """Pose and velocity of a body on a path through waypoints, as functions of time.
 
     The motion starts and ends at rest. The speed along the path rises with the given
-    acceleration, stays constant, and falls with the same acceleration. On a short path
+    acceleration, stays constant, and falls with the same acceleration. On a short path,
     the phase of constant speed is missing.
 
     Args:
-        waypoints: Points in W, m. With one point the body is at rest.
+        waypoints: Points in the world frame W, m. With one point, the body is at rest.
         speed: Speed along the path, m/s, >= 0.
         acceleration: Acceleration along the path, m/s^2, > 0.
         corner_radius: Largest radius of the rounded corners, m, > 0. An arc replaces at
@@ -173,9 +174,9 @@ class WaypointPath:
         return poses_on(np.array(self._pieces), self._elapsed(times)[0])
 
     def twists(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Returns the (n, 2) forward speeds, m/s, and yaw rates, rad/s, at n times.
+        """Returns (n, 2) forward speeds, m/s, and yaw rates, rad/s, at n times in s.
 
-        The speed is negative while a shuttle goes back.
+        A shuttle drives backward on its way back, so its speed is then negative.
         """
         elapsed, direction = self._elapsed(np.asarray(times, dtype=float))
         index = np.searchsorted(self._begins, elapsed, side="right") - 1
@@ -186,11 +187,11 @@ class WaypointPath:
     def extreme_twists(self, until: float) -> NDArray[np.float64]:
         """Returns the speeds and yaw rates at both ends of each piece of the path.
 
-        Within a piece the curvature is constant and the speed is linear in time.
+        Within a piece, the curvature is constant and the speed is linear in time.
         Therefore every point of the body is fastest at one end of the piece.
 
         Args:
-            until: Time in s. Pieces that begin later are left out.
+            until: Time in s. Pieces that begin later are omitted.
 
         Returns:
             (n, 2) forward speeds, m/s, and yaw rates, rad/s.
@@ -234,17 +235,20 @@ def _along(
 def _pieces(
     segments: Sequence[_Segment], limits: Sequence[float], acceleration: float
 ) -> tuple[list[_Piece], float]:
-    """Computes the fastest motion along segments from rest to rest, and its duration.
+    """Computes the fastest motion along segments, which starts and ends at rest.
 
-    The function works with squared speeds, because they are linear in the distance. It
-    limits the squared speeds at the joints of segments in a forward pass (speeding up)
-    and a backward pass (braking). Then it splits each segment into up to three pieces:
-    speeding up, constant speed, and braking.
+    The function works with squared speeds, because they are linear in the distance. A
+    forward pass limits the squared speeds at the joints of segments by the
+    acceleration. A backward pass limits them by the braking. Then the function splits
+    each segment into up to three pieces: speeding up, constant speed, and braking.
 
     Args:
         segments: Lines and arcs, end to end.
         limits: Top speed on each segment, m/s.
         acceleration: Acceleration along the path, m/s^2.
+
+    Returns:
+        The pieces, and the duration of the motion, s.
     """
     tops = [limit * limit for limit in limits]
     joints = [0.0, *(min(pair) for pair in pairwise(tops)), 0.0]

@@ -1,11 +1,11 @@
-"""Points and rectangles in the plane, without compiled code.
+"""Computes geometry of points and rectangles in the plane, without compiled code.
 
-The checks of parameters use these functions. ``systems.world.geometry`` provides them
-to compiled code.
+The checks of parameters use these functions. Compiled code gets the same functions from
+``systems.world.geometry``.
 
-A rectangle is (x, y, theta, length, width) in m and rad. The center (x, y) and the
-heading theta are in the frame of the caller. The length and the width are along the
-rectangle's own x and y axes.
+A rectangle is a tuple (x, y, theta, length, width) in m and rad. The center (x, y) and
+the heading theta are given in any frame that the caller chooses. The length is along
+the rectangle's own x axis. The width is along its own y axis.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from systems.framework.elementary import cos, sin
 
 
 def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
-    """Transforms a vector from an inner frame, turned by theta, to the outer frame.
+    """Transforms a vector from an inner frame to an outer frame.
 
-    The function accepts floats and AutoDiffXd. It applies the matrix R = [[cos, -sin],
-    [sin, cos]]. Han 2019 prints the transpose of R in eq. 15.
+    The inner frame is turned by theta relative to the outer frame. The function applies
+    the matrix R = [[cos, -sin], [sin, cos]]. Han 2019 prints the transpose of R in eq.
+    15. The function accepts floats and AutoDiffXd.
 
     Args:
         theta: Angle of the inner frame in the outer frame, rad.
@@ -38,14 +39,15 @@ def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
 
 
 def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
-    """Computes the position p_WP of the control point of a body.
+    """Computes the position of a point P that is fixed ahead of the origin of a body.
 
     Args:
-        pose: (x, y, theta) of the body frame in W, m and rad; floats or AutoDiffXd.
-        offset: Distance epsilon of P ahead of the origin of the body frame, m.
+        pose: (x, y, theta) of the body in the world frame W, m and rad; floats or
+            AutoDiffXd.
+        offset: Distance of P ahead of the origin of the body, m.
 
     Returns:
-        (x, y) in W, m.
+        (x, y) of P in W, m.
     """
     x, y, theta = pose
     return x + offset * cos(theta), y + offset * sin(theta)
@@ -56,11 +58,12 @@ def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
 
     Args:
         point: (x, y), m; floats, AutoDiffXd, or arrays.
-        rectangle: (x, y, theta, length, width), m and rad; each component may be an
-            array.
+        rectangle: (x, y, theta, length, width) in the same frame, m and rad. Each
+            component may be an array.
 
     Returns:
-        (du, dv) along the rectangle's own axes, m; (0, 0) if the point is inside.
+        (du, dv) along the rectangle's own axes, m. The vector is (0, 0) if the point is
+        inside the rectangle.
     """
     x, y, theta, length, width = rectangle
     u, v = rotate(-theta, point[0] - x, point[1] - y)
@@ -68,14 +71,16 @@ def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
 
 
 def outside(u: Any, half: Any) -> Any:
-    """Calls ``beyond`` for a number and ``beyond_each`` for an array.
+    """Computes the distance of u beyond the interval [-half, half], for any type of u.
+
+    The function calls ``beyond`` for a number and ``beyond_each`` for an array.
 
     Args:
         u: Coordinate in any unit; float, AutoDiffXd, or array.
         half: Half of the length of the interval, in the unit of u.
 
     Returns:
-        Distance beyond the interval, with the type and unit of u.
+        Distance with the sign, type, and unit of u; 0 inside the interval.
     """
     return beyond_each(u, half) if isinstance(u, np.ndarray) else beyond(u, half)
 
@@ -100,21 +105,22 @@ def beyond(u: Any, half: Any) -> Any:
 
 
 def beyond_each(u: NDArray[np.float64], half: ArrayLike) -> NDArray[np.float64]:
-    """Computes ``beyond`` for each element of an array.
+    """Computes the distance beyond [-half, half] for each element of an array.
 
     Args:
-        u: (...) coordinates in any unit.
-        half: (...) half lengths of the intervals, in the unit of u. The shape must
-            broadcast with the shape of u.
+        u: Coordinates of any shape and in any unit.
+        half: Half lengths of the intervals, in the unit of u. The shape must broadcast
+            with the shape of u.
 
     Returns:
-        (...) distances in the unit of u.
+        Distances in the broadcast shape, with the signs and the unit of u; 0 inside the
+        interval.
     """
     return u - np.clip(u, -np.asarray(half), half)
 
 
 def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Computes the distance between two rectangles, negative if they overlap.
+    """Computes the distance between two rectangles, which is negative if they overlap.
 
     If the rectangles overlap, the result is minus the depth of the overlap. The depth
     is the length of the shortest motion that separates the rectangles (separating-axis
@@ -122,7 +128,7 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
     nearest to the other rectangle.
 
     Args:
-        a: (5,) first rectangle.
+        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
         b: (5,) second rectangle in the same frame.
 
     Returns:
@@ -147,17 +153,19 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
 def side_normals(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> tuple[tuple[float, float, float, float], ...]:
-    """Computes the side normals of two rectangles: two normals of a, then two of b.
+    """Computes the normals of the sides of two rectangles a and b.
+
+    The first two normals are those of a. The last two normals are those of b.
 
     Args:
-        a: (5,) first rectangle.
+        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
         b: (5,) second rectangle in the same frame.
 
     Returns:
         One tuple (x, y, ahead, touching) per normal. (x, y) is the unit normal.
         ``ahead`` is the signed distance in m from the center of a to the center of b
-        along the normal. ``touching`` is the magnitude of this distance in m at which
-        the projections of both rectangles just touch.
+        along the normal. ``touching`` is the distance in m at which the projections of
+        both rectangles just touch.
     """
     ca, sa, cb, sb = math.cos(a[2]), math.sin(a[2]), math.cos(b[2]), math.sin(b[2])
     c, s = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)
@@ -176,10 +184,12 @@ def nearest_corner(
 ) -> float:
     """Computes the squared distance from a box to the nearest corner of a rectangle.
 
+    The coordinates are those along the axes of the box, with the origin at its center.
+
     Args:
-        u: Center of the rectangle in the axes of the box, first component, m.
-        v: Center of the rectangle in the axes of the box, second component, m.
-        c: Cosine of the angle of the rectangle in the axes of the box.
+        u: First coordinate of the center of the rectangle, m.
+        v: Second coordinate of the center of the rectangle, m.
+        c: Cosine of the angle of the rectangle relative to the box.
         s: Sine of this angle.
         corner: Half of the length and half of the width of the rectangle, m.
         half: Half of the length and half of the width of the box, m.

@@ -72,12 +72,12 @@ def studies():
 def push(scenario, c, s=0.0):
     """f(c, s) in N, from docs/results_laws.md."""
     gains = scenario.follower.laws
-    if scenario.law == "conventional":
+    if scenario.only.law == "conventional":
         own = gains.conventional
         near = c < own.reach_m
         spring = own.stiffness_n_m * (own.reach_m - c) + own.damping_n_s_m * s
         return np.where(near, spring, 0.0)
-    if scenario.law == "active":
+    if scenario.only.law == "active":
         own = gains.active
         alpha = own.reach_m / (
             2.0 * math.log(own.reference_stiffness_n_m / own.matched_stiffness_n_m)
@@ -100,7 +100,7 @@ def motion(scenario, share=1.0):
     v+ = v + T a, w+ = e w + (1 - e) v+, p+ = p + share (b w + (T - b) v+) with the
     motor's e = exp(-T/lag) and b = lag (1 - e).
     """
-    lag = scenario.plant.motor_lag_s
+    lag = scenario.only.plant.motor_lag_s
     e = math.exp(-T / lag)
     b, z = lag * (1.0 - e), np.poly1d([1.0, 0.0])
     moved = share * T * z * ((T - b) * (z - e) + b * (1.0 - e))
@@ -109,7 +109,7 @@ def motion(scenario, share=1.0):
 
 def growth_with(scenario, stiffness, *, ticks=0, share=1.0, values=None):
     """ln|z|/T of a mass between springs that act ``ticks`` late."""
-    robot, attraction = scenario.robot, scenario.attraction
+    robot, attraction = scenario.only.robot, scenario.follower.attraction
     mass, damping = values or (robot.mass_kg, attraction.damping_n_s_m)
     v, p, whole = motion(scenario, share)
     late = np.poly1d([1.0] + [0.0] * ticks)
@@ -169,7 +169,7 @@ def test_damping_and_prediction_are_those_of_a_simulated_step(studies, law, shar
 def test_offset_is_where_the_forces_balance(studies, law):
     """K_r (r - d_f) = f(r - half the source's length, 0), by bisection."""
     scenario = studies[law].scenario
-    attraction, half = scenario.attraction, 0.5 * scenario.source.length_m
+    attraction, half = scenario.follower.attraction, 0.5 * scenario.source.length_m
 
     def left(r):
         pull = attraction.stiffness_n_m * (r - attraction.follow_distance_m)
@@ -195,10 +195,10 @@ def test_margins_of_the_conventional_law_are_those_of_polynomials(studies):
     """No push about rest: the attraction's difference equation, cut by hand."""
     study = studies["conventional"]
     scenario = study.scenario
-    mass = scenario.robot.mass_kg
+    mass = scenario.only.robot.mass_kg
     K, D = (
-        scenario.attraction.stiffness_n_m / mass,
-        scenario.attraction.damping_n_s_m / mass,
+        scenario.follower.attraction.stiffness_n_m / mass,
+        scenario.follower.attraction.damping_n_s_m / mass,
     )
     v, p, whole = motion(scenario)
     # Numerator and denominator of L at the sensor and at the actuator.
@@ -260,7 +260,7 @@ def test_margins_of_active_laws_are_those_of_unreduced_models(studies, law):
                 phases.append(abs(np.angle(-L[k] - part * (L[k + 1] - L[k]))))
             peaks.append(np.abs(1.0 / (1.0 + L)).max())
             disks.append(1.0 / np.abs(1.0 / (1.0 + L) - 0.5).max())
-    epsilon, r = study.scenario.robot.control_point_m, at.source_distance_m
+    epsilon, r = study.scenario.only.robot.control_point_m, at.source_distance_m
     expected = {
         "gain_margin_db": 20.0 * math.log10((r + epsilon) / r),
         "phase_margin_deg": math.degrees(min(phases)),
@@ -338,10 +338,12 @@ def test_burst_cycle_forgets_the_silence(studies):
     """
     study = studies["conventional"]
     scenario, at = study.scenario, study.found["equilibria"].at
-    hold = scenario.tracker.hold
+    hold = scenario.follower.tracker.hold
     assert hold == "motion"
     cycles = Made(today=hold, cycles=[burst_cycle(scenario, hold, point=at)])
-    left = math.exp(2.0 * growth_with(scenario, scenario.attraction.stiffness_n_m))
+    left = math.exp(
+        2.0 * growth_with(scenario, scenario.follower.attraction.stiffness_n_m)
+    )
     found = read_cycle(Study(scenario, {"burst_cycle": cycles}))
     assert found == pytest.approx(left, abs=1e-3)
 
@@ -365,13 +367,9 @@ def test_worst_cases_are_those_of_all_corners(studies, contact):
     cloud = pole_cloud(poles, box, period=T, samples=1, seed=1)
     found = []
     for values in corners(box):
-        other = scenario.model_copy(
-            update={
-                "plant": scenario.plant.model_copy(
-                    update={"motor_lag_s": values["plant.motor_lag_s"]}
-                )
-            }
-        )
+        lag_s = values["plant.motor_lag_s"]
+        plant = scenario.only.plant.model_copy(update={"motor_lag_s": lag_s})
+        other = scenario.with_robot(plant=plant)
         stiffness = values["attraction.stiffness_n_m"]
         # A range that is read with the wrong speed of sound.
         speed = values.get("sound_speed_m_s")
@@ -396,14 +394,14 @@ def stretch(scenario, true_speed):
     A source on the row's axis of symmetry: the outer microphones hear it later by
     (h - R)/c_true, which is read with c.
     """
-    half = max(abs(y) for _, y in scenario.robot.microphones_m)
+    half = max(abs(y) for _, y in scenario.only.robot.microphones_m)
     k = scenario.sound_speed_m_s / true_speed
 
     def read(R):
         path = k * (math.hypot(R, half) - R)
         return (half**2 - path**2) / (2.0 * path)
 
-    d = scenario.attraction.follow_distance_m
+    d = scenario.follower.attraction.follow_distance_m
     return (read(d + 1e-4) - read(d - 1e-4)) / 2e-4
 
 
@@ -413,7 +411,7 @@ def test_power_of_the_velocity_term_by_search(studies, law):
     scenario = studies[law].scenario
     c, s = np.meshgrid(np.linspace(0.01, 3.0, 300), np.linspace(0.004, 1.4, 700))
     slopes = (push(scenario, c, s) - push(scenario, c, 0.0)) / s
-    expected = np.abs(slopes).max() / scenario.attraction.damping_n_s_m
+    expected = np.abs(slopes).max() / scenario.follower.attraction.damping_n_s_m
     assert read_passive(studies[law]) == pytest.approx(expected, rel=3e-3)
 
 
@@ -449,7 +447,7 @@ def away(scenario, points):
 
 def fly(scenario, states, duration_s, h=0.01):
     """Ends and least distances of a point mass under the law, semi-implicit steps."""
-    attraction, robot = scenario.attraction, scenario.robot
+    attraction, robot = scenario.follower.attraction, scenario.only.robot
     source = bodies(scenario)[-1, :2]
     p, v = states[:, :2].copy(), states[:, 2:].copy()
     closest = away(scenario, p)[0]
@@ -493,7 +491,7 @@ def test_places_to_jam_are_where_runs_end():
 
 def potential(scenario, points, c):
     """K_r (r - d_f)^2/2 + K_0 (rho_0 - c)^2/2, J: the conventional law's."""
-    own, attraction = scenario.follower.laws.conventional, scenario.attraction
+    own, attraction = scenario.follower.laws.conventional, scenario.follower.attraction
     r = np.linalg.norm(points - bodies(scenario)[-1, :2], axis=1)
     spring = 0.5 * own.stiffness_n_m * np.maximum(own.reach_m - c, 0.0) ** 2
     pull = 0.5 * attraction.stiffness_n_m * (r - attraction.follow_distance_m) ** 2
@@ -517,18 +515,18 @@ def levels(W, touch):
 
 def flooded(scenario, h=0.05):
     """Whether energy or the top speed keeps the start from each body: own grid."""
-    start = np.array(scenario.start.position_m)
-    start[0] += scenario.robot.control_point_m
+    start = np.array(scenario.only.start.position_m)
+    start[0] += scenario.only.robot.control_point_m
     x, y = np.arange(-1.5, 6.5, h) + start[0], np.arange(-2.5, 2.5, h)
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     distances = np.linalg.norm(gaps(scenario, points), axis=2)
     energy = potential(scenario, points, distances.min(axis=1)).reshape(len(x), len(y))
     i, j = np.abs(x - start[0]).argmin(), np.abs(y - start[1]).argmin()
-    top = 0.5 * scenario.robot.mass_kg * scenario.robot.top_speed_m_s**2
+    top = 0.5 * scenario.only.robot.mass_kg * scenario.only.robot.top_speed_m_s**2
     for distance in distances.T:
         touch = (
             distance.reshape(energy.shape)
-            <= scenario.ultrasonic.minimum_range_m + h / 2
+            <= scenario.follower.ultrasonic.minimum_range_m + h / 2
         )
         slow, _ = label(energy <= energy[i, j], np.ones((3, 3)))
         fast, _ = label(levels(energy, touch) - energy <= top, np.ones((3, 3)))

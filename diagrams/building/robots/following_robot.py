@@ -33,13 +33,13 @@ def following_blocks(
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
-        controller: The block of its law.
-        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        controller: The controller block of the robot's law.
+        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
         others: Names of the sources and loudspeakers that the robot does not follow.
-        seed_of: Returns the seed of a block, by its name.
+        seed_of: Function that returns the random seed of a block from its name.
 
     Returns:
-        Blocks, not yet in a diagram.
+        Blocks that are not yet in a diagram.
 
     Raises:
         InputError: The law reads ranges, but the robot has no range sensors.
@@ -91,9 +91,10 @@ def _hearing(
 
 
 def _tracker(scenario: Scenario, robot: Follower) -> Any:
-    """Makes the tracker for the kind of hearing.
+    """Makes the tracker of the source for the robot's kind of hearing.
 
-    An ideal estimate is one tick old; an estimate from audio is older by half a frame.
+    With ideal hearing, an estimate is one tick (control period) old. With audio, an
+    estimate is older by half an audio frame.
     """
     tick, frame = scenario.tick_s, robot.microphones.frame_s
     exact = robot.hearing == "ideal"
@@ -113,7 +114,7 @@ _OF_RANGES = {"ranges", "echo", "range_ages", "free_space"}
 
 
 def _check_sensing(robot: Follower, controller: Any) -> None:
-    """Refuses a law that reads ranges if the robot has no range sensors."""
+    """Raises an error if a law reads ranges, but the robot has no range sensors."""
     wanted = _OF_RANGES.intersection(_inputs(controller))
     if wanted and robot.obstacle_sensing != "ultrasonic" and not robot.blocks:
         raise InputError(

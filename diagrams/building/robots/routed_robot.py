@@ -22,18 +22,18 @@ from systems.laws.trajectory.trajectory_filtered import FilteredTrajectoryParame
 
 
 def _adapting(own: Any) -> AdaptiveTrajectoryParameters | None:
-    """The gains of a law if it adapts them; otherwise None."""
+    """The gains of a law that adapts its gains; None for any other law."""
     return own if isinstance(own, AdaptiveTrajectoryParameters) else None
 
 
 def make_trajectory_controller(scenario: Scenario) -> Any:
-    """Makes the controller of a robot with a route.
+    """Makes the controller block of a robot that drives on a route.
 
     Args:
         scenario: Scenario of this robot alone.
 
     Returns:
-        The block.
+        The controller block.
     """
     router = scenario.router
     return TrajectoryImpedanceController(
@@ -45,13 +45,13 @@ def make_trajectory_controller(scenario: Scenario) -> Any:
 
 
 def trajectory_command(scenario: Scenario) -> Any | None:
-    """Makes the safety filter that drives the wheels of a robot with a route.
+    """Makes the safety filter that drives the wheels of a robot on a route.
 
     Args:
         scenario: Scenario of this robot alone.
 
     Returns:
-        The block; None if the law has no safety filter.
+        The block, or None if the law of the robot has no safety filter.
     """
     router = scenario.router
     own = router.gains
@@ -70,16 +70,16 @@ def routed_blocks(
     robots: Sequence[int],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    """Makes all blocks of the robot except plant, odometry, law and wheel command.
+    """Makes all blocks of a robot on a route except plant, odometry, law and command.
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
-        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Indices of the bodies that are robots.
-        seed_of: Returns the seed of a block, by its name.
+        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
+        robots: Indices of those bodies that are robots.
+        seed_of: Function that returns the random seed of a block from its name.
 
     Returns:
-        Blocks, not yet in a diagram.
+        Blocks that are not yet in a diagram.
 
     Raises:
         InputError: No route leads to the goal.

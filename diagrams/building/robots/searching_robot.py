@@ -24,13 +24,13 @@ from systems.odor.parameters import CONTAINER_M
 
 
 def search_controller(scenario: Scenario) -> Any:
-    """Makes the block of the search.
+    """Makes the block that searches for an odor or a sound.
 
     Args:
         scenario: Scenario of this searching robot alone.
 
     Returns:
-        The block.
+        The block, which is the controller of the robot.
     """
     robot = scenario.only
     if isinstance(robot, OdorSearcher):
@@ -66,16 +66,17 @@ def searching_blocks(
     others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    """Makes all blocks of the robot except plant, odometry, search and motors.
+    """Makes all blocks of a searching robot except plant, odometry, search and motors.
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
-        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        others: Names of the sounds that the robot does not search for.
-        seed_of: Returns the seed of a block, by its name.
+        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
+        others: Names of the sources and loudspeakers that the robot does not search
+            for.
+        seed_of: Function that returns the random seed of a block from its name.
 
     Returns:
-        Blocks, not yet in a diagram.
+        Blocks that are not yet in a diagram.
     """
     robot, tick_s = scenario.only, scenario.tick_s
     assert isinstance(robot, OdorSearcher | SoundSearcher)

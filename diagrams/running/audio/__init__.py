@@ -1,1 +1,1 @@
-"""Saving the sound of a run in files."""
+"""Saves the sound of a run in files."""

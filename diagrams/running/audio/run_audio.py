@@ -26,20 +26,20 @@ from systems.sound.wav_writer import (
     pcm_of_pressure,
 )
 
-#: Port by which a block reports whether the robot listens. A robot without such a port
-#: always listens.
+#: Name of the port by which a block reports whether the robot listens. A robot without
+#: this port always listens.
 LISTENING = "listening"
 
 
 def played_in_a_tick(emission: Emission, tick_s: float) -> NDArray[np.float32]:
-    """Returns the sound that a loudspeaker emitted between two ticks.
+    """Returns the sound that a loudspeaker emitted between two ticks (control periods).
 
     Args:
-        emission: The emission at the second tick.
-        tick_s: Time between the ticks, s.
+        emission: Emission of the loudspeaker at the second tick.
+        tick_s: Control period, s.
 
     Returns:
-        (n,) sound pressure at 1 m, Pa.
+        (n,) samples of the sound pressure at a distance of 1 m, Pa.
     """
     now = float(emission.knot_times[-1]) - emission.start_time
     end, count = (round(t * emission.sample_rate_hz) for t in (now, tick_s))
@@ -64,25 +64,30 @@ class _Played(NamedTuple):
 
 
 class RunAudio:
-    """Files with the sound of one run; they grow during the run.
+    """Saves the sound of one run in files that grow during the run.
 
-    ``heard.wav`` has one channel per microphone and the sample rate of the converter.
-    Its samples are the counts of the converter times a power of two. ``array.yaml``
-    contains the positions of the microphones. ``played.wav`` contains the sound of the
-    loudspeaker, at 100 kHz. If there are several robots or loudspeakers, file names
-    begin with the name of the robot or source and a dot. The time in a file equals the
-    time in the run. While a robot does not listen, its file contains silence.
+    The directory contains these files:
+
+    - ``heard.wav``: the sound at the microphones of a robot. The file has one channel
+      per microphone, and the sample rate of the analog-digital converter. The samples
+      are the counts of the converter times a power of two.
+    - ``array.yaml``: the positions of the microphones.
+    - ``played.wav``: the sound of a loudspeaker, at 100 kHz.
+
+    If there are several robots or loudspeakers, each file name begins with the name of
+    the robot or source and a dot. The time in a file equals the time in the run. While
+    a robot does not listen, its file contains silence.
 
     This class is a context manager. ``simulate`` fills the files. On exit, the class
-    closes the files, and removes them if nothing was written.
+    closes the files. If nothing was written, the class also removes the files.
 
     Args:
         scenario: The scenario to run.
-        directory: Directory of the files; created if necessary.
+        directory: Directory of the files. It is created if necessary.
 
     Raises:
-        InputError: See ``check_audible``; or a file exists already, or cannot be
-            written.
+        InputError: The scenario has no sound that can be saved, see ``check_audible``.
+        InputError: A file exists already, or cannot be written.
     """
 
     def __init__(self, scenario: Scenario, directory: str | Path) -> None:
@@ -148,7 +153,7 @@ class RunAudio:
         self.close()
 
     def close(self) -> None:
-        """Closes the files, and removes them if nothing was written.
+        """Closes the files. If nothing was written, the method also removes the files.
 
         Raises:
             OSError: The disk fails.
@@ -161,7 +166,7 @@ class RunAudio:
                 path.unlink(missing_ok=True)
 
     def check_unused(self, scenario: Scenario) -> None:
-        """Refuses a run of another scenario, or a second run.
+        """Checks that the files belong to a scenario and do not contain sound yet.
 
         Args:
             scenario: The scenario to run.
@@ -182,20 +187,22 @@ class RunAudio:
         return next(iter(self._heard.values())).writer.path
 
     def save(self, tick: int, read: Callable[[str, str], Any]) -> None:
-        """Appends the frames that end at a tick, and the sounds since the last tick.
+        """Appends the sound of one tick (control period) to the files.
 
-        Both engines call this method before any block changes its state at the tick.
-        The sound at tick 0 precedes the run and is not saved.
+        For each robot that listens, the method appends the audio frame that ends at the
+        tick, if there is one. For each loudspeaker, it appends the sound since the last
+        tick. Both engines call this method before any block changes its state at the
+        tick. The sound at tick 0 precedes the run and is not saved.
 
         Args:
-            tick: The present tick.
-            read: Takes the name of a robot or source, and the name of an output port of
-                one of its blocks. Returns the present value of this port, or None if
-                there is no such port.
+            tick: Number of the present tick.
+            read: Function that returns the present value of an output port. Its
+                arguments are the name of a robot or source, and the name of the port.
+                If there is no such port, the function returns None.
 
         Raises:
-            InputError: A robot that listens has no block with an output port ``audio``,
-                or a frame does not fit the robot's microphones.
+            InputError: A robot that listens has no block with an output port ``audio``.
+            InputError: An audio frame does not fit the robot's microphones.
             OSError: The disk is full, or fails.
         """
         if tick == 0:
@@ -216,12 +223,12 @@ class RunAudio:
             self.play(name, tick, read(name, "emission"))
 
     def hear(self, robot: str, tick: int, frame: AudioFrame | None) -> None:
-        """Appends the frame that ends at a tick.
+        """Appends the audio frame of a robot that ends at a tick (control period).
 
         Args:
             robot: Name of the robot.
-            tick: Last tick of the frame, above 0.
-            frame: Frame of the robot's microphones; None while the robot does not
+            tick: Number of the last tick of the frame, above 0.
+            frame: Audio frame of the robot's microphones. None: the robot does not
                 listen.
 
         Raises:
@@ -243,12 +250,12 @@ class RunAudio:
         writer.write(pcm_of_counts(frame.counts, frame.full_scale))
 
     def play(self, name: str, tick: int, emission: Emission) -> None:
-        """Appends the sound that a loudspeaker has played since the last tick.
+        """Appends the sound that a loudspeaker has played in the last control period.
 
         Args:
             name: Name of the source, or of the robot that carries the loudspeaker.
-            tick: The present tick, above 0.
-            emission: The emission at this tick.
+            tick: Number of the present tick (control period), above 0.
+            emission: Emission of the loudspeaker at this tick.
 
         Raises:
             OSError: The disk is full, or fails.

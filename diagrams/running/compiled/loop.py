@@ -1,20 +1,21 @@
-"""The blocks of a scenario in one compiled loop over ticks.
+"""Runs the blocks of a scenario in one compiled loop over ticks (control periods).
 
-Drake's diagram remains the model. The loop calls the same functions, which are the
-``Step`` of each block. The connections in the diagrams of the robots determine the
-order of the calls. The integrator and the random numbers are the same, and the loop
+Drake's diagram remains the model. Each block has a ``Step``, and the loop calls the
+same step functions as Drake does. The connections in the diagrams determine the order
+of the calls. The integrator and the random numbers are the same as in Drake. The loop
 logs the same columns.
 
-Each tick has the following order, which is the same as in Drake:
+Some outputs are parts of a block's state (state outputs). Each tick has the following
+order, which is the same as in Drake:
 
-1. The outputs that are part of a state are already published.
-2. The blocks with other outputs do their steps. Each block follows the blocks whose
-   outputs it reads.
-3. The stop rules judge.
-4. The blocks with state outputs do their steps, except plants, and publish their
+1. The state outputs are already published.
+2. The blocks with other outputs compute their steps. Each block comes after the blocks
+   whose outputs it reads.
+3. The stop rules decide whether the run is over.
+4. The blocks with state outputs, except plants, compute their steps and publish their
    outputs.
 5. The loop logs one row, which contains the results of this tick.
-6. The plants move on by one tick.
+6. The plants (models of the robots' motion) move on by one tick.
 """
 
 from __future__ import annotations
@@ -55,11 +56,11 @@ class CompiledLoop:
     """A run in compiled code that advances tick by tick."""
 
     log: NDArray[np.float64]
-    """(ticks + 1, columns) logged values of all robots; rows from ``done`` on are not
+    """(ticks + 1, columns) logged values of all robots. Rows from ``done`` on are not
     yet filled."""
     tick_s: float
     referee: Referee
-    """It knows why the run ended."""
+    """Referee of the run, which states why the run ended."""
     columns: Mapping[str, Mapping[str, int]]
     """Indices of the columns in the log, by robot or world, and by column name."""
     plan: LoopPlan
@@ -75,20 +76,22 @@ class CompiledLoop:
         return (self.done - 1) * self.tick_s
 
     def logged(self, robot: str) -> dict[str, NDArray[np.float64]]:
-        """Returns the columns of a robot, and the time.
+        """Returns the logged columns of a robot, including the time.
 
         Args:
-            robot: Name of the robot, or of the world.
+            robot: Name of the robot, or ``world`` for the blocks that all robots share.
 
         Returns:
-            (ticks,) arrays, by name.
+            (ticks,) array of each column, by name of the column.
         """
         log = np.ascontiguousarray(self.log[: self.done].T)
         times: NDArray[np.float64] = np.arange(float(self.done)) * self.tick_s
         return {"t": times, **{n: log[k] for n, k in self.columns[robot].items()}}
 
     def prepare(self) -> None:
-        """Compiles or loads the blocks, unless this process has done so.
+        """Compiles the code of the blocks, or loads code that was compiled earlier.
+
+        If this process has already compiled the code, the method does nothing.
 
         Raises:
             InputError: numba cannot compile a user's own law or block.
@@ -121,7 +124,10 @@ class CompiledLoop:
         return done
 
     def advance(self, ticks: int) -> None:
-        """Advances the run by a number of ticks, at most to its end.
+        """Advances the run by a number of ticks (control periods), at most to its end.
+
+        Args:
+            ticks: Number of ticks.
 
         Raises:
             InputError: A value became NaN or infinite.
@@ -146,14 +152,14 @@ def _complaint(error: Exception) -> str:
 
 
 def compile_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
-    """Assembles the compiled loop of a scenario.
+    """Assembles the compiled loop of a scenario from the steps of its blocks.
 
     Args:
         scenario: The scenario to run.
-        audio: Open files for the sound, if it is saved.
+        audio: Open files for the sound of the run. None: no sound is saved.
 
     Returns:
-        The loop before its first tick.
+        The loop before its first tick (control period).
 
     Raises:
         InputError: A user's own block has no step, or a sound file cannot be played.

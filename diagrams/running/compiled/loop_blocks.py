@@ -1,4 +1,4 @@
-"""Blocks of robots for compiled loops, shared by runs that differ only in layout."""
+"""Makes the blocks of compiled loops, which runs with different layouts share."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step
 from systems.framework.input_error import InputError
 
-#: Fields of a scenario that do not affect how blocks are made. ``RunFacts`` provides
-#: the values of a run that blocks need.
+#: Fields of a scenario that do not affect how blocks are made. If the step of a block
+#: needs such a value, ``RunFacts`` provides it.
 _NO_BLOCKS = {
     "name",
     "description",
@@ -35,17 +35,21 @@ _NO_BLOCKS = {
     "wind",
     "odor",
 }
-#: Shared blocks by the values that they were made from, most recently used last.
+#: Shared blocks, by a text of the values from which they were made. The most recently
+#: used blocks are last.
 _SHARED: dict[str, LoopBlocks] = {}
 _MOST_SHARED = 64
 
-#: A port: the part of its block, and its name. The part of an input of the whole
-#: diagram is empty.
+#: Key of a port: the part of its block, and the name of the port. For an input of the
+#: whole diagram, the part is empty.
 PortKey = tuple[str, str]
 
 
 class LoopBlocks:
-    """The blocks of a diagram by part, and the connections of their ports.
+    """Contains the blocks of a diagram, and the connections of their ports.
+
+    The key of each block is its part, the role of the block in the diagram, for example
+    ``plant``.
 
     Args:
         diagram: Diagram of a robot, a source or the world.
@@ -93,14 +97,18 @@ class LoopBlocks:
     def steps(
         self, run: RunFacts
     ) -> tuple[dict[str, Step], dict[PortKey, Callable[[int], Any]]]:
-        """Returns the step of each part in a run.
+        """Returns the step of each block in a run, and the objects on ports.
+
+        Most ports carry numbers, but some ports carry objects such as sound. The
+        function also covers ports from outside of the diagram.
 
         Args:
-            run: Facts about the run.
+            run: Facts about the run, such as seed and initial pose.
 
         Returns:
-            The steps, by part. Also, for each port that carries an object, a function
-            that returns this object at a tick. Ports from outside are included.
+            Two mappings. The first contains the step of each block, by part (role of
+            the block). The second contains one function for each port that carries an
+            object. This function returns the object at a tick (control period).
 
         Raises:
             InputError: A user's own block has no step.
@@ -118,11 +126,19 @@ class LoopBlocks:
         return {part: found[part] for part in self.blocks}, carried
 
     def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
-        """Orders the parts for a tick.
+        """Returns the order in which the blocks compute their steps in a tick.
 
-        The first list has the parts without state outputs, each after the parts whose
-        outputs it reads. The second list has the parts whose outputs are part of their
-        state.
+        A tick is a control period. A part is the role of a block, for example
+        ``plant``.
+
+        Args:
+            steps: Step of each block, by part.
+
+        Returns:
+            Two lists of parts. The first list has the blocks whose outputs depend on
+            present inputs. Each block in this list comes after the blocks whose outputs
+            it reads. The second list has the blocks whose outputs are parts of their
+            state.
         """
         late = [part for part, step in steps.items() if step.publish is not None]
         early = [part for part in self.blocks if part not in late]
@@ -142,12 +158,12 @@ class LoopBlocks:
 
 
 class LoopDiagram:
-    """The blocks of a diagram in one run: their steps, and the values of their ports.
+    """Contains the blocks of a diagram in one run, with their steps and port values.
 
     Args:
-        made: The blocks.
-        run: Facts about the run.
-        shared: Values of ports that another diagram or the world also uses.
+        made: The blocks and their connections.
+        run: Facts about the run, such as seed and initial pose.
+        shared: Arrays with the values of those ports that another diagram also uses.
     """
 
     def __init__(
@@ -167,14 +183,15 @@ class LoopDiagram:
         """Keys of the output ports, by name."""
 
     def output(self, port: str, tick: int = 0) -> Any:
-        """Returns the values or the object of an output port.
+        """Returns the values of an output port, or the object that the port carries.
 
         Args:
             port: Name of the port.
-            tick: The present tick, for an object.
+            tick: Number of the present tick (control period). It matters only for an
+                object.
 
         Returns:
-            None if there is no such port.
+            The values or the object. None if there is no such port.
         """
         key = self.published.get(port)
         if key in self.made.objects:
@@ -194,20 +211,21 @@ def _step_for(block: Any, run: RunFacts) -> Step:
 
 
 def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
-    """Returns blocks for a compiled loop, and reuses blocks of earlier scenarios.
+    """Returns the blocks of all robots for a compiled loop.
 
-    Blocks are reused if the scenarios differ only in fields that do not affect the
-    blocks, such as layout, start and seed. Reuse matters because Drake never frees
-    blocks written in Python.
+    The function reuses the blocks of an earlier scenario if both scenarios differ only
+    in fields that do not affect the blocks. Examples of such fields are the arrangement
+    of the obstacles, the start pose and the seed. Reuse matters because Drake never
+    frees blocks written in Python.
 
     Args:
         scenario: The scenario to run.
 
     Returns:
-        Blocks of each robot.
+        Blocks of each robot, by name of the robot.
 
     Raises:
-        InputError: See ``make_robot``.
+        InputError: The blocks of a robot cannot be made, see ``make_robot``.
     """
     blocks = {}
     for name in scenario.robots:
@@ -227,13 +245,15 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
 
 
 def shared_sources(scenario: Scenario) -> dict[str, LoopBlocks]:
-    """Returns the blocks of all sources that a robot hears as waves.
+    """Returns the blocks of all sources that a robot hears as sound waves.
+
+    The function reuses the blocks of earlier scenarios where possible.
 
     Args:
         scenario: The scenario to run.
 
     Returns:
-        Blocks of each source.
+        Blocks of each source, by name of the source.
 
     Raises:
         InputError: A sound file cannot be played.
@@ -251,13 +271,15 @@ def shared_sources(scenario: Scenario) -> dict[str, LoopBlocks]:
 
 
 def shared_world(scenario: Scenario) -> LoopBlocks | None:
-    """Returns the blocks that all robots share, and reuses blocks of earlier scenarios.
+    """Returns the blocks that all robots share, such as radio and wind.
+
+    The function reuses the blocks of earlier scenarios where possible.
 
     Args:
         scenario: The scenario to run.
 
     Returns:
-        The blocks; None if no robot searches.
+        The blocks, or None if no robot searches.
     """
     nodes = radio_nodes(scenario)
     if not nodes:
@@ -277,9 +299,10 @@ def _shared(key: str, made: Callable[[], Any]) -> LoopBlocks:
 
 
 def _made_from(own: Scenario) -> str:
-    """Returns the values of all fields that affect the blocks of the only robot.
+    """Returns a text of all field values that affect the blocks of the only robot.
 
-    The goal does not affect them; ``RunFacts`` has the goal of the run.
+    The goal of a route does not affect the blocks. The steps of the blocks receive the
+    goal of the run through ``RunFacts``.
     """
     robot = own.only
     if isinstance(robot, Router):

@@ -1,14 +1,16 @@
-"""Compiled functions that a loop calls by their addresses.
+"""Defines the compiled functions that a compiled loop calls by their addresses.
 
-Compiling a loop together with all functions that it calls takes numba long, and has to
-be repeated for every set of blocks. With calls by address, numba compiles each block
-separately, and the loop ``run_parts`` only once.
+A part of the loop is a compiled function, for example the step of one block. If numba
+compiled the loop together with all parts, the compilation would take long. It would
+also be necessary again for every set of blocks. With calls by address, numba compiles
+each part separately, and the loop ``run_parts`` only once.
 
-This file imports little, so that changes elsewhere leave the compiled code of the parts
-valid.
+Each part has two arguments: the number of the tick (control period), and the address of
+an array of words. A word is a whole number or the address of another array. These
+arrays must not move in memory.
 
-A part is a function of the tick and of the address of its words. The words are whole
-numbers and addresses of arrays. These arrays must not move in memory.
+This file imports little. A change of another file therefore rarely makes the compiled
+code of the parts invalid.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from systems.framework.compiling import njit
 # The type stubs of numba lack carray.
 carray: Any = numba.carray  # type: ignore[attr-defined]
 
-#: A part that is called with this value as the tick publishes its state outputs.
+#: Value of the tick with which a part publishes its state outputs.
 PUBLISH = -1
 
 
@@ -95,7 +97,7 @@ ARRAYS: dict[Any, Callable[[int, Any], Any]] = {
 
 
 def _define_called(_, address, tick, words):  # type: ignore[no-untyped-def]
-    """Calls a part at an address and returns its result; exceptions are passed on."""
+    """Calls the part at an address and returns its result; passes exceptions on."""
     whole, arguments = types.int64, (types.int64, types.int64)
 
     def codegen(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
@@ -152,25 +154,34 @@ def run_parts(
     parts: Any,
     plan: Any,
 ) -> tuple[int, bool]:  # pragma: no cover  (compiled)
-    """Runs ticks of a compiled loop.
+    """Runs ticks (control periods) of a compiled loop.
 
-    At the start of the run, the function publishes the state outputs. In each tick, it
-    runs the first parts, the judge, and the parts before the log. It then logs one row.
-    Unless the run is over, it also runs the parts after the log.
+    A part is a compiled function, for example the step of one block. At the start of
+    the run, the function publishes the outputs that are parts of a block's state. In
+    each tick, it calls the following parts:
+
+    1. the first parts, which compute steps;
+    2. the judge, which decides whether the run is over;
+    3. the parts before the log.
+
+    The function then logs one row. If the run continues, it also calls the parts after
+    the log.
 
     Args:
         begin: First tick.
         end: One after the last tick.
         log: (ticks, columns) rows to fill.
-        logged: (n, 2) addresses of the logged values, and their numbers of elements.
-        parts: (m, 2) addresses of functions and of their words.
-        plan: Five entries with indices of parts: the parts that publish at the start of
-            the run; the first parts of a tick; the judge; a table (k, 2) of the parts
-            before the log; and a table (j, 2) of the parts after the log. The second
-            column of the tables is 1 if the part publishes, and 0 if it does its step.
+        logged: (n, 2) address and number of elements of each logged array.
+        parts: (m, 2) address of each part, and address of the words of this part.
+        plan: Tuple (begins, first, judge, before, after) with indices of parts.
+            ``begins`` lists the parts that publish at the start of the run. ``first``
+            lists the first parts of a tick. ``judge`` is one index. ``before`` and
+            ``after`` are tables of the parts before and after the log. In each row of a
+            table, the first number is the index of a part. The second number is 1 if
+            the part publishes its outputs, and 0 if it computes its step.
 
     Returns:
-        The tick after the last logged one, and whether the run is over.
+        Two values: the tick after the last logged tick, and whether the run is over.
     """
     begins, first, judge, before, after = plan
     if begin == 0:

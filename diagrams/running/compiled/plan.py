@@ -1,4 +1,4 @@
-"""The parts of a tick in a compiled loop, and the order of their calls."""
+"""Lists the parts that a compiled loop calls in each tick, and their order."""
 
 from __future__ import annotations
 
@@ -21,10 +21,13 @@ from systems.framework.host_step import HostCall, HostFunction, host_step
 
 
 class LoopPlan:
-    """The parts of a loop, and the order of their calls in a tick.
+    """Collects the parts of a compiled loop, in the order of their calls in a tick.
+
+    A part is a compiled function, for example the step of one block. A tick is a
+    control period.
 
     Args:
-        robots: Robots of the run, by name.
+        robots: Diagram of each robot, by name of the robot.
         times: (n,) times of the ticks, s.
     """
 
@@ -44,9 +47,13 @@ class LoopPlan:
         self._plants: list[int] = []
 
     def add(self, diagram: LoopDiagram) -> None:
-        """Adds the blocks of a robot or of the world.
+        """Adds the blocks of a robot, or the blocks that all robots share, to the plan.
 
-        Loudspeakers come first in a tick, because several robots hear them.
+        Blocks of loudspeakers come first in a tick (control period), because several
+        robots hear their sound.
+
+        Args:
+            diagram: The blocks, with their steps and port values.
         """
         made, values = diagram.made, diagram.values
         early, late = made.order(diagram.steps)
@@ -71,11 +78,12 @@ class LoopPlan:
         self.logged += [values[key] for key in made.columns]
 
     def add_source(self, source: SourceParameters, emitter: Step) -> None:
-        """Adds a source with a loudspeaker.
+        """Adds a source with a loudspeaker to the plan.
 
         Args:
-            source: Its path; poses and velocities are tabulated for all ticks.
-            emitter: Step of its loudspeaker.
+            source: Path of the source. The method tabulates the poses and velocities
+                for all ticks (control periods).
+            emitter: Step of the loudspeaker's block.
         """
         path, times = source.path(), self._times
         velocities = np.array([path.velocity(time) for time in times.tolist()])
@@ -85,10 +93,13 @@ class LoopPlan:
         self._filled.append(self._step(emitter, (pose_WS, v_WS), ()))
 
     def call(self, function: HostFunction) -> None:
-        """Calls a Python function at every tick, directly before the stop rules judge.
+        """Adds a Python function that the loop calls at every tick (control period).
+
+        The loop calls the function directly before the stop rules judge the robots.
 
         Args:
-            function: Takes the tick, and two arrays that it ignores.
+            function: Function whose arguments are the tick and two arrays. It ignores
+                the arrays.
         """
         nothing = (np.zeros(1),)  # compiled code has no empty state
         self._early.append(self._step(host_step(function, 1, 0, 1), nothing, ()))
@@ -96,11 +107,15 @@ class LoopPlan:
     def _step(
         self, step: Step, inputs: tuple[Any, ...], outputs: tuple[Any, ...]
     ) -> int:
-        """Adds the part of a block, as generated source, and returns its number.
+        """Adds the step of a block as a part with generated source code.
 
-        If the block has state outputs, its part normally does the step. If the part is
-        called with ``PUBLISH``, it publishes these outputs instead. The part of any
-        other block sets the outputs to zero, and then the step fills them.
+        If the outputs of the block are parts of its state, the part normally computes
+        the step. If the loop calls the part with ``PUBLISH`` as the tick, the part
+        publishes the outputs instead. The part of any other block sets the outputs to
+        zero, and then the step fills the outputs.
+
+        Returns:
+            Number of the part.
         """
         if step.host is not None:
             self.hosts.append(step.host)
@@ -119,10 +134,11 @@ class LoopPlan:
         return self._add(part, lines)
 
     def surround(self, name: str, around: Surroundings) -> None:
-        """Fills the inputs of a robot that come from the world, at every tick.
+        """Adds parts that fill a robot's inputs with poses and sizes of other bodies.
 
-        Poses of bodies on known paths are tabulated for all ticks. Poses of other
-        robots are copied from their ports. Sizes never change and are set once.
+        The method tabulates the poses of bodies on known paths for all ticks (control
+        periods). At every tick, the loop copies the poses of other robots from their
+        ports. Sizes never change, so the method sets them once.
 
         Args:
             name: Name of the robot.
@@ -157,7 +173,10 @@ class LoopPlan:
         self._filled.append(self._add(part, [line]))
 
     def judge(self, referee: Referee) -> None:
-        """Adds the steps of the referee, and the part that ends the run.
+        """Adds the steps of the referee to the plan, and the part that ends the run.
+
+        A part is a compiled function that the loop calls. The referee applies the stop
+        rules to all robots.
 
         Args:
             referee: Referee of the run.

@@ -1,10 +1,13 @@
-"""Generated source of the parts of a loop, compiled by numba once for all processes.
+"""Generates the source code of a loop's parts, and compiles it once for all processes.
 
-numba keeps compiled code for functions in files, by the types of their arguments. The
-source is therefore written to a file in the cache folder. Its file name is a hash of
-everything that the code depends on. Functions and named tuples appear in the source as
-names. All numbers are read from a few arrays by address, so that the source does not
-depend on their values.
+A part is a function of the tick (control period), for example the step of one block.
+numba saves compiled code only for functions in files, and separately for each
+combination of argument types. The generated source is therefore written to a file in
+the cache folder. The name of this file is a hash of everything that the code depends
+on.
+
+Functions and named tuples appear in the source as names. The code reads all numbers
+from a few arrays by address. The source therefore does not depend on these numbers.
 """
 
 from __future__ import annotations
@@ -42,9 +45,10 @@ _COUNT = count()
 
 
 class LoopPart:
-    """The source of a function of the tick, and the values that it uses.
+    """Builds the source code of one part of a compiled loop, and collects its values.
 
-    ``expression`` adds a value to the source, and ``name`` adds a function.
+    A part is a function of the tick (control period). ``expression`` adds a value to
+    the source. ``name`` adds a function to the source.
     """
 
     def __init__(self) -> None:
@@ -56,12 +60,15 @@ class LoopPart:
         self._kept: list[Any] = []
 
     def source(self, lines: Sequence[str]) -> str:
-        """Returns the source of a function of ``tick``.
+        """Returns the complete source code of the part, a function of ``tick``.
 
-        The function returns 0 unless the lines return another value.
+        The generated function returns 0 unless one of the lines returns another value.
 
         Args:
-            lines: Lines of the function.
+            lines: Lines of code in the function.
+
+        Returns:
+            The source code.
         """
         words = f"{self.name(ARRAYS[np.dtype(np.int64)])}(address, (1,))"
         floats = f"{self.name(ARRAYS[np.dtype(np.float64)])}(words[0], (words[1],))"
@@ -69,23 +76,28 @@ class LoopPart:
         return "\n".join(["def part(tick, address):", *_indented(body), ""])
 
     def words(self) -> NDArray[np.int64]:
-        """The words of the part; the caller keeps them and passes their address."""
+        """The words of the part. The caller keeps this array and passes its address."""
         floats = np.array(self._floats)
         self._kept.append(floats)
         self._words[:2] = floats.ctypes.data, floats.size
         return np.array(self._words, dtype=np.int64)
 
     def expression(self, value: Any) -> str:
-        """Returns a value as source text.
+        """Returns source code that stands for a value.
+
+        Some values change their form. Parameters become a named tuple of their fields
+        and cached properties. A list becomes an array, and an empty list becomes an
+        array of pairs. None becomes 0.
 
         Args:
-            value: A number, text, array, function, tuple of values, or parameters.
-                Parameters become a named tuple of their fields and cached properties.
-                Lists become arrays; an empty list becomes an array of pairs. None
-                becomes 0.
+            value: A number, text, array, function, list, tuple of values, parameters,
+                or None.
+
+        Returns:
+            The source code of the value.
 
         Raises:
-            InputError: The value is, or contains, something else.
+            InputError: The value has another type, or contains a value of another type.
         """
         if isinstance(value, Parameters):
             kind = _tuple_type(type(value))
@@ -123,9 +135,11 @@ class LoopPart:
         return f"words[{len(self._words) - 1}]"
 
     def _array(self, value: Any) -> str:
-        """Returns an array as source text.
+        """Returns source code that stands for an array.
 
-        Address and shape are words. The source therefore serves all layouts.
+        The code contains no values of the array. It reads the address and the shape of
+        the array from the words of the part. The same source therefore serves all
+        layouts.
         """
         if id(value) not in self._arrays:
             # An empty list becomes an array of pairs. A scalar becomes an array with
@@ -167,9 +181,10 @@ def _tuple_type(model: type[Parameters]) -> Any:
 def _compilable(function: FunctionType) -> Any:
     """Makes a function callable from compiled code, without the checks that wrap it.
 
-    numba identifies the function by its type alone. A compiled function in a named
-    tuple would be a pointer, and numba does not cache code with pointers. If the
-    function calls plain functions in a user's own modules, these are registered, too.
+    The result is a function that numba identifies by its type alone. A compiled
+    function in a named tuple would be a pointer, and numba does not cache code with
+    pointers. If the function calls plain functions in a user's own modules, compiled
+    code can call these functions, too.
     """
     plain = inspect.unwrap(function)
     for called in _users_helpers(plain, set()):
@@ -180,7 +195,7 @@ def _compilable(function: FunctionType) -> Any:
 def _users_helpers(
     function: FunctionType, known: set[FunctionType]
 ) -> set[FunctionType]:
-    """The plain functions in a user's own modules that a function of the user calls."""
+    """Returns the functions of a user's modules that a user's function calls."""
     if _is_ours(function):
         return set()
     for name in function.__code__.co_names:
@@ -194,14 +209,14 @@ def _users_helpers(
 
 
 def compiled_part(source: str, names: Mapping[str, Any]) -> Any:
-    """Compiles or loads the function ``part`` of generated source.
+    """Compiles the function ``part`` of generated source, or loads its compiled code.
 
     Args:
-        source: Source from ``LoopPart.source``.
-        names: Objects by their names in the source.
+        source: Source code from ``LoopPart.source``.
+        names: Objects that the source code uses, by their names in the source.
 
     Returns:
-        The function; the same source and names give the same function.
+        The compiled function. For the same source and names, the function is the same.
     """
     return _loaded(source, tuple(names.items()))
 
@@ -226,13 +241,14 @@ def _say_that_it_takes_time() -> None:
 
 
 def address_of(part: Any) -> int:
-    """Returns the address of the code of a compiled part.
+    """Returns the address of the machine code of a compiled part.
 
     Args:
         part: A function from ``compiled_part``.
 
     Returns:
-        The address by which ``run_parts`` calls the part; valid while the part is kept.
+        The address by which ``run_parts`` calls the part. It is valid as long as the
+        caller keeps the part.
     """
     (found,) = part.overloads.values()
     address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
@@ -240,10 +256,13 @@ def address_of(part: Any) -> int:
 
 
 def _file(source: str, names: Mapping[str, Any]) -> Path | None:
-    """Returns a file with the source; None if the code cannot be cached.
+    """Writes generated source code to a file in the cache folder.
 
-    Code is not cached if the names do not determine what it does, or if the file cannot
-    be written. The file name is a hash of all that the compiled code depends on.
+    The name of the file is a hash of all that the code depends on. If the names do not
+    determine what the code does, the function writes no file.
+
+    Returns:
+        The file. None if the code cannot be cached, or if the file cannot be written.
     """
     origins = (
         [*map(str, _origins(names))] if all(map(_is_known, names.values())) else []

@@ -13,15 +13,16 @@ from systems.world.plane import control_point
 
 
 def check_goals(robots: Mapping[str, Robot], farthest_m: float) -> None:
-    """Refuses unreachable goals.
+    """Raises an error if a robot with a route cannot reach its goal.
 
     Args:
-        robots: Robots by name.
-        farthest_m: ``stop.diverged_range_m``, m.
+        robots: Robots of the scenario, by name.
+        farthest_m: ``stop.diverged_range_m``, the distance from the goal beyond which a
+            run counts as diverged, m.
 
     Raises:
-        InputError: A goal is so far from the start that the run counts as diverged; the
-            bodies of two robots would overlap at their goals.
+        InputError: A robot starts so far from its goal that the run counts as diverged.
+        InputError: The bodies of two robots would overlap at their goals.
     """
     routed = {
         name: robot for name, robot in robots.items() if isinstance(robot, Router)

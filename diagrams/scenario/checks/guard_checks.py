@@ -24,17 +24,20 @@ from systems.world.plane import beyond_rectangle
 def check_guard(
     prefix: str, robot: Follower, bodies: Mapping[str, Body], tick_s: float
 ) -> None:
-    """Refuses a guarded robot that could never start, or never drive ahead.
+    """Raises an error if a robot's guard would never let it start or drive ahead.
+
+    The guard limits the commands so that the robot stays in free space. At the start,
+    it assumes that a disc around the robot (start bubble) is free.
 
     Args:
         prefix: Prefix of the robot's fields in messages.
-        robot: The robot; without a guard there is no check.
+        robot: The robot. Without a guard, there is no check.
         bodies: All bodies that the robot could touch, by name.
         tick_s: Control period, s.
 
     Raises:
-        InputError: The sensors or the grid are unsuitable, or a body is within the
-            start bubble.
+        InputError: The sensors or the grid are unsuitable.
+        InputError: A body is within the start bubble.
     """
     guard = robot.own_guard
     if guard is None:
@@ -80,11 +83,11 @@ def _check_view(prefix: str, robot: Follower) -> None:
 def _check_memory(
     prefix: str, robot: Follower, guard: GuardParameters, tick_s: float
 ) -> None:
-    """Refuses a place error that is too small for the braking distance.
+    """Raises an error if the guard's place error is too small for its braking distance.
 
     A body at the braking distance ahead must stay on the map until the robot has
-    stopped. Meanwhile odometry adds an error to the position of the body on the map.
-    ``place_error_m`` must cover this error.
+    stopped. During this time, odometry adds an error to the position of the body on the
+    map. The field ``place_error_m`` must be at least as large as this error.
     """
     body = robot.robot
     stopping = stopping_way(guard, body, robot.plant, tick_s)

@@ -17,15 +17,15 @@ def address_of_robot(robot: OdorSearcher | SoundSearcher) -> int:
 
 
 def check_searches(robots: Mapping[str, Robot], run: RunParameters) -> None:
-    """Refuses searches without a source, or without the necessary sensors.
+    """Raises an error if a robot searches, but lacks its source or a necessary sensor.
 
     Args:
-        robots: Robots by name.
-        run: Fields of the run.
+        robots: Robots of the scenario, by name.
+        run: Fields of the run that belong to no robot.
 
     Raises:
-        InputError: A searching robot lacks its source or a sensor, or has the address
-            of another robot. The error names the field and the remedy.
+        InputError: A searching robot lacks its source or a sensor.
+        InputError: Two robots have the same radio address.
     """
     taken: dict[int, str] = {}
     for name, robot in robots.items():

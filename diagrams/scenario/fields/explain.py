@@ -1,4 +1,4 @@
-"""Turns validation errors of pydantic into messages, one line per fault."""
+"""Converts validation errors of pydantic to messages, one line per fault."""
 
 from __future__ import annotations
 
@@ -29,14 +29,16 @@ def explain(
     what: str,
     written: Callable[[Sequence[str]], list[str]] = list,
 ) -> InputError:
-    """Converts all faults, each into one line with field, value and remedy.
+    """Converts the faults that pydantic found in a user's data to one error message.
+
+    Each fault becomes one line with the field, its value and the remedy.
 
     Args:
         error: Error from pydantic.
         schema: JSON Schema of the validated data.
         what: Name of the data for users, for example 'a scenario'.
-        written: Returns the place of a field in the data of the user, from its place in
-            the validated data.
+        written: Function that returns the path of a field in the user's data. Its
+            argument is the path of this field in the validated data.
 
     Returns:
         The error to raise.
@@ -66,7 +68,7 @@ def _faults(
         if not isinstance(inner, InputError):
             inner = InputError("", str(inner))
         for fault in inner.all:
-            below = [part for part in fault.field.split(".") if part]
+            below = fault.field.split(".") if fault.field else []
             yield InputError(".".join(written([*loc, *below])), fault.message)
     else:
         # Replace words of Python by words of YAML.
@@ -89,5 +91,5 @@ def _unknown(
             f"the laws {', '.join(laws)}"
         )
     if constant := constant_now(".".join(loc[3:] if loc[0] == "robots" else loc)):
-        return f"is no longer a field, but {constant}; remove it"
+        return f"is no longer a field; it is now {constant}; remove it"
     return f"is not a field of {what}; remove it{near_field(schema, place)}"

@@ -43,7 +43,9 @@ class Field:
 
 
 def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
-    """Lists all fields, each group before its fields.
+    """Lists all fields of a scenario, in the order of the schema.
+
+    Some fields are groups of further fields. Each group comes before its own fields.
 
     Args:
         schema: JSON Schema of a scenario.
@@ -55,16 +57,16 @@ def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
 
 
 def fields_of_law(fields: Iterable[Field], law: str, kind: str) -> list[Field]:
-    """Returns the fields that a robot with a certain law has.
+    """Returns the fields of a robot that runs a certain control law.
 
     Args:
         fields: The fields to select from.
-        law: Name of a law.
+        law: Name of the law.
         kind: Kind of the robots that run the law.
 
     Returns:
-        The fields of robots of this kind, without the gains of other laws and without
-        fields of the run.
+        The fields of robots of this kind. Gains of other laws and fields of the run are
+        not included.
     """
     return [
         field
@@ -75,13 +77,15 @@ def fields_of_law(fields: Iterable[Field], law: str, kind: str) -> list[Field]:
 
 
 def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
-    """Finds fields by their path or meaning; fields with a matching path come first.
+    """Finds fields of a scenario by their path or meaning.
+
+    Fields with a matching path come first. Case does not matter.
 
     Args:
         schema: JSON Schema of a scenario.
-        pattern: A part of the path or meaning. With a wildcard (``*``, ``?`` or
-            ``[...]``), the pattern must match the whole path or a part of the meaning.
-            Case does not matter. Empty: all fields.
+        pattern: A part of the path or meaning. If the pattern contains a wildcard
+            (``*``, ``?`` or ``[...]``), it must match the whole path or a part of the
+            meaning. If the pattern is empty, all fields match.
 
     Returns:
         One or more fields.

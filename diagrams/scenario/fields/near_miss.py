@@ -18,17 +18,22 @@ _SAME_THING = (
 
 
 def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
-    """Suggests a field instead of an unknown field, see ``did_you_mean``.
+    """Suggests an existing field if a user has written an unknown field.
+
+    The function suggests the first of these fields that exists:
+
+    1. a field in the same group with a similar name;
+    2. a field in the same group with the same meaning;
+    3. a field in a lower group with the same name;
+    4. a field anywhere with the same name.
 
     Args:
         schema: JSON Schema of the whole data.
         place: Parts of the path of the unknown field.
 
     Returns:
-        A text that suggests the first of these that exists: a field in the same group
-        with a similar name; one in the same group with the same meaning; one in a lower
-        group with the same name; one anywhere with the same name. Empty if there is
-        none.
+        A text for the error message, as from ``did_you_mean``. It is empty if there is
+        no such field.
     """
     *parents, last = place
     siblings = at_place(schema, parents)
@@ -40,7 +45,7 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
 
 
 def _of_that_meaning(name: str, siblings: Iterable[str]) -> str:
-    """Suggests a sibling with the same meaning; units are ignored."""
+    """Suggests a field of the same group with the same meaning, whatever its unit."""
 
     def told(field: str) -> str:
         return field.casefold().partition("_")[0]

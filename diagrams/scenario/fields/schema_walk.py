@@ -1,4 +1,4 @@
-"""Navigates the JSON Schema of a tree of parameters."""
+"""Finds fields and paths in the JSON Schema of a tree of parameters."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ Schema = Mapping[str, Any]
 
 
 def resolved(schema: Schema, node: Schema) -> Schema:
-    """Follows the reference of a node.
+    """Replaces the reference in a node of a JSON Schema by the referenced node.
 
     Args:
         schema: The whole schema.
-        node: A part of it.
+        node: A node of the schema.
 
     Returns:
-        The referenced node, extended by the entries of the node itself. A node without
-        a reference is returned as it is.
+        The referenced node, extended by the other entries of ``node``. If ``node`` has
+        no reference, the result is ``node`` itself.
     """
     if "$ref" not in node:
         return node
@@ -25,14 +25,14 @@ def resolved(schema: Schema, node: Schema) -> Schema:
 
 
 def options(schema: Schema, node: Schema) -> list[Schema]:
-    """Returns the alternatives of a node.
+    """Returns the alternatives that a node of a JSON Schema permits.
 
     Args:
         schema: The whole schema.
-        node: A part of it.
+        node: A node of the schema.
 
     Returns:
-        All alternatives except null, with references resolved.
+        All alternatives except null. References are replaced by the referenced nodes.
     """
     node = resolved(schema, node)
     several = node.get("anyOf", [node]) if "type" not in node else [node]
@@ -40,14 +40,16 @@ def options(schema: Schema, node: Schema) -> list[Schema]:
 
 
 def at_place(schema: Schema, place: Sequence[str]) -> Schema:
-    """Returns the fields below a place.
+    """Returns the fields of a group, as given by the path of the group.
 
     Args:
-        schema: The whole schema.
-        place: Names of fields, indices of list elements, names of robots and sources.
+        schema: The whole JSON Schema.
+        place: Parts of the path: names of fields, indices of list elements, and names
+            of robots and sources.
 
     Returns:
-        Schemas of the fields by name; empty if there are none.
+        Schema of each field, by name of the field. The mapping is empty if the group
+        has no fields.
     """
     node: Schema = schema
     for part in place:
@@ -71,14 +73,17 @@ def _below(node: Schema, part: str) -> Iterator[Schema]:
 
 
 def leaf_paths(schema: Schema, place: Sequence[str] = ()) -> Iterator[tuple[str, ...]]:
-    """Yields the paths of all fields and groups; 0 is any element of a list.
+    """Yields the paths of all fields and groups below a place in a JSON Schema.
+
+    In a path, 0 stands for any element of a list.
 
     Args:
         schema: The whole schema.
-        place: Start of the walk, see ``at_place``; empty: the top.
+        place: Path of the group to start from, see ``at_place``. Empty: the whole
+            schema.
 
     Yields:
-        Paths relative to the place.
+        Paths relative to ``place``, as tuples of their parts.
     """
     yield from _leaf_paths(schema, {"properties": at_place(schema, place)}, ())
 

@@ -1,4 +1,4 @@
-"""Speeds of the corners of bodies; corners of a turning body are the fastest points."""
+"""Computes the speeds of corners, which are the fastest points of turning bodies."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from systems.world.paths import WaypointPath
 
 
 def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
-    """Returns the greatest corner speed of each body that a robot could touch.
+    """Returns the greatest speed of the corners of each body that a robot could touch.
+
+    The corners of a turning rectangle are its fastest points.
 
     Args:
         scenario: Any scenario.
-        robot: Name of a robot in it.
+        robot: Name of a robot in the scenario.
 
     Returns:
-        Greatest speeds in the run, m/s, by name of the body. The speed of another robot
-        is the greatest that its wheels allow.
+        Greatest speed in the run, m/s, by name of the body. For another robot, the
+        value is the greatest speed that its wheels permit.
     """
     until = scenario.duration_s
     speeds = {
@@ -50,8 +52,9 @@ def _corner_speed(
 def _reachable_speed(robot: Robot) -> float:
     """Greatest possible speed of a corner of a robot, m/s.
 
-    It is the greater of two speeds: when the robot drives straight ahead at top speed,
-    and when it turns on the spot with both wheels at top speed.
+    The function compares two motions, and returns the greater corner speed. In the
+    first motion, the robot drives straight ahead at top speed. In the second motion,
+    the robot turns on the spot with both wheels at top speed.
     """
     body, faster = robot.robot, 1.0 + max(map(abs, robot.plant.slip))
     lever = 2.0 * body_radius(body) / body.wheel_separation_m

@@ -1,6 +1,7 @@
-"""Which theorem of the guard holds in a scenario, and with which margins.
+"""Finds which theorem about the guard holds in a scenario, and with which margins.
 
-The stability report and the warnings of a run use the same list of assumptions.
+The guard is the block that keeps a robot in free space (docs/guard.md). The stability
+report and the warnings of a run use the same list of assumptions.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from systems.world.plane import beyond_rectangle
 _LAGS = 6.0
 #: Spacing of the directions that sample the view, deg.
 _STEP_DEG = 0.25
-#: Greatest gap, deg, with which a view still counts as a view in all directions.
+#: Greatest gap in a view that still counts as a view in all directions, deg.
 _GAP_DEG = 1.0
 #: Tolerance for rounding errors, in the units of the values.
 _ROUNDING = 1e-9
@@ -50,8 +51,8 @@ class Assumption:
     """The value in words."""
     value: float
     limit: float
-    """Greatest value with which the assumption holds. If ``at_least`` is set, the least
-    such value."""
+    """Greatest value at which the assumption holds. If ``at_least`` is set, it is the
+    least value at which the assumption holds."""
     unit: str
     at_least: bool = False
     field: str = "guard"
@@ -117,18 +118,22 @@ class Guarantees:
 
 
 def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
-    """Returns the clear distance ahead of the axle that the guard needs for a speed.
+    """Returns the free distance ahead of the axle that the guard needs for a speed.
 
-    The distance is a sum. It contains the body radius, the margin of the guard, the
-    place error and the range error. It also contains the motion of the robot during two
-    ticks, the motor lag and braking. If all bodies are at rest, the sum also contains
-    the diagonal of a cell and the motion of the robot during four rounds of readings.
-    Otherwise it contains the approach of the bodies until the robot has stopped.
+    The distance is the sum of these parts:
+
+    - body radius, margin of the guard, place error, and range error;
+    - motion of the robot during two control periods, during the motor lag, and while it
+      brakes;
+    - if all bodies are at rest: the diagonal of a map cell, and the motion of the robot
+      during four rounds of sensor readings;
+    - if bodies move: their motion during one round of sensor readings, and until the
+      robot has stopped.
 
     Args:
-        scenario: Scenario of one robot; its guard defines braking and margin.
+        scenario: Scenario of one robot. Its guard defines braking and margin.
         speed: Speed of the robot, m/s.
-        body_speed: Greatest speed of bodies, m/s; 0: bodies are at rest.
+        body_speed: Greatest speed of bodies, m/s. 0: all bodies are at rest.
 
     Returns:
         The distance, m.
@@ -158,11 +163,11 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
 
 
 def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> float:
-    """Returns the total angle that range sensors see.
+    """Returns the total angle around a robot that its range sensors see.
 
     Args:
         sensors: The range sensors.
-        control_point_m: Distance of P ahead of the axle, m.
+        control_point_m: Distance of the control point P ahead of the axle, m.
 
     Returns:
         The angle, deg, 0 to 360.
@@ -178,7 +183,10 @@ def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> flo
 
 
 def guarantees(scenario: Scenario) -> Guarantees:
-    """Returns the guarantees of the guard of a scenario's only robot.
+    """Returns the guarantees that the guard of a scenario's only robot gives.
+
+    The guard is the block that limits all commands so that the robot stays in free
+    space.
 
     Args:
         scenario: Scenario of one robot.
@@ -203,11 +211,14 @@ def guarantees(scenario: Scenario) -> Guarantees:
 
 
 def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
-    """Returns the assumptions of the theorems about a robot's guard.
+    """Returns the assumptions of the theorems about the guard of a robot.
+
+    The guard is the block that limits all commands so that the robot stays in free
+    space.
 
     Args:
         scenario: Any scenario.
-        robot: Name of a robot in it.
+        robot: Name of a robot in the scenario.
 
     Returns:
         All assumptions, whether they hold or not.
@@ -222,7 +233,7 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
     needed = clear_way(alone, body.top_speed_m_s, speed)
     axes, places, half_angles = sensors.beams
     forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angles
-    # Of the sensors that look ahead, the one that sees farthest counts.
+    # Only the sensor that sees farthest ahead counts.
     reach = body.control_point_m + places[:, 0] + sensors.each("maximum_range_m")
     seen = float(np.max(reach[forward], initial=-np.inf))
     return (
@@ -242,7 +253,7 @@ def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
 
 
 def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
-    """A1: no body is faster than the guard expects."""
+    """Returns assumption A1: no body is faster than the guard expects."""
     text, fastest = "speed of the fastest body", 0.0
     if speeds:
         name = max(speeds, key=speeds.__getitem__)
@@ -253,7 +264,7 @@ def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
 
 
 def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
-    """A3: no body is within the start bubble."""
+    """Returns assumption A3: no body is within the start bubble."""
     place = scenario.only.start.position_m
     nearest = min(
         (math.hypot(*beyond_rectangle(place, body.rectangle(0.0))) for body in bodies),
@@ -266,10 +277,12 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A2: no body is nearer than a range reading minus the margin.
+    """Returns the conditions of assumption A2 for a robot with a guard.
 
-    Of the sensors, the one that misses most echoes and the one that sees farthest
-    count.
+    A2 states that no body is nearer than a range reading minus the margin. The
+    conditions limit the share of missed echoes, the number of blind sensors, and the
+    error of ranges due to the assumed speed of sound. If the sensors differ, the
+    greatest share of missed echoes and the greatest maximum range count.
     """
     sensors = scenario.follower.ultrasonic
     stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s
@@ -300,7 +313,7 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
 
 
 def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
-    """A4 and A5: errors of position and wheels are bounded, and the tires grip."""
+    """Returns A4 and A5: position and wheel errors are bounded, and the tires grip."""
     own, tick_s = scenario.follower, scenario.tick_s
     guard, robot, plant = own.own_guard, own.robot, own.plant
     assert guard is not None

@@ -25,13 +25,13 @@ from systems.laws.trajectory.trajectory_conventional import (
 from systems.ranging.parameters import OBJECT_SLOTS
 from systems.world.plane import beyond_rectangle, rotate
 
-#: Greatest number of steps toward the equilibrium, and the step length that ends
-#: the iteration, m.
+#: ``_STEPS``: greatest number of steps toward the equilibrium. ``_STEP_M``: length of
+#: a step that ends the iteration, m.
 _STEPS, _STEP_M = 2_000, 1e-6
 
 
 def route_warnings(prefix: str, robot: Router, tick_s: float) -> list[ScenarioWarning]:
-    """Warns if a robot cannot come to rest with its gains, or can hit obstacles.
+    """Warns if a robot on a route cannot come to rest, or can hit obstacles.
 
     Args:
         prefix: Prefix of the robot's fields in messages.
@@ -39,7 +39,7 @@ def route_warnings(prefix: str, robot: Router, tick_s: float) -> list[ScenarioWa
         tick_s: Control period, s.
 
     Returns:
-        One warning for each violated bound; its message states the bound.
+        One warning for each violated bound. The message states the bound.
     """
     if robot.law not in ROUTE_LAWS:
         return []
@@ -126,7 +126,7 @@ def _of_stiffness(
 def _of_rate(
     field: str, own: AdaptiveTrajectoryParameters, of: SampledMass
 ) -> list[ScenarioWarning]:
-    """Warns if K and D without limits can run away."""
+    """Warns if the adapted gains K and D have no limits and can grow without bound."""
     amplitude_m = pull_through_m(own)
     bound = rate_bound(own.rule, amplitude_m, of)
     if own.projected or own.rate < bound:
@@ -144,29 +144,32 @@ def goal_warnings(
     resting: Mapping[str, NDArray[np.float64]],
     margin_m: float,
 ) -> list[ScenarioWarning]:
-    """Warns if obstacles at rest keep the robot away from its goal.
+    """Warns if obstacles at rest keep a robot away from its goal.
 
-    P comes to rest where the pull of the goal and the pushes of the obstacles balance::
+    P is the control point of the robot. P comes to rest where the pull of the goal and
+    the pushes of the obstacles balance::
 
         K (p_d - p) + sum of K_e (S - d_j) n_j = 0
 
     p is the position of P, and p_d is the goal. d_j is the distance of P from obstacle
-    j, and n_j is the direction away from this obstacle. If the goal is at distance b
-    from a single wall, P comes to rest at distance (S - b) K_e/(K + K_e) from the goal.
+    j, and n_j is the unit vector away from this obstacle. K and K_e are stiffnesses,
+    and S is the range of the push. If the goal is at distance b from a single wall, P
+    comes to rest at the distance (S - b) K_e/(K + K_e) from the goal.
 
-    The function finds the equilibrium by an iteration. It starts at the goal and
-    follows the force until the steps are tiny. It uses the initial values of adaptive
-    gains.
+    The function finds the equilibrium by an iteration. The iteration starts at the goal
+    and follows the force until the steps are tiny. If the law adapts its gains, the
+    function uses their initial values.
 
     Args:
         prefix: Prefix of the robot's fields in messages.
         robot: A robot on a route.
-        resting: (5,) rectangle in W of each obstacle at rest, by name.
-        margin_m: ``stop.goal_margin_m``, m.
+        resting: Rectangle of each obstacle at rest, by name. A rectangle is (x, y,
+            theta, length, width) in the world frame W, m and rad.
+        margin_m: ``stop.goal_margin_m``, the permitted distance from the goal, m.
 
     Returns:
-        One warning if P comes to rest farther than the margin from the goal; otherwise
-        an empty list.
+        One warning if P comes to rest farther than the margin from the goal. Otherwise,
+        the list is empty.
     """
     if robot.route is None or robot.law not in ROUTE_LAWS:
         return []

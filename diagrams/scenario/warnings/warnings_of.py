@@ -21,18 +21,19 @@ from systems.world.plane import beyond_rectangle, control_point
 def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
     """Returns the warnings about a scenario that can still be run.
 
-    For each robot, the function warns if:
+    For each robot, the function warns in these cases:
 
-    - the scenario violates an assumption of the theorems about the robot's guard;
-    - P starts nearer to a known obstacle than the clearance of the robot's route;
-    - the robot cannot come to rest with its gains, or can hit obstacles;
-    - obstacles at rest keep the robot away from its goal.
+    - The scenario violates an assumption of the theorems about the robot's guard.
+    - The control point P starts nearer to a known obstacle than the clearance of the
+      robot's route.
+    - The robot cannot come to rest with its gains, or can hit obstacles.
+    - Obstacles at rest keep the robot away from its goal.
 
     Args:
         scenario: Any scenario.
 
     Returns:
-        The warnings, robot by robot; empty if there are none.
+        The warnings, robot by robot. There may be none.
     """
     found: list[ScenarioWarning] = []
     for name, robot in scenario.robots.items():
@@ -63,9 +64,11 @@ def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
 def _of_the_start(
     prefix: str, robot: Router, known: NDArray[np.float64]
 ) -> Iterator[ScenarioWarning]:
-    """Warns if P starts nearer to a known obstacle than the clearance of its route.
+    """Warns if the control point P starts too near to a known obstacle.
 
-    ``known`` contains the (k, 5) rectangles of the known obstacles in W.
+    The limit is the clearance of the robot's route. ``known`` contains the known
+    obstacles as (k, 5) rectangles (x, y, theta, length, width) in the world frame W, m
+    and rad.
     """
     place = control_point(robot.start.pose, robot.robot.control_point_m)
     off = (math.hypot(*beyond_rectangle(place, each)) for each in known)

@@ -25,37 +25,40 @@ _OLDEST_S = 2.0
 @define_for_scalars("SourceTracker_", __name__)
 def SourceTracker_(T):
     class Impl(Block_[T]):
-        """Tracks the source from the estimates of its position.
+        """Tracks the position of the sound source during and between its bursts.
 
-        The block contains a Kalman filter in W
-        (``systems.hearing.tracking.target_filter``). The block converts a new estimate
-        to W with the odometry pose at the moment of the measurement,
-        ``measurement_age_s`` ago. An estimate without a range corrects the position
-        only across the bearing. If a source cannot have moved to the place of an
-        estimate, the estimate is rejected, unless several consecutive estimates agree.
+        The block contains a Kalman filter in the world frame W
+        (``systems.hearing.tracking.target_filter``). Each new estimate of the position
+        was measured ``measurement_age_s`` ago. The block converts the estimate to W
+        with the odometry pose at the time of the measurement. An estimate without a
+        range corrects the position only across the bearing. If the source cannot have
+        moved to the position of an estimate, the block rejects the estimate. If several
+        consecutive estimates agree, the block accepts them nevertheless.
 
-        Between bursts, the target stays at its place in W, moves with the robot, or
-        moves on with its velocity. ``hold`` selects the rule. The covariance includes
-        the distance between this target and the expected position of the source.
-        ``target_valid`` is 0 if nothing was heard yet, or if the source was last heard
-        more than ``maximum_age_s`` ago. The controllers then stop the robot.
+        Between bursts, the target follows one of three rules, which ``hold`` selects:
+        it stays at its place in W, it moves with the robot, or it moves on with its
+        velocity. The covariance includes the distance between this target and the
+        expected position of the source. The output ``target_valid`` is 0 if nothing was
+        heard yet, or if the source was last heard more than ``maximum_age_s`` ago. The
+        controllers then stop the robot.
 
-        Discrete state, updated every tick: past poses and the tracks, see
-        ``track_step``. The outputs include the present estimate, so there is no
-        latency. If the period of the estimates is longer than the tick, each estimate
-        is used once, one tick after the end of its frame.
+        The discrete state has the past poses and the tracks, see ``track_step``. The
+        block updates the state every control period (tick). The outputs include the
+        present estimate, so there is no latency. If the period of the estimates is
+        longer than the tick, each estimate is used once, one tick after the end of its
+        frame.
 
         Args:
-            robot: Position of P, and microphones.
-            tracker: ``TrackerParameters``.
-            measurement_age_s: Time from the moment of a measurement to the arrival of
-                its estimate, s. It is at most 2 s. It is one tick for the ideal sensor,
-                and one tick and half a frame for the audio chain.
+            robot: Distance of the control point P ahead of the axle, and microphones.
+            tracker: Rule and time limit for the target between bursts.
+            measurement_age_s: Time from a measurement to the arrival of its estimate,
+                s, at most 2 s. For the ideal sensor, it is one tick. For the audio
+                chain, it is one tick and half a frame.
             frame_s: Period of the estimates, s.
-            exact: Whether the estimates are those of ideal hearing. They have no mirror
-                image and no errors that are not in their covariance.
+            exact: Whether the estimates are those of ideal hearing. Such estimates have
+                no mirror image, and all their errors are in their covariance.
             initial_pose: (x, y, theta) before time zero, m and rad.
-            tick_s: Period of the robot, s.
+            tick_s: Control period of the robot, s.
 
         Raises:
             InputError: The age is out of range, or the period of the estimates is no

@@ -1,33 +1,52 @@
-"""Kalman filter of a moving source, with front and back as two hypotheses.
+"""Tracks a moving source by a Kalman filter, with front and back as two hypotheses.
 
 The velocity of the source fades and is driven by white acceleration (an
-Ornstein-Uhlenbeck process). The same model holds at every speed of the source. The
-standard deviation of the velocity stays bounded however long the source is silent.
+Ornstein-Uhlenbeck process). The same model is used at every speed of the source. The
+standard deviation of the velocity stays bounded, however long the source is silent.
 
-A row of microphones gives two candidates, the one ahead and its mirror image.
-Hypothesis 0 says that the source is ahead now, hypothesis 1 that it is behind. Each
-hypothesis keeps the better of the two histories that lead to it (the Viterbi
-recursion). The cost of a hypothesis is a negative log-likelihood. It is half the sum of
-the squared normalized innovations and of the logarithms of the determinants of their
-covariances. When the robot moves, the mirror image moves too, which is unlikely for
-a source.
+A row of microphones gives two candidates for the position: the position ahead and its
+mirror image behind the row. Hypothesis 0 says that the source is ahead now. Hypothesis
+1 says that it is behind. Each hypothesis keeps the better of the two histories that
+lead to it (the Viterbi recursion). The cost of a hypothesis is a negative
+log-likelihood. Each innovation (difference between an estimate and its prediction) adds
+half of two terms. The terms are the squared normalized innovation and the logarithm of
+the determinant of its covariance. When the robot moves, the mirror image moves too,
+which is unlikely for a source.
 
 All functions use only flat arrays and numbers. numba therefore compiles them for
 floats, and ``fold.py_func`` and ``expected.py_func`` run them with AutoDiffXd. ``fold``
 and its helper functions change arrays in place.
 
-Layouts (m, s, in W):
-- track, 16: age of its last estimate; position (2), velocity (2), covariance of the
-  position (xx, xy, yy), of position and velocity (xx, xy, yx, yy), and of the velocity
-  (xx, xy, yy), all at the moment of that estimate; and the scatter, which is the ratio
-  of the actual variance of sightings to their stated covariance
-- hypothesis, 34: cost, number of consecutive outliers that agree, track, and track of
-  these outliers
-- memory: index of the chosen hypothesis, then one hypothesis, or two if front and back
-  are to be distinguished
-- sighting, 10: position of the source (or the unit vector to it, if there is no range),
-  its covariance (xx, xy, yy), center of the microphones (2), unit normal of their row,
-  which points ahead (2), and 1 if there is a range
+The arrays have these layouts, in m and s, in the world frame W. The number of elements
+is in parentheses.
+
+A track (16) has these elements:
+
+- age of the last estimate (1);
+- position (2), velocity (2), covariance of the position (xx, xy, yy), covariance of
+  position and velocity (xx, xy, yx, yy), and covariance of the velocity (xx, xy, yy),
+  all at the moment of the last estimate;
+- scatter (1), the ratio of the actual variance of sightings to their stated covariance.
+
+A hypothesis (34) has these elements:
+
+- cost (1);
+- number of consecutive outliers that agree (1);
+- track (16), and track of these outliers (16).
+
+A memory has these elements:
+
+- index of the chosen hypothesis (1);
+- one hypothesis, or two hypotheses if front and back are to be distinguished.
+
+A sighting is an estimate of the position from one audio frame. It has these elements
+(10):
+
+- position of the source, or the unit vector to the source if there is no range (2);
+- covariance of this position (xx, xy, yy);
+- center of the microphones (2);
+- unit normal of the row of microphones, which points ahead (2);
+- 1 if there is a range, otherwise 0 (1).
 """
 
 from __future__ import annotations
@@ -51,8 +70,8 @@ HYPOTHESIS = 2 + 2 * TRACK
 
 #: Age of a track that never had a sighting, s. It is finite and exceeds every limit.
 NEVER_HEARD_S = 1e6
-#: Standard deviation of each component of the velocity of a source, m/s: half the speed
-#: of a fast source.
+#: Standard deviation of each component of the velocity of a source, m/s. It is half the
+#: speed of a fast source.
 SPEED_STD = 0.35
 #: Time constant with which a velocity is forgotten, s.
 VELOCITY_FADE_S = 5.0
@@ -65,7 +84,7 @@ BELIEVED_OUTLIERS = 3
 #: Squared normalized innovation in two dimensions that chance exceeds in 1 % of the
 #: cases.
 GATE = 9.21
-#: Innovations agree with the covariances up to this ratio of variances.
+#: Largest ratio of the variance of innovations to their covariance at which both agree.
 SCATTER_MARGIN = 1.5
 #: Each sighting changes the scatter by this share of the relative excess over
 #: ``SCATTER_MARGIN``. A burst has 20 sightings.
@@ -167,7 +186,7 @@ def _predict(track: NDArray[Any], seconds: Any) -> None:
 def _innovation(
     track: NDArray[Any], sighting: NDArray[Any], floor: float, scale: Any, extra: float
 ) -> tuple[Any, ...]:
-    """Compares a sighting with a track.
+    """Compares a sighting (estimate of the position from one audio frame) with a track.
 
     With a range, the innovation is the difference of the positions. Without a range, it
     is the offset from the track to the line of the bearing.
@@ -180,10 +199,11 @@ def _innovation(
         extra: Variance added to that of the innovation, m^2.
 
     Returns:
-        Innovation (2); the inverse of its covariance (xx, xy, yy); the squared
-        normalized innovation; and the logarithm of the determinant of the covariance.
-        Without a range, the inverse has rank one. The squared innovation is infinite if
-        the track is in the direction opposite to the bearing.
+        Four parts, in this order: the innovation (2); the inverse of its covariance
+        (xx, xy, yy); the squared normalized innovation; and the logarithm of the
+        determinant of the covariance. Without a range, the inverse has rank one. If the
+        track is in the direction opposite to the bearing, the squared innovation is
+        infinite.
     """
     zx, zy, rxx, rxy, ryy, ox, oy, _, _, ranged = sighting
     _, x, y, _, _, axx, axy, ayy = track[:8]
@@ -212,15 +232,17 @@ def _innovation(
 def _robust_innovation(
     track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> tuple[bool, Any, tuple[Any, ...]]:
-    """Computes the innovation that the filter uses.
+    """Computes the innovation that the filter uses, with bounded effect of outliers.
 
-    An innovation above ``GATE`` does not agree with the model. Such a sighting gets a
-    larger covariance, so that its effect stays bounded (Huber's weight). A sighting is
-    rejected if it is also outside a second gate, which ``GATE_FLOOR_M`` widens.
+    If an innovation is above ``GATE``, it does not agree with the model. Its sighting
+    then gets a larger covariance, so that its effect stays bounded (Huber's weight). If
+    the innovation is also above a second limit, which ``GATE_FLOOR_M`` widens, the
+    sighting is rejected.
 
     Returns:
-        Whether the sighting is accepted; the squared normalized innovation before the
-        covariance was enlarged; and the innovation.
+        Three values. The first is whether the sighting is accepted. The second is the
+        squared normalized innovation before the covariance was enlarged. The third is
+        the innovation in the form of ``_innovation``.
     """
     floor, scale = settings.floor, track[15]
     found = _innovation(track, sighting, floor, scale, 0.0)
@@ -238,9 +260,10 @@ def _robust_innovation(
 def _learn_scatter(track: NDArray[Any], squared: Any, dimensions: Any) -> None:
     """Adapts the scatter of a track to the innovations.
 
-    Reflections scatter estimates far more than noise does. Innovations above
-    ``SCATTER_MARGIN`` times their covariance raise the scatter, and smaller innovations
-    lower it. The scatter adapts within about ``1 / SCATTER_RATE`` sightings.
+    The scatter is the ratio of the actual variance of estimates to their stated
+    covariance. Reflections scatter estimates far more than noise does. If an innovation
+    is above ``SCATTER_MARGIN`` times its covariance, the scatter rises. Otherwise it
+    falls. The scatter adapts within about ``1 / SCATTER_RATE`` sightings.
     """
     excess = min(squared, GATE) / (dimensions * SCATTER_MARGIN)
     track[15] = max(1.0, track[15] * (1.0 + SCATTER_RATE * (excess - 1.0)))
@@ -301,11 +324,11 @@ def _begin(
 def _follow(
     track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> tuple[bool, Any]:
-    """Updates one track with a sighting, if it is accepted.
+    """Updates one track with a sighting (estimate of the position), if it is accepted.
 
     Returns:
-        Whether the sighting is accepted, and the cost that it adds. If it is rejected,
-        the track is unchanged.
+        Whether the sighting is accepted, and the cost that the sighting adds. If the
+        sighting is rejected, the track is unchanged.
     """
     moved = track.copy()
     seconds = track[0] - settings.measurement_age
@@ -345,20 +368,22 @@ def _inherit(
 ) -> tuple[Any, Any, int]:
     """Continues the likelier of the histories that can lead to a hypothesis.
 
-    If a sighting is an outlier to every history, it updates the track of the outliers.
-    Once there are enough consecutive outliers that agree, their track replaces that of
-    the hypothesis.
+    The hypotheses are that the source is ahead (0) or behind (1). If a sighting
+    (estimate of the position) is an outlier to every history, it updates the track of
+    the outliers. If there are enough consecutive outliers that agree, their track
+    replaces the track of the hypothesis.
 
     Args:
-        memory: Memory; its hypothesis ``index`` is changed.
+        memory: Memory of the filter. The function changes the hypothesis ``index``.
         before: Copy of the memory before the sighting.
         index: Index of the hypothesis.
         candidate: The sighting for hypothesis 0, or its mirror image for hypothesis 1.
-        settings: ``FilterSettings``.
+        settings: Floor of the errors, and age of the sightings.
 
     Returns:
-        Cost of the history; cost that the sighting adds, infinite if it is an outlier
-        to every history; and the index of the history.
+        Three values. The first is the cost of the history. The second is the cost that
+        the sighting adds, infinite if it is an outlier to every history. The third is
+        the index of the history.
     """
     child = _hypothesis(memory, index)
     cost, step, history = child[0], np.inf, index
@@ -391,15 +416,16 @@ def _choose(
     back: tuple[Any, Any, int],
     largest: float,
 ) -> None:
-    """Updates the costs and the choice from the results of ``_inherit``.
+    """Updates the costs of both hypotheses, and chooses between them.
 
-    The lead is the cost of hypothesis 0 minus the cost of hypothesis 1. The choice
-    changes if the chosen hypothesis costs more than the other one by ``SWITCH_MARGIN``.
+    The hypotheses are that the source is ahead (0) or behind (1). If the chosen
+    hypothesis costs more than the other hypothesis by ``SWITCH_MARGIN``, the choice
+    changes.
 
     Args:
-        memory: Memory, changed.
-        front: Cost, added cost and history of hypothesis 0.
-        back: Cost, added cost and history of hypothesis 1.
+        memory: Memory of the filter, which the function changes.
+        front: Result of ``_inherit`` for hypothesis 0: cost, added cost and history.
+        back: Result of ``_inherit`` for hypothesis 1.
         largest: Largest cost that this sighting can add to one hypothesis, nepers.
     """
     lead = front[0] - back[0]
@@ -426,13 +452,14 @@ def _choose(
 def fold(
     memory: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> bool:
-    """Updates the memory with a sighting.
+    """Updates the memory of the filter with a sighting (estimate of the position).
 
     Args:
-        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,), changed. Its ages are those at
-            the arrival of the sighting.
+        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) memory of one or two
+            hypotheses. The function changes the memory. The ages of the tracks are
+            those at the arrival of the sighting.
         sighting: (10,) sighting, see the docstring of the module.
-        settings: ``FilterSettings``.
+        settings: Floor of the errors, and age of the sightings.
 
     Returns:
         Whether the chosen track has accepted the sighting.
@@ -456,14 +483,15 @@ def fold(
 
 @njit(cache=True)
 def expected(memory: NDArray[Any]) -> NDArray[Any]:
-    """Returns a copy of the chosen track, predicted to the present.
+    """Returns a copy of the chosen track of the source, predicted to the present.
 
     Args:
-        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) with present ages.
+        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,) memory of one or two
+            hypotheses. The ages of the tracks are those at present.
 
     Returns:
-        (TRACK,) elements as in TRACK_NAMES. A track without any sighting is copied
-        without prediction.
+        (TRACK,) elements as in TRACK_NAMES. If the source was never heard, the track is
+        copied without prediction.
     """
     track = chosen_track(memory).copy()
     if track[0] < NEVER_HEARD_S:

@@ -1,4 +1,4 @@
-"""Converts estimates to W, and holds the target between bursts."""
+"""Converts estimates to the world frame W, and holds the target between bursts."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ class TrackerNumbers(NamedTuple):
     microphones: _Microphones
     settings: FilterSettings
     older: NDArray[np.float64]
-    """(n,) vector that each tick adds to the memory of the filter. It contains the tick
-    for each age, s, and zeros for all other elements."""
+    """(n,) vector that is added to the memory of the filter in each control period. It
+    contains the period, s, for each age, and zeros for all other elements."""
 
 
 def tracker_numbers(
@@ -79,15 +79,14 @@ def tracker_numbers(
     resolve_front_back: bool = True,
     floor_m: float = MEASUREMENT_FLOOR_M,
 ) -> TrackerNumbers:
-    """Returns the data of the step for one robot and one kind of hearing.
+    """Computes the constants of the tracker for one robot and one kind of hearing.
 
     Args:
-        tracker: Parameters.
-        robot: Position of P, and microphones.
-        measurement_age_s: Time from the moment of a measurement to the arrival of its
-            estimate, s.
-        frame_s: Period of the estimates, s, a multiple of the tick.
-        tick_s: Period of the robot, s.
+        tracker: Parameters of the tracker.
+        robot: Distance of the control point P ahead of the axle, and microphones.
+        measurement_age_s: Time from a measurement to the arrival of its estimate, s.
+        frame_s: Period of the estimates, s, a multiple of ``tick_s``.
+        tick_s: Control period of the robot, s.
         resolve_front_back: Whether the motion of the robot distinguishes the source
             from its mirror image behind a row of microphones. Off: every source is in
             front.
@@ -95,7 +94,7 @@ def tracker_numbers(
             estimate, m.
 
     Returns:
-        Data for ``track_step``.
+        Constants for ``track_step``.
     """
     centre_P = np.mean(robot.microphones_m, axis=0).tolist()
     ahead = ArrayShape.of(robot.microphones_m).ahead
@@ -115,14 +114,15 @@ def tracker_numbers(
 
 
 def blank_track(numbers: TrackerNumbers, pose: Sequence[float]) -> NDArray[np.float64]:
-    """Returns the state of ``track_step`` before anything is heard.
+    """Returns the state of the tracker before anything is heard.
 
     Args:
-        numbers: Data of the tracker.
+        numbers: Constants of the tracker.
         pose: (3,) odometry pose of the robot now and before, m and rad.
 
     Returns:
-        (n,) numbers, named by ``track_names``.
+        (n,) state of ``track_step``. The function ``track_names`` returns the names of
+        its elements.
     """
     poses = np.tile(np.asarray(pose, dtype=float), numbers.past_ticks + 1)
     return np.concatenate((poses, blank_memory(_hypotheses(numbers))))
@@ -171,10 +171,13 @@ def _for_scalars(function: Any) -> Any:
 
 @register_jitable
 def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
-    """Returns the odometry pose some ticks ago, with linear interpolation.
+    """Returns the odometry pose some control periods (ticks) ago.
+
+    Between two ticks, the function interpolates linearly.
 
     Args:
-        pose: (3,) present x, y, theta in W, m and rad; floats or AutoDiffXd.
+        pose: (3,) present x, y, theta in the world frame W, m and rad; floats or
+            AutoDiffXd.
         past: (3 n,) x, y, theta at the last n ticks, most recent first, m and rad.
         ticks: Number of ticks, 0 to n, not necessarily whole.
 
@@ -207,20 +210,20 @@ def _sighting(
     pose: tuple[Any, Any, Any],
     microphones: _Microphones,
 ) -> NDArray[Any]:
-    """Converts an estimate to a sighting of the filter.
+    """Converts an estimate of the source to a sighting, the input of the filter.
 
-    ``_sighting.py_func`` accepts AutoDiffXd.
+    The function ``_sighting.py_func`` accepts AutoDiffXd.
 
     Args:
-        p_PS_B: (2,) position of the source relative to P, m; a unit vector if only the
-            bearing is known.
+        p_PS_B: (2,) position of the source relative to the control point P, in the axes
+            of the body frame B, m. If only the bearing is known, it is a unit vector.
         covariance: (4,) covariance of p_PS_B, row by row, m^2.
         ranged: 1 if the range is known, otherwise 0.
         pose: Pose of the robot at the moment of the measurement, m and rad.
         microphones: Positions of the microphones.
 
     Returns:
-        (10,) sighting of ``systems.hearing.tracking.target_filter``.
+        (10,) sighting, see ``systems.hearing.tracking.target_filter``.
     """
     c, s = np.cos(pose[2]), np.sin(pose[2])
     x_P = pose[0] + microphones.control_point * c
@@ -247,14 +250,17 @@ _expected = _for_scalars(expected)
 def _held_position(
     hold: int, chosen: Any, likely: Any, pose_heard: Any, pose: Any
 ) -> tuple[Any, Any]:
-    """Returns x and y of the target in W, by the rule of ``hold``.
+    """Computes the position of the target, by the rule that applies between bursts.
 
     Args:
         hold: Index of the rule in ``_HOLDS``.
-        chosen: Chosen track at the moment of its last estimate.
-        likely: Chosen track, predicted to the present.
+        chosen: Chosen track of the filter at the moment of its last estimate.
+        likely: Chosen track of the filter, predicted to the present.
         pose_heard: Pose of the robot at the moment of the last estimate.
         pose: Present pose of the robot.
+
+    Returns:
+        x and y of the target in the world frame W, m.
     """
     if hold == 0:
         return likely[1], likely[2]
@@ -269,13 +275,15 @@ def _held_position(
 def track_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrackerNumbers
 ) -> None:
-    """Updates the target in one tick.
+    """Updates the target of the tracker in one control period (tick).
 
-    A new estimate is converted to W and updates the filter. The outputs follow from the
-    chosen track and the rule of ``hold``. The state then shifts by one tick.
+    The step converts a new estimate to the world frame W and updates the filter. The
+    outputs follow from the chosen track of the filter and the rule of ``hold``. The
+    state then shifts by one tick.
 
-    The state contains the odometry poses at the last ticks, most recent first; the pose
-    at the moment of the last accepted estimate; and the memory of the filter.
+    The state has three parts, in this order: the odometry poses at the last ticks, most
+    recent first; the pose at the moment of the last accepted estimate; and the memory
+    of the filter.
     """
     p_PS_B, covariance, detected, range_valid, pose = inputs
     position, velocity, covariance_W, age, valid = outputs

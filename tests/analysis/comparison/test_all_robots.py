@@ -33,7 +33,7 @@ def test_worst_last_and_mean():
     assert pooled["time_to_goal_s"].tolist() == [14.0, 11.0]
     assert pooled["route_deviation_max_m"].tolist() == [0.5, 0.9]
     assert pooled["path_length_m"].tolist() == [7.0, 7.0]
-    assert with_all_robots(table, []) is table
+    assert with_all_robots(table, ["robot"]) is table
 
 
 def test_two_robots_are_compared():

@@ -460,7 +460,7 @@ def test_gains_of_a_fast_loop_are_judged_by_its_own_crossover():
             "tick_s": 0.001,
             "microphones": {"frame_s": 0.001},
             "ultrasonic": {"period_s": 0.001},
-            "integrator": {"step_s": 0.001},
+            "integration_step_s": 0.001,
             "plant": {"motor_lag_s": 0.002},
             "attraction": {"stiffness_n_m": 8000.0, "damping_n_s_m": 300.0},
         }

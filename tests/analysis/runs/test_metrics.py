@@ -17,7 +17,7 @@ from analysis.runs.metrics import frames_with_sound, run_metrics
 from analysis.runs.proximity import Proximity
 from analysis.runs.smoothness import log_dimensionless_jerk, spectral_arc_length
 from diagrams import RunResult, build_sound_follower, load_scenario, simulate
-from diagrams.running import stop_rules
+from diagrams.running import referee
 from diagrams.running.stop_rules import Collision
 from diagrams.scenario.scenario import Scenario
 from systems.ranging.parameters import UltrasonicParameters
@@ -329,7 +329,7 @@ def test_completed_is_decided_by_the_share_that_is_reported(monkeypatch):
     share = run_metrics(simulate(scenario))["following_fraction"]
     assert share is not None
     for bound, cause in ((share, "completed"), (share + 1e-6, "astray")):
-        monkeypatch.setattr(stop_rules, "FOLLOWING_SHARE", bound)
+        monkeypatch.setattr(referee, "FOLLOWING_SHARE", bound)
         assert simulate(scenario).cause == cause
 
 

@@ -246,3 +246,13 @@ def test_unreadable_file_is_refused(tmp_path, text, hint):
         load_sweep(written(tmp_path / "sweep.yaml", text))
     with pytest.raises(InputError, match="give the path of a YAML file"):
         load_sweep(tmp_path / "missing.yaml")
+
+
+def test_one_element_of_a_list_that_the_file_leaves_out():
+    plan = SweepPlan(
+        scenario="two_followers",
+        set={"robots.near.start.position_m.1": 0.05},
+        grid={"robots.near.start.position_m.0": (0.1, 0.2)},
+    )
+    starts = [plan.scenario_of(each).robots["near"].start for each in plan.points()]
+    assert [each.position_m for each in starts] == [(0.1, 0.05), (0.2, 0.05)]

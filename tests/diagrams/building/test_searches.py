@@ -146,7 +146,11 @@ def test_with_three_microphones_it_still_finds():
 
 REFUSED = [
     ("odor_search", ["odor=null"], "odor: is missing"),
-    ("odor_search", ["guard={}"], "guard: is not a field of an odor searcher"),
+    (
+        "odor_search",
+        ["guard={}"],
+        "guard: is not a field of robots that search for an odor",
+    ),
     ("odor_search", ["odor.kind=steady", "wind.speed_m_s=0.0"], "wind.speed_m_s: is 0"),
     (
         "odor_search",
@@ -157,7 +161,11 @@ REFUSED = [
     ("odor_search", ["obstacles.0.name=odor"], "the name 'odor' is taken"),
     ("odor_search", ["robots={odor: {}}"], "the name 'odor' is taken"),
     ("odor_search", ["robots={world: {}}"], "the name 'world' is taken"),
-    ("sound_search", ["hearing=ideal"], "hearing: is not a field of a sound searcher"),
+    (
+        "sound_search",
+        ["hearing=ideal"],
+        "hearing: is not a field of robots that search for a sound",
+    ),
     ("sound_search", ["robot.preset=han2019"], "robot.microphones_m: has 3"),
     ("sound_search", ["sound_search.await_call=true"], "sound_search.await_call: is"),
     (

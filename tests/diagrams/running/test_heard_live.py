@@ -37,9 +37,9 @@ class Listener(SourceListener):
 
     def __init__(self, scenario):
         super().__init__(
-            robot=scenario.robot,
+            robot=scenario.only.robot,
             sound_speed_m_s=scenario.sound_speed_m_s,
-            microphones=scenario.microphones,
+            microphones=scenario.follower.microphones,
         )
 
 

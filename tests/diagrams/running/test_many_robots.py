@@ -11,8 +11,8 @@ import pytest
 from diagrams import RunResult, Scenario, load_scenario, simulate
 from diagrams.building.builder import build_sound_follower
 from diagrams.building.robot import make_robot
-from diagrams.scenario.loading import scenario_from_mapping
 from diagrams.scenario.participants import Follower
+from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 from systems.hearing.tdoa_estimator import may_sound
 from systems.sound.parameters import SoundParameters
@@ -308,6 +308,10 @@ PAIR = "robots={a: {}, b: {start: {position_m: [-2, 0]}}}"
         ([PAIR, "robots.b.follows=c"], r"robots\.b\.follows: 'c' is neither .*use "),
         ([PAIR, "robots.b.follows=a"], r"robots\.b\.follows: 'a' is neither "),
         (["follows=robot"], r"follows: 'robot' is neither a source .*use source"),
+        (
+            [PAIR, "robots.a.follows=b", "robots.b.follows=a"],
+            r"robots\.a\.follows: 'b' is neither .*; add a source, or a loudspeaker$",
+        ),
         (
             ["sources={s: {body: false}}"],
             r"sources\.s\.body: is off, but robot 'robot' follows it",

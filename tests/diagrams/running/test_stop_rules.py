@@ -18,7 +18,7 @@ from diagrams import (
     make_simulator,
     simulate,
 )
-from diagrams.running import stop_rules
+from diagrams.running import referee
 from diagrams.running.monitor import Monitor
 from diagrams.running.referee import Referee
 from diagrams.running.stop_rules import FOUND, judge_search
@@ -196,7 +196,7 @@ def leaving(duration_s: float) -> RunResult:
     ],
 )
 def test_completed_needs_a_share_of_following(duration_s, share, cause, monkeypatch):
-    monkeypatch.setattr(stop_rules, "FOLLOWING_SHARE", share)
+    monkeypatch.setattr(referee, "FOLLOWING_SHARE", share)
     assert leaving(duration_s).cause == cause
 
 

@@ -16,6 +16,7 @@ from systems.framework.noise import frame_noise
 from systems.framework.signals import AudioFrame
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.tdoa_estimator import TDOAEstimator, robot_localiser
+from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.adc import convert
 from systems.sound.parameters import MicArrayParameters
 

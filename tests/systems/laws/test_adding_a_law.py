@@ -65,7 +65,7 @@ print(json.dumps({
     "equations": [each.text for each in sheet.law_equations],
     "parameters": [row.field for row in sheet.parameters if row.of_law],
     "heading": stability_page([analyse_law(scenario, [])]),
-    "all": [each.law for each in chosen_laws(scenario, ["all"])],
+    "all": [each.only.law for each in chosen_laws(scenario, ["all"])],
     "loci": [locus.parameter for locus in root_loci(scenario)],
     "lines": {line.get_label(): line.get_color() for line in lines},
     "compared": {name: plan.grid["law"] for name, plan in comparison_plans().items()},

@@ -87,11 +87,12 @@ def test_a_robot_changes_some_sensors_of_the_scenario():
         "two": {"start": {"position_m": [-2, -1]}, "ultrasonic": {"noise_m": 0.4}},
     }
     settings = {"robots": robots, "ultrasonic": {**MIXED, "minimum_range_m": 0.1}}
-    one, two = load_scenario("default", settings).robots.values()
-    assert one.ultrasonic.each("noise_m").tolist() == [0.001, 0.3, 0.02]
-    assert set(one.ultrasonic.each("minimum_range_m")) == {0.1}
+    scenario = load_scenario("default", settings)
+    one, two = (scenario.of_robot(n).sensing.ultrasonic for n in ("one", "two"))
+    assert one.each("noise_m").tolist() == [0.001, 0.3, 0.02]
+    assert set(one.each("minimum_range_m")) == {0.1}
     # The third sensor has a value of its own.
-    assert two.ultrasonic.each("noise_m").tolist() == [0.4, 0.4, 0.02]
+    assert two.each("noise_m").tolist() == [0.4, 0.4, 0.02]
 
 
 @pytest.mark.parametrize(
