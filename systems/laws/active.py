@@ -99,12 +99,12 @@ class ActiveParameters(Parameters):
 def active_force(c: Any, s: Any, gains: ActiveParameters) -> Any:
     """Computes the force k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s).
 
-    The force is eq. 20 of Han 2019. The first term is the spring term. The spring term
+    This force is eq. 20 of Han 2019. The first term is the spring term. The spring term
     is largest at c = alpha and zero at contact. The second term is the velocity term.
     For an obstacle at rest, the velocity term is d_ref mu_0 at any distance.
 
-    Eq. 19-b of the paper has another factor (rho_0 - c) at K_0(c). This function
-    follows eq. 20, because eq. 20 agrees with table 4.
+    Eq. 19-b of the paper differs: it has another factor (rho_0 - c) at K_0(c). This
+    function follows eq. 20, because eq. 20 agrees with table 4.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.

@@ -11,7 +11,8 @@ from systems.laws.law import Equation, Law, Tuning
 class Active2017Parameters(Parameters):
     """Gains of a law whose push grows near the obstacle (Kim 2017, eq. 21, fig. 6).
 
-    Below the distance rho_1, the push is constant. Kim 2017 does not print the gains.
+    The push is the part of the force that depends on the distance. Below the distance
+    rho_1, the push is constant. Kim 2017 does not print the gains.
     """
 
     distance_gain_j: Positive = 1.22

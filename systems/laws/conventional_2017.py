@@ -9,7 +9,7 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 class Conventional2017Parameters(Parameters):
-    """Gains of a law whose push is proportional to 1/distance (Kim 2017, eq. 20).
+    """Gains of a law whose force has the term K_0/distance (Kim 2017, eq. 20).
 
     Kim 2017 does not print the gains.
     """
@@ -25,9 +25,9 @@ def conventional_2017_force(
 ) -> Any:
     """Computes the force K_0/c + D_0 s at any distance c (Kim 2017, eq. 20).
 
-    In the printed equation, the push K_0/c becomes infinite as c approaches 0. In this
-    function, c counts at least as the least range of the sensors. The sensors cannot
-    distinguish distances below this range.
+    The push of the law is the term K_0/c. In the printed equation, the push becomes
+    infinite as c approaches 0. In this function, the push is constant below the least
+    range of the sensors, because the sensors cannot distinguish these distances.
 
     The law acts at any distance. If the distance doubles, the push halves.
 

@@ -37,7 +37,7 @@ def guarded_step(
 
 
 class GuardedController(Block):
-    """Plans a route to the target and commands the speed and yaw rate to follow it.
+    """Plans a route to the target and commands speed and yaw rate along the route.
 
     The route leads through free and unknown space. The block computes the cheapest
     route every 0.5 s. The route is for the smallest disc around the axle that contains

@@ -149,7 +149,7 @@ def impedance_step(
     first. A sensor round is the time in which every sensor fires once. A row has three
     numbers for each slot of the input port: the feature, C_x, and C_y. C is the
     collision vector from the control point P to an obstacle, in the world frame W, m.
-    The feature is the number of the sensors or the body that the vector belongs to.
+    The feature is a number that identifies the sensors or the body that C comes from.
 
     The step works in three stages:
 
@@ -232,9 +232,10 @@ def ImpedanceController_(T):
     class Impl(Block_[T]):
         """Pulls the robot to the target and pushes it away from obstacles.
 
-        The law computes the push from the length c of a collision vector and a speed s.
-        A collision vector points from the control point P to an obstacle. The feature
-        of a vector is the number of the sensors or the body that the vector belongs to.
+        The push of the law depends on the length c of a collision vector and on a speed
+        s. A collision vector points from the control point P to an obstacle. The
+        feature of a vector is a number that identifies the sensors or the body that the
+        vector comes from.
 
         The block computes s from two collision vectors of the same feature: the present
         vector and the vector of one sensor round ago. If the feature was absent one

@@ -22,8 +22,8 @@ class AttractionParameters(Parameters):
     stiffness_n_m: NonNegativeStiffness = 2.0
     """Stiffness K_r, N/m (printed without unit)."""
     damping_n_s_m: NonNegativeDamping = 1.0
-    """Damping D_r, N s/m (printed without unit). With the stiffness K_r = 2 N/m and a
-    virtual mass of 3.94 kg, the damping ratio is 0.18."""
+    """Damping D_r, N s/m (the paper prints no unit). With the stiffness K_r = 2 N/m and
+    a virtual mass of 3.94 kg, the damping ratio is 0.18."""
     follow_distance_m: NonNegativeLength = 1.2
     """Follow distance d_f from the source, m (our choice). At this distance, the spring
     has no force. The paper uses 0: the spring pulls the control point P onto the

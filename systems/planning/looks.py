@@ -60,13 +60,13 @@ class Look(NamedTuple):
 
 
 def make_looks(sensors: int) -> Look:
-    """Makes a memory for the readings of all sensors without any readings.
+    """Makes an empty memory for the readings of all sensors.
 
     Args:
         sensors: Number of range sensors.
 
     Returns:
-        Empty memory.
+        Memory without any readings.
     """
     looks = Look(*(np.zeros((_LOOKS, sensors)) for _ in Look._fields))
     looks.time_s[:] = -np.inf

@@ -41,7 +41,9 @@ def safety_filter_step(
 ) -> None:
     """Computes the wheel speeds, the velocity of P, the slack, and the action.
 
-    These values are for the next control period. They are the state of the block.
+    P is the control point of the robot. The slack is the amount by which constraints
+    are violated, m/s. The action is 1 if the filter has changed the velocity, otherwise
+    0. These values are for the next control period. They are the state of the block.
     """
     acceleration, pose, objects = inputs
     robot, theta = numbers.robot, pose[2]

@@ -32,14 +32,14 @@ class FilterNumbers(NamedTuple):
     """Distances that the control point P keeps, and limits of the wheels."""
 
     keep_m: float
-    """Distance that P keeps from objects, m. The distance is the sum of three terms:
-    the radius of the body around the axle, the distance epsilon of P ahead of the axle,
-    and the margin."""
+    """Distance that the control point P keeps from objects, m. The distance is the sum
+    of three terms: the radius of the body around the axle, the distance epsilon of P
+    ahead of the axle, and the margin."""
     top_speed: float
     """Top speed of each wheel's rim and of P, m/s."""
     turn_share: float
-    """Ratio L/(2 epsilon) of the wheel separation L and twice the distance epsilon of P
-    ahead of the axle."""
+    """Ratio L/(2 epsilon). L is the wheel separation, and epsilon is the distance of
+    the control point P ahead of the axle."""
 
 
 @njit(cache=True)
@@ -124,8 +124,8 @@ def filtered_velocity(
     P is the control point of the robot. Each object contributes one half plane of
     permitted velocities:
 
-    - If the object is at rest or its motion is unknown, P may approach at most at alpha
-      times the remaining distance.
+    - If the object is at rest or its motion is unknown, the speed of approach is
+      limited. The limit is the constant alpha times the remaining distance.
     - If the object moves, P must not have a velocity that leads into the object.
       ``disc_plane`` computes the smallest change of the present velocity that prevents
       the contact.

@@ -134,8 +134,9 @@ def collision_vectors(
 
     Returns:
         At most ``SLOTS`` entries (feature, x, y), with x and y of the vector from P, m.
-        Features 1 to n are single sensors (case I, Han 2019, eq. 12). Feature n + k is
-        the pair of sensor k, counted from 1, and its right neighbor (case II, eq. 14).
+        With n sensors, features 1 to n are single sensors (case I, Han 2019, eq. 12).
+        Feature n + k is the pair of sensor k, counted from 1, and its right neighbor
+        (case II, eq. 14).
     """
     if neighbours is None:
         neighbours = pairwise(range(len(points)))
@@ -353,7 +354,7 @@ def collision_step(
 @define_for_scalars("CollisionVector_", __name__)
 def CollisionVector_(T):
     class Impl(Block_[T]):
-        """Computes collision vectors from the echoes of the sensors (cases I and II).
+        """Computes collision vectors from sensor echoes (Han 2019, eq. 11-14).
 
         A collision vector points from the control point P to an obstacle. The block
         fills the slots of the output ports in order. Only ``aggregation: sum`` fills
@@ -382,7 +383,8 @@ def CollisionVector_(T):
             initial_pose: Pose (x, y, theta) before time zero, m and rad.
             tick_s: Control period, s.
 
-        Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
+        Reference: Han 2019, eq. 11-14 (cases I and II), with the corrections of
+        docs/errata.md.
         """
 
         part, stage = "collision", "obstacle sensing"

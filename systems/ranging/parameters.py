@@ -178,8 +178,7 @@ class UltrasonicParameters(Parameters):
             field: Name of a field of ``RangeSensorParameters``.
 
         Returns:
-            (n,) array with one value per sensor. For ``position_m``, the shape is (n,
-            2).
+            (n,) array with one value per sensor, or (n, 2) array for ``position_m``.
         """
         return np.array([getattr(sensor, field) for sensor in self.sensors])
 

@@ -214,10 +214,14 @@ def can_be_braked(
 
     If obstacles may move, the function assumes an obstacle that starts at the end of a
     sensor's view at the time of the reading. The obstacle moves at
-    ``obstacle_speed_m_s``. The axle then has to meet one of two conditions. It keeps
-    the distance ``keep_m`` from all points that such an obstacle may reach. Or the
-    robot withdraws from the end of the view. A slow turn on the spot counts as rest, so
-    the function does not check this turn against moving obstacles.
+    ``obstacle_speed_m_s``. One of two conditions must then hold:
+
+    - The axle keeps the distance ``keep_m`` from all points that such an obstacle may
+      reach.
+    - The robot withdraws from the end of the view.
+
+    A slow turn on the spot counts as rest, so the function does not check this turn
+    against moving obstacles.
 
     Args:
         pose: Present pose (x, y, theta), m and rad.
@@ -280,14 +284,16 @@ def _enters(
     """Checks whether the robot's disc has come nearer to a point of a non-free cell.
 
     The disc at the start contains no obstacle, whatever the map states about its cells.
-    Some points of the present disc are nearer to the middle at the start than to the
-    present middle. These points were also in the disc at the start, so there is no
-    obstacle at these points. They lie on one side of the perpendicular bisector between
-    both middles. A cell lies on this side if all its corners do.
+    Some points of the present disc are nearer to the center of the disc at the start
+    than to the present center. These points were also in the disc at the start, so
+    there is no obstacle at these points. They lie on one side of the perpendicular
+    bisector between both centers. A cell lies on this side if all its corners lie on
+    this side.
 
     Args:
-        begin: Middle (x, y) of the disc at the start, m.
-        pose: Present pose (x, y, theta), m and rad.
+        begin: Center (x, y) of the disc at the start, m.
+        pose: Present pose (x, y, theta), m and rad. The center of the present disc is
+            at (x, y).
         danger: Non-free cells.
         radius: Radius of the disc, m.
 
@@ -323,8 +329,8 @@ def _keeps_off_moving(
 
     The result is true in two cases:
 
-    - No such obstacle can be within ``keep_m`` of the position ``place`` after
-      ``ahead_s``.
+    - No moving obstacle can be within ``keep_m`` of the position ``place`` after the
+      time ``ahead_s``.
     - The robot withdraws from the end of the sensors' view.
     """
     x, y = place

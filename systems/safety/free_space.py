@@ -290,9 +290,9 @@ def see(
     """Enters the newest readings of the sensors into the map of free space.
 
     Sensors at the same position form a group. For each group, the function visits the
-    cells in the sectors of the group. The greatest distance that the group has seen
-    limits these cells. As seen from the group, the circle around a cell covers an
-    angle. The reading affects a cell in one of these ways:
+    cells in the sectors of the group, up to the greatest distance that the group has
+    seen. As seen from the group, the circumscribed circle of a cell covers an angle.
+    The readings affect a cell in one of these ways:
 
     - If the group has seen free floor in this whole angle up to the far side of the
       circle, the cell becomes free. The cell then loses all hits.
@@ -380,15 +380,15 @@ def _in_direction(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Returns how far a group of sensors has seen toward a cell.
 
-    As seen from the group, the circle around the cell covers an angle. The distance
-    seen free is the least distance of all sectors that overlap this angle. If a part of
-    the angle is outside the sectors of the group, the distance seen free is 0. The echo
-    is that of the sector that contains the middle of the cell.
+    As seen from the group, the circumscribed circle of the cell covers an angle. The
+    distance seen free is the least distance of all sectors that overlap this angle. If
+    a part of the angle is outside the sectors of the group, the distance seen free is
+    0. The echo is that of the sector that contains the middle of the cell.
 
     Args:
         bearing: Bearing of the cell from the right edge of the group, rad, from 0 to a
             full turn.
-        hides: Half of the angle that the circle around the cell covers, rad.
+        hides: Half of the angle that the circle covers, rad.
         sectors: Sectors of all groups.
         seen: Result of ``_of_sectors``.
         begin: Index of the first sector of the group.

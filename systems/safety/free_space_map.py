@@ -50,8 +50,8 @@ class MapNumbers(NamedTuple):
     error: PlaceError
     """Quantities that determine the position error of a cell due to odometry."""
     least_way: float
-    """Least rolled distance of each rim that counts for one control period, m per rad/s
-    of the faster wheel's command. The value is 0 if the angles of the encoders are not
+    """Least rolled distance of a rim in one control period, per commanded speed of the
+    faster wheel, m/(rad/s). The value is 0 if the angles of the encoders are not
     rounded."""
     radius: float
     """Radius of the disc that contains the body, m."""
@@ -165,13 +165,13 @@ class FreeSpaceMap(Block):
     The floor around the robot is divided into square cells. The sensors at one position
     see a cell free if two conditions hold:
 
-    - The circle around the cell lies within the apertures of these sensors.
-    - The whole circle is nearer than their readings minus a margin.
+    - The circumscribed circle of the cell lies within the apertures of these sensors.
+    - The whole circle is nearer than the readings of these sensors minus a margin.
 
     The cell stays free as long as the error of its position relative to the robot is at
-    most ``place_error_m``. The error grows for two reasons. Encoders count whole
-    pulses. The travel of each wheel has the relative error ``wheel_error``. The block
-    enters each reading in the control period in which the sensor fires.
+    most ``place_error_m``. The error grows for two reasons: encoders count whole
+    pulses, and the travel of each wheel has the relative error ``wheel_error``. The
+    block enters each reading in the control period in which the sensor fires.
 
     At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
     free. The disc that contains the body counts as free in every period, because

@@ -40,8 +40,8 @@ class GuardParameters(Parameters):
     start_bubble_m: float = Field(default=1.0, gt=0.0, le=WINDOW_M / 4.0)
     """Radius of the disc around the axle that counts as free at the start, m."""
     wheel_error: Fraction = 0.0
-    """Relative error of the travel of each wheel. The error due to the pulses of the
-    encoders comes in addition."""
+    """Relative error of the travel of each wheel. Errors due to the pulses of the
+    encoders are not included."""
     place_error_m: NonNegativeLength = 0.006
     """Largest position error of a cell that counts as free, m. The encoders and
     ``wheel_error`` cause this error. The guard keeps this distance in addition to

@@ -72,7 +72,8 @@ def adaptation_step(
 
     K is the stiffness to the target, D is the damping, and K_e is the stiffness of
     contacts. The state begins with K, D, and K_e. For each of these gains q, four
-    sensitivities follow: x and y of dp/dq, then x and y of dv/dq.
+    sensitivities follow: x and y of dp/dq, then x and y of dv/dq. p and v are the
+    position and velocity of the control point P.
 
     For each gain, the step computes the gradient of the error. The gradient follows
     from the Lyapunov rule or from the sensitivities. Then the step moves the gain

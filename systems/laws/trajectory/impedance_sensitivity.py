@@ -24,10 +24,12 @@ class Sensitivities(NamedTuple):
 def sensitivity_sources(
     p_WP: Any, v_WP: Any, target: Any, contacts: Any, mass: Any
 ) -> Any:
-    """Computes the source terms dA/dq X + dB/dq u of eq. 34 for the gains q.
+    """Computes the source terms of the sensitivities to the gains K, D, and K_e.
 
-    Eq. 35 to 41 are these terms for the stiffness K, the damping D, and the contact
-    stiffness K_e.
+    K is the stiffness to the target, D is the damping, and K_e is the stiffness of
+    contacts. For a gain q, the source term is dA/dq X + dB/dq u in eq. 34 of
+    Engelbrecht 2021. X is the state, u is the input, and A and B are the matrices of
+    the model X' = A X + B u. Eq. 35 to 41 are these terms for the three gains.
 
     Args:
         p_WP: Position p (x, y) of the control point P in the world frame W, m.
@@ -60,16 +62,17 @@ def advance_sensitivity(
 ) -> None:
     """Advances the sensitivities X_q to one gain q by one control period.
 
-    The equation is d/dt X_q = A X_q + source. X_q consists of dp/dq and dv/dq, where p
-    and v are the position and velocity of the control point P. The equation is eq. 34
-    with two corrections: the left side is a time derivative, and the right side
-    contains the term A X_q.
+    X_q consists of dp/dq and dv/dq, where p and v are the position and velocity of the
+    control point P. The equation is d/dt X_q = A X_q + source. It is eq. 34 of
+    Engelbrecht 2021 with two corrections: the left side is a time derivative, and the
+    right side contains the term A X_q.
 
     A is the exact linearization of the loop. S is the distance at which a contact
     begins, and d is the present distance. A contact has the stiffness K_e along the
-    unit vector n, and the stiffness -K_e (S - d)/d across n. The damping D_e of a
-    contact fades with d. Therefore the matrix -(D_e/S) (v - v_j) n^T is added to the
-    stiffness, where v_j is the velocity of the object.
+    unit vector n from the object to P. Across n, the contact has the stiffness -K_e (S
+    - d)/d. The damping D_e of a contact fades with d. Therefore the function adds the
+    matrix -(D_e/S) (v - v_j) n^T to the stiffness, where v_j is the velocity of the
+    object.
 
     The function updates the velocity first, and then the position with the new
     velocity. The virtual mass moves in the same order.
@@ -116,7 +119,7 @@ def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
     The penalty is lambda/2 h(d)^2 with the hinge h = max(0, d_sec - d) for the distance
     d. The gradient is the sum of -lambda h(d) n over all contacts, where n is the unit
     vector from the object to the control point P. The penalty replaces the safety term
-    of eq. 27, lambda/2 (d_sec^2 - d^2).
+    lambda/2 (d_sec^2 - d^2) in eq. 27 of Engelbrecht 2021.
 
     Args:
         contacts: Result of ``contacts_of_objects``.

@@ -27,9 +27,10 @@ class ReferenceNumbers(NamedTuple):
 
 @lru_cache(maxsize=64)
 def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNumbers:
-    """Computes the exact discretization of eq. 20 to 26 for one axis.
+    """Computes the exact discrete-time model of a second-order system for one axis.
 
-    The target is constant during each control period.
+    The continuous model is that of eq. 20 to 26 of Engelbrecht 2021. The target is
+    constant during each control period.
 
     Args:
         frequency: Natural frequency w_n, rad/s.
@@ -37,7 +38,8 @@ def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNum
         tick_s: Control period, s.
 
     Returns:
-        Matrices A and B of x+ = A x + B u.
+        Matrices A and B of x+ = A x + B u. The state x has the position and velocity of
+        the model. The input u has the position and velocity of the target.
     """
     stiff, damp = frequency**2, 2.0 * ratio * frequency
     whole = np.zeros((4, 4))
@@ -51,7 +53,7 @@ def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNum
 def nominal_poles(mass: float, stiffness: float, damping: float) -> tuple[float, float]:
     """Computes the natural frequency and damping ratio of a mass, spring, and damper.
 
-    The paper prints neither of these numbers.
+    Engelbrecht 2021 prints neither of these numbers.
 
     Args:
         mass: Virtual mass M, kg.

@@ -44,9 +44,9 @@ def sampled_matrix(
     """Computes the matrix A that advances one axis of the robot by one control period.
 
     A spring with the stiffness K to a fixed point and a damper D act on the virtual
-    mass M. The velocity v of the virtual mass commands the wheels. The wheel speed w
-    follows v with the time constant lag. w moves the control point P to the position
-    p::
+    mass M. The velocity v of the virtual mass is the command of the wheels. The wheel
+    speed w follows v with the time constant lag. p is the position of the control point
+    P, which moves at the speed w. T is the control period::
 
         v+ = v - T/M (K p + D v),  w+ = a w + (1 - a) v+,  a = exp(-T/lag)
         p+ = p + lag (1 - a) w + (T - lag (1 - a)) v+
@@ -57,7 +57,7 @@ def sampled_matrix(
     Args:
         stiffness: Sum of the stiffnesses of all springs, N/m.
         damping: Sum of all dampers, N s/m.
-        of: Mass, lag, and control period T.
+        of: Mass, lag, and control period.
 
     Returns:
         (3 + late_ticks, 3 + late_ticks) matrix A of x+ = A x. The state x has p, w, v,
@@ -129,7 +129,8 @@ def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
     """Computes the lag at which the target pulls the control point P through a contact.
 
     Args:
-        own: Parameters of the law.
+        own: Parameters of the law: stiffness K to the target, stiffness K_e of
+            contacts, and distance S at which contacts begin.
 
     Returns:
         Lag K_e S/K of P behind the target, m. If K_e is 0, the result is 1 m.
@@ -141,7 +142,8 @@ def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
 def rate_bound(rule: str, amplitude_m: float, of: SampledMass) -> float:
     """Computes the adaptation rate gamma above which the gains K and D may run away.
 
-    The bound applies to an adaptation without limits of the gains.
+    K is the stiffness to the target, and D is the damping. The bound applies to an
+    adaptation without limits of the gains.
 
     Args:
         rule: ``lyapunov`` or ``sensitivity``.

@@ -18,8 +18,8 @@ class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
     rule: Literal["lyapunov", "sensitivity"] = "lyapunov"
     """Rule that adapts the gains.
 
-    ``lyapunov`` uses eq. 40 to 42 as printed, which are a Lyapunov rule.
-    ``sensitivity`` uses the gradient of eq. 27 with the sensitivities that eq. 34
+    ``lyapunov`` uses eq. 40 to 42 of Engelbrecht 2021 as printed, which are a Lyapunov
+    rule. ``sensitivity`` uses the gradient of eq. 27 with the sensitivities that eq. 34
     intends.
 
     With ``sensitivity``, the damping of a contact is 0 at the edge of the zone and
@@ -30,11 +30,12 @@ class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
     contact_rate: NonNegative = 0.0
     """Rate gamma of K_e, (N/m)^2/(m^2 s). With 0, K_e is fixed."""
     penalty: NonNegative = 0.0
-    """Weight lambda of the safety term of eq. 27, without unit. With 0 the term is off.
+    """Weight lambda of the safety term, without unit. With 0 the term is off.
 
-    Eq. 27 prints lambda/2 (d_sec^2 - d^2) for each object. Here the term is lambda/2
-    max(0, S - d)^2. d is the distance of the object, and S is ``security_zone_m``. The
-    gradient of the term is -lambda (S - d) n, where n points from the object to P.
+    Eq. 27 of Engelbrecht 2021 prints the term lambda/2 (d_sec^2 - d^2) for each object.
+    Here the term is lambda/2 max(0, S - d)^2. d is the distance of the object, and S is
+    ``security_zone_m``. The gradient of the term is -lambda (S - d) n, where n is the
+    unit vector from the object to P.
 
     The term has an effect only with ``rule: sensitivity``. Without the term, a robot
     with adaptive gains collides more often than a robot with fixed gains."""

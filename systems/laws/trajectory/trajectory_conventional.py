@@ -32,7 +32,7 @@ class TrajectoryImpedanceParameters(Parameters):
     security_zone_m: Length = 1.0
     """Distance S from P at which contacts begin, m (1 m in tables 1 and 2)."""
     block_distance_m: Length | None = None
-    """Distance L_block of eq. 6, m. With null, eq. 6 is off.
+    """Distance L_block of eq. 6 of Engelbrecht 2021, m. With null, eq. 6 is off.
 
     The control point P stops if two conditions hold. The next step of P would end
     within this distance of an object. The step would not lead away from the object.

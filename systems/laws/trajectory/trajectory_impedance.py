@@ -65,7 +65,9 @@ def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
 def target_force(
     p_WP: Any, v_WP: Any, target: Any, stiffness: Any, damping: Any
 ) -> Any:
-    """Computes the force toward the target, U = -K (p - p_d) - D (v - v_d) (eq. 2).
+    """Computes the force toward the target, U = -K (p - p_d) - D (v - v_d).
+
+    The force is eq. 2 of Engelbrecht 2021.
 
     Args:
         p_WP: Position p (x, y) of the control point P in the world frame W, m; floats
@@ -120,11 +122,13 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
 
 @register_jitable
 def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
-    """Computes the force of all contacts (eq. 4 and 5 with restored signs).
+    """Computes the force of all contacts (Engelbrecht 2021, eq. 4 and 5).
 
-    Each contact has a spring and a damper. The force V is the sum of K_e overlap n -
-    D_e (v - v_j) over all contacts. n is the unit vector from the object to the control
-    point P. v - v_j is the velocity of P relative to the object.
+    The signs of the printed equations are corrected. Each contact has a spring and a
+    damper. The force V is the sum of K_e (S - d) n - D_e (v - v_j) over all contacts. S
+    - d is the compression of the spring. n is the unit vector from the object to the
+    control point P. v - v_j is the velocity of P relative to the object. If the damping
+    fades, a share of D_e acts.
 
     Args:
         contacts: Result of ``contacts_of_objects``.
@@ -145,15 +149,15 @@ def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
 
 @register_jitable
 def step_is_blocked(objects: Any, step: Any, block_m: Any) -> Any:
-    """Checks whether eq. 6 forbids a step of the control point P.
+    """Checks whether eq. 6 of Engelbrecht 2021 forbids a step of the control point P.
 
     Eq. 6 allows a new position if its distance from every object is greater than
     L_block. Otherwise the robot stays at its position.
 
-    This function allows a further kind of step: a step that ends within L_block but
-    leads away from the object. Without this exception, a robot within L_block could
-    never leave. A robot can come to rest there, because a robot with the speed v moves
-    on by up to v (T + motor lag). T is the control period.
+    This function also allows a step that ends within L_block but leads away from the
+    object. Without this exception, a robot within L_block could never leave. A robot
+    can come to rest within L_block, because it needs a distance to stop. At the speed
+    v, this distance is up to v (T + motor lag), where T is the control period.
 
     Args:
         objects: Vector of the port ``objects_W``, with the present positions.
