@@ -69,7 +69,9 @@ def parse_setting(text: str) -> tuple[str, Any]:
 
 
 def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:
-    """Changes fields of a scenario that a user has given by their paths.
+    """Sets fields of a scenario to the values that a user has given for them.
+
+    The user names each field by its dotted path.
 
     Args:
         data: Fields of a scenario, changed in place.

@@ -111,15 +111,15 @@ def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
     direction of v_P. A heading along v_P is a stable equilibrium. A heading opposite to
     v_P is an unstable equilibrium. There, the robot would drive backward for meters,
     even into its target, until rounding errors grow. This function points the vector
-    aside, so that the body turns around. The method is ours, because the papers do not
-    say how an acceleration becomes wheel speeds.
+    aside, so that the body turns around. The papers do not state how a law drives the
+    wheels. Therefore this method is our own.
 
     Args:
         x: First component in the world frame W, any unit; float or AutoDiffXd.
         y: Second component in W, in the same unit.
         theta: Heading of the body in W, rad.
-        least: Largest backward component of a vector that is never turned, in the unit
-            of x.
+        least: Threshold of the backward component, in the unit of x. The function does
+            not turn a vector whose backward component is at or below this threshold.
 
     Returns:
         (x, y) in W. A vector near straight backward turns toward the side to which it

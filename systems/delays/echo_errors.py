@@ -38,7 +38,8 @@ def echo_errors(
     Args:
         shape: The n microphones.
         c: Speed of sound, m/s.
-        news: Share of the audio frame's energy that is no echo, above 0.
+        news: Share of the energy of the audio frame that is not from echoes. The share
+            must be above 0.
         angular_frequency: Root mean square angular frequency of the remaining sound,
             rad/s.
 

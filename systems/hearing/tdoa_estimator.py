@@ -66,13 +66,15 @@ def robot_choice(
 
     Args:
         localiser: Localizer that ``robot_localiser`` returns.
-        robot: Distance of the control point P ahead of the axle.
+        robot: Parameters of the body. The function uses the distance of the control
+            point P ahead of the axle.
         p_PA_B: (2,) centroid of the microphones relative to P, in the axes of the body
             frame B, m.
         frame_s: Period of the audio frames, s.
 
     Returns:
-        The choice. Its first bearing is that of the localizer's parameters.
+        The choice. It starts with the bearing ``first_bearing_deg`` of the localizer's
+        parameters.
     """
     degrees = localiser.parameters.first_bearing_deg
     return SourceChoice(

@@ -358,8 +358,8 @@ def _define_for(law: Law, block_name: str) -> Any:
 
     {law.equations[0].title}: {equations}.
 
-    It is ``ImpedanceController`` with this law, and takes the same arguments but
-    ``law``. Its gains are ``{law.gains.__name__ if law.gains else None}``."""
+    The block is ``ImpedanceController`` with this law. It takes the same arguments,
+    except ``law``. Its gains are ``{law.gains.__name__ if law.gains else None}``."""
     return _define(law.controller_name, block_name, documentation, law=law)
 
 

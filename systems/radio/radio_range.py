@@ -78,11 +78,11 @@ def radio_range_step(
 
 
 class RadioRange(Block):
-    """Measures the level of the radio that the robot approaches.
+    """Measures the level of the radio signal from the robot that this robot approaches.
 
     The block measures a level every 0.1 s. The level is the sum of the path loss and a
     normally distributed error. The path loss depends on the distance between the
-    origins of the two robots.
+    origins of this robot and the other robot.
 
     The discrete state is the last measured level. There is no latency.
 

@@ -92,8 +92,9 @@ def carried_point(
 def foot_on_segment(a: Any, b: Any) -> Any:
     """Computes the point of a line segment that is nearest to the origin.
 
-    Eq. 14 of Han 2019 has a wrong sign and a singular slope. The equation also does not
-    limit the point to the segment. A point outside the segment would be in empty space.
+    The function does not use eq. 14 of Han 2019, which has a wrong sign and a singular
+    slope. This equation also does not limit the point to the segment, so that the point
+    could be in empty space.
 
     Args:
         a: Position (x, y) of one end, m; floats or AutoDiffXd.

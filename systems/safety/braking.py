@@ -329,9 +329,10 @@ def _keeps_off_moving(
 
     The result is true in two cases:
 
-    - No moving obstacle can be within ``keep_m`` of the position ``place`` after the
-      time ``ahead_s``.
-    - The robot withdraws from the end of the sensors' view.
+    - At the time ``ahead_s`` from now, no moving obstacle can be within ``keep_m`` of
+      the position ``place``.
+    - The robot moves away from the limit of the sensors' view. Obstacles that the
+      sensors do not see can be beyond this limit.
     """
     x, y = place
     speed = numbers.obstacle_speed_m_s

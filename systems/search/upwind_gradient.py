@@ -56,9 +56,10 @@ _CALM_STOPS = 3
 def upwind_angle(airflow: Any) -> float:
     """Computes the upwind direction from two sensors at 45 deg to the left and right.
 
-    If the readings are proportional to the cosine of the angle between wind and sensor,
-    the result is exact up to 39 deg. At larger angles, the result is 80 deg to the side
-    from which the wind comes.
+    Assume that each reading is proportional to the cosine of the angle between the wind
+    and the sensor. Then the result is exact if the upwind direction is at most 39 deg
+    from the heading. If the upwind direction is farther to one side, the result is a
+    fixed turn of 80 deg to that side.
 
     Args:
         airflow: (F1, F2), left and right reading.

@@ -366,9 +366,11 @@ def _inherit(
     candidate: NDArray[Any],
     settings: FilterSettings,
 ) -> tuple[Any, Any, int]:
-    """Continues the likelier of the histories that can lead to a hypothesis.
+    """Updates one of the two hypotheses of the filter with a sighting.
 
-    The hypotheses are that the source is ahead (0) or behind (1). If a sighting
+    The hypotheses are that the source is ahead (0) or behind (1). Each hypothesis may
+    follow from either of the two previous hypotheses. The function continues the
+    likelier of these two histories. If a sighting
     (estimate of the position) is an outlier to every history, it updates the track of
     the outliers. If there are enough consecutive outliers that agree, their track
     replaces the track of the hypothesis.

@@ -60,9 +60,9 @@ def sensitivity_sources(
 def advance_sensitivity(
     state: Any, begin: Any, source: Any, contacts: Any, gains: Any, numbers: Any
 ) -> None:
-    """Advances the sensitivities X_q to one gain q by one control period.
+    """Integrates the sensitivities X_q over one control period.
 
-    X_q consists of dp/dq and dv/dq, where p and v are the position and velocity of the
+    q is one gain of the law. X_q consists of dp/dq and dv/dq, where p and v are the position and velocity of the
     control point P. The equation is d/dt X_q = A X_q + source. It is eq. 34 of
     Engelbrecht 2021 with two corrections: the left side is a time derivative, and the
     right side contains the term A X_q.

@@ -112,7 +112,9 @@ def stiffness_bound(damping: float, of: SampledMass) -> float:
 
 
 def damping_bound(of: SampledMass) -> float:
-    """Computes the largest stable damping 2 M/T of a virtual mass M with the period T.
+    """Computes the largest stable damping of a virtual mass, 2 M/T.
+
+    M is the virtual mass, and T is the control period.
 
     With more damping, the velocity changes sign in every control period and grows.
 

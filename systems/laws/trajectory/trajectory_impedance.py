@@ -18,7 +18,8 @@ class ContactNumbers(NamedTuple):
     """Constants of the contact force.
 
     The laws of the package set both distances to S, the width of the security zone.
-    Different values correspond to other readings of the paper, see docs/errata.md.
+    Distances other than S correspond to other readings of the paper, which
+    docs/errata.md lists.
     """
 
     begins_m: float
