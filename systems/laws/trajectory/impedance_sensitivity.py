@@ -63,9 +63,9 @@ def advance_sensitivity(
     """Integrates the sensitivities X_q over one control period.
 
     q is one gain of the law. X_q consists of dp/dq and dv/dq, where p and v are the
-    position and velocity of the control point P. The equation is d/dt X_q = A X_q + source. It is eq. 34 of
-    Engelbrecht 2021 with two corrections: the left side is a time derivative, and the
-    right side contains the term A X_q.
+    position and velocity of the control point P. The equation is d/dt X_q = A X_q +
+    source. It is eq. 34 of Engelbrecht 2021 with two corrections: the left side is a
+    time derivative, and the right side contains the term A X_q.
 
     A is the exact linearization of the loop. S is the distance at which a contact
     begins, and d is the present distance. A contact has the stiffness K_e along the
