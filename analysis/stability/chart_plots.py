@@ -1,4 +1,4 @@
-"""Pictures of sampling and latency: charts, root loci, contact limits."""
+"""Figures of sampling and latency: stability charts, root loci, and contact limits."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ from analysis.linear.sampled_stability import PolesAgainstPeriod, StabilityChart
 from analysis.reporting.palette import COLOURS
 
 _LINES = ("#0072B2", "#D55E00", "#009E73", "#A8498A", "#7A5200")
-#: The mark of the scenario's own design.
+#: Marker of the values in the scenario.
 _CURRENT: dict[str, Any] = {"color": "#F0E442", "markeredgecolor": "black"}
-#: Exponents beyond these look alike in a chart, 1/s.
+#: Limits of the color scale for growth rates, 1/s.
 _SLOWEST, _FASTEST = -0.5, 0.5
 
 
 def plot_chart(chart: StabilityChart) -> Figure:
-    """Exponent of the slowest mode over two parameters, the current design marked."""
+    """Plots the growth rate of the slowest mode over two parameters.
+
+    A star marks the values of the scenario.
+    """
     figure = Figure(figsize=(6.4, 4.8), layout="constrained")
     axes = figure.subplots()
     shown = np.clip(chart.growth_per_s, _SLOWEST, _FASTEST)
@@ -54,7 +57,11 @@ def plot_chart(chart: StabilityChart) -> Figure:
 
 
 def plot_poles_against_period(found: PolesAgainstPeriod) -> Figure:
-    """Poles in the z plane, and the slowest mode's exponent, over the period."""
+    """Plots the poles and the growth rate of the slowest mode for many sample periods.
+
+    The left panel shows the poles in the z plane. The right panel shows the growth
+    rate.
+    """
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     angle = np.linspace(0.0, 2.0 * np.pi, 300)
@@ -84,7 +91,7 @@ def plot_poles_against_period(found: PolesAgainstPeriod) -> Figure:
 
 
 def plot_gap_chart(chart: GapChart) -> Figure:
-    """Largest multiplier of a cycle over the silence, for each hold."""
+    """Plots the largest multiplier of a burst cycle over the silence, for each hold."""
     figure = Figure(figsize=(6.8, 4.2), layout="constrained")
     axes = figure.subplots()
     styles = {"world": "-", "robot": "-", "motion": "--"}
@@ -106,7 +113,7 @@ def plot_gap_chart(chart: GapChart) -> Figure:
 
 
 def plot_contact_limits(limits: ContactLimits) -> Figure:
-    """Largest K_0 and k_ref over the motors' lag, for each latency."""
+    """Plots the largest stable K_0 and k_ref over the motor lag, for each latency."""
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")
     panels = (
         ("K_0 (N/m)", limits.stiffness_n_m, limits.stiffness_today_n_m),
@@ -141,7 +148,7 @@ def plot_contact_limits(limits: ContactLimits) -> Figure:
 
 
 def plot_root_loci(loci: Sequence[RootLocus]) -> Figure:
-    """Poles in the s plane, from a twentieth to twenty times the current gain."""
+    """Plots poles in the s plane for 0.05 to 20 times the current gain."""
     figure, cells = panels(len(loci), columns=2, size=(4.8, 3.8))
     for axes, locus in zip(cells, loci, strict=True):
         _root_locus(figure, axes, locus)
@@ -167,7 +174,7 @@ def _root_locus(figure: Figure, axes: Axes, locus: RootLocus) -> None:
 
 
 def plot_delay_check(check: DelayCheck) -> Figure:
-    """Simulated offsets with 0.95 and 1.05 of the delay margin."""
+    """Plots the simulated offsets for 0.95 and 1.05 times the delay margin."""
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     runs = (("0.95", check.below), ("1.05", check.above))
     for axes, (share, run) in zip(figure.subplots(1, 2), runs, strict=True):

@@ -1,4 +1,4 @@
-"""Which robot and which laws a report is of."""
+"""Choice of the robot and of the laws that a stability report covers."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ from systems.laws.catalogue import FORCE_LAWS, LAWS, ROUTE_LAWS
 
 
 def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...]:
-    """The same scenario under one law after the other.
+    """Returns copies of a scenario, each of which has one of the chosen laws.
 
     Args:
-        scenario: Any scenario.
-        names: Laws; ``all`` stands for those that avoid obstacles, or that drive on a
-            route; none at all: the scenario's own.
+        scenario: The scenario with any number of robots of which one is analyzed.
+        names: Names of the chosen laws. The name ``all`` means all force laws except
+            ``none``, or all route laws for a robot on a route. If the sequence is
+            empty, the only law is the law of the scenario.
 
     Returns:
-        One a law; a law that is named twice comes once.
+        One scenario per law, in the order of the names. If a law occurs more than once,
+        only the first occurrence counts.
 
     Raises:
-        InputError: There is no such law.
+        InputError: A law does not exist, or it cannot be analyzed for this robot.
     """
     routed = scenario.only.kind == "router"
     every = list(ROUTE_LAWS if routed else FORCE_LAWS)
@@ -58,18 +60,19 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
 
 
 def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
-    """The robot of a scenario that is analysed, alone with what it follows.
+    """Returns a scenario with only the robot that is analyzed and what it follows.
 
     Args:
         scenario: Any scenario.
-        name: Of the robot; none: the first one.
+        name: Name of the robot. If the name is None, the first robot is analyzed.
 
     Returns:
-        The scenario as if it were alone, and a line that says so; the line is empty
-        where there are no others.
+        The first value is the scenario without all other robots. The second value is a
+        sentence that lists the removed robots. If the scenario has only one robot, this
+        sentence is empty.
 
     Raises:
-        InputError: There is no such robot.
+        InputError: The scenario has no robot with this name.
     """
     names = list(scenario.robots)
     if name is not None and name not in names:

@@ -48,49 +48,58 @@ from analysis.stability.recommended_gains import (
     recommend_gains,
 )
 
-#: Length of the runs that check delay margins in a short and a full report, s.
+#: Duration of the runs that check delay margins, s, in a short and in a full report.
 _CHECK_S = (60.0, 300.0)
-#: Simulated cycles of the sound, as above.
+#: Number of simulated burst cycles in a short and in a full report.
 _CYCLES = (20, 40)
 
 
 @dataclass(frozen=True)
 class SampledLoop:
-    """Poles over a tick, and the delay that the loop stands."""
+    """Poles and delay margins of the sampled loop."""
 
     period_s: float
     poles: NDArray[np.complex128]
-    """z plane, of P's motion."""
+    """(n,) poles of the motion of the control point P, z plane."""
     margins: tuple[DelayMargin, ...]
-    """At sensor and wheels, along and across, where there is such a loop."""
+    """One delay margin for each place (sensor, wheels) and direction (along, across)
+    that has a loop."""
     check: DelayCheck | None
-    """Simulation beside the margin at the sensor; none: it is infinite."""
+    """Simulations on both sides of the delay margin at the sensor. None if this margin
+    is infinite."""
 
     @property
     def delay_margin_s(self) -> float:
-        """Of the motion along the line to the source, late at the sensor, s."""
+        """Delay margin at the sensor for motion along the line to the source, s."""
         found = [m for m in self.margins if (m.at, m.direction) == ("sensor", "along")]
         return found[0].delay_s if found else float("inf")
 
 
 @dataclass(frozen=True)
 class BurstCycles:
-    """The burst cycle with each way to hold the target."""
+    """Stability over one burst cycle, for each way to hold the target in the silence.
+
+    A burst is the interval in which the source sounds. A burst cycle consists of one
+    burst and the silence after it.
+    """
 
     today: str
-    """``tracker.hold`` of the scenario."""
+    """Hold of the scenario, ``tracker.hold``."""
     cycles: tuple[BurstCycle, ...]
     runs: tuple[BurstRun, ...]
-    """Simulated, in the same order."""
+    """One simulated run per entry of ``cycles``, in the same order."""
     gaps: GapChart
-    """Against the length of the silence."""
+    """Largest multipliers over the duration of the silence."""
 
 
 def sampling_parts(*, full: bool) -> tuple[Part, ...]:
-    """Delay margins, burst cycle, charts over gains and period, contact mode.
+    """Returns the parts about sampling, delays, the burst cycle, and contact.
 
     Args:
-        full: Whether runs that check are long.
+        full: Whether the simulations that check the results are long.
+
+    Returns:
+        Five parts, in the order of the report.
     """
     duration_s, cycles = _CHECK_S[full], _CYCLES[full]
     return (
@@ -235,7 +244,10 @@ def _burst_document(data: BurstCycles) -> dict[str, Any]:
 
 
 def _slowest(multipliers: NDArray[np.complex128]) -> Sequence[complex]:
-    """One of each pair, largest first, of those that count."""
+    """Returns up to four multipliers, largest first, and one of each conjugate pair.
+
+    Multipliers of at most 1e-3 are left out.
+    """
     found = [complex(m) for m in multipliers if m.imag >= 0.0 and abs(m) > 1e-3]
     return found[:4]
 
@@ -273,10 +285,10 @@ def _render_bursts(data: BurstCycles, name: str) -> list[str]:
 
 @dataclass(frozen=True)
 class SamplingCharts:
-    """How sampling, gains and delay decide, with the current design marked."""
+    """Stability over sample period, gains, and delay, with the scenario marked."""
 
     conditions: tuple[ConditionCheck, ...]
-    """Closed forms of the sampled double integrator."""
+    """Closed-form stability conditions of the sampled double integrator."""
     period: PolesAgainstPeriod
     charts: tuple[StabilityChart, ...]
 
@@ -382,7 +394,7 @@ def _render_contact(data: ContactLimits, name: str) -> list[str]:
 
 
 def gain_parts() -> tuple[Part, ...]:
-    """Gains that meet the usual thresholds, and what they cost."""
+    """Returns the part that recommends gains and states what these gains cost."""
     return (
         Part(
             "recommended_gains",

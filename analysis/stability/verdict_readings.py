@@ -1,6 +1,7 @@
-"""What the verdicts of the stability report ask, and the numbers that they are about.
+"""The criteria of the stability report, and functions that read their numbers.
 
-Each reading takes the study and returns a number, or says why there is none.
+Each reading function takes a study and returns a number. If the study has no such
+number, the function returns the reason as a text.
 """
 
 from __future__ import annotations
@@ -15,14 +16,17 @@ from analysis.stability.law_analysis import Study
 from analysis.stability.margin_parts import Margins, least_damped
 from analysis.stability.verdicts import YES_OR_NO, Criterion
 
-#: A number, or why there is none.
+#: A number, or a text with the reason why the number does not exist.
 Reading = float | str
 
 
 def _of(
     key: str, missing: str, number: Callable[[Any], float | None]
 ) -> Callable[[Study], Reading]:
-    """Reads a number from a part's data; ``missing`` says why there is none."""
+    """Returns a function that reads a number from the data of one part of the report.
+
+    If the part has no data or no such number, that function returns ``missing``.
+    """
 
     def read(study: Study) -> Reading:
         data = study.found.get(key)
@@ -37,25 +41,31 @@ def _at(study: Study) -> Any:
 
 
 def read_decay(study: Study) -> Reading:
-    """Growth of the slowest motion about rest, 1/s."""
+    """Returns the growth rate of the slowest motion about the point of rest, 1/s."""
     return float(_at(study).eigenvalues.real.max())
 
 
 def read_damping(study: Study) -> Reading:
-    """Damping ratio of the least damped slow mode."""
+    """Returns the damping ratio of the least damped slow mode."""
     pole = least_damped(_at(study).eigenvalues)
     return -pole.real / abs(pole)
 
 
 def read_worst_margin(name: str, *, largest: bool) -> Callable[[Study], Reading]:
-    """The worst of a margin over all cuts and directions.
+    """Makes a function that reads the worst value of one margin from a study.
+
+    The worst value is taken over all places where the loop is cut and over both
+    directions of motion.
 
     Args:
-        name: Field of ``LoopMargins``, or ``disk``.
-        largest: Whether the largest is the worst.
+        name: Name of a field of ``LoopMargins``, or ``disk`` for the size of the disk
+            margin.
+        largest: Whether the largest value is the worst value. Otherwise, the smallest
+            value is the worst value.
 
     Returns:
-        Reads it from a study, in the unit of the field; a text says why there is none.
+        A function of the study. The function returns the worst value in the unit of the
+        field. If no margins were computed, the function returns the reason as a text.
     """
 
     def read(study: Study) -> Reading:
@@ -71,13 +81,13 @@ def read_worst_margin(name: str, *, largest: bool) -> Callable[[Study], Reading]
     return read
 
 
-#: Least exact delay margin, s.
+#: Reads the least exact delay margin, s.
 read_delay = _of(
     "sampled",
     "delay margins were not computed",
     lambda data: min((m.delay_s for m in data.margins), default=None),
 )
-#: Largest multiplier of the burst cycle with the current hold.
+#: Reads the largest multiplier of the burst cycle with the hold of the scenario.
 read_cycle = _of(
     "burst_cycle",
     "the burst cycle was not computed",
@@ -86,9 +96,11 @@ read_cycle = _of(
 
 
 def read_jams(study: Study) -> Reading:
-    """Sinks and attractive switching points outside the goal.
+    """Counts the places outside the goal where the robot can get stuck.
 
-    A run that ends there is stuck or out of time.
+    Such a place is a stable equilibrium or an attractive switching point. A switching
+    point is a point at which several bodies are equally near. A run that ends at such a
+    place has the outcome "stuck" or "timeout".
     """
     search, scenario = study.need("equilibria").search, study.scenario
     margin = scenario.goal_radius_m - scenario.follower.attraction.follow_distance_m
@@ -102,19 +114,22 @@ def read_jams(study: Study) -> Reading:
 
 
 def read_offset(study: Study) -> Reading:
-    """Distance from the follow point at rest, m."""
+    """Returns the distance between the point of rest and the follow point, m."""
     return round(abs(float(_at(study).offset_m)), 9)
 
 
 def read_contact(study: Study, ticks: int) -> Reading:
-    """Growth of the contact mode at the law's largest slope, 1/s.
+    """Returns the growth rate of the motion in front of an obstacle, 1/s.
+
+    The slope of the force is the largest slope of the law.
 
     Args:
-        study: Has the scenario.
-        ticks: Age of the position that the springs act on, periods.
+        study: The study, of which only the scenario is used.
+        ticks: Age of the position on which the springs act, in control periods.
 
     Returns:
-        1/s, negative where it decays; a text says why there is none.
+        The growth rate in 1/s. The rate is negative if the motion decays. If the law
+        does not push away from obstacles, the result is a text that says so.
     """
     scenario = study.scenario
     stiffness = law_stiffness(scenario)
@@ -126,7 +141,10 @@ def read_contact(study: Study, ticks: int) -> Reading:
 
 
 def read_worst_case(key: str) -> Callable[[Study], Reading]:
-    """Growth in the worst case of a robustness part, 1/s."""
+    """Makes a function that reads the growth rate in the worst case of a part, 1/s.
+
+    The part ``key`` is one of the two parts about uncertain parameters.
+    """
 
     def read(study: Study) -> Reading:
         data = study.found.get(key)
@@ -138,7 +156,11 @@ def read_worst_case(key: str) -> Callable[[Study], Reading]:
 
 
 def read_passive(study: Study) -> Reading:
-    """Largest power of the velocity term over that of D_r."""
+    """Returns how much energy the velocity term can add, relative to the damping D_r.
+
+    The result is the largest power of the velocity term divided by the power that D_r
+    takes at the same speed. A value of at most 1 means that the loop is passive.
+    """
     data = study.found.get("energy_balance")
     if not data:
         return "the law has no radial force"
@@ -150,7 +172,11 @@ def read_passive(study: Study) -> Reading:
 
 
 def read_start(study: Study) -> Reading:
-    """1 where no path that the energy allows leads from the start to contact."""
+    """Returns 1 if the energy certificate covers the start, and 0 otherwise.
+
+    The certificate covers the start if the energy at the start is too low for every
+    path to contact with an obstacle.
+    """
     data = study.found.get("certificates")
     if not data:
         return "there is no energy certificate"
@@ -160,17 +186,19 @@ def read_start(study: Study) -> Reading:
     return float(certified)
 
 
-#: Collisions of simulated certified starts.
+#: Reads the number of simulated runs that start in the certified set and collide.
 read_trials = _of(
     "certificates",
     "no certificate",
     lambda data: data[0].trials.inside_collisions,
 )
-#: Largest difference of the two one-period matrices.
+#: Reads the largest difference between the two computations of the one-period
+#: matrix.
 read_routes = _of(
     "linear_models", "no linear models", lambda data: data.routes.matrix_difference
 )
-#: Error of frequency or damping of a small step, per cent.
+#: Reads the error of the predicted frequency or damping of a small step, whichever
+#: is larger, in percent.
 read_prediction = _of(
     "step",
     "no step was simulated",
@@ -181,7 +209,7 @@ _MARGINS = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
 _SENSITIVITY = "usual: M_s of 1.2 to 2.0 (Astrom and Murray)"
 _OURS = "set by this project"
 
-#: What is asked, and what is read for it.
+#: The criteria, each with the function that reads its number.
 CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
     Criterion(
         "growth at rest", "1/s", "below", 0.0,

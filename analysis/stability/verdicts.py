@@ -1,4 +1,4 @@
-"""Numbers against thresholds: pass, fail, or not applicable, in plain words."""
+"""Verdicts on numbers: pass, fail, or not applicable, with a text in plain words."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-#: Unit of what is true or not: 1 or 0.
+#: Unit of a number that is 1 for true and 0 for false.
 YES_OR_NO = "yes or no"
 
 Judgement = Literal["pass", "fail", "not applicable"]
@@ -14,29 +14,29 @@ Judgement = Literal["pass", "fail", "not applicable"]
 
 @dataclass(frozen=True)
 class Criterion:
-    """What is asked of a number."""
+    """A criterion compares a number with a threshold."""
 
     name: str
     unit: str
     sense: Literal["at least", "above", "at most", "below"]
     limit: float
     good: str
-    """What it means that the number meets the limit; a clause."""
+    """What follows if the number meets the threshold; a clause."""
     bad: str
-    """What it means that it does not; a clause."""
+    """What follows if the number does not meet the threshold; a clause."""
     source: str
-    """Where the limit comes from."""
+    """Where the threshold comes from."""
 
     @property
     def threshold(self) -> str:
-        """In signs, with the unit."""
+        """The threshold as text, with its sign and unit."""
         if self.unit == YES_OR_NO:
             return "yes"
         sign = {"at least": "\u2265", "above": ">", "at most": "\u2264", "below": "<"}
         return f"{sign[self.sense]} {self.limit:.4g} {self.unit}".rstrip()
 
     def met_by(self, value: float) -> bool:
-        """Whether a number meets the limit; an infinite one may."""
+        """Returns whether a number meets the threshold; the number may be infinite."""
         return {
             "at least": value >= self.limit,
             "above": value > self.limit,
@@ -47,23 +47,23 @@ class Criterion:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A number, its threshold, and what follows."""
+    """The verdict on one number."""
 
     name: str
     value: float | None
-    """None where there is no such number."""
+    """The number, or None if it does not exist."""
     unit: str
     threshold: str
     verdict: Judgement
     text: str
-    """In plain words."""
+    """The verdict in plain words."""
     source: str
-    """Of the threshold."""
+    """Where the threshold comes from."""
 
 
 @dataclass(frozen=True)
 class VerdictRow:
-    """One criterion, law by law."""
+    """The verdicts of all laws on one criterion."""
 
     name: str
     unit: str
@@ -71,18 +71,19 @@ class VerdictRow:
     values: dict[str, float | None]
     verdicts: dict[str, Judgement]
     text: str
-    """In plain words, laws of the same verdict together."""
+    """The verdicts in plain words. Laws with the same text share one sentence."""
 
 
 def shown_value(value: float | None, unit: str) -> float | str | None:
-    """What a table shows of a number: yes or no, where it stands for that.
+    """Returns a value in the form in which a table shows it.
 
     Args:
-        value: Of a verdict.
-        unit: Its unit.
+        value: Value of a verdict, or None if it does not exist.
+        unit: Unit of the value.
 
     Returns:
-        The number, a word, or None where there is none.
+        The word "yes" or "no" if the unit is ``YES_OR_NO``. Otherwise, the value
+        itself. None if the value does not exist.
     """
     if value is None or unit != YES_OR_NO:
         return value
@@ -90,15 +91,15 @@ def shown_value(value: float | None, unit: str) -> float | str | None:
 
 
 def judge(criterion: Criterion, value: float | None, reason: str = "") -> Verdict:
-    """Holds a number against a criterion.
+    """Compares a number with the threshold of a criterion.
 
     Args:
-        criterion: What is asked.
-        value: The number; none where there is none.
-        reason: Why there is none; a clause.
+        criterion: The criterion with the threshold.
+        value: The number, or None if it does not exist.
+        reason: Why the number does not exist; a clause.
 
     Returns:
-        Pass, fail or not applicable, with a text.
+        A verdict (pass, fail, or not applicable) with a text.
     """
     if value is None:
         verdict: Judgement = "not applicable"
@@ -121,7 +122,7 @@ def judge(criterion: Criterion, value: float | None, reason: str = "") -> Verdic
 def compare_verdicts(
     by_law: dict[str, Sequence[Verdict]],
 ) -> tuple[VerdictRow, ...]:
-    """The same criteria side by side, in the order of the first law's."""
+    """Puts the verdicts of several laws side by side, in the order of the first law."""
     laws = list(by_law)
     rows = []
     for first in by_law[laws[0]]:
@@ -143,7 +144,7 @@ def compare_verdicts(
 
 
 def _together(found: dict[str, Verdict]) -> str:
-    """Laws with one text before it, group by group."""
+    """Joins the texts of all laws. Laws with the same text share one sentence."""
     groups: dict[str, list[str]] = {}
     for law, verdict in found.items():
         groups.setdefault(verdict.text, []).append(law)
