@@ -1,1 +1,1 @@
-"""Gains from requirements."""
+"""Design of gains from requirements."""

@@ -1,7 +1,6 @@
-"""From requirements to K_r, D_r and the follow distance.
+"""Search for K_r, D_r, and the follow distance that meet given requirements.
 
-The printed K_r = 2, D_r = 1 are kept as defaults; these are the gains that
-would follow from the requirements as well.
+The default gains stay K_r = 2 N/m and D_r = 1 N s/m, as printed in the papers.
 """
 
 from __future__ import annotations
@@ -21,34 +20,42 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.parameters import AttractionParameters
 
-#: K_r that are tried, N/m.
+#: Least and largest K_r of the search, N/m.
 _STIFFNESSES_N_M = (0.5, 40.0)
-#: The follow distance is rounded up to this, m.
+#: The follow distance is rounded up to a multiple of this step, m.
 _STEP_M = 0.05
-#: A source so far away that P reaches top speed, and a follow distance so large
-#: that it stops before the source, m.
+#: The first number is the distance of a source so far away that P reaches top speed,
+#: m.
+#: The second number is a follow distance so large that P stops in front of the
+#: source, m.
 _APPROACH_M, _STAND_OFF_M = 8.0, 3.0
-#: Laws whose offset the follow distance has to allow for.
+#: Laws whose push at rest the follow distance must allow for.
 _FOLLOWING_LAWS = tuple(
     law for law, tuning in DESIGNED_LAWS.items() if tuning.sets_follow_distance
 )
 
 
 def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
-    """The scenario with the attraction that the requirements give, and gains for it.
+    """Returns the scenario with the attraction and the gains that meet the requirements.
 
-    D_r/K_r follows from the lag behind a moving source, K_r from the damping
-    ratio, the follow distance from the overshoot and from the offsets.
+    The attraction follows from the requirements in three steps:
+
+    - The ratio D_r/K_r follows from the largest lag behind a moving source. This lag is
+      the goal margin.
+    - K_r follows from the damping ratio.
+    - The follow distance follows from the overshoot and from the offsets at rest.
 
     Args:
-        scenario: Robot, plant, source, sensors and laws.
-        requirements: What is to be met.
+        scenario: The scenario with the robot, the plant, the source, the sensors, and
+            the laws.
+        requirements: Requirements that the result must meet.
 
     Returns:
-        A copy with K_r, D_r, follow distance and gains changed.
+        A copy of the scenario with new K_r, D_r, follow distance, and gains of the
+        laws.
 
     Raises:
-        InputError: Nothing meets the requirements.
+        InputError: No gains meet the requirements.
     """
     time = scenario.stop.goal_margin_m / scenario.source.speed_m_s
 
@@ -85,7 +92,7 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
 
 
 def _with_reserve(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
-    """The scenario with a goal that is smaller by the reserve."""
+    """Returns the scenario with a goal margin that is smaller by the reserve."""
     margin = scenario.stop.goal_margin_m - requirements.offset_reserve_m
     if margin <= 0.0:
         raise InputError(
@@ -99,9 +106,10 @@ def _with_reserve(scenario: Scenario, requirements: DesignRequirements) -> Scena
 
 
 def attraction_damping_ratio(scenario: Scenario) -> float:
-    """Least damping ratio of the loop to the follow point, along the robot.
+    """Returns the least damping ratio of the loop to the follow point.
 
-    Sampled, with the motors' lag; no obstacle.
+    The loop is sampled and has the motor lag. The motion is along the axis of the
+    robot, and there is no obstacle.
     """
     z = np.linalg.eigvals(
         contact_matrix(scenario, scenario.follower.attraction.stiffness_n_m)
@@ -111,16 +119,21 @@ def attraction_damping_ratio(scenario: Scenario) -> float:
 
 
 def following_lag(scenario: Scenario) -> float:
-    """How far P follows behind the follow point of a moving source, D_r v/K_r, m."""
+    """Returns the distance of P behind the follow point of a moving source, m.
+
+    P is the control point of the robot, ahead of the axle. The distance is D_r v/K_r,
+    where v is the speed of the source.
+    """
     attraction = scenario.follower.attraction
     time = attraction.damping_n_s_m / attraction.stiffness_n_m
     return time * scenario.source.speed_m_s
 
 
 def braking_overshoot(scenario: Scenario) -> float:
-    """How far P runs past the follow point of a resting source, m.
+    """Returns how far P overshoots the follow point of a source at rest, m.
 
-    P comes at top speed; no obstacle, exact hearing, no avoidance.
+    P is the control point of the robot, ahead of the axle. A simulation gives the
+    overshoot. P approaches at top speed, with exact hearing, no obstacle, and no law.
     """
     changes = {
         "law": "none",
@@ -137,15 +150,16 @@ def braking_overshoot(scenario: Scenario) -> float:
 def follow_distance(
     scenario: Scenario, requirements: DesignRequirements, overshoot_m: float
 ) -> float:
-    """Least follow distance with room for an overshoot, m, rounded up to 5 cm.
+    """Returns the least follow distance that leaves room for an overshoot.
 
     Args:
-        scenario: Length of the master robot.
-        requirements: The clearance that is to be left.
-        overshoot_m: Of P beyond the follow point, m.
+        scenario: The scenario with the length of the leader. The leader is the robot
+            that carries the source.
+        requirements: The requirements with the clearance to the body of the leader.
+        overshoot_m: Overshoot of the control point P beyond the follow point, m.
 
     Returns:
-        Distance from P to the source, m.
+        The distance from P to the source, m, rounded up to 5 cm.
     """
     room = scenario.source.length_m / 2.0 + requirements.clearance_m
     least = overshoot_m + room
@@ -153,15 +167,15 @@ def follow_distance(
 
 
 def with_attraction(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
-    """The same scenario with another spring and damper to the source.
+    """Returns a copy of a scenario with another K_r and D_r.
 
     Args:
-        scenario: It stays as it is.
-        K_r: N/m.
-        D_r: N s/m.
+        scenario: The scenario, which stays unchanged.
+        K_r: Stiffness of the spring to the follow point, N/m.
+        D_r: Damping, N s/m.
 
     Returns:
-        A copy.
+        The copy with the new gains.
     """
     attraction = AttractionParameters.model_validate(
         scenario.follower.attraction.model_dump()

@@ -1,4 +1,4 @@
-"""Picture of the design: pushes against the pull, and barrier against contact."""
+"""Figure of the design: the pushes against the pull, and stiffness limits in contact."""
 
 from __future__ import annotations
 
@@ -11,18 +11,27 @@ from analysis.laws.law_curves_plots import LAW_STYLES
 from analysis.laws.push_and_pull import DESIGNED_LAWS, spring, stiffest
 from analysis.linear.contact_mode import largest_contact_stiffness
 
-#: Damping that is drawn, N s/m, and the stiffest push, N/m.
+#: Values of D_r on the axis of the right panel, N s/m.
 _DAMPING_N_S_M = np.linspace(0.2, 2.0, 37)
+#: Largest stiffness on the axis of the right panel, N/m.
 _STIFFNESS_N_M = 30.0
-#: Distances that are drawn, m.
+#: Distances of the obstacle on the axis of the left panel, m.
 _DISTANCE_M = np.linspace(0.005, 1.2, 240)
 
 
 def plot_design(study: DesignStudy) -> Figure:
-    """Left: each push less the pull, shaded where it stops P. Right: the conflict.
+    """Plots the forces of the laws, and the stiffness that contact allows.
+
+    The left panel shows the push of each law and the pull of the attraction over the
+    distance of an obstacle. Shaded areas show where the push exceeds the pull and stops
+    the robot. The right panel shows the stiffness of each law and the stiffness limits
+    for a stable contact over D_r.
 
     Args:
-        study: See ``study_design``; drawn for its attraction as it is.
+        study: The result of ``study_design``. The figure is for its current attraction.
+
+    Returns:
+        The figure with two panels.
     """
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
     balance, conflict = figure.subplots(1, 2)

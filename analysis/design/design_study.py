@@ -1,4 +1,4 @@
-"""The whole design: gains for the attraction as it is, and the one recommended."""
+"""The complete design: gains for the current and for the recommended attraction."""
 
 from __future__ import annotations
 
@@ -30,68 +30,72 @@ from analysis.laws.push_and_pull import (
 from analysis.linear.contact_mode import largest_contact_stiffness
 from diagrams.scenario.scenario import Scenario
 
-#: Distances from obstacle to rest for the table of barriers, m.
+#: Distances from the obstacle to the point of rest in the table of barriers, m.
 _TO_GO_M = (1.0, 1.5, 2.0, 3.0)
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """An attraction, and the gains of the laws that go with it."""
+    """An attraction with its performance figures and with the gains of the laws."""
 
     scenario: Scenario
-    """With these gains."""
+    """Scenario with this attraction and these gains."""
     damping_ratio: float
-    """Of the loop to the follow point."""
+    """Damping ratio of the loop to the follow point."""
     following_lag_m: float
-    """Behind the follow point of a moving source, m."""
+    """Distance of the control point P behind the follow point of a moving source, m."""
     overshoot_m: float
-    """Past the follow point of a resting source, coming at top speed, m."""
+    """Overshoot of P past the follow point of a source at rest after an approach at top
+    speed, m."""
     follow_distance_m: float
-    """Least follow distance with room for that, m."""
+    """Least follow distance that leaves room for the overshoot, m."""
     metres_to_go: float
-    """From an obstacle within reach to where the attraction rests, m."""
+    """Distance from an obstacle within reach to the point where the attraction rests,
+    m."""
     allowed_stiffness_n_m: float
-    """Stiffest push that is stable in contact, with spare latency, N/m."""
+    """Largest stiffness of a push that is stable in contact with late echoes, N/m."""
     laws: tuple[LawDesign, ...]
     jams: tuple[JamRuns, ...]
-    """Runs before the two obstacles."""
+    """Simulated runs toward two obstacles, one entry per law."""
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the figures and the attraction for the JSON document."""
         figures = {k: v for k, v in vars(self).items() if k != "scenario"}
         return {"attraction": self.scenario.follower.attraction, **figures}
 
 
 @dataclass(frozen=True)
 class BarrierRow:
-    """K_0 of the conventional law for a target so far behind the obstacle."""
+    """K_0 of the conventional law that stops P, for one position of the target."""
 
     metres_to_go: float
+    """Distance of the point of rest behind the obstacle, m."""
     stiffness_n_m: float
-    """With speed limited all the way, N/m."""
+    """K_0 if the speed is limited during the whole approach, N/m."""
     stiffness_from_reach_n_m: float
-    """Without that limit within rho_0, N/m."""
+    """K_0 if the speed is not limited within the reach rho_0 of the law, N/m."""
 
 
 @dataclass(frozen=True)
 class DesignStudy:
-    """What ``phonotaxis design`` finds."""
+    """The result of ``phonotaxis design``."""
 
     requirements: DesignRequirements
     kinetic_energy_j: float
-    """At top speed, J."""
+    """Kinetic energy of the virtual mass at top speed, J."""
     barriers: tuple[BarrierRow, ...]
     contact_limits_n_m: tuple[float, ...]
-    """Stiffest push at 0, 1, 2 and 4 periods of latency, N/m."""
+    """Largest stiffness of a push that is stable with echoes 0, 1, 2, and 4 ticks late,
+    N/m."""
     today: Alternative
-    """The scenario's attraction."""
+    """The attraction of the scenario."""
     recommended: Alternative
-    """The attraction that the requirements give."""
+    """The attraction that meets the requirements."""
 
 
-#: Latencies of ``DesignStudy.contact_limits_n_m``, periods.
+#: Latencies for ``DesignStudy.contact_limits_n_m``, in control periods.
 _TICKS = (0, 1, 2, 4)
-#: Runs of a whole study, for progress.
+#: Number of simulated runs in a complete study.
 STUDY_RUNS = 2 * len(DESIGNED_LAWS) * len(JAM_STARTS_M)
 
 
@@ -101,19 +105,23 @@ def study_design(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> DesignStudy:
-    """Chooses gains for a scenario's attraction and robot, and recommends others.
+    """Chooses gains for the attraction of a scenario, and recommends another attraction.
 
     Args:
-        scenario: Its gains give reaches and limits of speed only.
-        requirements: Bounds.
-        progress: Called with the number of simulated runs, of ``STUDY_RUNS``.
+        scenario: The scenario with the attraction and the robot. Of the gains of the
+            laws, only the reaches and the speed limits are used.
+        requirements: Requirements that the gains must meet. None means the default
+            requirements.
+        progress: Function that is called with the number of finished runs. There are
+            ``STUDY_RUNS`` runs.
 
     Returns:
-        Gains for today's attraction and for the recommended one, and what they achieve.
+        The gains and their performance figures, for the current attraction and for the
+        recommended attraction.
 
     Raises:
-        InputError: There are several robots, or nothing meets a requirement that has
-            to be met.
+        InputError: There are several robots, or no gains meet a requirement that must
+            be met.
     """
     scenario.require_one_robot("a design of gains")
     requirements = requirements or DesignRequirements()

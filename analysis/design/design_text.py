@@ -1,4 +1,4 @@
-"""The design as tables on a terminal, and as files."""
+"""The design as tables for a terminal, and as files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from diagrams import dump_scenario
 
 
 def design_text(study: DesignStudy) -> str:
-    """What was asked for, what was found, and what gives."""
+    """Returns the results of the design as text for a terminal.
+
+    The text has the requirements, the gains that were found, and whether the gains meet
+    the requirements.
+    """
     lines = [
         f"kinetic energy at top speed {study.kinetic_energy_j:.3f} J",
         "",
@@ -70,14 +74,14 @@ def _check_text(check: Check) -> str:
 
 
 def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
-    """The JSON document of the study.
+    """Returns the JSON document of the design.
 
     Args:
-        study: What was found.
-        out: The result directory, to be named.
+        study: The result of the design.
+        out: The result directory, whose name is written into the document.
 
     Returns:
-        Plain values, to be written as JSON.
+        Plain values that can be written as JSON.
     """
     return {
         "schema_version": SCHEMA_VERSION,
@@ -89,12 +93,18 @@ def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
 
 
 def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -> None:
-    """``summary.json``, both scenarios, ``design.png`` and ``law_curves.png``.
+    """Writes the files of a design into a directory.
+
+    - ``summary.json`` is the JSON document.
+    - ``scenario.yaml`` is the scenario with gains for the current attraction.
+    - ``recommended.yaml`` is the scenario with the recommended attraction.
+    - ``design.png`` shows the push and the pull.
+    - ``law_curves.png`` shows the forces of the laws.
 
     Args:
-        study: What was found.
-        summary: From ``design_summary``.
-        directory: Exists.
+        study: The result of the design.
+        summary: The JSON document from ``design_summary``.
+        directory: An existing directory.
     """
     from analysis.design.design_plots import plot_design
     from analysis.laws.law_curves import law_curves

@@ -1,7 +1,7 @@
-"""From requirements to gains: K_0, k_ref, D_0, d_ref of each law, and K_r, D_r, d_f.
+"""Search for the gains of each law (K_0, k_ref, D_0, d_ref) that meet requirements.
 
-Where requirements exclude each other, what comes first holds: the barrier
-before the contact, the contact before the offset. docs/avoidance.md explains.
+If requirements exclude each other, the first one in this order has priority: the
+barrier, the contact, the offset. docs/avoidance.md explains the requirements.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ from systems.framework.input_error import InputError
 from systems.laws.active import matched_share
 from systems.laws.catalogue import LAWS
 
-#: Gains are rounded to so many figures.
+#: Gains are rounded to this number of significant figures.
 _FIGURES = 3
-#: Springs that are tried, N/m or N m.
+#: Least and largest spring gain of the search, N/m or N m.
 _GAINS = (1e-3, 1e5)
-#: Decay lengths that are tried by the rule ``matched``, m.
+#: Least and largest decay length of the search by the rule ``matched``, m.
 _ALPHAS_M = (0.05, 1.0)
 
 
 def search_gains(scenario: Scenario, requirements: DesignRequirements) -> LawGains:
-    """The gains that the requirements give to each law.
+    """Finds the gains of each law that meet the requirements.
 
     Args:
-        scenario: Reaches, limits of speed and saturations are its, as are the
-            attraction, the robot and the sensors.
-        requirements: What the gains must achieve.
+        scenario: The scenario with the attraction, the robot, and the sensors. The
+            reaches, speed limits, and saturations of its laws are also used.
+        requirements: Requirements that the gains must meet.
 
     Returns:
-        The scenario's parameters with the gains that were found.
+        The law parameters of the scenario, with the gains that were found.
 
     Raises:
-        InputError: No gain meets a requirement that has to be met.
+        InputError: No gain meets a requirement that must be met.
     """
     for law, tuning in DESIGNED_LAWS.items():
         scenario = _RULES[tuning.rule](scenario, law, requirements)
@@ -68,20 +68,24 @@ def gain_for_barrier(
     requirements: DesignRequirements,
     **also: float,
 ) -> float:
-    """The value of a gain with which the barrier is just met.
+    """Returns the value of a gain with which a law just meets the required barrier.
+
+    The barrier is the energy that the push of the law takes from the robot during an
+    approach. The barrier must be equal to the kinetic energy at top speed.
 
     Args:
-        scenario: Everything else.
-        law: Whose gain.
-        field: The gain, N/m or N m; the push is proportional to it.
-        requirements: See ``DesignRequirements``.
-        also: Further gains as multiples of this one.
+        scenario: The scenario with all other values.
+        law: The law that has the gain.
+        field: Name of the gain, in N/m or N m. The push must be proportional to the
+            gain.
+        requirements: The requirements with the largest distance of the source.
+        **also: Other gains of the law, as multiples of this gain.
 
     Returns:
-        In the unit of the field.
+        The gain in the unit of its field.
 
     Raises:
-        InputError: No gain in a sensible range meets it.
+        InputError: No gain from 1e-3 to 1e5 meets the required barrier.
     """
     to_go, energy = metres_to_go(scenario, requirements), kinetic_energy(scenario)
 
@@ -98,7 +102,10 @@ def gain_for_barrier(
 def _barrier_gains(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> Scenario:
-    """The spring from the barrier, the damper from the energy put back."""
+    """Derives the spring gain from the barrier, and the damper gain from the energy.
+
+    The energy is the share of the dissipation that the velocity term may return.
+    """
     gains = LAWS[law].loop_gains
     assert gains is not None, f"{law} does not name the gains that tune it"
     spring_gain, damper_gain = gains
@@ -113,7 +120,7 @@ def _barrier_gains(
 def _matched_gains(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> Scenario:
-    """Both terms of the active law of 2019."""
+    """Derives the gains of both terms of the active law of 2019."""
     # A far echo meets the spring's tail as well: the second round knows it.
     for _ in range(2):
         scenario = _matched_damper(scenario, law, requirements)
@@ -121,14 +128,18 @@ def _matched_gains(
     return scenario
 
 
-#: By ``Tuning.rule``.
+#: Functions that derive the gains, by ``Tuning.rule``.
 _RULES = {"barrier": _barrier_gains, "matched": _matched_gains}
 
 
 def _matched_damper(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> Scenario:
-    """d_ref from the offset by a far echo, D_0 from the energy put back."""
+    """Derives the two gains of the velocity term of the active law of 2019.
+
+    The gain d_ref follows from the offset that a far echo causes. The gain D_0 follows
+    from the energy that the velocity term may return.
+    """
     far = scenario.follower.ultrasonic.maximum_range_m
     tail = spring(law, scenario)(far)
     at_rest = (
@@ -162,11 +173,13 @@ def _matched_damper(
 def _matched_spring(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> Scenario:
-    """k_ref from the barrier, alpha from offset and contact.
+    """Derives the two gains of the spring term of the active law of 2019.
 
-    The longer alpha, the softer the push and the farther it reaches. Of those
-    that meet the offset the longest is taken; where even that is too stiff
-    for the contact, the shortest that is not.
+    The gain k_ref follows from the barrier. The decay length alpha follows from the
+    offset at rest and from the contact. With a longer alpha, the push is softer and
+    reaches farther. The function takes the longest alpha that meets the offset. If the
+    push is then too stiff for a stable contact, the function takes the shortest alpha
+    with a stable contact.
     """
     reach = getattr(scenario.follower.laws, law).reach_m
     # Of the attraction alone: no alpha changes it.
@@ -214,7 +227,7 @@ def _root(
 
 
 def _rounded(value: float, *, up: bool = False) -> float:
-    """To three significant figures."""
+    """Rounds a value to three significant figures."""
     step = 10.0 ** (math.floor(math.log10(value)) + 1 - _FIGURES)
     steps = math.ceil(value / step - 1e-9) if up else round(value / step)
     return float(f"{steps * step:.12g}")

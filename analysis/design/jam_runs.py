@@ -1,4 +1,7 @@
-"""Whether a law jams before the two obstacles of the papers' experiment."""
+"""Simulated runs that show whether a law jams in front of two obstacles.
+
+The scenario is the experiment with two obstacles in the papers.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +14,21 @@ import numpy as np
 from diagrams import load_scenario, simulate
 from diagrams.scenario.scenario import Scenario
 
-#: Lateral offsets of the start, m: from before one obstacle to before the other.
+#: Lateral offsets of the start, m. At both ends, the robot starts in front of an
+#: obstacle.
 JAM_STARTS_M = tuple(np.linspace(-0.6, 0.6, 9).round(3).tolist())
 
 
 @dataclass(frozen=True)
 class JamRuns:
-    """How the runs of one law ended."""
+    """The outcomes of the runs of one law."""
 
     law: str
     causes: dict[str, int]
-    """Runs by cause."""
+    """Number of runs by outcome."""
     jams: int
-    """Runs that stopped or circled without ever having come into the goal."""
+    """Number of runs with the outcome "stuck" or "timeout" that never reached the
+    goal."""
 
 
 def jam_runs(
@@ -32,16 +37,19 @@ def jam_runs(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> list[JamRuns]:
-    """Runs ``two_static_obstacles`` with exact hearing and ultrasonic cones.
+    """Simulates the scenario ``two_static_obstacles`` for each law and each start.
+
+    The runs have exact hearing and ultrasonic cones.
 
     Args:
-        scenario: Its attraction, gains, tick and rates of sensors and
-            engine are used.
-        laws: As ``Scenario.law``.
-        progress: Called with the number of runs done.
+        scenario: The scenario with the attraction and the gains. Its tick, the frame
+            duration of its microphones, the period of its ultrasonic sensors, and its
+            engine are also used.
+        laws: Names of the laws.
+        progress: Function that is called with the number of finished runs.
 
     Returns:
-        One a law, in their order.
+        One entry per law, in the order of the laws.
     """
     settings = (
         f"tick_s={scenario.tick_s}",

@@ -1,4 +1,4 @@
-"""What the laws' gains must achieve, and how far a set of gains does."""
+"""Requirements on the gains of the laws, and checks of gains against them."""
 
 from __future__ import annotations
 
@@ -19,49 +19,50 @@ from analysis.linear.contact_mode import largest_contact_stiffness
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
-#: Gains are rounded; a bound holds to within the rounding.
+#: A gain may miss its requirement by this share, because gains are rounded.
 _ROUNDING = 0.01
-#: A figure that is off its bound by less is off by the rounding of floats alone.
+#: A figure may miss its bound by this share because of floating-point rounding.
 _EXACT = 1e-9
 
 
 @dataclass(frozen=True)
 class DesignRequirements:
-    """Bounds that the scenario does not say itself."""
+    """Requirements that a scenario does not contain."""
 
     source_range_m: float = 4.0
-    """The source is this far away at most, m: Han 2019, tables 1 and 2."""
+    """Largest distance of the source, m (Han 2019, tables 1 and 2)."""
     spare_latency_ticks: int = 1
-    """Periods by which echoes may be older than in the model, which leaves out
-    their travelling time, up to 18 ms."""
+    """Additional age of echoes in control periods with which contact must be stable.
+    The model leaves out the travel time of echoes, which is up to 18 ms."""
     far_offset_m: float = 0.03
-    """An echo at the sensors' limit may push a resting robot so far, m: what
-    hearing errs by at 1 m (Han 2019, tables 1 and 2)."""
+    """Largest offset that an echo at the largest sensor range may cause at rest, m. The
+    default is the error of hearing at 1 m (Han 2019, tables 1 and 2)."""
     injected_share: float = 0.8
-    """Share of D_r's dissipation that the velocity term may put back."""
+    """Largest share of the dissipation of D_r that the velocity term may return."""
     damping: float = 0.7
     """Least damping ratio of the loop to the follow point."""
     clearance_m: float = 0.25
-    """Room left to the master robot's body when P overshoots, m."""
+    """Least clearance between P and the body of the leader during an overshoot, m."""
     offset_reserve_m: float = 0.1
-    """Left of the goal by an attraction of one's own, m: cones and an oblique
-    approach add up to 6 cm to the offset, hearing errs by 2 to 7 cm at 1 m."""
+    """Part of the goal margin that the recommended attraction must leave unused, m.
+    Cones and an oblique approach add up to 6 cm to the offset. Hearing has errors of 2
+    to 7 cm at 1 m."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One requirement, and what was achieved."""
+    """One requirement, and the value that the gains achieve."""
 
     name: str
     value: float
     bound: float
     unit: str
     at_least: bool = False
-    """Whether the bound is a lower one."""
+    """Whether the bound is a lower bound."""
 
     @property
     def ratio(self) -> float:
-        """How well it is met: 1 is just."""
+        """How well the requirement is met. At 1, the requirement is just met."""
         good, bad = self.value, self.bound
         if not self.at_least:
             good, bad = bad, good
@@ -69,35 +70,35 @@ class Check:
 
     @property
     def met(self) -> bool:
-        """Whether it is."""
+        """Whether the requirement is met."""
         return self.ratio >= 1.0 - _EXACT
 
     @property
     def acceptable(self) -> bool:
-        """Whether it is met, to the rounding of the gains."""
+        """Whether the requirement is met, except for the rounding of gains."""
         return self.ratio >= 1.0 - _ROUNDING
 
 
 @dataclass(frozen=True)
 class LawDesign:
-    """A law's gains held against the requirements."""
+    """The gains of a law, and their checks against the requirements."""
 
     law: str
     gains: dict[str, float]
-    """Fields of the law's parameters."""
+    """Gains by field of the parameters of the law."""
     checks: tuple[Check, ...]
 
     def check(self, name: str) -> Check:
-        """One of the checks."""
+        """Returns the check with the given name."""
         return next(check for check in self.checks if check.name == name)
 
     @property
     def acceptable(self) -> bool:
-        """Whether every requirement is met, to the rounding of the gains."""
+        """Whether every requirement is met, except for the rounding of gains."""
         return all(check.acceptable for check in self.checks)
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the gains and the checks for the JSON document."""
         checks = [
             vars(c)
             | {name: getattr(c, name) for name in ("ratio", "met", "acceptable")}
@@ -107,15 +108,15 @@ class LawDesign:
 
 
 def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
-    """The same scenario with some gains of a law changed, unchecked.
+    """Returns a copy of a scenario with other gains of one law, without validation.
 
     Args:
-        scenario: Whose gains are changed; it stays as it is.
-        law: As ``Scenario.law``.
-        **gains: New values by field of the law's parameters, in the field's unit.
+        scenario: The scenario, which stays unchanged.
+        law: Name of the law.
+        **gains: New values by field of the law's parameters, in the unit of the field.
 
     Returns:
-        A copy.
+        The copy with the new gains.
     """
     parameters = getattr(scenario.follower.laws, law).model_copy(update=gains)
     laws = scenario.follower.laws.model_copy(update={law: parameters})
@@ -123,17 +124,21 @@ def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
 
 
 def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
-    """From an obstacle at rho_0 to where the attraction rests, m, at most.
+    """Returns the largest distance from an obstacle to the point of rest behind it.
+
+    P is the control point of the robot, ahead of the axle. The obstacle is at the
+    distance rho_0 ahead of P, where rho_0 is the reach of the conventional law. At the
+    point of rest, the attraction is zero.
 
     Args:
-        scenario: Follow distance and rho_0.
-        requirements: The source's largest range.
+        scenario: The scenario with the follow distance and rho_0.
+        requirements: The requirements with the largest distance of the source.
 
     Returns:
-        m, above 0.
+        The distance in m, above 0.
 
     Raises:
-        InputError: Nothing is left of the source's range.
+        InputError: The source is too near for a point of rest behind the obstacle.
     """
     follow = scenario.follower.attraction.follow_distance_m
     reach = scenario.follower.laws.conventional.reach_m
@@ -148,14 +153,15 @@ def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
 
 
 def allowed_stiffness(scenario: Scenario, requirements: DesignRequirements) -> float:
-    """Stiffest push with which the motion before an obstacle is stable, N/m.
+    """Returns the largest stiffness of a push with a stable motion at an obstacle.
 
     Args:
-        scenario: Robot, plant and attraction.
-        requirements: The latency that is to be spared, in ticks.
+        scenario: The scenario with the robot, the plant, and the attraction.
+        requirements: The requirements with the additional age of echoes, in ticks.
 
     Returns:
-        N/m; negative where the attraction alone is too stiff.
+        The stiffness in N/m. If the attraction alone is too stiff, the result is
+        negative.
     """
     total = largest_contact_stiffness(
         scenario, latency_ticks=requirements.spare_latency_ticks
@@ -166,18 +172,19 @@ def allowed_stiffness(scenario: Scenario, requirements: DesignRequirements) -> f
 def check_law(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> LawDesign:
-    """Holds a law's gains, as they stand in the scenario, against requirements.
+    """Checks the gains of a law in a scenario against the requirements.
 
     Args:
-        scenario: Gains, robot, plant and sensors.
-        law: As ``Scenario.law``.
-        requirements: Bounds.
+        scenario: The scenario with the gains, the robot, the plant, and the sensors.
+        law: Name of the law.
+        requirements: Requirements that the gains must meet.
 
     Returns:
-        The law's gains, and five figures beside their bounds.
+        The gains of the law, and five checks.
 
     Raises:
-        InputError: The law has no gains to choose, or see ``metres_to_go``.
+        InputError: The design does not choose gains for this law, or the source is too
+            near (see ``metres_to_go``).
     """
     push = spring(law, scenario)
     to_go = metres_to_go(scenario, requirements)

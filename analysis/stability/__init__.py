@@ -1,1 +1,1 @@
-"""The stability report, which gathers models, margins, certificates and verdicts."""
+"""The stability report, which combines models, margins, certificates, and verdicts."""

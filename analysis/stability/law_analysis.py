@@ -1,9 +1,9 @@
-"""Stability analysis of a scenario's law, part by part.
+"""Stability analysis of the law of a scenario, part by part.
 
-A part is one analysis with its place in the report: what computes its data
-object, and what sets the object as HTML. Parts run in order, and a part may use
-what earlier ones found. A part that a law or a scenario cannot have says so in
-its place and does not stop the others.
+A part is one analysis and its section in the report. A part has one function that
+computes a data object and one function that writes the object as HTML. The parts run in
+order, and a part may use the data of earlier parts. If a part does not apply to a law
+or to a scenario, its section states the reason. The other parts still run.
 """
 
 from __future__ import annotations
@@ -23,18 +23,25 @@ from systems.framework.input_error import InputError
 
 @dataclass(frozen=True)
 class Study:
-    """What a part may use."""
+    """The inputs of a part: the scenario and the data of earlier parts."""
 
     scenario: Scenario
-    """With the law to analyse."""
+    """The scenario with the law to analyze."""
     found: dict[str, Any] = field(default_factory=dict)
-    """Data objects of earlier parts, by key; none where there is a problem."""
+    """Data objects of earlier parts, by key. The value is None for a part without a
+    result."""
 
     def need(self, key: str) -> Any:
-        """Data object of an earlier part.
+        """Returns the data object of an earlier part.
+
+        Args:
+            key: Key of the earlier part.
+
+        Returns:
+            The data object.
 
         Raises:
-            InputError: It has none.
+            InputError: The earlier part has no result.
         """
         if self.found.get(key) is None:
             raise InputError(
@@ -47,57 +54,63 @@ class Study:
 
 @dataclass(frozen=True)
 class Part:
-    """One analysis and its place in the report."""
+    """One analysis and its section in the report."""
 
     key: str
-    """Name in the JSON document and in links."""
+    """Name of the part in the JSON document and in links."""
     title: str
     compute: Callable[[Study], Any]
-    """Raises InputError where there is nothing to compute, and says why."""
+    """Computes the data object. Raises an InputError with the reason if the part does
+    not apply."""
     render: Callable[[Any, str], list[str]]
-    """Pieces of HTML from the data and a prefix for names of figures."""
+    """Makes pieces of HTML from the data object and from a prefix for the names of
+    figures."""
     fresh: bool = False
-    """Whether it begins a sheet of paper."""
+    """Whether the section begins on a new page of paper."""
     document: Callable[[Any], dict[str, Any]] | None = None
-    """Entries of the JSON document; none: the data as it is, under the key."""
+    """Makes the entries of the JSON document from the data object. If it is None, the
+    data object itself is the only entry, under the key of the part."""
     models: Callable[[Any], Sequence[LinearModel]] | None = None
-    """Linear models that are written as files."""
+    """Returns the linear models that are written to files. None if the part has no
+    models."""
     notes: Callable[[Any], Sequence[str]] | None = None
-    """What the first page must say before the numbers; none: nothing."""
+    """Returns notes that readers must know before they use the numbers. None if the
+    part has no notes."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What came of a part."""
+    """The result of one part, or the reason why the part has no result."""
 
     part: Part
     data: Any | None
     problem: str
-    """Why there is no data; empty where there is."""
+    """Reason why there is no data object. Empty if there is one."""
     seconds: float
-    """Time that it took, s."""
+    """Computing time of the part, s."""
     failed: bool = False
-    """Whether the problem is a fault of the program, none of law or scenario."""
+    """Whether a fault of the program is the reason. Otherwise, the law or the scenario
+    is the reason."""
 
 
 @dataclass(frozen=True)
 class LawAnalysis:
-    """All about one law."""
+    """The complete stability analysis of one law."""
 
     scenario: Scenario
     sheet: ModelSheet
     findings: dict[str, Finding]
     failures: dict[str, Exception] = field(default_factory=dict)
-    """What parts raised that is no complaint about law or scenario, by key."""
+    """Unexpected exceptions, by key of the part that raised them."""
 
     @property
     def law(self) -> str:
-        """As the scenario names it."""
+        """Name of the law in the scenario."""
         return self.scenario.only.law
 
     @property
     def models(self) -> tuple[LinearModel, ...]:
-        """Of all parts, for files."""
+        """Linear models of all parts, which are written to files."""
         return tuple(
             model
             for finding in self.findings.values()
@@ -107,7 +120,7 @@ class LawAnalysis:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Of all parts, for the first page; sentences."""
+        """Notes of all parts for the first page, each a sentence."""
         return tuple(
             note
             for finding in self.findings.values()
@@ -117,11 +130,11 @@ class LawAnalysis:
 
     @property
     def verdicts(self) -> Sequence[Verdict]:
-        """Of the last part; none where it has no result."""
+        """Verdicts of the last part. Empty if this part has no result."""
         return self.data("verdicts") or ()
 
     def data(self, key: str) -> Any | None:
-        """Data object of a part, none if it was left out or failed."""
+        """Returns the data object of a part, or None if the part has no result."""
         finding = self.findings.get(key)
         return finding and finding.data
 
@@ -132,19 +145,21 @@ def analyse_law(
     *,
     step: Callable[[str], None] = lambda title: None,
 ) -> LawAnalysis:
-    """Runs the parts for the scenario's law.
+    """Runs the parts of the stability analysis for the law of a scenario.
 
     Args:
-        scenario: With any fidelity; parts choose theirs.
-        parts: In order.
-        step: Called with the title of each part before it runs.
+        scenario: The scenario with the law. The sensors may be exact or realistic,
+            because each part chooses its own sensors.
+        parts: The parts, in the order in which they run.
+        step: Function that is called with the title of each part before the part runs.
 
     Returns:
-        Findings by key of the part; one that has no result says why.
+        The analysis, with one finding per part. If a part has no result, its finding
+        states the reason.
 
     Raises:
-        InputError: The very first part, without which the others are nothing,
-            has no result. What else it raises, it raises too.
+        InputError: The first part has no result. All other parts depend on this part.
+            If the first part raises another exception, this exception is also raised.
     """
     study = Study(scenario)
     analysis = LawAnalysis(scenario, model_sheet(scenario), {})

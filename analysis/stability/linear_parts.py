@@ -1,4 +1,4 @@
-"""Parts of the stability report: operating points, linear models, a small step."""
+"""Linear parts of the stability report: operating points, models, and a small step."""
 
 from __future__ import annotations
 
@@ -33,32 +33,34 @@ from analysis.reporting.html_page import (
 from analysis.stability.law_analysis import Part, Study
 from systems.framework.input_error import InputError
 
-#: Elements of a matrix below this are printed as a dot.
+#: Matrix elements with a smaller magnitude are printed as a dot.
 _ZERO = 1e-12
-#: Matrices of more columns are printed in small type.
+#: Matrices with more columns are printed in small type.
 _WIDE = 8
-#: Slower modes than this are neutral, 1/s.
+#: Modes with a smaller natural frequency count as neutral, rad/s.
 _NEUTRAL_1_S = 1e-6
-#: Modes that are printed.
+#: Largest number of modes that a table shows.
 _MODES = 12
 
 
 @dataclass(frozen=True)
 class OperatingPoints:
-    """Where the loop can be, and where it is linearised."""
+    """Equilibria of the loop. The loop is linearized about one of these equilibria."""
 
     search: EquilibriumSearch
     at: OperatingPoint
-    """The stable equilibrium nearest to the follow distance, in free reach."""
+    """Stable equilibrium about which the loop is linearized; see
+    ``EquilibriumSearch.follow_point``."""
     moving: OperatingPoint | None
-    """Following a source that moves on; none: there is no such state."""
+    """The state of following a source at constant velocity. None if this state does not
+    exist."""
     no_moving: str
-    """Why there is none."""
+    """Reason why ``moving`` is None. Empty if ``moving`` exists."""
 
 
 @dataclass(frozen=True)
 class LinearModels:
-    """The loop about the operating point."""
+    """Linear models of the loop about the operating point, with checks of the models."""
 
     at: OperatingPoint
     continuous: LinearModel
@@ -68,10 +70,16 @@ class LinearModels:
 
 
 def linear_parts(*, full: bool) -> tuple[Part, ...]:
-    """Operating points first: the report needs one to stand on.
+    """Returns the parts about operating points, linear models, and a small step.
+
+    The part about operating points is the first one, because all other parts of the
+    report depend on it.
 
     Args:
-        full: Whether the small step is simulated with the scenario's sensors too.
+        full: Whether the small step is also simulated with the sensors of the scenario.
+
+    Returns:
+        Three parts, in the order of the report.
     """
     return (
         Part(
@@ -111,7 +119,7 @@ def _operating_points(study: Study) -> OperatingPoints:
 
 
 def point_document(point: OperatingPoint) -> dict[str, Any]:
-    """An entry of ``equilibria``."""
+    """Returns an operating point as an entry of the list ``equilibria`` in the JSON."""
     return {
         "position_W": point.p_WP,
         "heading_rad": point.theta_WB,
@@ -273,14 +281,16 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
 
 
 def matrix_table(model: LinearModel, matrix: str) -> str:
-    """A matrix with the names of its rows and columns; a dot is a zero.
+    """Returns a matrix as an HTML table with the names of its rows and columns.
+
+    A dot in the table is a zero.
 
     Args:
-        model: Has the names.
-        matrix: ``A``, ``B``, ``C`` or ``D``.
+        model: The linear model with the matrix and the names.
+        matrix: Name of the matrix: ``A``, ``B``, ``C``, or ``D``.
 
     Returns:
-        HTML.
+        The HTML table.
     """
     x, u, y = model.state_names, model.input_names, model.output_names
     rows, columns = {"A": (x, x), "B": (x, u), "C": (y, x), "D": (y, u)}[matrix]

@@ -1,4 +1,4 @@
-"""Parts of the stability report: margins of the loops."""
+"""Part of the stability report about the stability margins of the loops."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from analysis.models.operating_points import OperatingPoint
 from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
 from analysis.stability.law_analysis import Part, Study
 
-#: What decides what a margin says, for readers.
+#: Explanation of the margins for readers of the report.
 _EXPLANATION = (
     "Each loop is cut at one place while the others stay closed: at the sensor (the "
     "source as it is heard), at the actuator (the law's acceleration) or at the "
@@ -40,9 +40,9 @@ _EXPLANATION = (
     "disk margin covers changes of gain and phase at the same time; the table lists "
     "the gains and phases for which it guarantees stability."
 )
-#: Faster modes are those of motors and filters, rad/s.
+#: Modes with a higher natural frequency belong to motors and filters, rad/s.
 _SLOW_RAD_S = 12.0
-#: Fields of ``LoopMargins`` by heading.
+#: Fields of ``LoopMargins`` by the heading of their column.
 _COLUMNS = {
     "gain up (dB)": "gain_increase_margin_db",
     "gain down (dB)": "gain_reduction_margin_db",
@@ -53,32 +53,37 @@ _COLUMNS = {
     "M_t": "complementary_peak",
     "delay (s)": "delay_margin_s",
 }
-#: The loop whose margins stand for the implemented one.
+#: Place and direction of the cut loop that represents the implemented loop.
 _MAIN = ("sensor", "along")
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Of the ideal target loop and of the implemented one."""
+    """Stability margins of the ideal target loop and of the implemented loop.
+
+    The target loop contains the attraction alone, without motor lag, sampling, and
+    obstacles. The implemented loop is the loop of the built diagram.
+    """
 
     target: dict[str, LoopMargins]
-    """By break point."""
+    """Margins of the target loop, by the place of the cut."""
     target_model: LinearModel
-    """Cut at the sensor."""
+    """Linear model of the target loop, cut at the sensor."""
     implemented: tuple[PointMargins, ...]
     gangs: tuple[GangOfFour, ...]
-    """Of the loops cut at the sensor."""
+    """Gang of four of each loop that is cut at the sensor."""
     at: OperatingPoint
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
-        """One of the implemented loop's margins.
+        """Returns the margins of the implemented loop for one cut.
 
         Args:
-            at: Where the loop is cut.
-            direction: ``along`` or ``across``.
+            at: Place of the cut: ``sensor``, ``actuator``, or ``wheels``.
+            direction: Direction of the motion: ``along`` or ``across`` the line to the
+                source.
 
         Returns:
-            The margins; None: there is no such loop.
+            The margins, or None if there is no such loop.
         """
         for found in self.implemented:
             if (found.at, found.direction) == (at, direction):
@@ -87,16 +92,23 @@ class Margins:
 
     @property
     def target_poles(self) -> NDArray[np.complex128]:
-        """Of the closed ideal target loop, 1/s."""
+        """(n,) poles of the closed target loop, 1/s."""
         model = self.target_model
         return np.linalg.eigvals(model.A - model.B @ model.C).astype(complex)
 
 
 def least_damped(poles: NDArray[np.complex128]) -> complex:
-    """The oscillation that decays slowest for its frequency; else the slowest pole.
+    """Returns the pole of the slow oscillation with the least damping ratio.
+
+    If nothing oscillates slowly, the function returns the pole with the largest real
+    part.
 
     Args:
-        poles: s plane, 1/s.
+        poles: (n,) poles in the s plane, 1/s.
+
+    Returns:
+        The pole in the s plane, 1/s. Of a conjugate pair, it is the pole with the
+        positive imaginary part.
     """
     slow = poles[np.abs(poles) < _SLOW_RAD_S]
     swinging = slow[np.abs(slow.imag) > 1e-6]
@@ -107,7 +119,7 @@ def least_damped(poles: NDArray[np.complex128]) -> complex:
 
 
 def margin_parts() -> tuple[Part, ...]:
-    """Margins of the ideal target loop and of the implemented loop."""
+    """Returns the part on margins of the target loop and of the implemented loop."""
     return (
         Part(
             "margins",

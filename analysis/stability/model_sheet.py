@@ -1,7 +1,7 @@
-"""What a stability analysis is about: equations, parameters, limits, latencies.
+"""The model sheet of a stability analysis: equations, parameters, limits, latencies.
 
-Everything is read from the scenario and from the blocks' own parameter models;
-the formulas are those of docs/model.md.
+The sheet takes all values from the scenario and from the parameter models of the
+blocks. Its formulas are the formulas of docs/model.md.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from systems.heading.heading_controller import TURNING_BEYOND_DEG
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Equation
 
-#: Parts of a scenario that a loop with exact sensors depends on.
+#: Parts of a scenario that affect a loop with exact sensors, by kind of robot.
 _PARTS = {
     "follower": ("attraction", "collision_vector", "robot", "plant", "tracker"),
     "router": ("robot", "plant", "route", "objects"),
@@ -39,7 +39,7 @@ _PARTS = {
         "sound_search",
     ),
 }
-#: Fields of theirs that it does not depend on.
+#: Fields of these parts that do not affect the loop.
 _OTHERS = frozenset(
     {
         "robot.microphones_m",
@@ -48,10 +48,10 @@ _OTHERS = frozenset(
         *(f"sound.{name}_hz" for name in ("low", "high", "tone")),
     }
 )
-#: The field that says which speed of an obstacle a law gets.
+#: The field that selects which speed of an obstacle a law gets.
 _VELOCITY_TERM = "collision_vector.velocity_term"
 
-#: Conventions and assumptions, for every law.
+#: Conventions that hold for every law.
 _CONVENTIONS = (
     (
         "World frame W is on the floor. Body frame B is midway between the wheels, "
@@ -99,28 +99,29 @@ _ROUTE_ASSUMPTIONS = (
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """A parameter that the loop depends on."""
+    """A parameter that affects the loop."""
 
     field: str
-    """Its path in the scenario."""
+    """Path of the parameter in the scenario."""
     part: str
-    """What it is a parameter of, with the source of its values."""
+    """The part of the scenario that has the parameter, with the source of its
+    values."""
     value: Any
-    """As the scenario has it."""
+    """Value in the scenario."""
     changed: bool
-    """Whether this differs from the default."""
+    """Whether the value differs from the default."""
     text: str
-    """Symbol, unit and source, in the words of its block."""
+    """Symbol, unit, and source, in the words of the parameter model."""
 
     @property
     def of_law(self) -> bool:
-        """Whether it belongs to the law, rather than to every loop."""
+        """Whether the parameter belongs to the law, rather than to every loop."""
         return self.field.startswith("laws.") or self.field == _VELOCITY_TERM
 
 
 @dataclass(frozen=True)
 class Limit:
-    """An edge of the operating envelope."""
+    """A limit of the operating envelope."""
 
     quantity: str
     value: float
@@ -130,32 +131,32 @@ class Limit:
 
 @dataclass(frozen=True)
 class Latency:
-    """A delay between the world and the wheels."""
+    """A delay on the way from a measured quantity to the wheels."""
 
     path: str
-    """``source``, ``target`` or ``obstacle``."""
+    """What is measured: ``source``, ``target``, ``obstacle``, or ``heading``."""
     part: str
-    """What takes the time."""
+    """What causes the delay."""
     mean_s: float
-    """On average, s."""
+    """Mean delay, s."""
     remark: str
 
 
 @dataclass(frozen=True)
 class ModelSheet:
-    """The first page of a report."""
+    """The model sheet of a stability report."""
 
     scenario: str
-    """Name."""
+    """Name of the scenario."""
     description: str
     law: str
     seed: int
     scenario_sha256: str
-    """Of the effective scenario as YAML, with this law."""
+    """SHA-256 of the effective scenario with this law, as YAML."""
     motion: tuple[Equation, ...]
-    """Of every law."""
+    """Equations that hold for every law."""
     law_equations: tuple[Equation, ...]
-    """None for a law of the user's."""
+    """Equations of the law. Empty for a user's own law."""
     parameters: tuple[ParameterRow, ...]
     envelope: tuple[Limit, ...]
     latencies: tuple[Latency, ...]
@@ -164,16 +165,16 @@ class ModelSheet:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """From what latencies are counted."""
+        """Measured quantities that have latencies, for example ``source``."""
         return tuple(dict.fromkeys(row.path for row in self.latencies))
 
     def latency_s(self, path: str) -> float:
-        """Sum over one of ``paths``, s."""
+        """Returns the sum of the mean delays from one measured quantity to the wheels, s."""
         return sum(row.mean_s for row in self.latencies if row.path == path)
 
 
 def model_sheet(scenario: Scenario) -> ModelSheet:
-    """Collects the model sheet of a scenario's law."""
+    """Makes the model sheet for the law of a scenario."""
     law, routed = LAWS.get(scenario.only.law), scenario.only.kind == "router"
     motion: tuple[Equation, ...]
     assumptions: tuple[str, ...]
@@ -387,7 +388,7 @@ def _motion(tick_s: float) -> tuple[Equation, ...]:
 
 
 def _drive(tick_s: float) -> tuple[Equation, Equation]:
-    """From the acceleration to the wheels, and from these to the motion."""
+    """Returns the equations from the acceleration to the wheels and to the motion."""
     return (
         Equation(
             f"Command, each tick T = {tick_s * 1e3:g} ms",

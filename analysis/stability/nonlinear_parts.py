@@ -1,4 +1,4 @@
-"""Parts of the stability report: corners at rest, energy, proofs, maps."""
+"""Nonlinear parts of the stability report: velocity terms, energy, proofs, and maps."""
 
 from __future__ import annotations
 
@@ -51,10 +51,21 @@ from systems.framework.input_error import InputError
 
 
 def nonlinear_parts(*, full: bool) -> tuple[Part, ...]:
-    """Velocity terms, oscillation before an obstacle, certified starts, energy.
+    """Returns the nonlinear parts that every report has.
+
+    The parts are about these subjects:
+
+    - The velocity terms of the law.
+    - The oscillation in front of an obstacle.
+    - Certified starts.
+    - The energy of the velocity term.
 
     Args:
-        full: Ten times the starts, and runs of the full diagram.
+        full: Whether ten times as many starts are simulated, and also runs of the full
+            diagram.
+
+    Returns:
+        Four parts, in the order of the report.
     """
     return (
         Part(
@@ -156,29 +167,29 @@ def _render_oscillation(data: ContactOscillation, name: str) -> list[str]:
     ]
 
 
-#: For the first page.
+#: Note for the first page of the report.
 _ABOUT_P = (
     "A certificate is about the point P only: another part of the body may still "
     "touch something."
 )
-#: Simulated starts on each side of the certificate's border.
+#: Number of simulated starts on each side of the border of the certified set.
 STARTS = 300
-#: Starts of the full diagram, with exact hearing.
+#: Number of starts that are simulated in the full diagram with exact hearing.
 DIAGRAM_STARTS = 24
 
 
 @dataclass(frozen=True)
 class CertifiedStarts:
-    """The energy certificate, and what simulation says to it."""
+    """The energy certificate, and simulations that check the certificate."""
 
     certificate: EnergyCertificate
     trials: CertificateTrials
-    """In the certificate's own model."""
+    """Simulations in the model of the certificate."""
     diagram: DiagramTrials | None
-    """In the diagram of all blocks; none: left out of a short report."""
+    """Simulations in the diagram of all blocks. None in a short report."""
 
     def to_dict(self) -> dict[str, Any]:
-        """An entry of ``certificates``."""
+        """Returns the entry for the list ``certificates`` of the JSON document."""
         parts = {"trials": self.trials, "diagram": self.diagram}
         return self.certificate.to_dict() | parts
 
@@ -242,13 +253,14 @@ def _render_balance(data: EnergyBalance, name: str) -> list[str]:
     ]
 
 
-#: Ways to sense two boxes, and one.
+#: Ways in which the robot senses two boxes.
 _GAP_SENSING = ("exact nearest", "exact sum", "cones")
+#: Ways in which the robot senses one box.
 _OFFSET_SENSING = ("exact nearest", "cones")
 
 
 def extended_parts() -> tuple[Part, ...]:
-    """What only a full report holds."""
+    """Returns the parts that only a full report has."""
     return (
         Part(
             "gap_maps",
@@ -364,7 +376,7 @@ def _part(
     *,
     document: Callable[[Any], dict[str, Any]] | None = None,
 ) -> Part:
-    """A part of a paragraph, its numbers and one figure."""
+    """Makes a part that shows a paragraph, the numbers of its data, and one figure."""
 
     def render(data: Any, name: str) -> list[str]:
         facts = plain(data)

@@ -1,8 +1,10 @@
-"""Least damping that meets the usual thresholds, for several springs, and its cost.
+"""Search for the least damping D_r that meets the usual thresholds, for several K_r.
 
-The loop is the attraction's, sampled, with motor lag: springs and dampers of the
-law come in as the contact mode, whose stability is asked for as well. What the
-law does about rest, pushing off the source's own body, has its margins stated beside.
+The analyzed loop is the sampled loop of the attraction with motor lag. The springs and
+dampers of the law are not in this loop. They only enter the contact mode, the motion in
+front of an obstacle, which must also be stable. The law also pushes the robot away from
+the body of the source. Margins of the loop with this push are computed separately
+(``WholeLoop``).
 """
 
 from __future__ import annotations
@@ -32,29 +34,30 @@ from analysis.models.open_loops import BreakPoint
 from diagrams import Scenario, library_scenarios
 from systems.framework.input_error import InputError
 
-#: Springs beside the present one, as multiples of it.
+#: Values of K_r that are tried, as multiples of the current K_r.
 _SPRINGS = (0.5, 1.0, 2.0, 4.0)
-#: Dampers that are tried, as multiples of the critical one.
+#: Values of D_r that are tried, as multiples of critical damping.
 _DAMPERS = np.geomspace(0.05, 3.0, 30)
-#: Where the loop is cut.
+#: Places where the loop is cut.
 _CUTS: tuple[BreakPoint, ...] = ("sensor", "actuator")
 
 
 @dataclass(frozen=True)
 class GainThresholds:
-    """What the gains are to meet."""
+    """Thresholds that recommended gains must meet."""
 
     damping_ratio: float = 0.4
     phase_margin_deg: float = 45.0
     sensitivity_peak: float = 2.0
     disk_margin: float = 2.0 / 3.0
     spare_ticks: int = 1
-    """The contact mode stays stable with echoes so many ticks late."""
+    """The contact mode must be stable even if echoes are this many control periods
+    late."""
 
 
 @dataclass(frozen=True)
 class GainFigures:
-    """What a pair of gains achieves, and what it costs."""
+    """Performance figures of one pair of gains K_r and D_r."""
 
     stiffness_n_m: float
     """K_r, N/m."""
@@ -62,49 +65,51 @@ class GainFigures:
     """D_r, N s/m."""
     damping_ratio: float
     phase_margin_deg: float
-    """The lesser one of sensor and actuator, deg."""
+    """Phase margin at the sensor or at the actuator, whichever is smaller, deg."""
     gain_margin_db: float
-    """The lesser one, up or down, dB."""
+    """Gain margin at the sensor or at the actuator, whichever is smaller, dB."""
     sensitivity_peak: float
-    """The greater one."""
+    """Sensitivity peak M_s at the sensor or at the actuator, whichever is larger."""
     disk_margin: float
-    """The lesser one."""
+    """Disk margin at the sensor or at the actuator, whichever is smaller."""
     delay_margin_s: float
-    """The lesser one, s."""
+    """Delay margin at the sensor or at the actuator, whichever is smaller, s."""
     contact_radius: float
-    """Of the contact mode with the spare ticks; stable below 1."""
+    """Spectral radius of the contact mode with late echoes. The mode is stable below
+    1."""
     following_lag_m: float
-    """Behind the follow point of a source that moves as the scenario's, m."""
+    """Distance of the control point P behind the follow point, m. The source moves at
+    the speed that it has in the scenario."""
     settling_s: float
-    """To 2 % of a small deviation, s."""
+    """Time in which a small deviation falls to 2 %, s."""
     largest_law_stiffness_n_m: float
-    """The stiffest law that does not swing before an obstacle, N/m."""
+    """Largest stiffness of a law with which the contact mode is stable, N/m."""
 
 
 @dataclass(frozen=True)
 class GainChoice:
-    """The least damping for one spring."""
+    """The least damping that meets the thresholds for one K_r."""
 
     stiffness_n_m: float
     """K_r, N/m."""
     figures: GainFigures | None
-    """None: no damping meets the thresholds with this spring."""
+    """Performance figures. None if no damping meets the thresholds with this K_r."""
 
 
 @dataclass(frozen=True)
 class WholeLoop:
-    """Least margins of the loop with the law in it, over all cuts, at rest."""
+    """Least margins at rest of the loop that includes the law, over all cuts."""
 
     gain_margin_db: float
-    """Up or down, dB."""
+    """Least gain margin for an increase or a decrease, dB."""
     phase_margin_deg: float
-    """Lag or lead, deg."""
+    """Least phase margin for a lag or a lead, deg."""
     disk_margin: float
     weakest: str
-    """The cut loop with the least disk margin."""
+    """Name of the cut loop with the least disk margin."""
 
     def meets(self, thresholds: GainThresholds) -> bool:
-        """Whether it has the margins that are asked of the attraction's loop."""
+        """Returns whether the phase margin and the disk margin meet the thresholds."""
         return (
             self.phase_margin_deg >= thresholds.phase_margin_deg
             and self.disk_margin >= thresholds.disk_margin
@@ -113,22 +118,29 @@ class WholeLoop:
 
 @dataclass(frozen=True)
 class RecommendedGains:
-    """The current gains, and the least damping for each of several springs."""
+    """The current gains, and the least damping for each of several K_r."""
 
     thresholds: GainThresholds
     scenario: str
-    """Name in the library, or the file that a report writes beside itself."""
+    """Name of a library scenario, or the name of the scenario file that a report
+    writes."""
     law: str
     today: GainFigures
     choices: tuple[GainChoice, ...]
     recommended: GainFigures | None
-    """With the current spring, or else the one with the least lag; none: nothing."""
+    """Figures of the recommended gains. They have the current K_r if a damping meets
+    the thresholds with this K_r. Otherwise, they have the K_r with the least lag. None
+    if no gains meet the thresholds."""
     whole_loop: WholeLoop | None
-    """With the recommended gains; none: nothing is recommended."""
+    """Margins of the loop with the recommended gains and the law. None if no gains are
+    recommended."""
 
     @property
     def command(self) -> str:
-        """Simulates with the recommended gains; empty where there are none."""
+        """Command line that simulates the scenario with the recommended gains.
+
+        The command is empty if no gains are recommended.
+        """
         if self.recommended is None:
             return ""
         gains = self.recommended
@@ -166,7 +178,7 @@ class RecommendedGains:
 
     @property
     def _of_the_law(self) -> str:
-        """What the law adds to the attraction's loop, where that is too much."""
+        """Sentences about the margins with the law, if these margins are too small."""
         whole = self.whole_loop
         if whole is None or whole.meets(self.thresholds):
             return ""
@@ -179,14 +191,17 @@ class RecommendedGains:
 
 
 def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
-    """L of the attraction alone, sampled, along the line to a source at rest.
+    """Returns the sampled open loop L of the attraction alone.
+
+    The motion is along the line to a source at rest.
 
     Args:
-        scenario: Gains, robot and plant are used.
-        at: ``sensor``: the damper stays closed; ``actuator``: both are cut.
+        scenario: The scenario with the gains, the robot, and the plant.
+        at: Where the loop is cut. At ``sensor``, only the spring is cut, and the damper
+            stays closed. At ``actuator``, both are cut.
 
     Returns:
-        One input and one output, both accelerations, m/s^2.
+        A model whose one input and one output are accelerations, m/s^2.
     """
     chain = motion_chain(scenario)
     mass = scenario.only.robot.mass_kg
@@ -204,14 +219,15 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
 
 
 def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
-    """What the scenario's K_r and D_r achieve.
+    """Computes the performance figures of the gains K_r and D_r of a scenario.
 
     Args:
-        scenario: Gains, robot and plant.
-        thresholds: The latency that the contact mode is to spare, in ticks.
+        scenario: The scenario with the gains, the robot, and the plant.
+        thresholds: The thresholds, of which only ``spare_ticks`` is used.
 
     Returns:
-        Margins, lag, m, and settling, s.
+        The performance figures. Each margin is the smaller of its two values for cuts
+        at the sensor and at the actuator.
     """
     margins = [loop_margins(attraction_loop(scenario, at)) for at in _CUTS]
     K_r = scenario.follower.attraction.stiffness_n_m
@@ -246,15 +262,17 @@ def recommend_gains(
     """Finds the least D_r for each of several K_r.
 
     Args:
-        scenario: Current gains, law, robot and plant.
-        thresholds: What is to be met.
-        springs: K_r that are tried, as multiples of the current one.
+        scenario: The scenario with the current gains, the law, the robot, and the
+            plant.
+        thresholds: Thresholds that the gains must meet. None means the default
+            thresholds.
+        springs: Values of K_r that are tried, as multiples of the current K_r.
 
     Returns:
-        The current gains, each choice with its figures, and the one recommended.
+        The current gains, the least D_r for each K_r, and the recommended gains.
 
     Raises:
-        InputError: There is no spring.
+        InputError: The current K_r is 0.
     """
     thresholds = thresholds or GainThresholds()
     today = scenario.follower.attraction.stiffness_n_m
@@ -312,7 +330,10 @@ def _choice(scenario: Scenario, K_r: float, thresholds: GainThresholds) -> GainC
 
 
 def _bisected(meets: Callable[[float], bool], low: float, high: float) -> float:
-    """Least value that meets, rounded up to two decimals, where that meets too."""
+    """Returns the least value that meets the thresholds, by bisection.
+
+    The value is rounded up to two decimals, unless the rounded value fails.
+    """
     while high - low > 1e-3 * high:
         middle = (low + high) / 2.0
         low, high = (low, middle) if meets(middle) else (middle, high)

@@ -1,4 +1,4 @@
-"""A stability analysis as a JSON document, as text, and as files."""
+"""The stability analysis as a JSON document, as text, and as files."""
 
 from __future__ import annotations
 
@@ -20,17 +20,19 @@ from diagrams import write_scenario
 def stability_document(
     analyses: Sequence[LawAnalysis], out: Path | None
 ) -> dict[str, Any]:
-    """The JSON document: of one law, or of several beside each other.
+    """Returns the JSON document of a stability analysis of one or several laws.
 
-    One law: its keys at the top. Several: ``laws`` holds a document each, and
-    ``comparison`` the verdicts side by side.
+    The document of one law has its results as keys at the top level. The document of
+    several laws has the key ``laws`` with one document per law, and the key
+    ``comparison`` with the verdicts side by side.
 
     Args:
-        analyses: One a law, of one scenario.
-        out: The result directory, to be named; None: there is none.
+        analyses: One analysis per law, all of the same scenario.
+        out: The result directory, whose name is written into the document. None if no
+            files are written.
 
     Returns:
-        Plain values, to be written as JSON.
+        Plain values that can be written as JSON.
     """
     first = analyses[0].scenario
     common = {
@@ -46,7 +48,7 @@ def stability_document(
 
 
 def comparison(analyses: Sequence[LawAnalysis]) -> tuple[Any, ...]:
-    """Verdicts side by side; of one law too."""
+    """Returns the verdicts of all laws side by side. One law is also allowed."""
     return compare_verdicts({a.law: a.verdicts for a in analyses})
 
 
@@ -75,7 +77,7 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
 
 
 def stability_text(document: dict[str, Any]) -> str:
-    """The verdicts on one screen, and what must be known before they are used."""
+    """Returns the verdicts and the notes of a stability analysis as text."""
     rows = document.get("comparison")
     if rows is None:
         verdicts = document["verdicts"]
@@ -122,14 +124,17 @@ def _mark(verdict: str) -> str:
 def write_stability(
     analyses: Sequence[LawAnalysis], document: dict[str, Any], directory: Path
 ) -> None:
-    """Writes ``report.html``, ``summary.json``, ``scenario.yaml`` and models.
+    """Writes the files of a stability analysis into a directory.
 
-    Linear models go to ``models.mat`` and to ``models/*.csv``.
+    - ``report.html`` is the report.
+    - ``summary.json`` is the JSON document.
+    - ``scenario.yaml`` is the scenario.
+    - ``models.mat`` and ``models/*.csv`` are the linear models.
 
     Args:
-        analyses: One a law, of one scenario.
-        document: From ``stability_document``.
-        directory: Exists.
+        analyses: One analysis per law, all of the same scenario.
+        document: The JSON document from ``stability_document``.
+        directory: An existing directory.
     """
     models = [
         replace(model, name=f"{analysis.law} {model.name}")

@@ -1,4 +1,4 @@
-"""A stability analysis as one page: summary first, then each law's parts."""
+"""The stability report as one HTML page: the summary, then the parts of each law."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from systems.laws.law import Equation
 
 
 def stability_page(analyses: Sequence[LawAnalysis]) -> str:
-    """The report as HTML, with everything in it."""
+    """Returns the complete stability report as one HTML page."""
     first = analyses[0].scenario
     laws = ", ".join(law_title(a.law).lower() for a in analyses)
     contents = [("summary", "Summary"), ("model", "Model sheet")]
@@ -69,7 +69,10 @@ def _summary(analyses: Sequence[LawAnalysis]) -> str:
 
 
 def _notes(analyses: Sequence[LawAnalysis]) -> list[str]:
-    """What must be known before the numbers, law by law where there are several."""
+    """Returns the notes that readers must know before they use the numbers.
+
+    If the report covers several laws, each note begins with the name of its law.
+    """
     found = [
         note_ if len(analyses) == 1 else f"{law_title(analysis.law)}: {note_}"
         for analysis in analyses
@@ -134,7 +137,7 @@ def _finding(analysis: LawAnalysis, finding: Finding, prefix: str) -> list[str]:
 
 
 def _model(sheet: ModelSheet) -> str:
-    """What holds for every law."""
+    """Returns the section with the model sheet, which holds for every law."""
     parts = _equations(sheet.motion, "motion")
     parts.append(bullets(sheet.assumptions))
     parts.append(_parameter_table([row for row in sheet.parameters if not row.of_law]))

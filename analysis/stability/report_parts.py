@@ -1,4 +1,4 @@
-"""The parts of a stability report, in order."""
+"""The parts of a stability report, in the order of the report."""
 
 from __future__ import annotations
 
@@ -25,16 +25,18 @@ def parts(
     routed: bool = False,
     searching: bool = False,
 ) -> tuple[Part, ...]:
-    """The parts of a report.
+    """Returns the parts of a stability report for one kind of robot.
 
     Args:
-        full: Also those that take minutes.
-        guarded: Also that of a robot's guard.
-        routed: Those of a robot on a route, in the place of one that follows a sound.
-        searching: Those of a robot that searches step by step.
+        full: Whether parts that take minutes are included.
+        guarded: Whether the robot has a guard. The report then has a part about it.
+        routed: Whether the robot drives on a route. The report then has parts about the
+            route instead of parts about following a sound.
+        searching: Whether the robot searches step by step. The report then only has
+            parts about the search and its verdicts.
 
     Returns:
-        In the report's order.
+        The parts, in the order of the report.
     """
     guard = safety_parts() if guarded else ()
     left_out = [part.title for part in _sound_parts(full=full)]
@@ -46,14 +48,14 @@ def parts(
 
 
 def parts_for(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part, ...]:
-    """The parts of a report about a robot.
+    """Returns the parts of a stability report for the robot of some scenarios.
 
     Args:
-        scenarios: The robot's, one a law.
-        full: Also those that take minutes.
+        scenarios: One scenario per law, all of the same robot.
+        full: Whether parts that take minutes are included.
 
     Returns:
-        In the report's order.
+        The parts, in the order of the report.
     """
     return parts(
         full=full,

@@ -1,4 +1,4 @@
-"""Parts of the stability report: what uncertain parameters do to the poles."""
+"""Parts of the stability report about the poles under uncertain parameters."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from analysis.reporting.html_page import Cell, figure_html, paragraph, table
 from analysis.stability.law_analysis import Part
 from diagrams import Scenario
 
-#: Random points of the box, in a short and in a full report.
+#: Number of random points in the parameter box, in a short and in a full report.
 _SAMPLES = (25, 200)
 
 
 @dataclass(frozen=True)
 class LoopRobustness:
-    """One loop over its box of parameters."""
+    """Poles of one loop over its box of uncertain parameters."""
 
     cloud: PoleCloud
     sensitivities: tuple[PoleSensitivity, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the poles of each sample."""
+        """Returns everything except the poles of each sample, for the JSON document."""
         cloud = self.cloud
         return {
             "period_s": cloud.period_s,
@@ -64,16 +64,19 @@ def loop_robustness(
     *,
     samples: int,
 ) -> LoopRobustness:
-    """Pole cloud, worst case and sensitivities of a sampled loop.
+    """Computes the poles of a sampled loop over a box of uncertain parameters.
+
+    The result also contains the worst case and the sensitivities of the poles.
 
     Args:
-        scenario: Gives the period and the seed.
-        poles: The loop, from parameters to poles in the z plane.
-        parameters: The box.
-        samples: Random points of the box.
+        scenario: The scenario with the control period and the seed.
+        poles: Function from parameter values to poles of the loop, z plane.
+        parameters: The uncertain parameters. Their intervals form the box.
+        samples: Number of random points in the box.
 
     Returns:
-        Poles in the z plane; sensitivities in 1/s.
+        The poles (z plane), the worst case, and the sensitivities of the slowest pole.
+        The sensitivities are changes of ln(z)/T in 1/s.
     """
     return LoopRobustness(
         pole_cloud(
@@ -88,7 +91,17 @@ def loop_robustness(
 
 
 def robustness_parts(*, full: bool) -> tuple[Part, ...]:
-    """Robustness about the operating point, and before an obstacle."""
+    """Returns the two parts on robustness under uncertain parameters.
+
+    The first part is about the operating point. The second part is about the motion in
+    front of an obstacle.
+
+    Args:
+        full: Whether more random points of the parameter box are analyzed.
+
+    Returns:
+        The two parts, in the order of the report.
+    """
     samples = _SAMPLES[full]
     return (
         Part(

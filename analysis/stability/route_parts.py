@@ -1,4 +1,4 @@
-"""Parts of the stability report of a robot on a route."""
+"""Parts of the stability report for a robot on a route."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from analysis.trajectory.trajectory_plots import (
     plot_gain_bounds,
 )
 
-#: Fields of a loop's margins that go to the JSON document.
+#: Fields of ``LoopMargins`` that the JSON document contains.
 _MARGINS = (
     "stable", "gain_margin_db", "phase_margin_deg", "delay_margin_s",
     "crossover_rad_s", "sensitivity_peak",
@@ -53,7 +53,10 @@ _MARGINS = (
 
 @dataclass(frozen=True)
 class ChainStudy:
-    """Robots that follow one another: responses, and runs beside them."""
+    """Frequency responses of a chain of robots, and simulations of the same chain.
+
+    In a chain, each robot follows the robot in front of it.
+    """
 
     chain: RobotChain
     runs: tuple[ChainRun, ...]
@@ -61,13 +64,21 @@ class ChainStudy:
 
 
 def route_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
-    """Frozen gains, bounds, adaptation, chains; and which parts do not apply.
+    """Returns the parts for a robot on a route, and a list of parts that do not apply.
+
+    The parts are about these subjects:
+
+    - Poles and margins with frozen gains.
+    - Bounds of stiffness and damping.
+    - Adaptation of the gains.
+    - Chains of robots that follow one another.
 
     Args:
-        left_out: Titles of the parts of a robot that follows a sound.
+        left_out: Titles of the parts for a robot that follows a sound. They do not
+            apply to a robot on a route.
 
     Returns:
-        In the report's order.
+        Five parts, in the order of the report. The last one lists ``left_out``.
     """
     titles = tuple(left_out)
     return (
@@ -177,7 +188,7 @@ def _render_frozen(data: Sequence[FrozenPoint], name: str) -> list[str]:
 
 
 def _poles_of(point: FrozenPoint) -> list[str]:
-    """One of each pair, slowest first."""
+    """Returns the poles as texts, slowest first; of a conjugate pair only one pole."""
     poles = sorted(point.poles.tolist(), key=lambda pole: -pole.real)
     shown = [pole for pole in poles if pole.imag >= -1e-9]
     return [number(p if abs(p.imag) > 1e-9 else p.real) for p in shown]

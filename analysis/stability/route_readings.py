@@ -1,4 +1,4 @@
-"""What the verdicts ask of a robot on a route."""
+"""Criteria for a robot on a route, and functions that read their numbers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ _OURS = "ours"
 def _of(
     key: str, number: Callable[[Any], float | None], missing: str
 ) -> Callable[[Study], Reading]:
-    """Reads a number from a part's data; ``missing`` says why there is none."""
+    """Returns a function that reads a number from the data of one part of the report.
+
+    If the part has no data or no such number, that function returns ``missing``.
+    """
 
     def read(study: Study) -> Reading:
         data = study.found.get(key)
@@ -61,7 +64,10 @@ def _chain(name: str) -> Callable[[Study], Reading]:
 
 
 def _springs(study: Study) -> Reading:
-    """All springs in a zone, of those that are stable with the target's own damping."""
+    """Returns the sum of all springs in a zone divided by the largest stable stiffness.
+
+    The largest stable stiffness is for the damping of the target alone.
+    """
     bounds = study.found.get("gain_bounds")
     if not bounds:
         return "bounds were not computed"
@@ -72,7 +78,11 @@ def _springs(study: Study) -> Reading:
 
 
 def _jammed(study: Study) -> Reading:
-    """K at the end of a jam, of what is stable with the target's own damping."""
+    """Returns K at the end of a jam divided by the largest stable stiffness.
+
+    The largest stable stiffness is for the damping of the target alone. In a jam, a
+    wall holds the robot back while the target moves on.
+    """
     adaptation, bounds = study.found.get("adaptation"), study.found.get("gain_bounds")
     if not adaptation or not bounds:
         return "nothing adapts"
@@ -84,7 +94,7 @@ def _rise(data: Any) -> float | None:
     return data.lyapunov.largest_rise if data.lyapunov else None
 
 
-#: What is asked, and what is read for it.
+#: Criteria for a robot on a route, each with the function that reads its number.
 ROUTE_CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
     Criterion(
         "growth with frozen gains", "1/s", "below", 0.0,

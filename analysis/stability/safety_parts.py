@@ -1,4 +1,8 @@
-"""Part of the stability report: what the guard promises, and with which margins."""
+"""Part of the stability report about the guarantees of the guard and their margins.
+
+The guard is the block that limits the commands of any law, so that the robot stays in
+free space.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,10 @@ from diagrams.scenario.warnings.guarantees import Guarantees, guarantees
 
 
 def safety_parts() -> tuple[Part, ...]:
-    """The theorem that holds for a guarded robot, and its assumptions."""
+    """Returns the part with the theorem that holds for a guarded robot.
+
+    The part also lists the assumptions of the theorem.
+    """
     return (
         Part(
             "safety",

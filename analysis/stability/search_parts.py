@@ -1,4 +1,4 @@
-"""Parts of the stability report of a robot that searches step by step."""
+"""Parts of the stability report for a robot that searches step by step."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ _MARGINS = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
 
 
 def search_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
-    """The heading loop; and which parts do not apply.
+    """Returns the part about the heading loop, and a list of parts that do not apply.
 
     Args:
-        left_out: Titles of the parts of a robot that follows a sound.
+        left_out: Titles of the parts for a robot that follows a sound. They do not
+            apply to a search.
 
     Returns:
-        In the report's order.
+        Two parts, in the order of the report.
     """
     titles = tuple(left_out)
     return (
@@ -84,7 +85,7 @@ def _of(name: str) -> Callable[[Study], Reading]:
     return read
 
 
-#: What is asked of the heading loop, and what is read for it.
+#: Criteria for the heading loop, each with the function that reads its number.
 SEARCH_CRITERIA: Mapping[Criterion, Callable[[Study], Reading]] = {
     Criterion(
         "phase margin of the heading", "deg", "at least", 45.0,

@@ -1,4 +1,4 @@
-"""The last part of the stability report: numbers against thresholds."""
+"""The last part of the stability report, which compares numbers with thresholds."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from analysis.stability.verdicts import Criterion, Verdict, judge, shown_value
 def verdict_parts(
     criteria: Mapping[Criterion, Callable[[Study], Reading]] = CRITERIA,
 ) -> tuple[Part, ...]:
-    """All criteria, of what earlier parts found.
+    """Returns the part that judges the results of the earlier parts by all criteria.
 
     Args:
-        criteria: What is asked, and what is read for it.
+        criteria: The criteria, each with the function that reads its number.
 
     Returns:
-        One part.
+        A tuple that contains this one part.
     """
     return (
         Part(
