@@ -36,7 +36,7 @@ _FOLLOWING_LAWS = tuple(
 
 
 def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
-    """Returns the scenario with the attraction and the gains that meet the requirements.
+    """Returns the scenario with an attraction and gains that meet the requirements.
 
     The attraction follows from the requirements in three steps:
 
@@ -72,7 +72,8 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
             f"no value from {low} to {high} N/m has a damping ratio of "
             f"{requirements.damping}; change plant.motor_lag_s",
         )
-    # Rounded up, since damping grows with K_r here: D_r grows along with it.
+    # D_r is proportional to K_r here, so that the damping ratio grows with K_r.
+    # Therefore, K_r is rounded up.
     K_r = math.ceil(10.0 * brentq(excess, low, high)) / 10.0
     scenario = with_attraction(scenario, K_r, round(time * K_r, 2))
     overshoot = braking_overshoot(scenario)

@@ -1,4 +1,4 @@
-"""Figure of the design: the pushes against the pull, and stiffness limits in contact."""
+"""Figure of the design: push against pull, and stiffness limits in contact."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def study_design(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> DesignStudy:
-    """Chooses gains for the attraction of a scenario, and recommends another attraction.
+    """Chooses gains for the attraction of a scenario and recommends another attraction.
 
     Args:
         scenario: The scenario with the attraction and the robot. Of the gains of the

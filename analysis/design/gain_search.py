@@ -109,7 +109,7 @@ def _barrier_gains(
     gains = LAWS[law].loop_gains
     assert gains is not None, f"{law} does not name the gains that tune it"
     spring_gain, damper_gain = gains
-    # The secant of D_0 s is D_0: it puts back D_0/D_r.
+    # The velocity term D_0 s returns the share D_0/D_r of the dissipation.
     D_r = scenario.follower.attraction.damping_n_s_m
     damping = _rounded(requirements.injected_share * D_r)
     found = gain_for_barrier(scenario, law, spring_gain, requirements)
@@ -121,7 +121,8 @@ def _matched_gains(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> Scenario:
     """Derives the gains of both terms of the active law of 2019."""
-    # A far echo meets the spring's tail as well: the second round knows it.
+    # The push on a far echo includes the tail of the spring term. The second round
+    # takes this tail into account.
     for _ in range(2):
         scenario = _matched_damper(scenario, law, requirements)
         scenario = _matched_spring(scenario, law, requirements)
@@ -159,7 +160,7 @@ def _matched_damper(
         )
         return injected_share(law, changed) - requirements.injected_share
 
-    # Below sqrt(e) d_ref the term never rises above its value at rest.
+    # If D_0 is below sqrt(e) d_ref, the term never exceeds its value at rest.
     field = f"laws.{law}.matched_damping_n_s_m"
     D_0 = _root(excess, math.sqrt(math.e) * d_ref, 1e3 * d_ref, field)
     return with_gains(
@@ -182,7 +183,7 @@ def _matched_spring(
     with a stable contact.
     """
     reach = getattr(scenario.follower.laws, law).reach_m
-    # Of the attraction alone: no alpha changes it.
+    # This limit depends on the attraction alone, and not on alpha.
     allowed = allowed_stiffness(scenario, requirements)
 
     def with_alpha(alpha: float) -> Scenario:

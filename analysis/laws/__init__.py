@@ -1,1 +1,1 @@
-"""Laws as force over distance: curves, push and pull, the head-on approach."""
+"""Laws as forces over distance: curves, push and pull, and the head-on approach."""

@@ -1,9 +1,14 @@
-"""The head-on approach: P, an obstacle's flat face, and the goal behind it.
+"""Head-on approach of the control point P to the flat face of an obstacle.
+
+The goal is behind the obstacle. The motion obeys this equation:
 
     M c'' = f(c, s) - K_r (L + c) - D_r c'
 
-with c the distance of P from the face and L what is left to go behind it, from
-the face to the follow point. The attraction is linear along the line.
+- c is the distance of P from the face, m.
+- L is the distance from the face to the follow point behind it, m.
+- f is the force of the law, N, and s is the speed of the obstacle in the law, m/s.
+
+The attraction is linear along the line of the approach.
 """
 
 from __future__ import annotations
@@ -23,23 +28,29 @@ from systems.world.geometry import control_point
 
 @dataclass(frozen=True, eq=False)
 class HeadOn:
-    """Contact mode in one dimension."""
+    """The head-on approach of the control point P to a flat face, in one dimension.
+
+    The symbols are those of the module: c, s, L, and f(c, s).
+    """
 
     scenario: Scenario
-    """Gains and mass."""
+    """Scenario with the gains and the mass."""
     law: RadialLaw
-    """Its law."""
+    """Law of the scenario."""
     to_go_m: float
-    """L, m."""
+    """Distance L from the face to the follow point, m."""
     equilibria_m: tuple[float, ...]
-    """Distances at which P rests, m, farthest first."""
+    """Distances at which P can rest, m, largest first."""
 
     @property
     def equilibrium_m(self) -> float:
-        """Where an approach is held up: the farthest stable equilibrium, m.
+        """Distance at which the obstacle stops P, m.
+
+        The distance is the largest one of all stable equilibria.
 
         Raises:
-            InputError: There is none: the attraction overcomes the obstacle.
+            InputError: There is no stable equilibrium, because the attraction is
+                stronger than the push of the law.
         """
         held = [c for c in self.equilibria_m if self.slope(c) < 0.0]
         if not held:
@@ -54,41 +65,50 @@ class HeadOn:
 
     @property
     def stiffness_n_m(self) -> float:
-        """K_r - df/dc at the equilibrium, N/m."""
+        """Stiffness K_r - df/dc at the equilibrium, N/m."""
         return -self.slope(self.equilibrium_m)
 
     def slope(self, c: float) -> float:
-        """df/dc - K_r at a distance and at rest, N/m; negative: P is pushed back."""
+        """Returns the slope df/dc - K_r of the net force at rest, N/m.
+
+        Args:
+            c: Distance of P from the face, m.
+
+        Returns:
+            The slope. A negative slope means that a small deviation is pushed back.
+        """
         slope, _ = self.law.gradient(c, 0.0)
         return slope - self.scenario.follower.attraction.stiffness_n_m
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """f(c, s) - K_r (L + c), N: what moves P away from the face.
+        """Returns the net force f(c, s) - K_r (L + c) on P.
 
         Args:
             c: Distance of P from the face, m.
-            s: Speed of the obstacle as the law takes it, m/s.
+            s: Speed of the obstacle in the law, m/s.
 
         Returns:
-            N, positive away from the face.
+            The force in N, positive away from the face.
         """
         pull = self.scenario.follower.attraction.stiffness_n_m * (self.to_go_m + c)
         return self.law.force(c, s) - pull
 
 
 def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
-    """The head-on approach with the scenario's gains.
+    """Makes the head-on approach with the gains of a scenario.
 
     Args:
-        scenario: Law, attraction and mass.
-        to_go_m: L; none: that of the obstacle nearest to the way from the start
-            to the source, or half the way where there is none.
+        scenario: The scenario with the law, the attraction, and the mass.
+        to_go_m: Distance L from the face to the follow point, m. If it is None, L comes
+            from the obstacle that is nearest to the line from the start to the source.
+            Without such an obstacle, L is half the distance from the start to the
+            follow point.
 
     Returns:
-        The approach, with the distances at which P rests, m.
+        The approach, with the distances at which P can rest, m.
 
     Raises:
-        InputError: The law is not known.
+        InputError: The law does not exist.
         InputError: The law has no radial force, or L is negative.
     """
     if to_go_m is None:
@@ -102,14 +122,15 @@ def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
 
 
 def radial_equilibria(law: RadialLaw, pull_n: NDArray[np.float64]) -> tuple[float, ...]:
-    """Distances at which f(c, 0) equals a pull, farthest first, m.
+    """Returns the distances at which the push f(c, 0) is equal to a given pull.
 
     Args:
-        law: Tabulated law.
-        pull_n: (n,) pull towards the obstacle at ``law.distances_m``, N.
+        law: The tabulated law.
+        pull_n: (n,) pull toward the obstacle at the distances ``law.distances_m``, N.
 
     Returns:
-        m; empty where push and pull are never equal.
+        The distances in m, largest first. If push and pull are never equal, the tuple
+        is empty.
     """
     balance = law.forces_n - pull_n
     crossings = np.flatnonzero(np.diff(np.sign(balance)))

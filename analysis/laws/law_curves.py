@@ -1,7 +1,7 @@
-"""How hard each law pushes, by distance and by speed.
+"""Curves of the force of each law over distance and over speed.
 
-Han 2019 describes its figure 6 in words, and Kim 2017 its own; both pictures
-are missing. The forces here come from the blocks that simulate.
+Han 2019 describes its figure 6 in words, and Kim 2017 describes its own figure. Both
+figures are missing. The forces in this module come from the blocks of the simulation.
 """
 
 from __future__ import annotations
@@ -18,45 +18,48 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.ranging.collision_vector import SLOTS
 
-#: Where curves are drawn, m and m/s (negative: the obstacle recedes).
+#: Distances of the curves, m.
 DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
+#: Speeds of approach of the curves, m/s. A negative speed means that the obstacle
+#: recedes.
 SPEEDS_M_S = np.linspace(-1.0, 1.0, 201)
-#: Where speeds vary, m: half of rho_0.
+#: Distance for the curves over speed, m. This distance is half of rho_0.
 AT_DISTANCE_M = 0.4
 
 
 @dataclass(frozen=True)
 class LawCurves:
-    """Force away from an obstacle straight ahead, under one law."""
+    """Force of one law away from an obstacle straight ahead."""
 
     law: str
-    """As ``Scenario.law``."""
+    """Name of the law in scenarios."""
     velocity_term: str
-    """``printed`` or ``closing``."""
+    """Velocity term of the scenario: ``printed`` or ``closing``."""
     distance_m: NDArray[np.float64]
-    """(n,) m."""
+    """(n,) distances of the obstacle, m."""
     push_n: NDArray[np.float64]
-    """(n,) force at these distances, the obstacle at rest, N."""
+    """(n,) force at ``distance_m`` for an obstacle at rest, N."""
     at_distance_m: float
-    """Distance at which the speed varies, m."""
+    """Distance for the curve over speed, m."""
     speed_m_s: NDArray[np.float64]
-    """(k,) speed of approach, negative for a receding obstacle, m/s."""
+    """(k,) speeds of approach, m/s. A negative speed means that the obstacle
+    recedes."""
     force_n: NDArray[np.float64]
-    """(k,) force at these speeds, N."""
+    """(k,) force at ``speed_m_s``, N."""
 
 
 def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
-    """Samples the laws with a scenario's gains.
+    """Computes the force curves of laws with the gains of a scenario.
 
     Args:
-        scenario: Its gains and ``robot`` count.
-        laws: As ``Scenario.law``.
+        scenario: The scenario with the gains and the robot.
+        laws: Names of the laws.
 
     Returns:
-        One a law, forces in N.
+        One entry per law, with forces in N.
 
     Raises:
-        InputError: There is no such law, or it tells no forces.
+        InputError: A law does not exist, or its block has no output for forces.
     """
     curves = []
     for law in laws:
@@ -82,15 +85,16 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
 def radial_forces(
     controller: Any, c: ArrayLike, approach: ArrayLike
 ) -> NDArray[np.float64]:
-    """Force away from an obstacle that one control period brought nearer.
+    """Returns the force away from an obstacle that has moved for one control period.
 
     Args:
         controller: A block with the ports of ``RadialLawController``.
-        c: (...) distances now, m, above 0; broadcast with ``approach``.
-        approach: (...) how fast they have shrunk over the last period, m/s.
+        c: (...) distances at the end of the control period, m, above 0. The arrays
+            ``c`` and ``approach`` are broadcast.
+        approach: (...) speeds at which the distance has decreased, m/s.
 
     Returns:
-        (...) N, of the shape that both broadcast to.
+        (...) force in N, with the broadcast shape of both arrays.
     """
     context = controller.CreateDefaultContext()
     for name, size in (("p_WS_estimated", 2), ("pose_WB_estimated", 3), ("v_WP", 2)):
@@ -112,7 +116,7 @@ def radial_forces(
 
 
 def _see(controller: Any, context: Any, distance: float) -> None:
-    """An obstacle straight ahead, in the first slot."""
+    """Sets the first input vector of a controller to an obstacle straight ahead."""
     vectors = np.zeros(2 * SLOTS)
     vectors[0] = distance
     controller.GetInputPort("collision_vectors_B").FixValue(context, vectors)

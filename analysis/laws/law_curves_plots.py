@@ -1,4 +1,4 @@
-"""Picture of the laws: force against distance and against speed."""
+"""Figure of the laws: force over distance and force over speed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from analysis.laws.law_curves import LawCurves
 from analysis.reporting.palette import SERIES_COLOURS
 from systems.laws.catalogue import LAWS
 
-#: (colour, title) of the laws of the package.
+#: Color and title of each law of the package, by name.
 LAW_STYLES = {
     law.name: (law.colour or colour, law.label)
     for law, colour in zip(LAWS.values(), cycle(SERIES_COLOURS), strict=False)
@@ -19,10 +19,17 @@ LAW_STYLES = {
 
 
 def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
-    """Left: the push at rest against distance. Right: the force against speed.
+    """Plots the forces of laws over distance and over speed.
+
+    The left panel shows the push of an obstacle at rest over distance. The right panel
+    shows the force over the speed of approach.
 
     Args:
-        curves: One a law and velocity term; ``closing`` is dashed.
+        curves: One entry per law and velocity term. Curves with the velocity term
+            ``closing`` are dashed.
+
+    Returns:
+        The figure with two panels.
     """
     figure = Figure(figsize=(10.0, 4.0), layout="constrained")
     by_distance, by_speed = figure.subplots(1, 2)

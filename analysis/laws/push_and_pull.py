@@ -1,7 +1,8 @@
-"""One obstacle straight ahead of a target: what the push holds, and what it costs.
+"""Push of an obstacle straight ahead against the pull of a target behind it.
 
-P drives head-on at an obstacle with the target some way behind it. All forces
-are along the line; the obstacle rests and the velocity terms are left out.
+The control point P of the robot moves head-on toward the obstacle. All forces act along
+the line to the target. The obstacle is at rest. Only ``injected_share`` takes velocity
+terms into account.
 """
 
 from __future__ import annotations
@@ -17,32 +18,33 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 
-#: The laws whose gains are to be chosen, by name.
+#: Laws whose gains the design chooses, by name, with their tuning.
 DESIGNED_LAWS = {
     law.name: law.tuning for law in LAWS.values() if law.tuning is not None
 }
 
-#: Force away from the obstacle, N, at a distance in m.
+#: Function from the distance of the obstacle, m, to the force away from it, N.
 Push = Callable[[float], float]
 
-#: Distances at which a push is sampled, m.
+#: The first number is the step between the distances at which a push is sampled, m.
+#: The second number is the largest of these distances, m.
 _STEP_M, _FARTHEST_M = 0.002, 3.0
-#: Speeds at which a velocity term is sampled, as shares of twice the top speed.
+#: Speeds at which a velocity term is sampled, as multiples of the top speed.
 _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
 
 def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
-    """A law with the scenario's gains.
+    """Returns the force function f(c, s) of a law with the gains of a scenario.
 
     Args:
         law: One of ``DESIGNED_LAWS``.
-        scenario: Its gains and sensors count.
+        scenario: The scenario with the gains and the sensors.
 
     Returns:
-        ``f(c, s)`` in N, of m and m/s.
+        The function f(c, s), N, of the distance c, m, and the speed s, m/s.
 
     Raises:
-        InputError: The law has no gains to choose.
+        InputError: The design does not choose gains for this law.
     """
     if law not in DESIGNED_LAWS:
         raise InputError(
@@ -52,17 +54,17 @@ def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
 
 
 def spring(law: str, scenario: Scenario) -> Push:
-    """A law's push at rest, without its velocity term.
+    """Returns the push of a law at rest, without its velocity term.
 
     Args:
         law: One of ``DESIGNED_LAWS``.
-        scenario: Its gains and sensors count.
+        scenario: The scenario with the gains and the sensors.
 
     Returns:
-        Push in N at a distance in m.
+        A function from the distance in m to the push in N.
 
     Raises:
-        InputError: The law has no gains to choose.
+        InputError: The design does not choose gains for this law.
     """
     force = law_force(law, scenario)
     speed = DESIGNED_LAWS[law].spring_speed(getattr(scenario.follower.laws, law))
@@ -70,28 +72,28 @@ def spring(law: str, scenario: Scenario) -> Push:
 
 
 def kinetic_energy(scenario: Scenario) -> float:
-    """Of the virtual mass at top speed, J."""
+    """Returns the kinetic energy of the virtual mass at top speed, J."""
     robot = scenario.only.robot
     return 0.5 * robot.mass_kg * robot.top_speed_m_s**2
 
 
 def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
-    """Energy that push less pull takes from P on its way to the obstacle, J.
+    """Returns the energy that push and pull together take from P during an approach.
 
-    The attraction does work against the push all the way. Speed is limited, so
-    that P enters the stretch in which the push prevails with the kinetic
-    energy of top speed at most: what counts is the largest rise of the
-    potential over any stretch of the way in, down to the nearest distance that
-    the sensors tell.
+    P is the control point of the robot, ahead of the axle. The pull of the attraction
+    acts against the push during the whole approach. The speed is limited. Therefore,
+    when the push becomes stronger than the pull, P has at most the kinetic energy of
+    top speed. The barrier is the largest rise of the potential between any two points
+    of the approach. The approach ends at the least distance that the sensors measure.
 
     Args:
-        push: See ``spring``.
-        scenario: K_r and the sensors' least range are used.
-        metres_to_go: From the obstacle's surface to where the attraction
-            rests, m.
+        push: Push over distance; see ``spring``.
+        scenario: The scenario with K_r and the least range of the sensors.
+        metres_to_go: Distance from the surface of the obstacle to the point where the
+            attraction rests, m.
 
     Returns:
-        J; 0 where the push never prevails.
+        The energy in J. If the push is never stronger than the pull, the energy is 0.
     """
     c, forces = sampled_push(push, scenario)
     return largest_rise(
@@ -102,41 +104,50 @@ def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
 def sampled_push(
     push: Push, scenario: Scenario
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A push at many distances, from the sensors' least range on.
+    """Samples a push at many distances, starting at the least range of the sensors.
 
     Args:
-        push: Force at a distance, N; see ``spring``.
-        scenario: The sensors' least range is used.
+        push: Push over distance, N; see ``spring``.
+        scenario: The scenario with the least range of the sensors.
 
     Returns:
-        (n,) distances, m, and (n,) forces, N.
+        The first array has the (n,) distances, m. The second array has the (n,) forces,
+        N.
     """
     c = np.arange(scenario.follower.ultrasonic.minimum_range_m, _FARTHEST_M, _STEP_M)
     return c, np.array([push(distance) for distance in c.tolist()])
 
 
 def largest_rise(net: NDArray[np.float64]) -> float:
-    """Largest rise of the potential over any stretch of the way in, J.
+    """Returns the largest rise of the potential between two points of the approach.
 
     Args:
-        net: (n,) push less pull at the distances of ``sampled_push``, N.
+        net: (n,) push minus pull at the distances of ``sampled_push``, N.
+
+    Returns:
+        The rise in J, 0 or more.
     """
     potential = np.concatenate([[0.0], np.cumsum(net[1:] + net[:-1]) * _STEP_M / 2.0])
     return float(np.max(potential - np.minimum.accumulate(potential)))
 
 
 def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
-    """K_0 of the conventional law without the limit of speed, N/m.
+    """Returns K_0 of the conventional law for an approach without a speed limit.
 
-    Its spring K_0 rho_0^2/2 holds the kinetic energy at rho_0 and the work of
-    the attraction over all of rho_0.
+    The law acts within its reach rho_0. The energy K_0 rho_0^2/2 of its spring is equal
+    to the sum of two energies:
+
+    - The kinetic energy at the distance rho_0.
+    - The work of the attraction over the distance rho_0.
 
     Args:
-        scenario: Attraction, reach rho_0, mass and top speed.
-        metres_to_go: From the obstacle's surface to where the attraction rests, m.
+        scenario: The scenario with the attraction, the reach rho_0, the mass, and the
+            top speed.
+        metres_to_go: Distance from the surface of the obstacle to the point where the
+            attraction rests, m.
 
     Returns:
-        N/m.
+        K_0 in N/m.
     """
     K_r = scenario.follower.attraction.stiffness_n_m
     reach = scenario.follower.laws.conventional.reach_m
@@ -145,14 +156,14 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
 
 
 def stiffest(law: str, scenario: Scenario) -> float:
-    """The slope at the worst distance to rest at.
+    """Returns the largest stiffness of a law for an obstacle at rest.
 
     Args:
         law: One of ``DESIGNED_LAWS``.
-        scenario: Its gains and the sensors' least range count.
+        scenario: The scenario with the gains and the least range of the sensors.
 
     Returns:
-        Largest -df/dc at rest, N/m.
+        The largest slope -df/dc in N/m, over all distances that the sensors measure.
     """
     gains = getattr(scenario.follower.laws, law)
     nearest = scenario.follower.ultrasonic.minimum_range_m
@@ -160,16 +171,18 @@ def stiffest(law: str, scenario: Scenario) -> float:
 
 
 def rest_offset(law: str, scenario: Scenario) -> float:
-    """How far the master robot's body pushes P off the follow point at rest, m.
+    """Returns how far the body of the leader pushes P off the follow point at rest.
 
-    P stands behind the master robot, on its axis.
+    The leader is the robot that carries the source. P is the control point of the
+    follower, ahead of its axle. P is behind the leader, on the axis of the leader.
 
     Args:
-        law: As ``Scenario.law``.
-        scenario: Gains, follow distance and the master robot's length.
+        law: One of ``DESIGNED_LAWS``.
+        scenario: The scenario with the gains, the follow distance, and the length of
+            the leader.
 
     Returns:
-        m, 0 or more.
+        The offset in m, 0 or more.
     """
     force = law_force(law, scenario)
     K_r, follow = (
@@ -181,7 +194,7 @@ def rest_offset(law: str, scenario: Scenario) -> float:
     def unbalanced(offset: float) -> float:
         return K_r * offset - force(max(gap + offset, 1e-6), 0.0)
 
-    # Where the master robot reaches the follow point, P rests outside of it.
+    # If the body of the leader covers the follow point, P rests outside the body.
     nearest = max(0.0, -gap)
     if unbalanced(nearest) >= 0.0:
         return nearest
@@ -189,14 +202,16 @@ def rest_offset(law: str, scenario: Scenario) -> float:
 
 
 def far_offset(law: str, scenario: Scenario) -> float:
-    """How far an echo at the sensors' limit pushes a resting P, m.
+    """Returns how far an echo at the largest sensor range pushes P at rest.
+
+    P is the control point of the robot, ahead of the axle.
 
     Args:
-        law: As ``Scenario.law``.
-        scenario: Gains, and the sensors' largest range.
+        law: One of ``DESIGNED_LAWS``.
+        scenario: The scenario with the gains and the largest range of the sensors.
 
     Returns:
-        m, 0 where the law ends before.
+        The offset in m. If the law has a shorter reach, the offset is 0.
     """
     force = law_force(law, scenario)
     farthest = scenario.follower.ultrasonic.maximum_range_m
@@ -204,18 +219,21 @@ def far_offset(law: str, scenario: Scenario) -> float:
 
 
 def injected_share(law: str, scenario: Scenario) -> float:
-    """Largest share of D_r's dissipation that |dC/dt| can put back.
+    """Returns the largest share of the dissipation that the velocity term can return.
 
-    Before a resting obstacle the printed velocity term h(s) = f(c, s) - f(c, 0)
-    does work h(s) ds at most while P recedes at s, and D_r takes D_r s ds; the
-    rest, f(c, 0), has a potential. Below 1 the motion cannot gain energy.
+    The obstacle is at rest, and the velocity term is h(s) = f(c, s) - f(c, 0). While
+    the robot recedes at the speed s, the power of the printed term is at most h(s) s.
+    The damping D_r takes the power D_r s^2. The share is the ratio of the two powers.
+    The other part of the force, f(c, 0), has a potential. If the share is below 1, the
+    motion cannot gain energy.
 
     Args:
-        law: As ``Scenario.law``.
-        scenario: Gains, D_r and top speed.
+        law: One of ``DESIGNED_LAWS``.
+        scenario: The scenario with the gains, D_r, and the top speed.
 
     Returns:
-        A ratio, 0 or more, at half the reach rho_0.
+        The largest share, 0 or more. The distance c is half the reach rho_0 of the
+        conventional law.
     """
     force = law_force(law, scenario)
     within = 0.5 * scenario.follower.laws.conventional.reach_m

@@ -1,7 +1,7 @@
-"""A law's radial force as tables: f(c, s), and the energy of f(c, 0).
+"""Tables of the radial force f(c, s) of a law, and of the energy of f(c, 0).
 
-The tables hold what the controller's own law returns, so that loops over
-thousands of starts need no second copy of it.
+The tables contain the results of the controller's own law. Therefore, code that
+evaluates thousands of starts does not need a second implementation of the law.
 """
 
 from __future__ import annotations
@@ -20,64 +20,75 @@ from diagrams.building.laws import make_controller
 from diagrams.scenario.own_code import loaded_digests
 from systems.framework.input_error import InputError
 
-#: Spacing of ``forces_n``, m. Linear interpolation of the default laws between
-#: two entries errs by less than 1e-5 N; of K_0/c near 3 cm by less than 4e-4 N.
+#: Step between the distances of ``forces_n``, m. For the default laws, linear
+#: interpolation between two entries has an error of less than 1e-5 N. For the force
+#: K_0/c near 3 cm, the error is less than 4e-4 N.
 DISTANCE_STEP_M = 2e-4
-#: Spacing of ``increments_n``, m and m/s.
+#: Steps between the distances, m, and between the speeds, m/s, of ``increments_n``.
 INCREMENT_STEPS = (2e-3, 0.01)
 
 
 @dataclass(frozen=True, eq=False)
 class RadialLaw:
-    """Force away from an obstacle at distance c, whose vector changes at s."""
+    """The force f(c, s) of a law away from an obstacle.
+
+    - c is the distance of the obstacle, m.
+    - s is the speed at which the vector to the obstacle changes, m/s.
+    """
 
     name: str
-    """The scenario's ``law``."""
+    """Name of the law in the scenario."""
     function: Callable[[Any, Any], Any]
-    """f(c, s), N: the controller's own, for floats and AutoDiffXd."""
+    """The function f(c, s) of the controller, N, for floats and for AutoDiffXd."""
     range_m: float
-    """Beyond it no obstacle is sensed, m."""
+    """Largest range of the sensors, m."""
     forces_n: NDArray[np.float64]
-    """f(c, 0) at c = 0, DISTANCE_STEP_M, ... up to the range, N."""
+    """(n,) force f(c, 0) at the distances 0, DISTANCE_STEP_M, and so on up to the
+    range, N."""
     energies_j: NDArray[np.float64]
-    """U(c): work of f(., 0) from c to the range, at the same distances, J."""
+    """(n,) energy U(c) at the same distances, J. U(c) is the work of f(c, 0) from c to
+    the range."""
     increments_n: NDArray[np.float64]
-    """f(c, s) - f(c, 0) at multiples of INCREMENT_STEPS, N; rows by c."""
+    """(n, k) increment f(c, s) - f(c, 0) at multiples of INCREMENT_STEPS, N. Each row
+    has one distance c."""
 
     @property
     def distances_m(self) -> NDArray[np.float64]:
-        """Distances of ``forces_n`` and ``energies_j``, m."""
+        """(n,) distances of ``forces_n`` and ``energies_j``, m."""
         return DISTANCE_STEP_M * np.arange(len(self.forces_n), dtype=float)
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """f(c, s); 0 beyond the range.
+        """Returns the force f(c, s) of the law.
 
         Args:
-            c: Distance, m.
-            s: Speed of the obstacle as the law takes it, m/s.
+            c: Distance of the obstacle, m.
+            s: Speed of the obstacle in the law, m/s.
 
         Returns:
-            N, positive away from the obstacle.
+            The force in N, positive away from the obstacle. Beyond the range of the
+            sensors, the force is 0.
         """
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
     def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
-        """f(c, 0) in N of many distances, by interpolation."""
+        """Interpolates the force f(c, 0), N, at many distances c, m."""
         return np.interp(np.asarray(c), self.distances_m, self.forces_n, right=0.0)
 
     def energy(self, c: ArrayLike) -> NDArray[np.float64]:
-        """U(c) in J, by interpolation."""
+        """Interpolates the energy U(c), J, at many distances c, m."""
         return np.interp(np.asarray(c), self.distances_m, self.energies_j, right=0.0)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
-        """Slopes of f(c, s); at s = 0 the one towards s > 0.
+        """Returns the slopes of the force f(c, s).
 
         Args:
-            c: Distance, m.
-            s: Speed of the obstacle as the law takes it, m/s.
+            c: Distance of the obstacle, m.
+            s: Speed of the obstacle in the law, m/s. At s = 0, the slope in s is the
+                slope toward s > 0.
 
         Returns:
-            df/dc, N/m, and df/ds, N s/m.
+            The first value is the slope df/dc, N/m. The second value is the slope
+            df/ds, N s/m.
         """
         f = self.function(AutoDiffXd(c, np.eye(2)[0]), AutoDiffXd(s, np.eye(2)[1]))
         slopes = f.derivatives() if isinstance(f, AutoDiffXd) else np.zeros(0)
@@ -85,11 +96,17 @@ class RadialLaw:
 
 
 def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:
-    """f(c, s) of the scenario's controller, N.
+    """Returns the radial force function f(c, s) of the controller of a scenario.
+
+    Args:
+        scenario: The scenario with the law.
+
+    Returns:
+        The function f(c, s), N, of the distance c, m, and the speed s, m/s.
 
     Raises:
-        InputError: The law is not known.
-        InputError: It is a block of its own that has no radial law.
+        InputError: The law does not exist.
+        InputError: The law is a block without a radial force.
     """
     controller = make_controller(scenario)
     function = getattr(controller, "radial_force", None)
@@ -103,11 +120,17 @@ def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:
 
 
 def radial_law(scenario: Scenario) -> RadialLaw:
-    """Tabulates the scenario's law up to the sensors' range and the top speed.
+    """Tabulates the law of a scenario up to the sensor range and the top speed.
+
+    Args:
+        scenario: The scenario with the law, the sensors, and the top speed.
+
+    Returns:
+        The tables of the law.
 
     Raises:
-        InputError: The law is not known.
-        InputError: It has no radial force, or one that is not finite.
+        InputError: The law does not exist.
+        InputError: The law has no radial force, or its force is not finite.
     """
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
     return _tabulate(
@@ -124,7 +147,10 @@ def radial_law(scenario: Scenario) -> RadialLaw:
 
 
 class _Scenario:
-    """Carries a scenario past the cache: all of them are alike to it."""
+    """Wrapper that excludes a scenario from the key of the cache.
+
+    All wrappers compare equal. Therefore, the cache only uses the other arguments.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -165,7 +191,8 @@ def _increments(
     function: Callable[[Any, Any], Any], range_m: float, top_speed: float
 ) -> NDArray[np.float64]:
     dc, ds = INCREMENT_STEPS
-    # Between two distances the nearer one counts: laws may step, as at rho_0.
+    # The force of a law may jump, for example at rho_0. Therefore, users of the table
+    # take the row of the nearest distance and do not interpolate between rows.
     distances = np.maximum(dc * np.arange(round(range_m / dc) + 1), 1e-9).tolist()
     speeds = (ds * np.arange(int(np.ceil(top_speed / ds)) + 2)).tolist()
     table = np.array([[float(function(c, s)) for s in speeds] for c in distances])

@@ -83,7 +83,7 @@ def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
     others = [each for each in names if each != chosen]
     if not others:
         return scenario.of_robot(chosen), ""
-    # Alone there is nobody to hear it.
+    # No other robot is left that could hear the loudspeaker.
     alone = scenario.of_robot(chosen).with_robot(loudspeaker=None)
     note = f"the report covers robot {chosen!r} alone, without {', '.join(others)}"
     if name is None:

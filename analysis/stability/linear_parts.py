@@ -60,7 +60,7 @@ class OperatingPoints:
 
 @dataclass(frozen=True)
 class LinearModels:
-    """Linear models of the loop about the operating point, with checks of the models."""
+    """Linear models of the loop about the operating point, with checks."""
 
     at: OperatingPoint
     continuous: LinearModel

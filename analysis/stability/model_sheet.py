@@ -169,7 +169,14 @@ class ModelSheet:
         return tuple(dict.fromkeys(row.path for row in self.latencies))
 
     def latency_s(self, path: str) -> float:
-        """Returns the sum of the mean delays from one measured quantity to the wheels, s."""
+        """Returns the sum of the mean delays from one measured quantity to the wheels.
+
+        Args:
+            path: One of ``paths``.
+
+        Returns:
+            The sum in s.
+        """
         return sum(row.mean_s for row in self.latencies if row.path == path)
 
 

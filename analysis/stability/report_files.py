@@ -64,7 +64,7 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
             parts[part.key] = plain(finding.data)
         else:
             for key, value in plain(part.document(finding.data)).items():
-                # Parts may add to a list of an earlier one.
+                # A part may add entries to a list of an earlier part.
                 earlier = parts.get(key)
                 parts[key] = earlier + value if isinstance(earlier, list) else value
     return {

@@ -1,1 +1,1 @@
-"""The blocks of a diagram and the wires between them, as a drawing."""
+"""Block diagrams as wires and as pictures."""

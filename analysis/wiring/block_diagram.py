@@ -1,7 +1,7 @@
-"""The block diagram as a picture: every port named, every wire traceable.
+"""The block diagram as a picture with the names of all ports and with all wires.
 
-Drawn here and not by Graphviz, whose builds for Python need system libraries
-that a bare machine lacks; the project asks for no more than Drake does.
+The module draws the picture without Graphviz. The Python builds of Graphviz need system
+libraries that a minimal machine does not have.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pydrake.systems.framework import Diagram
 from analysis.wiring.wires import Wire, blocks, wires
 from systems.framework.block import STAGES, Stage, part_of
 
-#: Fill of the stages' blocks.
+#: Fill color of the blocks of each stage.
 FILLS: dict[Stage, str] = {
     "world": "#E8EEF4",
     "hearing": "#FBE3D6",
@@ -26,7 +26,8 @@ FILLS: dict[Stage, str] = {
     "control": "#DDF1E7",
     "robot": "#DCEAF7",
 }
-#: Wires of one block have one colour; dark enough for a white page.
+#: Colors of the wires, dark enough for a white page. All wires from one block have
+#: the same color.
 WIRE_COLOURS = (
     "#0072B2",
     "#D55E00",
@@ -41,19 +42,19 @@ WIRE_COLOURS = (
     "#7A5195",
     "#6B6B6B",
 )
-#: Sizes, px.
+#: Sizes of the elements of the picture, px.
 MARGIN, HEADER, ROW, TRACK, GAP, CHARACTER = 24, 42, 20, 9, 36, 6.7
 
 
 @dataclass
 class _Box:
-    """A block with its place in the picture."""
+    """A block and its place in the picture."""
 
     name: str
     kind: str
     stage: Stage
     lower: bool
-    """Whether it stands in the row below the others."""
+    """Whether the block is in the lower row of the picture."""
     inputs: list[str]
     outputs: list[str]
     column: int = 0
@@ -71,7 +72,7 @@ class _Box:
         return HEADER + ROW * max(len(self.inputs), len(self.outputs)) + 6.0
 
     def port(self, name: str, *, output: bool) -> tuple[float, float]:
-        """Where a port's wire ends."""
+        """Returns the point (x, y) at which the wire of a port ends, px."""
         index = (self.outputs if output else self.inputs).index(name)
         x = self.x + (self.width if output else 0.0)
         return x, self.y + HEADER + ROW * (index + 0.5)
@@ -79,7 +80,11 @@ class _Box:
 
 @dataclass
 class _Layout:
-    """Boxes, wires between neighbouring columns, and wires along the bus."""
+    """The boxes and wires of the picture, with their places.
+
+    A direct wire joins neighboring columns. All other wires go along the bus, a set of
+    horizontal lines between the two rows of boxes.
+    """
 
     boxes: dict[str, _Box]
     direct: list[Wire]
@@ -91,25 +96,25 @@ class _Layout:
 
 
 def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
-    """The diagram as SVG text.
+    """Returns the block diagram as SVG text.
 
-    The signal runs from left to right. Wires that skip a column, or run back,
-    go along the bus between the upper row and the row of obstacle sensing. An
-    output that nothing reads is grey. Logs are left out.
+    The signals go from left to right. Some wires skip a column or go back to the left.
+    These wires go along the bus, a set of horizontal lines. The bus is between the
+    upper row and the row with the blocks of obstacle sensing. The name of an output
+    port that nothing reads is gray. Logs are left out.
 
     Args:
-        diagram: What to draw.
-        flat: Whether to draw what is in the diagrams that it is made of, in place of
-            them.
+        diagram: The diagram to draw.
+        flat: Whether a nested diagram is replaced by the blocks that it contains.
 
     Returns:
-        One svg element, with an end of line.
+        The text of one SVG element, with a newline at the end.
     """
     connections = wires(diagram, flat=flat)
     layout = _arrange(blocks(diagram, flat=flat), connections)
     width, height = f"{layout.width:.0f}", f"{layout.height:.0f}"
     head = (
-        # Without a width of its own it fills the window or page that shows it.
+        # An SVG element without a width fills the window or page that shows it.
         '<svg xmlns="http://www.w3.org/2000/svg" '
         f'viewBox="0 0 {width} {height}" font-family="Helvetica, Arial, sans-serif">'
     )
@@ -126,12 +131,12 @@ def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
 def write_block_diagram(
     diagram: Diagram, path: str | Path, *, flat: bool = True
 ) -> None:
-    """Writes the diagram of named blocks as SVG.
+    """Writes the block diagram as an SVG file.
 
     Args:
-        diagram: What to draw.
-        path: The .svg file.
-        flat: See ``block_svg``.
+        diagram: The diagram to draw.
+        path: Path of the SVG file.
+        flat: Whether a nested diagram is replaced by the blocks that it contains.
 
     Raises:
         OSError: The file cannot be written.
@@ -140,7 +145,7 @@ def write_block_diagram(
 
 
 def _class_name(block: Any) -> str:
-    """Name of the class, without the scalar type of a templated one."""
+    """Returns the class name of a block, without the scalar type of a template."""
     return type(block).__name__.split("_\N{MATHEMATICAL BOLD SCRIPT CAPITAL T}")[0]
 
 
@@ -148,7 +153,7 @@ def _box(block: Any) -> _Box:
     stage: Stage = getattr(block, "stage", "control")
     if isinstance(block, Diagram):
         stage = "robot" if block.HasOutputPort("pose_WB") else "world"
-    elif type(block).__module__.startswith("pydrake."):  # joins ports
+    elif type(block).__module__.startswith("pydrake."):  # it joins ports
         stage = "world"
     return _Box(
         block.get_name(),
@@ -178,10 +183,15 @@ def _arrange(systems: Sequence[Any], connections: Sequence[Wire]) -> _Layout:
 
 
 def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
-    """Longest path from the left, then as far to the right as readers allow."""
+    """Sets the column of each box from the wires that go forward.
+
+    Wires that close a loop, or that go back to an earlier stage, do not count. The
+    column is the length of the longest path from the left. Each box then moves as far
+    to the right as the boxes that read its outputs allow.
+    """
     names = list(boxes)
     forward: dict[str, set[str]] = {name: set() for name in boxes}
-    # Of the wires that close a loop, those against the order of building go back.
+    # In each loop, the wires against the order of building count as going back.
     against = sorted(
         connections, key=lambda w: names.index(w.source) > names.index(w.target)
     )
@@ -221,7 +231,7 @@ def _set_places(layout: _Layout) -> None:
 
 
 def _stack(boxes: list[_Box], top: float) -> float:
-    """Places boxes below each other in their columns; the lowest edge."""
+    """Places boxes below each other in their columns. Returns the lowest edge, px."""
     edges: dict[int, float] = {}
     for box in boxes:
         box.y = edges.get(box.column, top)
@@ -230,7 +240,7 @@ def _stack(boxes: list[_Box], top: float) -> float:
 
 
 def _set_tracks(layout: _Layout) -> None:
-    """Columns' x, with room between them for the bus wires' vertical parts."""
+    """Sets the x positions of columns and of the vertical parts of bus wires."""
     gaps: dict[int, list[tuple[str, str]]] = {}
     for key, along in layout.bus.items():
         columns = {layout.boxes[key[0]].column + 1}

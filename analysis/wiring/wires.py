@@ -1,4 +1,4 @@
-"""Which output port each input port reads, through diagrams of diagrams."""
+"""Wires from output ports to input ports, also through nested diagrams."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from pydrake.systems.primitives import VectorLogSink
 
 @dataclass(frozen=True)
 class Wire:
-    """A connection between two blocks, by the names of blocks and ports."""
+    """A wire from an output port of one block to an input port of another block.
+
+    All fields are names of blocks and ports.
+    """
 
     source: str
     output: str
@@ -21,14 +24,16 @@ class Wire:
 
 
 def blocks(diagram: Diagram, *, flat: bool = True) -> list[Any]:
-    """The systems but for logs, and but for what is read by logs alone.
+    """Returns the systems of a diagram, except logs.
+
+    A system whose outputs only go to logs is also left out.
 
     Args:
-        diagram: What they are in.
-        flat: Whether to give what diagrams in it are made of, in place of them.
+        diagram: The diagram that contains the systems.
+        flat: Whether a nested diagram is replaced by the systems that it contains.
 
     Returns:
-        Systems in the order of the diagram.
+        The systems, in the order of the diagram.
     """
     systems = list(_systems(diagram, flat=flat))
     logs = {s.get_name() for s in systems if isinstance(s, VectorLogSink)}
@@ -41,14 +46,14 @@ def blocks(diagram: Diagram, *, flat: bool = True) -> list[Any]:
 
 
 def wires(diagram: Diagram, *, flat: bool = True) -> list[Wire]:
-    """All connections between ``blocks``, in a fixed order.
+    """Returns all wires between the systems that ``blocks`` returns.
 
     Args:
-        diagram: What they are in.
-        flat: See ``blocks``.
+        diagram: The diagram that contains the systems.
+        flat: Whether a nested diagram is replaced by the systems that it contains.
 
     Returns:
-        Sorted by target, input and source.
+        The wires, sorted by target block, input port, and source block.
     """
     names = [block.get_name() for block in blocks(diagram, flat=flat)]
     found = [wire for wire in _all_wires(diagram, flat=flat) if wire.target in names]
@@ -83,14 +88,14 @@ def _all_wires(diagram: Diagram, *, flat: bool) -> list[Wire]:
 
 
 def _writer(system: Any, index: Any) -> tuple[Any, Any]:
-    """The block within, and its output port, that a diagram's port shows."""
+    """Returns the block and its output port behind an output port of a diagram."""
     while isinstance(system, Diagram):
         system, index = system.get_output_port_locator(index)
     return system, index
 
 
 def _readers(system: Any, index: Any) -> Iterator[tuple[Any, Any]]:
-    """The blocks within, and their input ports, that read a diagram's port."""
+    """Yields the blocks and their input ports behind an input port of a diagram."""
     if not isinstance(system, Diagram):
         yield system, index
         return
