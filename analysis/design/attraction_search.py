@@ -1,6 +1,9 @@
-"""Search for K_r, D_r, and the follow distance that meet given requirements.
+"""Search for an attraction that meets given requirements.
 
-The default gains stay K_r = 2 N/m and D_r = 1 N s/m, as printed in the papers.
+The attraction is the virtual spring and damper that pull the robot to the follow point.
+The follow point has a given distance, the follow distance, from the source. The search
+chooses the stiffness K_r, the damping D_r, and the follow distance. The defaults of the
+project stay K_r = 2 N/m and D_r = 1 N s/m, as printed in the papers.
 """
 
 from __future__ import annotations
@@ -38,11 +41,12 @@ _FOLLOWING_LAWS = tuple(
 def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
     """Returns the scenario with an attraction and gains that meet the requirements.
 
-    The attraction follows from the requirements in three steps:
+    The attraction is the virtual spring (stiffness K_r) and damper (damping D_r) that
+    pull the robot to the follow point near the source. It is found in three steps:
 
-    - The ratio D_r/K_r follows from the largest lag behind a moving source. This lag is
-      the goal margin.
-    - K_r follows from the damping ratio.
+    - The ratio D_r/K_r follows from the largest allowed lag behind a moving source.
+      This lag is equal to the goal margin.
+    - K_r follows from the required damping ratio.
     - The follow distance follows from the overshoot and from the offsets at rest.
 
     Args:
@@ -107,10 +111,10 @@ def _with_reserve(scenario: Scenario, requirements: DesignRequirements) -> Scena
 
 
 def attraction_damping_ratio(scenario: Scenario) -> float:
-    """Returns the least damping ratio of the loop to the follow point.
+    """Returns the least damping ratio of the loop that follows the source.
 
-    The loop is sampled and has the motor lag. The motion is along the axis of the
-    robot, and there is no obstacle.
+    The loop is sampled and has the motor lag. The robot moves straight toward the
+    source, and there is no obstacle.
     """
     z = np.linalg.eigvals(
         contact_matrix(scenario, scenario.follower.attraction.stiffness_n_m)
@@ -120,10 +124,10 @@ def attraction_damping_ratio(scenario: Scenario) -> float:
 
 
 def following_lag(scenario: Scenario) -> float:
-    """Returns the distance of P behind the follow point of a moving source, m.
+    """Returns the lag of the robot behind the follow point of a moving source, m.
 
-    P is the control point of the robot, ahead of the axle. The distance is D_r v/K_r,
-    where v is the speed of the source.
+    In steady state, the lag is D_r v/K_r, where v is the speed of the source. K_r is
+    the stiffness and D_r is the damping of the attraction.
     """
     attraction = scenario.follower.attraction
     time = attraction.damping_n_s_m / attraction.stiffness_n_m
@@ -131,10 +135,11 @@ def following_lag(scenario: Scenario) -> float:
 
 
 def braking_overshoot(scenario: Scenario) -> float:
-    """Returns how far P overshoots the follow point of a source at rest, m.
+    """Simulates a braking robot and returns its overshoot past the follow point, m.
 
-    P is the control point of the robot, ahead of the axle. A simulation gives the
-    overshoot. P approaches at top speed, with exact hearing, no obstacle, and no law.
+    The source is at rest, and the robot approaches at top speed. The simulation has
+    exact hearing, no obstacle, and no law. If the robot does not overshoot, the result
+    is 0.
     """
     changes = {
         "law": "none",
@@ -157,10 +162,11 @@ def follow_distance(
         scenario: The scenario with the length of the leader. The leader is the robot
             that carries the source.
         requirements: The requirements with the clearance to the body of the leader.
-        overshoot_m: Overshoot of the control point P beyond the follow point, m.
+        overshoot_m: Overshoot of the follower past the follow point, m.
 
     Returns:
-        The distance from P to the source, m, rounded up to 5 cm.
+        The distance from the follower's control point to the source, m. The distance is
+        rounded up to a multiple of 5 cm.
     """
     room = scenario.source.length_m / 2.0 + requirements.clearance_m
     least = overshoot_m + room
@@ -168,12 +174,15 @@ def follow_distance(
 
 
 def with_attraction(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
-    """Returns a copy of a scenario with another K_r and D_r.
+    """Returns a copy of a scenario with other gains of the attraction.
+
+    The attraction is the virtual spring and damper that pull the robot to the follow
+    point near the source.
 
     Args:
         scenario: The scenario, which stays unchanged.
-        K_r: Stiffness of the spring to the follow point, N/m.
-        D_r: Damping, N s/m.
+        K_r: Stiffness of the spring, N/m.
+        D_r: Damping of the damper, N s/m.
 
     Returns:
         The copy with the new gains.

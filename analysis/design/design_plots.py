@@ -20,15 +20,16 @@ _DISTANCE_M = np.linspace(0.005, 1.2, 240)
 
 
 def plot_design(study: DesignStudy) -> Figure:
-    """Plots the forces of the laws, and the stiffness that contact allows.
+    """Plots the forces of the laws, and their stiffness against its stability limits.
 
-    The left panel shows the push of each law and the pull of the attraction over the
-    distance of an obstacle. Shaded areas show where the push exceeds the pull and stops
-    the robot. The right panel shows the stiffness of each law and the stiffness limits
-    for a stable contact over D_r.
+    The left panel shows forces over the distance of an obstacle. It compares the push
+    of each law away from the obstacle with the pull toward the source. In shaded areas,
+    the push exceeds the pull. The right panel shows the stiffness of each law, and the
+    limits of a stable motion at an obstacle, over the damping D_r.
 
     Args:
-        study: The result of ``study_design``. The figure is for its current attraction.
+        study: The result of ``study_design``. The figure shows its current attraction,
+            and not its recommended one.
 
     Returns:
         The figure with two panels.

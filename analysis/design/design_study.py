@@ -45,12 +45,11 @@ class Alternative:
     following_lag_m: float
     """Distance of the control point P behind the follow point of a moving source, m."""
     overshoot_m: float
-    """Overshoot of P past the follow point of a source at rest after an approach at top
-    speed, m."""
+    """Overshoot past the follow point after an approach at top speed, m."""
     follow_distance_m: float
     """Least follow distance that leaves room for the overshoot, m."""
     metres_to_go: float
-    """Distance from an obstacle within reach to the point where the attraction rests,
+    """Distance from an obstacle to the point behind it where the robot would rest,
     m."""
     allowed_stiffness_n_m: float
     """Largest stiffness of a push that is stable in contact with late echoes, N/m."""
@@ -85,7 +84,7 @@ class DesignStudy:
     """Kinetic energy of the virtual mass at top speed, J."""
     barriers: tuple[BarrierRow, ...]
     contact_limits_n_m: tuple[float, ...]
-    """Largest stiffness of a push that is stable with echoes 0, 1, 2, and 4 ticks late,
+    """Largest stable stiffness of a push if echoes are 0, 1, 2, and 4 ticks late,
     N/m."""
     today: Alternative
     """The attraction of the scenario."""
@@ -105,19 +104,22 @@ def study_design(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> DesignStudy:
-    """Chooses gains for the attraction of a scenario and recommends another attraction.
+    """Chooses gains of the laws for a scenario, and also recommends another attraction.
+
+    The attraction is the virtual spring and damper that pull the robot to the follow
+    point near the source.
 
     Args:
-        scenario: The scenario with the attraction and the robot. Of the gains of the
-            laws, only the reaches and the speed limits are used.
+        scenario: The scenario with the attraction and the robot. Of the parameters of
+            its laws, only the reaches and the speed limits are used.
         requirements: Requirements that the gains must meet. None means the default
             requirements.
         progress: Function that is called with the number of finished runs. There are
             ``STUDY_RUNS`` runs.
 
     Returns:
-        The gains and their performance figures, for the current attraction and for the
-        recommended attraction.
+        The gains and their performance figures, both for the current attraction and for
+        the recommended attraction.
 
     Raises:
         InputError: There are several robots, or no gains meet a requirement that must

@@ -96,9 +96,9 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
     """Writes the files of a design into a directory.
 
     - ``summary.json`` is the JSON document.
-    - ``scenario.yaml`` is the scenario with gains for the current attraction.
-    - ``recommended.yaml`` is the scenario with the recommended attraction.
-    - ``design.png`` shows the push and the pull.
+    - ``scenario.yaml`` is the scenario with new gains of the laws.
+    - ``recommended.yaml`` is the scenario with the recommended attraction as well.
+    - ``design.png`` is the figure of ``plot_design``.
     - ``law_curves.png`` shows the forces of the laws.
 
     Args:

@@ -1,7 +1,13 @@
-"""Search for the gains of each law (K_0, k_ref, D_0, d_ref) that meet requirements.
+"""Search for gains of the laws that meet given requirements.
 
-If requirements exclude each other, the first one in this order has priority: the
-barrier, the contact, the offset. docs/avoidance.md explains the requirements.
+The gains are the springs K_0 and k_ref, and the dampers D_0 and d_ref. If two
+requirements exclude each other, the one that comes first in this list has priority:
+
+- The barrier, which stops the robot in front of an obstacle.
+- The contact, which must be stable in front of an obstacle.
+- The offset, which the law causes at the follow point.
+
+docs/avoidance.md explains these requirements.
 """
 
 from __future__ import annotations
@@ -68,16 +74,16 @@ def gain_for_barrier(
     requirements: DesignRequirements,
     **also: float,
 ) -> float:
-    """Returns the value of a gain with which a law just meets the required barrier.
+    """Returns the value of a gain with which a law just stops the robot at an obstacle.
 
-    The barrier is the energy that the push of the law takes from the robot during an
-    approach. The barrier must be equal to the kinetic energy at top speed.
+    During an approach, the push of the law must take the kinetic energy of top speed
+    from the robot. This energy is called the barrier.
 
     Args:
         scenario: The scenario with all other values.
-        law: The law that has the gain.
-        field: Name of the gain, in N/m or N m. The push must be proportional to the
-            gain.
+        law: Name of the law that has the gain.
+        field: Name of the gain, whose unit is N/m or N m. The push of the law must be
+            proportional to the gain.
         requirements: The requirements with the largest distance of the source.
         **also: Other gains of the law, as multiples of this gain.
 
@@ -85,7 +91,7 @@ def gain_for_barrier(
         The gain in the unit of its field.
 
     Raises:
-        InputError: No gain from 1e-3 to 1e5 meets the required barrier.
+        InputError: No gain from 1e-3 to 1e5 stops the robot.
     """
     to_go, energy = metres_to_go(scenario, requirements), kinetic_energy(scenario)
 
@@ -102,9 +108,10 @@ def gain_for_barrier(
 def _barrier_gains(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> Scenario:
-    """Derives the spring gain from the barrier, and the damper gain from the energy.
+    """Derives the two gains of a law by the rule ``barrier``.
 
-    The energy is the share of the dissipation that the velocity term may return.
+    The spring gain follows from the kinetic energy that the law must remove. The damper
+    gain follows from the energy that the velocity term may return to the motion.
     """
     gains = LAWS[law].loop_gains
     assert gains is not None, f"{law} does not name the gains that tune it"
@@ -138,8 +145,8 @@ def _matched_damper(
 ) -> Scenario:
     """Derives the two gains of the velocity term of the active law of 2019.
 
-    The gain d_ref follows from the offset that a far echo causes. The gain D_0 follows
-    from the energy that the velocity term may return.
+    The gain d_ref follows from the offset that a far echo may cause. The gain D_0
+    follows from the energy that the velocity term may return to the motion.
     """
     far = scenario.follower.ultrasonic.maximum_range_m
     tail = spring(law, scenario)(far)
@@ -176,11 +183,13 @@ def _matched_spring(
 ) -> Scenario:
     """Derives the two gains of the spring term of the active law of 2019.
 
-    The gain k_ref follows from the barrier. The decay length alpha follows from the
-    offset at rest and from the contact. With a longer alpha, the push is softer and
-    reaches farther. The function takes the longest alpha that meets the offset. If the
-    push is then too stiff for a stable contact, the function takes the shortest alpha
-    with a stable contact.
+    The gain k_ref follows from the kinetic energy that the law must remove. The second
+    gain follows from the decay length alpha of the force. With a longer alpha, the
+    force is softer and reaches farther. The function chooses alpha in two steps:
+
+    - It takes the longest alpha with an acceptable offset at rest.
+    - If the force is then too stiff for a stable contact, it takes the shortest alpha
+      with a stable contact.
     """
     reach = getattr(scenario.follower.laws, law).reach_m
     # This limit depends on the attraction alone, and not on alpha.

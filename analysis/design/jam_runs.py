@@ -1,4 +1,4 @@
-"""Simulated runs that show whether a law jams in front of two obstacles.
+"""Simulated runs that show whether a law gets stuck in front of two obstacles.
 
 The scenario is the experiment with two obstacles in the papers.
 """
@@ -27,8 +27,7 @@ class JamRuns:
     causes: dict[str, int]
     """Number of runs by outcome."""
     jams: int
-    """Number of runs with the outcome "stuck" or "timeout" that never reached the
-    goal."""
+    """Number of runs that got stuck or timed out and never reached the goal."""
 
 
 def jam_runs(
@@ -37,14 +36,13 @@ def jam_runs(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> list[JamRuns]:
-    """Simulates the scenario ``two_static_obstacles`` for each law and each start.
+    """Simulates the scenario ``two_static_obstacles`` for several laws and starts.
 
-    The runs have exact hearing and ultrasonic cones.
+    The starts are ``JAM_STARTS_M``. The runs have exact hearing and ultrasonic cones.
 
     Args:
-        scenario: The scenario with the attraction and the gains. Its tick, the frame
-            duration of its microphones, the period of its ultrasonic sensors, and its
-            engine are also used.
+        scenario: The scenario with the attraction and the gains. The runs also use its
+            tick, its engine, and the sample periods of its sensors.
         laws: Names of the laws.
         progress: Function that is called with the number of finished runs.
 

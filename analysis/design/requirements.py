@@ -32,11 +32,13 @@ class DesignRequirements:
     source_range_m: float = 4.0
     """Largest distance of the source, m (Han 2019, tables 1 and 2)."""
     spare_latency_ticks: int = 1
-    """Additional age of echoes in control periods with which contact must be stable.
-    The model leaves out the travel time of echoes, which is up to 18 ms."""
+    """Number of control periods by which echoes may be later than in the model. The
+    motion at an obstacle must still be stable. The model leaves out the travel time of
+    echoes, which is up to 18 ms."""
     far_offset_m: float = 0.03
-    """Largest offset that an echo at the largest sensor range may cause at rest, m. The
-    default is the error of hearing at 1 m (Han 2019, tables 1 and 2)."""
+    """Largest allowed offset of a robot at rest due to an echo at the largest sensor
+    range, m. The default is equal to the error of hearing at 1 m (Han 2019, tables 1
+    and 2)."""
     injected_share: float = 0.8
     """Largest share of the dissipation of D_r that the velocity term may return."""
     damping: float = 0.7
@@ -44,9 +46,9 @@ class DesignRequirements:
     clearance_m: float = 0.25
     """Least clearance between P and the body of the leader during an overshoot, m."""
     offset_reserve_m: float = 0.1
-    """Part of the goal margin that the recommended attraction must leave unused, m.
-    Cones and an oblique approach add up to 6 cm to the offset. Hearing has errors of 2
-    to 7 cm at 1 m."""
+    """Part of the goal margin that the recommended attraction must leave unused, m. The
+    cones of the sensors and an oblique approach increase the offset by up to 6 cm.
+    Hearing has errors of 2 to 7 cm at 1 m."""
 
 
 @dataclass(frozen=True)
@@ -124,11 +126,12 @@ def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
 
 
 def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
-    """Returns the largest distance from an obstacle to the point of rest behind it.
+    """Returns how far the robot would still go if an obstacle did not stop it.
 
-    P is the control point of the robot, ahead of the axle. The obstacle is at the
-    distance rho_0 ahead of P, where rho_0 is the reach of the conventional law. At the
-    point of rest, the attraction is zero.
+    The obstacle is at the distance rho_0 ahead of the robot, where rho_0 is the reach
+    of the conventional law. The follow point is the point where the attraction is zero.
+    The result is the distance from the obstacle to the follow point. The source has its
+    largest distance.
 
     Args:
         scenario: The scenario with the follow distance and rho_0.
@@ -138,7 +141,8 @@ def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
         The distance in m, above 0.
 
     Raises:
-        InputError: The source is too near for a point of rest behind the obstacle.
+        InputError: The follow distance and rho_0 together are too long for the largest
+            distance of the source.
     """
     follow = scenario.follower.attraction.follow_distance_m
     reach = scenario.follower.laws.conventional.reach_m
@@ -153,11 +157,12 @@ def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
 
 
 def allowed_stiffness(scenario: Scenario, requirements: DesignRequirements) -> float:
-    """Returns the largest stiffness of a push with a stable motion at an obstacle.
+    """Returns the largest stiffness of a law with a stable motion at an obstacle.
 
     Args:
         scenario: The scenario with the robot, the plant, and the attraction.
-        requirements: The requirements with the additional age of echoes, in ticks.
+        requirements: The requirements with ``spare_latency_ticks``, the additional
+            delay of echoes.
 
     Returns:
         The stiffness in N/m. If the attraction alone is too stiff, the result is
@@ -180,11 +185,11 @@ def check_law(
         requirements: Requirements that the gains must meet.
 
     Returns:
-        The gains of the law, and five checks.
+        The gains of the law with five checks. Each check has a number and its bound.
 
     Raises:
-        InputError: The design does not choose gains for this law, or the source is too
-            near (see ``metres_to_go``).
+        InputError: The design does not choose gains for this law.
+        InputError: The follow distance is too long; see ``metres_to_go``.
     """
     push = spring(law, scenario)
     to_go = metres_to_go(scenario, requirements)

@@ -1,14 +1,15 @@
-"""Head-on approach of the control point P to the flat face of an obstacle.
+"""Model of a robot that drives straight toward the flat face of an obstacle.
 
-The goal is behind the obstacle. The motion obeys this equation:
+The goal is behind the obstacle. The motion of the control point P, which is ahead of
+the axle, obeys this equation:
 
     M c'' = f(c, s) - K_r (L + c) - D_r c'
 
-- c is the distance of P from the face, m.
-- L is the distance from the face to the follow point behind it, m.
-- f is the force of the law, N, and s is the speed of the obstacle in the law, m/s.
-
-The attraction is linear along the line of the approach.
+- M is the virtual mass at P.
+- c is the distance of P from the face.
+- L is the distance from the face to the follow point behind it.
+- f is the force of the law, and s is the relative speed of the obstacle.
+- K_r is the stiffness and D_r is the damping of the attraction to the follow point.
 """
 
 from __future__ import annotations
@@ -28,9 +29,9 @@ from systems.world.geometry import control_point
 
 @dataclass(frozen=True, eq=False)
 class HeadOn:
-    """The head-on approach of the control point P to a flat face, in one dimension.
+    """Straight approach of a robot to the flat face of an obstacle.
 
-    The symbols are those of the module: c, s, L, and f(c, s).
+    The module docstring defines the equation of motion and its symbols.
     """
 
     scenario: Scenario
@@ -44,9 +45,9 @@ class HeadOn:
 
     @property
     def equilibrium_m(self) -> float:
-        """Distance at which the obstacle stops P, m.
+        """Distance from the obstacle at which the robot stops, m.
 
-        The distance is the largest one of all stable equilibria.
+        The robot stops at the stable equilibrium that is farthest from the obstacle.
 
         Raises:
             InputError: There is no stable equilibrium, because the attraction is
@@ -69,23 +70,30 @@ class HeadOn:
         return -self.slope(self.equilibrium_m)
 
     def slope(self, c: float) -> float:
-        """Returns the slope df/dc - K_r of the net force at rest, N/m.
+        """Returns the slope of the net force over the distance, N/m.
+
+        The slope is df/dc - K_r, where f is the force of the law and K_r is the
+        stiffness of the attraction. The obstacle is at rest.
 
         Args:
-            c: Distance of P from the face, m.
+            c: Distance of the robot's control point from the face, m.
 
         Returns:
-            The slope. A negative slope means that a small deviation is pushed back.
+            The slope. If the slope is negative at an equilibrium, the equilibrium is
+            stable.
         """
         slope, _ = self.law.gradient(c, 0.0)
         return slope - self.scenario.follower.attraction.stiffness_n_m
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """Returns the net force f(c, s) - K_r (L + c) on P.
+        """Returns the net force f(c, s) - K_r (L + c) on the robot.
+
+        The force of the law is f. The attraction pulls with K_r (L + c) toward the
+        follow point, which is the distance L behind the face.
 
         Args:
-            c: Distance of P from the face, m.
-            s: Speed of the obstacle in the law, m/s.
+            c: Distance of the robot's control point from the face, m.
+            s: Relative speed of the obstacle that the law uses, m/s.
 
         Returns:
             The force in N, positive away from the face.
@@ -95,17 +103,17 @@ class HeadOn:
 
 
 def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
-    """Makes the head-on approach with the gains of a scenario.
+    """Makes the model of a straight approach to an obstacle from a scenario.
 
     Args:
         scenario: The scenario with the law, the attraction, and the mass.
-        to_go_m: Distance L from the face to the follow point, m. If it is None, L comes
-            from the obstacle that is nearest to the line from the start to the source.
-            Without such an obstacle, L is half the distance from the start to the
-            follow point.
+        to_go_m: Distance L from the face of the obstacle to the follow point, m. If it
+            is None, the function takes L from the scenario. It uses the obstacle
+            nearest to the line from the start to the source. Without such an obstacle,
+            L is half the distance from the start to the follow point.
 
     Returns:
-        The approach, with the distances at which P can rest, m.
+        The model, with the distances at which the robot can rest.
 
     Raises:
         InputError: The law does not exist.
@@ -122,10 +130,10 @@ def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
 
 
 def radial_equilibria(law: RadialLaw, pull_n: NDArray[np.float64]) -> tuple[float, ...]:
-    """Returns the distances at which the push f(c, 0) is equal to a given pull.
+    """Returns the distances at which the push of a law is equal to a given pull.
 
     Args:
-        law: The tabulated law.
+        law: The law, as a table of its force over distance.
         pull_n: (n,) pull toward the obstacle at the distances ``law.distances_m``, N.
 
     Returns:

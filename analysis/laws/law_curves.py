@@ -1,7 +1,8 @@
 """Curves of the force of each law over distance and over speed.
 
-Han 2019 describes its figure 6 in words, and Kim 2017 describes its own figure. Both
-figures are missing. The forces in this module come from the blocks of the simulation.
+Han 2019 describes such curves in words (figure 6), and so does Kim 2017. The figures
+themselves are missing. The forces in this module come from the blocks of the
+simulation.
 """
 
 from __future__ import annotations
@@ -85,16 +86,17 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
 def radial_forces(
     controller: Any, c: ArrayLike, approach: ArrayLike
 ) -> NDArray[np.float64]:
-    """Returns the force away from an obstacle that has moved for one control period.
+    """Returns the force away from an obstacle after one control period of approach.
 
     Args:
         controller: A block with the ports of ``RadialLawController``.
-        c: (...) distances at the end of the control period, m, above 0. The arrays
-            ``c`` and ``approach`` are broadcast.
-        approach: (...) speeds at which the distance has decreased, m/s.
+        c: (...) distances at the end of the control period, m, above 0. The function
+            broadcasts ``c`` and ``approach`` to one shape.
+        approach: (...) speeds of approach during the control period, m/s. A negative
+            speed means that the obstacle recedes.
 
     Returns:
-        (...) force in N, with the broadcast shape of both arrays.
+        (...) force in N, with the broadcast shape.
     """
     context = controller.CreateDefaultContext()
     for name, size in (("p_WS_estimated", 2), ("pose_WB_estimated", 3), ("v_WP", 2)):

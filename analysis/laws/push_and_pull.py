@@ -1,8 +1,8 @@
 """Push of an obstacle straight ahead against the pull of a target behind it.
 
-The control point P of the robot moves head-on toward the obstacle. All forces act along
-the line to the target. The obstacle is at rest. Only ``injected_share`` takes velocity
-terms into account.
+The robot drives straight toward an obstacle at rest. The law pushes the robot away from
+the obstacle, and the attraction pulls the robot toward the target. Except for
+``injected_share``, the functions of this module leave out velocity terms.
 """
 
 from __future__ import annotations
@@ -34,14 +34,15 @@ _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
 
 def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
-    """Returns the force function f(c, s) of a law with the gains of a scenario.
+    """Returns the force function of a law with the gains of a scenario.
 
     Args:
         law: One of ``DESIGNED_LAWS``.
         scenario: The scenario with the gains and the sensors.
 
     Returns:
-        The function f(c, s), N, of the distance c, m, and the speed s, m/s.
+        A function f(c, s) that returns the force away from an obstacle, N. The distance
+        of the obstacle is c, m. Its relative speed is s, m/s.
 
     Raises:
         InputError: The design does not choose gains for this law.
@@ -54,14 +55,15 @@ def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
 
 
 def spring(law: str, scenario: Scenario) -> Push:
-    """Returns the push of a law at rest, without its velocity term.
+    """Returns the spring term of a law as a function of distance.
 
     Args:
         law: One of ``DESIGNED_LAWS``.
         scenario: The scenario with the gains and the sensors.
 
     Returns:
-        A function from the distance in m to the push in N.
+        A function from the distance of an obstacle, m, to the force away from it, N.
+        The force does not include the velocity term.
 
     Raises:
         InputError: The design does not choose gains for this law.
@@ -78,22 +80,23 @@ def kinetic_energy(scenario: Scenario) -> float:
 
 
 def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
-    """Returns the energy that push and pull together take from P during an approach.
+    """Returns the kinetic energy that a law takes from a robot during an approach.
 
-    P is the control point of the robot, ahead of the axle. The pull of the attraction
-    acts against the push during the whole approach. The speed is limited. Therefore,
-    when the push becomes stronger than the pull, P has at most the kinetic energy of
-    top speed. The barrier is the largest rise of the potential between any two points
-    of the approach. The approach ends at the least distance that the sensors measure.
+    The robot drives straight toward an obstacle. The law pushes the robot back, and the
+    attraction pulls it forward. The net force has a potential over the distance. Where
+    the push exceeds the pull, the potential rises. When this stretch begins, the
+    limited speed of the robot is at most the top speed. Therefore, only the largest
+    rise of the potential matters. The approach ends at the least distance that the
+    sensors measure.
 
     Args:
         push: Push over distance; see ``spring``.
-        scenario: The scenario with K_r and the least range of the sensors.
-        metres_to_go: Distance from the surface of the obstacle to the point where the
-            attraction rests, m.
+        scenario: The scenario with the attraction and the least range of the sensors.
+        metres_to_go: Distance from the surface of the obstacle to the point behind it
+            where the attraction is zero, m.
 
     Returns:
-        The energy in J. If the push is never stronger than the pull, the energy is 0.
+        The energy in J. If the push never exceeds the pull, the energy is 0.
     """
     c, forces = sampled_push(push, scenario)
     return largest_rise(
@@ -107,7 +110,7 @@ def sampled_push(
     """Samples a push at many distances, starting at the least range of the sensors.
 
     Args:
-        push: Push over distance, N; see ``spring``.
+        push: Force away from an obstacle over its distance; see ``spring``.
         scenario: The scenario with the least range of the sensors.
 
     Returns:
@@ -119,32 +122,34 @@ def sampled_push(
 
 
 def largest_rise(net: NDArray[np.float64]) -> float:
-    """Returns the largest rise of the potential between two points of the approach.
+    """Returns the largest rise of the potential of a force during an approach.
 
     Args:
-        net: (n,) push minus pull at the distances of ``sampled_push``, N.
+        net: (n,) net force away from the obstacle, N. The distances are those of
+            ``sampled_push``.
 
     Returns:
-        The rise in J, 0 or more.
+        The largest rise between two distances in J, 0 or more.
     """
     potential = np.concatenate([[0.0], np.cumsum(net[1:] + net[:-1]) * _STEP_M / 2.0])
     return float(np.max(potential - np.minimum.accumulate(potential)))
 
 
 def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
-    """Returns K_0 of the conventional law for an approach without a speed limit.
+    """Returns the K_0 with which the conventional law stops a robot at an obstacle.
 
-    The law acts within its reach rho_0. The energy K_0 rho_0^2/2 of its spring is equal
-    to the sum of two energies:
+    The law acts as a spring of stiffness K_0 within its reach rho_0. Within this reach,
+    the speed of the robot has no limit. The largest energy of the spring, K_0
+    rho_0^2/2, is equal to the sum of two energies:
 
-    - The kinetic energy at the distance rho_0.
-    - The work of the attraction over the distance rho_0.
+    - The kinetic energy at top speed, which the robot has at the distance rho_0.
+    - The work of the attraction from the distance rho_0 to the obstacle.
 
     Args:
         scenario: The scenario with the attraction, the reach rho_0, the mass, and the
             top speed.
-        metres_to_go: Distance from the surface of the obstacle to the point where the
-            attraction rests, m.
+        metres_to_go: Distance from the surface of the obstacle to the point behind it
+            where the attraction is zero, m.
 
     Returns:
         K_0 in N/m.
@@ -163,7 +168,8 @@ def stiffest(law: str, scenario: Scenario) -> float:
         scenario: The scenario with the gains and the least range of the sensors.
 
     Returns:
-        The largest slope -df/dc in N/m, over all distances that the sensors measure.
+        The largest slope -df/dc in N/m, where f is the force and c is the distance. The
+        distance is at least the least range of the sensors.
     """
     gains = getattr(scenario.follower.laws, law)
     nearest = scenario.follower.ultrasonic.minimum_range_m
@@ -171,10 +177,10 @@ def stiffest(law: str, scenario: Scenario) -> float:
 
 
 def rest_offset(law: str, scenario: Scenario) -> float:
-    """Returns how far the body of the leader pushes P off the follow point at rest.
+    """Returns how far the leader pushes the follower off the follow point at rest.
 
-    The leader is the robot that carries the source. P is the control point of the
-    follower, ahead of its axle. P is behind the leader, on the axis of the leader.
+    The leader is the robot that carries the source. The law of the follower treats the
+    body of the leader as an obstacle. The follower is straight behind the leader.
 
     Args:
         law: One of ``DESIGNED_LAWS``.
@@ -202,9 +208,7 @@ def rest_offset(law: str, scenario: Scenario) -> float:
 
 
 def far_offset(law: str, scenario: Scenario) -> float:
-    """Returns how far an echo at the largest sensor range pushes P at rest.
-
-    P is the control point of the robot, ahead of the axle.
+    """Returns how far an echo at the largest sensor range pushes a robot at rest.
 
     Args:
         law: One of ``DESIGNED_LAWS``.
@@ -219,21 +223,20 @@ def far_offset(law: str, scenario: Scenario) -> float:
 
 
 def injected_share(law: str, scenario: Scenario) -> float:
-    """Returns the largest share of the dissipation that the velocity term can return.
+    """Returns the largest power of the velocity term relative to the power of D_r.
 
-    The obstacle is at rest, and the velocity term is h(s) = f(c, s) - f(c, 0). While
-    the robot recedes at the speed s, the power of the printed term is at most h(s) s.
-    The damping D_r takes the power D_r s^2. The share is the ratio of the two powers.
-    The other part of the force, f(c, 0), has a potential. If the share is below 1, the
-    motion cannot gain energy.
+    The obstacle is at rest, and the robot recedes from it at the speed s. The velocity
+    term of the law adds at most the power h(s) s, with h(s) = f(c, s) - f(c, 0). The
+    damping D_r of the attraction removes the power D_r s^2. The result is the largest
+    ratio of the two powers. If the ratio is below 1, the motion cannot gain energy.
 
     Args:
         law: One of ``DESIGNED_LAWS``.
         scenario: The scenario with the gains, D_r, and the top speed.
 
     Returns:
-        The largest share, 0 or more. The distance c is half the reach rho_0 of the
-        conventional law.
+        The ratio, 0 or more. The distance c is half the reach rho_0 of the conventional
+        law.
     """
     force = law_force(law, scenario)
     within = 0.5 * scenario.follower.laws.conventional.reach_m

@@ -1,7 +1,8 @@
 """Tables of the radial force f(c, s) of a law, and of the energy of f(c, 0).
 
-The tables contain the results of the controller's own law. Therefore, code that
-evaluates thousands of starts does not need a second implementation of the law.
+The distance of the obstacle is c, and its relative speed is s. The tables contain
+forces that the law of the controller returns. Therefore, code that evaluates thousands
+of starts does not need a second implementation of the law.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class RadialLaw:
     """The force f(c, s) of a law away from an obstacle.
 
     - c is the distance of the obstacle, m.
-    - s is the speed at which the vector to the obstacle changes, m/s.
+    - s is the relative speed of the obstacle that the law uses, m/s.
     """
 
     name: str
@@ -49,8 +50,8 @@ class RadialLaw:
     """(n,) energy U(c) at the same distances, J. U(c) is the work of f(c, 0) from c to
     the range."""
     increments_n: NDArray[np.float64]
-    """(n, k) increment f(c, s) - f(c, 0) at multiples of INCREMENT_STEPS, N. Each row
-    has one distance c."""
+    """(n, k) velocity term f(c, s) - f(c, 0), N. Row i has the distance i
+    INCREMENT_STEPS[0]. Column j has the speed j INCREMENT_STEPS[1]."""
 
     @property
     def distances_m(self) -> NDArray[np.float64]:
@@ -58,15 +59,15 @@ class RadialLaw:
         return DISTANCE_STEP_M * np.arange(len(self.forces_n), dtype=float)
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """Returns the force f(c, s) of the law.
+        """Returns the force of the law away from an obstacle.
 
         Args:
             c: Distance of the obstacle, m.
-            s: Speed of the obstacle in the law, m/s.
+            s: Relative speed of the obstacle that the law uses, m/s.
 
         Returns:
-            The force in N, positive away from the obstacle. Beyond the range of the
-            sensors, the force is 0.
+            The force f(c, s) in N, positive away from the obstacle. Beyond the range of
+            the sensors, the force is 0.
         """
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
@@ -79,16 +80,15 @@ class RadialLaw:
         return np.interp(np.asarray(c), self.distances_m, self.energies_j, right=0.0)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
-        """Returns the slopes of the force f(c, s).
+        """Returns the partial derivatives of the force f(c, s).
 
         Args:
             c: Distance of the obstacle, m.
-            s: Speed of the obstacle in the law, m/s. At s = 0, the slope in s is the
-                slope toward s > 0.
+            s: Relative speed of the obstacle that the law uses, m/s. At s = 0, the
+                derivative by s is the one-sided derivative for s > 0.
 
         Returns:
-            The first value is the slope df/dc, N/m. The second value is the slope
-            df/ds, N s/m.
+            The first value is df/dc, N/m. The second value is df/ds, N s/m.
         """
         f = self.function(AutoDiffXd(c, np.eye(2)[0]), AutoDiffXd(s, np.eye(2)[1]))
         slopes = f.derivatives() if isinstance(f, AutoDiffXd) else np.zeros(0)
@@ -96,13 +96,14 @@ class RadialLaw:
 
 
 def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:
-    """Returns the radial force function f(c, s) of the controller of a scenario.
+    """Returns the radial force function of the controller of a scenario.
 
     Args:
         scenario: The scenario with the law.
 
     Returns:
-        The function f(c, s), N, of the distance c, m, and the speed s, m/s.
+        A function f(c, s) that returns the force away from an obstacle, N. The distance
+        of the obstacle is c, m. Its relative speed is s, m/s.
 
     Raises:
         InputError: The law does not exist.

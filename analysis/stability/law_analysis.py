@@ -28,8 +28,7 @@ class Study:
     scenario: Scenario
     """The scenario with the law to analyze."""
     found: dict[str, Any] = field(default_factory=dict)
-    """Data objects of earlier parts, by key. The value is None for a part without a
-    result."""
+    """Data objects of earlier parts, by key. None for a part without a result."""
 
     def need(self, key: str) -> Any:
         """Returns the data object of an earlier part.

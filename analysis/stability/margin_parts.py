@@ -75,15 +75,15 @@ class Margins:
     at: OperatingPoint
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
-        """Returns the margins of the implemented loop for one cut.
+        """Returns the stability margins of the implemented loop for one cut.
 
         Args:
             at: Place of the cut: ``sensor``, ``actuator``, or ``wheels``.
-            direction: Direction of the motion: ``along`` or ``across`` the line to the
-                source.
+            direction: Direction of the motion: ``along`` the line to the source, or
+                ``across`` this line.
 
         Returns:
-            The margins, or None if there is no such loop.
+            The margins. If there is no such loop, None.
         """
         for found in self.implemented:
             if (found.at, found.direction) == (at, direction):

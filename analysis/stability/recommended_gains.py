@@ -1,10 +1,13 @@
 """Search for the least damping D_r that meets the usual thresholds, for several K_r.
 
-The analyzed loop is the sampled loop of the attraction with motor lag. The springs and
-dampers of the law are not in this loop. They only enter the contact mode, the motion in
-front of an obstacle, which must also be stable. The law also pushes the robot away from
-the body of the source. Margins of the loop with this push are computed separately
-(``WholeLoop``).
+K_r is the stiffness and D_r is the damping of the attraction, which pulls the robot to
+the follow point near the source. The analyzed loop consists of the attraction with
+sampling and motor lag. It does not contain the force of the law. Two other analyses
+take this force into account:
+
+- The motion in front of an obstacle, called the contact mode, must be stable.
+- The law also pushes the robot away from the body of the source. ``WholeLoop`` has the
+  margins of the loop with this push.
 """
 
 from __future__ import annotations
@@ -51,8 +54,8 @@ class GainThresholds:
     sensitivity_peak: float = 2.0
     disk_margin: float = 2.0 / 3.0
     spare_ticks: int = 1
-    """The contact mode must be stable even if echoes are this many control periods
-    late."""
+    """The motion in front of an obstacle must be stable even if echoes are this many
+    control periods late."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +78,9 @@ class GainFigures:
     delay_margin_s: float
     """Delay margin at the sensor or at the actuator, whichever is smaller, s."""
     contact_radius: float
-    """Spectral radius of the contact mode with late echoes. The mode is stable below
-    1."""
+    """Spectral radius of the motion in front of an obstacle; stable below 1."""
     following_lag_m: float
-    """Distance of the control point P behind the follow point, m. The source moves at
-    the speed that it has in the scenario."""
+    """Lag of the robot behind the follow point of the moving source, m."""
     settling_s: float
     """Time in which a small deviation falls to 2 %, s."""
     largest_law_stiffness_n_m: float
@@ -128,9 +129,9 @@ class RecommendedGains:
     today: GainFigures
     choices: tuple[GainChoice, ...]
     recommended: GainFigures | None
-    """Figures of the recommended gains. They have the current K_r if a damping meets
-    the thresholds with this K_r. Otherwise, they have the K_r with the least lag. None
-    if no gains meet the thresholds."""
+    """Figures of the recommended gains. None if no gains meet the thresholds. If
+    possible, the gains have the current K_r. Otherwise, they have the K_r with the
+    least lag."""
     whole_loop: WholeLoop | None
     """Margins of the loop with the recommended gains and the law. None if no gains are
     recommended."""
@@ -191,17 +192,19 @@ class RecommendedGains:
 
 
 def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
-    """Returns the sampled open loop L of the attraction alone.
+    """Returns the sampled open loop of the attraction without the force of the law.
 
-    The motion is along the line to a source at rest.
+    The attraction consists of a spring and a damper. The robot moves along the line to
+    a source at rest.
 
     Args:
         scenario: The scenario with the gains, the robot, and the plant.
-        at: Where the loop is cut. At ``sensor``, only the spring is cut, and the damper
-            stays closed. At ``actuator``, both are cut.
+        at: Where the loop is cut. A cut at ``sensor`` opens the path of the spring
+            only. A cut at ``actuator`` opens the paths of both the spring and the
+            damper.
 
     Returns:
-        A model whose one input and one output are accelerations, m/s^2.
+        The model of the open loop. Its input and its output are accelerations, m/s^2.
     """
     chain = motion_chain(scenario)
     mass = scenario.only.robot.mass_kg
@@ -219,15 +222,15 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
 
 
 def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
-    """Computes the performance figures of the gains K_r and D_r of a scenario.
+    """Computes performance figures of the stiffness K_r and damping D_r of a scenario.
 
     Args:
         scenario: The scenario with the gains, the robot, and the plant.
         thresholds: The thresholds, of which only ``spare_ticks`` is used.
 
     Returns:
-        The performance figures. Each margin is the smaller of its two values for cuts
-        at the sensor and at the actuator.
+        The performance figures. The loop is cut at the sensor and at the actuator. Each
+        margin is the smaller of the margins of the two cuts.
     """
     margins = [loop_margins(attraction_loop(scenario, at)) for at in _CUTS]
     K_r = scenario.follower.attraction.stiffness_n_m
@@ -259,7 +262,7 @@ def recommend_gains(
     *,
     springs: Sequence[float] = _SPRINGS,
 ) -> RecommendedGains:
-    """Finds the least D_r for each of several K_r.
+    """Finds the least damping D_r for each of several stiffnesses K_r.
 
     Args:
         scenario: The scenario with the current gains, the law, the robot, and the

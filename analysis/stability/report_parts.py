@@ -28,12 +28,13 @@ def parts(
     """Returns the parts of a stability report for one kind of robot.
 
     Args:
-        full: Whether parts that take minutes are included.
-        guarded: Whether the robot has a guard. The report then has a part about it.
-        routed: Whether the robot drives on a route. The report then has parts about the
-            route instead of parts about following a sound.
-        searching: Whether the robot searches step by step. The report then only has
-            parts about the search and its verdicts.
+        full: Whether the report also has the parts that take minutes.
+        guarded: Whether the robot has a guard. If so, the report has a part about the
+            guard.
+        routed: Whether the robot drives on a route. If so, the report has parts about
+            the route, and no parts about following a sound.
+        searching: Whether the robot searches step by step. If so, the report has only
+            the parts about the search.
 
     Returns:
         The parts, in the order of the report.
@@ -48,11 +49,11 @@ def parts(
 
 
 def parts_for(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part, ...]:
-    """Returns the parts of a stability report for the robot of some scenarios.
+    """Returns the parts of a stability report that suit the robot of the scenarios.
 
     Args:
-        scenarios: One scenario per law, all of the same robot.
-        full: Whether parts that take minutes are included.
+        scenarios: One scenario per law. All scenarios have the same robot.
+        full: Whether the report also has the parts that take minutes.
 
     Returns:
         The parts, in the order of the report.

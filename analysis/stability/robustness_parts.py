@@ -64,19 +64,19 @@ def loop_robustness(
     *,
     samples: int,
 ) -> LoopRobustness:
-    """Computes the poles of a sampled loop over a box of uncertain parameters.
+    """Computes the poles of a sampled loop for uncertain parameters.
 
-    The result also contains the worst case and the sensitivities of the poles.
+    Each uncertain parameter has an interval. All intervals together form a box.
 
     Args:
         scenario: The scenario with the control period and the seed.
-        poles: Function from parameter values to poles of the loop, z plane.
-        parameters: The uncertain parameters. Their intervals form the box.
+        poles: Function from parameter values to the poles of the loop, z plane.
+        parameters: The uncertain parameters with their intervals.
         samples: Number of random points in the box.
 
     Returns:
-        The poles (z plane), the worst case, and the sensitivities of the slowest pole.
-        The sensitivities are changes of ln(z)/T in 1/s.
+        The poles at the random points, the worst case, and the sensitivity of the
+        slowest pole to each parameter.
     """
     return LoopRobustness(
         pole_cloud(

@@ -64,9 +64,11 @@ def _chain(name: str) -> Callable[[Study], Reading]:
 
 
 def _springs(study: Study) -> Reading:
-    """Returns the sum of all springs in a zone divided by the largest stable stiffness.
+    """Returns the total stiffness near an obstacle relative to its stability limit.
 
-    The largest stable stiffness is for the damping of the target alone.
+    The total stiffness is the sum of the stiffness to the target and the stiffness of
+    the contact. The limit is for the damping of the target alone and for positions that
+    are one tick late.
     """
     bounds = study.found.get("gain_bounds")
     if not bounds:
@@ -78,10 +80,10 @@ def _springs(study: Study) -> Reading:
 
 
 def _jammed(study: Study) -> Reading:
-    """Returns K at the end of a jam divided by the largest stable stiffness.
+    """Returns the stiffness at the end of a jam relative to its stability limit.
 
-    The largest stable stiffness is for the damping of the target alone. In a jam, a
-    wall holds the robot back while the target moves on.
+    In a jam, a wall holds the robot back while the target moves on, so that the law
+    adapts its stiffness. The limit is for the damping of the target alone.
     """
     adaptation, bounds = study.found.get("adaptation"), study.found.get("gain_bounds")
     if not adaptation or not bounds:

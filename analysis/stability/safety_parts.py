@@ -15,9 +15,10 @@ from diagrams.scenario.warnings.guarantees import Guarantees, guarantees
 
 
 def safety_parts() -> tuple[Part, ...]:
-    """Returns the part with the theorem that holds for a guarded robot.
+    """Returns the part about the guarantees of the guard.
 
-    The part also lists the assumptions of the theorem.
+    The part states the theorem that holds for the robot, and the assumptions of this
+    theorem.
     """
     return (
         Part(

@@ -62,11 +62,10 @@ class SampledLoop:
     poles: NDArray[np.complex128]
     """(n,) poles of the motion of the control point P, z plane."""
     margins: tuple[DelayMargin, ...]
-    """One delay margin for each place (sensor, wheels) and direction (along, across)
-    that has a loop."""
+    """Delay margins, one for each place of the delay and direction of motion."""
     check: DelayCheck | None
-    """Simulations on both sides of the delay margin at the sensor. None if this margin
-    is infinite."""
+    """Simulations just below and just above the delay margin at the sensor. None if
+    this margin is infinite."""
 
     @property
     def delay_margin_s(self) -> float:
@@ -77,10 +76,11 @@ class SampledLoop:
 
 @dataclass(frozen=True)
 class BurstCycles:
-    """Stability over one burst cycle, for each way to hold the target in the silence.
+    """Stability of the robot behind a source that sounds in bursts.
 
-    A burst is the interval in which the source sounds. A burst cycle consists of one
-    burst and the silence after it.
+    A burst cycle consists of one burst of sound and the silence after it. In the
+    silence, the robot holds the position of the target in one of several ways. There is
+    one result for each way.
     """
 
     today: str
@@ -244,9 +244,10 @@ def _burst_document(data: BurstCycles) -> dict[str, Any]:
 
 
 def _slowest(multipliers: NDArray[np.complex128]) -> Sequence[complex]:
-    """Returns up to four multipliers, largest first, and one of each conjugate pair.
+    """Returns up to four multipliers of a burst cycle, largest first.
 
-    Multipliers of at most 1e-3 are left out.
+    Of each conjugate pair, only one multiplier is returned. Multipliers with a
+    magnitude of at most 1e-3 are left out.
     """
     found = [complex(m) for m in multipliers if m.imag >= 0.0 and abs(m) > 1e-3]
     return found[:4]

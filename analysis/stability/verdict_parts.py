@@ -14,7 +14,7 @@ from analysis.stability.verdicts import Criterion, Verdict, judge, shown_value
 def verdict_parts(
     criteria: Mapping[Criterion, Callable[[Study], Reading]] = CRITERIA,
 ) -> tuple[Part, ...]:
-    """Returns the part that judges the results of the earlier parts by all criteria.
+    """Returns the part that compares the results of all earlier parts with thresholds.
 
     Args:
         criteria: The criteria, each with the function that reads its number.

@@ -52,10 +52,10 @@ def read_damping(study: Study) -> Reading:
 
 
 def read_worst_margin(name: str, *, largest: bool) -> Callable[[Study], Reading]:
-    """Makes a function that reads the worst value of one margin from a study.
+    """Makes a function that reads the worst value of one stability margin.
 
-    The worst value is taken over all places where the loop is cut and over both
-    directions of motion.
+    The stability report cuts the loop at several places, and for two directions of
+    motion. The worst value is the worst of all these cuts.
 
     Args:
         name: Name of a field of ``LoopMargins``, or ``disk`` for the size of the disk
@@ -64,8 +64,8 @@ def read_worst_margin(name: str, *, largest: bool) -> Callable[[Study], Reading]
             value is the worst value.
 
     Returns:
-        A function of the study. The function returns the worst value in the unit of the
-        field. If no margins were computed, the function returns the reason as a text.
+        A function that takes a study and returns the worst value in the unit of the
+        field. If no margins were computed, the function returns a text that says so.
     """
 
     def read(study: Study) -> Reading:
@@ -121,15 +121,15 @@ def read_offset(study: Study) -> Reading:
 def read_contact(study: Study, ticks: int) -> Reading:
     """Returns the growth rate of the motion in front of an obstacle, 1/s.
 
-    The slope of the force is the largest slope of the law.
+    The spring to the obstacle has the largest stiffness of the law.
 
     Args:
-        study: The study, of which only the scenario is used.
-        ticks: Age of the position on which the springs act, in control periods.
+        study: The study with the scenario.
+        ticks: Age of the measured position of the obstacle, in control periods.
 
     Returns:
-        The growth rate in 1/s. The rate is negative if the motion decays. If the law
-        does not push away from obstacles, the result is a text that says so.
+        The growth rate in 1/s, negative if the motion decays. If the law does not push
+        away from obstacles, the result is a text that says so.
     """
     scenario = study.scenario
     stiffness = law_stiffness(scenario)
@@ -141,9 +141,9 @@ def read_contact(study: Study, ticks: int) -> Reading:
 
 
 def read_worst_case(key: str) -> Callable[[Study], Reading]:
-    """Makes a function that reads the growth rate in the worst case of a part, 1/s.
+    """Makes a function that reads the growth rate for the worst parameter values, 1/s.
 
-    The part ``key`` is one of the two parts about uncertain parameters.
+    The argument is the key of a part about uncertain parameters.
     """
 
     def read(study: Study) -> Reading:
@@ -156,10 +156,10 @@ def read_worst_case(key: str) -> Callable[[Study], Reading]:
 
 
 def read_passive(study: Study) -> Reading:
-    """Returns how much energy the velocity term can add, relative to the damping D_r.
+    """Returns the largest power of the velocity term relative to the power of D_r.
 
-    The result is the largest power of the velocity term divided by the power that D_r
-    takes at the same speed. A value of at most 1 means that the loop is passive.
+    The velocity term of a law can add energy to the motion, and the damping D_r removes
+    energy. If the result is at most 1, the loop is passive.
     """
     data = study.found.get("energy_balance")
     if not data:
@@ -172,10 +172,11 @@ def read_passive(study: Study) -> Reading:
 
 
 def read_start(study: Study) -> Reading:
-    """Returns 1 if the energy certificate covers the start, and 0 otherwise.
+    """Returns 1 if the energy certificate covers the start of the robot, otherwise 0.
 
-    The certificate covers the start if the energy at the start is too low for every
-    path to contact with an obstacle.
+    The certificate covers the start if the energy of the robot is too low for every
+    path to a collision. If there is no certificate, or if bodies move, the result is a
+    text.
     """
     data = study.found.get("certificates")
     if not data:

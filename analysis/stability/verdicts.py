@@ -82,8 +82,8 @@ def shown_value(value: float | None, unit: str) -> float | str | None:
         unit: Unit of the value.
 
     Returns:
-        The word "yes" or "no" if the unit is ``YES_OR_NO``. Otherwise, the value
-        itself. None if the value does not exist.
+        If the unit is ``YES_OR_NO``, the word "yes" or "no". Otherwise, the value. If
+        the value does not exist, None.
     """
     if value is None or unit != YES_OR_NO:
         return value

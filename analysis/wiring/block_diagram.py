@@ -1,7 +1,7 @@
-"""The block diagram as a picture with the names of all ports and with all wires.
+"""Picture of a block diagram that shows the names of all ports and all wires.
 
-The module draws the picture without Graphviz. The Python builds of Graphviz need system
-libraries that a minimal machine does not have.
+The module does not use Graphviz, because its Python packages need system libraries that
+are not installed on every machine.
 """
 
 from __future__ import annotations
@@ -96,12 +96,12 @@ class _Layout:
 
 
 def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
-    """Returns the block diagram as SVG text.
+    """Returns a picture of the block diagram as SVG text.
 
-    The signals go from left to right. Some wires skip a column or go back to the left.
-    These wires go along the bus, a set of horizontal lines. The bus is between the
-    upper row and the row with the blocks of obstacle sensing. The name of an output
-    port that nothing reads is gray. Logs are left out.
+    The signals go from left to right. Wires to a neighboring column are drawn directly.
+    All other wires go along the bus, a set of horizontal lines between the two rows of
+    blocks. The name of an output port is gray if no input port reads it. Logs are left
+    out.
 
     Args:
         diagram: The diagram to draw.
@@ -183,11 +183,11 @@ def _arrange(systems: Sequence[Any], connections: Sequence[Wire]) -> _Layout:
 
 
 def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
-    """Sets the column of each box from the wires that go forward.
+    """Assigns each box to a column of the picture.
 
-    Wires that close a loop, or that go back to an earlier stage, do not count. The
-    column is the length of the longest path from the left. Each box then moves as far
-    to the right as the boxes that read its outputs allow.
+    The first column is on the left. A box comes after all boxes whose outputs it reads.
+    Boxes then move to the right, up to the boxes that read their outputs. Wires that
+    close a loop, or that go back to an earlier stage, do not count.
     """
     names = list(boxes)
     forward: dict[str, set[str]] = {name: set() for name in boxes}
