@@ -21,8 +21,8 @@ LAW_STYLES = {
 def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
     """Plots the forces of laws over distance and over speed.
 
-    The left panel shows the push of an obstacle at rest over distance. The right panel
-    shows the force over the speed of approach.
+    The left panel shows the force over the distance of an obstacle at rest. The right
+    panel shows the force over the speed at which the obstacle approaches.
 
     Args:
         curves: One entry per law and velocity term. Curves with the velocity term

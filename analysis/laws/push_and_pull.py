@@ -80,17 +80,17 @@ def kinetic_energy(scenario: Scenario) -> float:
 
 
 def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
-    """Returns the kinetic energy that a law takes from a robot during an approach.
+    """Returns the largest energy that a robot loses on its way to an obstacle.
 
-    The robot drives straight toward an obstacle. The law pushes the robot back, and the
-    attraction pulls it forward. The net force has a potential over the distance. Where
-    the push exceeds the pull, the potential rises. When this stretch begins, the
-    limited speed of the robot is at most the top speed. Therefore, only the largest
-    rise of the potential matters. The approach ends at the least distance that the
-    sensors measure.
+    The robot drives straight toward the obstacle. The law pushes the robot back, and
+    the attraction pulls the robot forward. Where the push exceeds the pull, the robot
+    loses kinetic energy. The result is the largest loss between two points of the
+    approach. If this loss is at least the kinetic energy of top speed, the robot stops,
+    because it cannot be faster than top speed. The approach ends at the least distance
+    that the sensors measure.
 
     Args:
-        push: Push over distance; see ``spring``.
+        push: Force away from the obstacle over its distance; see ``spring``.
         scenario: The scenario with the attraction and the least range of the sensors.
         metres_to_go: Distance from the surface of the obstacle to the point behind it
             where the attraction is zero, m.
@@ -223,12 +223,13 @@ def far_offset(law: str, scenario: Scenario) -> float:
 
 
 def injected_share(law: str, scenario: Scenario) -> float:
-    """Returns the largest power of the velocity term relative to the power of D_r.
+    """Returns how much power the velocity term can add, relative to the damping.
 
     The obstacle is at rest, and the robot recedes from it at the speed s. The velocity
-    term of the law adds at most the power h(s) s, with h(s) = f(c, s) - f(c, 0). The
-    damping D_r of the attraction removes the power D_r s^2. The result is the largest
-    ratio of the two powers. If the ratio is below 1, the motion cannot gain energy.
+    term of the law adds at most the power h(s) s, with h(s) = f(c, s) - f(c, 0). Here,
+    f is the force of the law at the distance c. The damping D_r of the attraction
+    removes the power D_r s^2. The result is the largest ratio of the two powers. If the
+    ratio is below 1, the motion cannot gain energy.
 
     Args:
         law: One of ``DESIGNED_LAWS``.

@@ -44,11 +44,11 @@ class RadialLaw:
     range_m: float
     """Largest range of the sensors, m."""
     forces_n: NDArray[np.float64]
-    """(n,) force f(c, 0) at the distances 0, DISTANCE_STEP_M, and so on up to the
-    range, N."""
+    """(n,) force f(c, 0), N. The distances c are 0, DISTANCE_STEP_M, and so on up to
+    ``range_m``."""
     energies_j: NDArray[np.float64]
-    """(n,) energy U(c) at the same distances, J. U(c) is the work of f(c, 0) from c to
-    the range."""
+    """(n,) work of the force f(c, 0) from the distance c to ``range_m``, J. The
+    distances are those of ``forces_n``."""
     increments_n: NDArray[np.float64]
     """(n, k) velocity term f(c, s) - f(c, 0), N. Row i has the distance i
     INCREMENT_STEPS[0]. Column j has the speed j INCREMENT_STEPS[1]."""
@@ -72,11 +72,11 @@ class RadialLaw:
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
     def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
-        """Interpolates the force f(c, 0), N, at many distances c, m."""
+        """Interpolates ``forces_n``, N, at many distances c, m."""
         return np.interp(np.asarray(c), self.distances_m, self.forces_n, right=0.0)
 
     def energy(self, c: ArrayLike) -> NDArray[np.float64]:
-        """Interpolates the energy U(c), J, at many distances c, m."""
+        """Interpolates ``energies_j``, J, at many distances c, m."""
         return np.interp(np.asarray(c), self.distances_m, self.energies_j, right=0.0)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
@@ -148,9 +148,10 @@ def radial_law(scenario: Scenario) -> RadialLaw:
 
 
 class _Scenario:
-    """Wrapper that excludes a scenario from the key of the cache.
+    """Wrapper that carries a scenario into a cached function.
 
-    All wrappers compare equal. Therefore, the cache only uses the other arguments.
+    All wrappers compare equal. Therefore, the cache distinguishes calls by the other
+    arguments only.
     """
 
     def __init__(self, scenario: Scenario) -> None:

@@ -10,17 +10,17 @@ from systems.laws.catalogue import FORCE_LAWS, LAWS, ROUTE_LAWS
 
 
 def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...]:
-    """Returns copies of a scenario, each of which has one of the chosen laws.
+    """Returns one copy of a scenario for each chosen law.
 
     Args:
-        scenario: The scenario with any number of robots of which one is analyzed.
+        scenario: The scenario with the robot that is analyzed.
         names: Names of the chosen laws. The name ``all`` means all force laws except
-            ``none``, or all route laws for a robot on a route. If the sequence is
-            empty, the only law is the law of the scenario.
+            ``none``. For a robot on a route, ``all`` means all laws for routes. For a
+            robot that searches, ``all`` means the law of the scenario. If there are no
+            names, the law of the scenario is chosen.
 
     Returns:
-        One scenario per law, in the order of the names. If a law occurs more than once,
-        only the first occurrence counts.
+        The copies, in the order of the names. A law that is named twice has one copy.
 
     Raises:
         InputError: A law does not exist, or it cannot be analyzed for this robot.
@@ -60,16 +60,15 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
 
 
 def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
-    """Returns a scenario with only the robot that is analyzed and what it follows.
+    """Returns a scenario that contains only one robot and the source that it follows.
 
     Args:
-        scenario: Any scenario.
-        name: Name of the robot. If the name is None, the first robot is analyzed.
+        scenario: A scenario with any number of robots.
+        name: Name of the robot that is analyzed. None means the first robot.
 
     Returns:
-        The first value is the scenario without all other robots. The second value is a
-        sentence that lists the removed robots. If the scenario has only one robot, this
-        sentence is empty.
+        The first value is the scenario without the other robots. The second value is a
+        text that lists the other robots. It is empty if there are no other robots.
 
     Raises:
         InputError: The scenario has no robot with this name.

@@ -59,22 +59,22 @@ class Part:
     """Name of the part in the JSON document and in links."""
     title: str
     compute: Callable[[Study], Any]
-    """Computes the data object. Raises an InputError with the reason if the part does
-    not apply."""
+    """Computes the data object. If the part does not apply, the function raises an
+    InputError with the reason."""
     render: Callable[[Any, str], list[str]]
     """Makes pieces of HTML from the data object and from a prefix for the names of
     figures."""
     fresh: bool = False
     """Whether the section begins on a new page of paper."""
     document: Callable[[Any], dict[str, Any]] | None = None
-    """Makes the entries of the JSON document from the data object. If it is None, the
-    data object itself is the only entry, under the key of the part."""
+    """Makes the entries of the JSON document from the data object. If this field is
+    None, the data object is the only entry, and its key is the key of the part."""
     models: Callable[[Any], Sequence[LinearModel]] | None = None
-    """Returns the linear models that are written to files. None if the part has no
-    models."""
+    """Returns the linear models that are written to files. If this field is None, the
+    part has no models."""
     notes: Callable[[Any], Sequence[str]] | None = None
-    """Returns notes that readers must know before they use the numbers. None if the
-    part has no notes."""
+    """Returns notes that readers must know before they use the numbers. If this field
+    is None, the part has no notes."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,8 @@ class Finding:
     seconds: float
     """Computing time of the part, s."""
     failed: bool = False
-    """Whether a fault of the program is the reason. Otherwise, the law or the scenario
-    is the reason."""
+    """Whether the part has no result because of a fault of the program. The fault is
+    then not in the law or in the scenario."""
 
 
 @dataclass(frozen=True)

@@ -49,11 +49,11 @@ class OperatingPoints:
 
     search: EquilibriumSearch
     at: OperatingPoint
-    """Stable equilibrium about which the loop is linearized; see
-    ``EquilibriumSearch.follow_point``."""
+    """Stable equilibrium about which the loop is linearized.
+    ``EquilibriumSearch.follow_point`` chooses this equilibrium."""
     moving: OperatingPoint | None
-    """The state of following a source at constant velocity. None if this state does not
-    exist."""
+    """The equilibrium of a robot behind a source that moves at constant velocity. None
+    if there is no such equilibrium."""
     no_moving: str
     """Reason why ``moving`` is None. Empty if ``moving`` exists."""
 

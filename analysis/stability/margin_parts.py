@@ -98,7 +98,7 @@ class Margins:
 
 
 def least_damped(poles: NDArray[np.complex128]) -> complex:
-    """Returns the pole of the slow oscillation with the least damping ratio.
+    """Returns the pole with the least damping ratio among all slow oscillations.
 
     If nothing oscillates slowly, the function returns the pole with the largest real
     part.

@@ -104,8 +104,7 @@ class ParameterRow:
     field: str
     """Path of the parameter in the scenario."""
     part: str
-    """The part of the scenario that has the parameter, with the source of its
-    values."""
+    """Description of the parameter group, with the source of its values."""
     value: Any
     """Value in the scenario."""
     changed: bool

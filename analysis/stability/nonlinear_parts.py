@@ -57,12 +57,12 @@ def nonlinear_parts(*, full: bool) -> tuple[Part, ...]:
 
     - The velocity terms of the law.
     - The oscillation in front of an obstacle.
-    - Certified starts.
+    - Starts from which the robot provably does not collide.
     - The energy of the velocity term.
 
     Args:
-        full: Whether ten times as many starts are simulated, and also runs of the full
-            diagram.
+        full: Whether the report is a full report. A full report simulates ten times as
+            many starts, and it also simulates the full diagram.
 
     Returns:
         Four parts, in the order of the report.

@@ -123,7 +123,7 @@ class RecommendedGains:
 
     thresholds: GainThresholds
     scenario: str
-    """Name of a library scenario, or the name of the scenario file that a report
+    """Name of a library scenario, or the file name of the scenario that a report
     writes."""
     law: str
     today: GainFigures
