@@ -356,7 +356,7 @@ def _first_reaction(
 
 
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:
-    """Counts the audio frames that the robot heard, and computes the estimation errors."""
+    """Counts the audio frames that the robot heard, and computes estimation errors."""
     columns, new = result.columns, _new_frames(result)
     sounding = new & _sounding(result)
     heard = new & (columns["detected"] > 0.5)
@@ -431,7 +431,7 @@ def _rms(values: NDArray[np.float64]) -> float | None:
 
 
 def _quantile(values: NDArray[np.float64], q: float) -> float | None:
-    """Returns a quantile with the interpolation of ``numpy.quantile``, but much faster."""
+    """Returns a quantile, interpolated as by ``numpy.quantile``, but much faster."""
     if not len(values):
         return None
     place = q * (len(values) - 1)
