@@ -1,8 +1,8 @@
 """Defines the meaning and the unit of each column in the table of a run.
 
-The blocks define the names of the columns of their output ports. The units equal those
-of the port tables of the blocks. ``tests/analysis/exports/test_columns.py`` compares
-names and units with the definitions here.
+The blocks of the model define the names of most columns. The port tables of the blocks
+define the units. ``tests/analysis/exports/test_columns.py`` checks that names and units
+agree with the definitions here.
 """
 
 from __future__ import annotations

@@ -157,10 +157,10 @@ def _robot_frames(
     tick: int,
     time: float,
 ) -> Iterator[Message]:
-    """Yields the transforms of B, of P, and of the range sensors.
+    """Yields the transforms of the frames of one robot.
 
-    B is the robot frame, and P is the control point. The x axis of a sensor's frame is
-    the axis of its cone.
+    The frames are the robot frame B, a frame at the control point P, and a frame for
+    each range sensor. The x axis of a sensor's frame is the axis of its cone.
     """
     base, ahead = f"{name}/base_link", robot.robot.control_point_m
     at = [float(own[key][tick]) for key in _POSES["pose"]]
@@ -213,7 +213,7 @@ def _robot_entries(
 
 
 def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Message:
-    """Returns a range message. Without an echo, the range is infinite, as ROS requires."""
+    """Returns a range message. Without an echo, the range is infinite."""
     assert isinstance(robot, HasRangeSensors)
     sensor = robot.ultrasonic.sensors[k - 1]
     return stamped(

@@ -1,8 +1,7 @@
-"""Defines the ROS 2 messages that an MCAP file contains.
+"""Contains the definitions of the ROS 2 messages in an MCAP file.
 
-An MCAP file stores these definitions in addition to the messages. The definitions are
-those of ROS 2 Jazzy, without comments, without default values, and without unused
-constants.
+An MCAP file stores these definitions together with the messages. The definitions are
+those of ROS 2 Jazzy. They omit comments, default values, and unused constants.
 """
 
 from __future__ import annotations

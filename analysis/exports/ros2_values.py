@@ -51,7 +51,7 @@ def pose(at: Sequence[float], height_m: float = 0.0) -> Message:
     """Returns a ``Pose`` message.
 
     Args:
-        at: x, y, theta, m and rad.
+        at: Pose (x, y, theta), m and rad.
         height_m: Height above the floor, m.
 
     Returns:
@@ -66,7 +66,7 @@ def stamped_pose(time: float, at: Sequence[float]) -> Message:
 
     Args:
         time: Time stamp, s.
-        at: x, y, theta in W, m and rad.
+        at: Pose (x, y, theta) in W, m and rad.
 
     Returns:
         The message.

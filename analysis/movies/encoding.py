@@ -148,7 +148,7 @@ class MovieFile:
 
 
 def _stereo(sound: Path) -> str:
-    """Returns an ffmpeg filter that makes loud stereo sound from the outer microphones."""
+    """Returns an ffmpeg filter that makes loud stereo from the outer microphones."""
     import soundfile
 
     last = soundfile.info(sound).channels - 1

@@ -112,7 +112,7 @@ class RunFrames:
             yield self.frame(min((number + 1) / frames_per_s, self._result.simulated_s))
 
     def frame(self, time: float) -> NDArray[np.uint8]:
-        """Returns the frame at a time, s, in the same format as ``frames``."""
+        """Returns the frame at a time, s, in the format of ``frames``."""
         self._canvas.restore_region(self._rest)
         for artist in self._artists(time):
             self._axes.draw_artist(artist)
@@ -172,7 +172,7 @@ class RunFrames:
     def _rings(
         self, center: tuple[float, float], since: float, lasts: float, color: str
     ) -> list[Any]:
-        """Adds the rings of a burst that began ``since`` s ago and lasts ``lasts`` s."""
+        """Adds the rings of a burst, for the time since its start and its length, s."""
         found = []
         for left in np.arange(0.0, min(since, lasts), RING_S):
             radius = RING_M_S * (since - left)

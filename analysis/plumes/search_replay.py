@@ -48,7 +48,7 @@ def record_switch(
 
     Args:
         meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
-        path: Path of the object in Meshcat's scene tree.
+        path: Path of the object in the scene tree of the 3D viewer.
         times: Times of the states, s.
         states: Whether the object is visible, for each time.
     """
@@ -83,7 +83,8 @@ def record_searches(
     Args:
         meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
         result: Result of the run.
-        paths: Paths of the robots in Meshcat's scene tree, by name of the robot.
+        paths: Paths of the robots in the scene tree of the 3D viewer, by name of the
+            robot.
     """
     if result.full_scenario.odor is not None:
         _record_plume(meshcat, result)

@@ -42,16 +42,16 @@ class Arrow(NamedTuple):
 def scale_m_n(result: RunResult) -> float | None:
     """Returns the length of an arrow for a force of 1 N.
 
-    With this scale, the arrow of the greatest force is at most 0.8 m long. The greatest
-    force is the 99th percentile over the run, because a short contact must not make all
-    other arrows short.
+    With this length, the arrow of the greatest force is at most 0.8 m long. The
+    greatest force is the 99th percentile of all forces in the run. A short contact with
+    a very large force therefore does not make all other arrows short.
 
     Args:
         result: Result of the run, for one robot or several robots.
 
     Returns:
-        Length per force, m/N. The value is 1, 2 or 5 times a power of ten. It is None
-        if no law logs its forces.
+        Length, m. The value is 1, 2 or 5 times a power of ten. It is None if no control
+        law logs its forces.
     """
     sizes = [
         np.hypot(*own.vector(name))
@@ -70,9 +70,9 @@ def scale_m_n(result: RunResult) -> float | None:
 def arrows(own: RunResult, m_per_n: float | None) -> list[Arrow]:
     """Returns the arrows of one robot.
 
-    If the law logs its forces, two arrows show the attraction and the repulsion. One
-    arrow shows the velocity of the control point P that the wheel commands would cause.
-    Its length is the distance that P would move in 1 s.
+    If the control law logs its forces, two arrows show the attraction and the
+    repulsion. One arrow shows the velocity of the control point P that the wheel
+    commands would cause. Its length is the distance that P would move in 1 s.
 
     Args:
         own: Result of the run, for this robot.
@@ -108,8 +108,8 @@ def record_arrows(
     Args:
         meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
         own: Result of the run, for this robot.
-        path: Path of the robot in Meshcat's scene tree. ``arrow_path`` derives the
-            paths of the arrows from this path.
+        path: Path of the robot in the scene tree of the 3D viewer. ``arrow_path``
+            derives the paths of the arrows from this path.
         m_per_n: Length of an arrow for a force of 1 N, m, from ``scale_m_n`` of the
             whole run.
     """

@@ -25,9 +25,9 @@ def collision_warning(result: RunResult) -> dict[str, float | None]:
       value is None if the body never caused an echo.
     - ``contact_unseen_s``: time from the last echo of the body to the contact, s. The
       value is None if the body never caused an echo.
-    - ``contact_push_n``: magnitude of the law's push at the last tick (control period),
-      N. Any body can be the reason for this push. The value is None if the law does not
-      log its forces.
+    - ``contact_push_n``: magnitude of the repulsive force of the control law at the
+      last tick (control period), N. The force can come from any obstacle. The value is
+      None if the law does not log its forces.
 
     Args:
         result: Result of a run, for one robot.

@@ -1,4 +1,8 @@
-"""Finds what a guard did in a run, and where the robot could have stopped."""
+"""Finds what a safety guard did in a run, and where the robot could have stopped.
+
+A guard limits the commands of the control law. The robot can then always brake to rest
+on floor that is known to be free.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +26,7 @@ _REST_M_S = 1e-4
 
 @dataclass(frozen=True)
 class GuardedMotion:
-    """The actions of a guard at the ticks (control periods) of a run."""
+    """Actions of a safety guard at the ticks (control periods) of a run."""
 
     actions: NDArray[np.int64]
     """(n,) action of the guard at each tick, as an index into ``GUARD_ACTIONS``."""
@@ -34,7 +38,9 @@ class GuardedMotion:
 
 
 def guarded_motion(result: RunResult) -> GuardedMotion | None:
-    """Finds what the guard did at each tick (control period) of a run.
+    """Finds what the safety guard did at each tick (control period) of a run.
+
+    The guard limits the commands of the control law.
 
     Args:
         result: Result of a run, for one robot.
@@ -85,7 +91,7 @@ class Halt:
 
 
 def halts_of(result: RunResult) -> list[Halt]:
-    """Lists the sensing faults for which the guard halted a robot.
+    """Lists the sensing faults for which the safety guard halted a robot.
 
     Args:
         result: Result of a run, for one robot.
@@ -114,12 +120,14 @@ def _resting_poses(
     commands: NDArray[np.float64],
     numbers: BrakingNumbers,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes where the robot would come to rest, with the braking model of the guard.
+    """Computes where the robot would come to rest if it braked at each tick.
+
+    A tick is a control period. The braking model is that of the safety guard.
 
     Args:
-        poses: (n, 3) poses (x, y, theta) at the ticks (control periods), m and rad.
-        commands: (n, 2) speeds of the left and right wheel, rad/s, as commanded at the
-            tick before each tick.
+        poses: (n, 3) poses (x, y, theta) of the robot at the ticks, m and rad.
+        commands: (n, 2) commands of the previous tick, for each tick: speeds of the
+            left and right wheel, rad/s.
         numbers: Braking model of the robot.
 
     Returns:

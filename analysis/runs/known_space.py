@@ -1,4 +1,8 @@
-"""Reconstructs a guarded robot's map of the floor from the log of a run."""
+"""Reconstructs a robot's map of the floor from the log of a run.
+
+Only robots with a safety guard have such a map. The guard keeps a robot on floor that
+the map shows as free.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +29,11 @@ _OURS = ("ultrasonic", "free_space")
 
 @dataclass(frozen=True)
 class KnownSpace:
-    """A guarded robot's knowledge of the floor at several times, in square cells.
+    """Map of the floor that a robot with a safety guard knew at several times.
 
-    All positions are in the frame of the odometry. At the start, this frame equals the
-    world frame W. During the run, it drifts away from W.
+    The map consists of square cells. All positions are in the frame of the odometry. At
+    the start, this frame equals the world frame W. During the run, it drifts away from
+    W.
     """
 
     times: NDArray[np.float64]
@@ -67,15 +72,18 @@ class KnownSpace:
 def has_known_space(result: RunResult) -> bool:
     """Returns whether the log of a run is sufficient to reconstruct the robot's map.
 
-    The robot needs a guard. The blocks of its range sensors and of its map must be
-    those of this project, and the log must contain their inputs.
+    Three conditions must hold:
+
+    - The robot has a safety guard, which uses a map of free floor.
+    - The blocks of the range sensors and of the map are not a user's own blocks.
+    - The log contains the poses, the wheel speeds and the sensor readings.
 
     Args:
         result: Result of a run.
 
     Returns:
-        Whether the map can be reconstructed. The value is False for the joint result of
-        several robots.
+        Whether all conditions hold. The value is False for the joint result of several
+        robots.
     """
     scenario = result.scenario
     if result.several or scenario.only.own_guard is None:
@@ -96,7 +104,7 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
     The function feeds the log to the step of the block ``FreeSpaceMap``.
 
     Args:
-        result: Result of a run, for one guarded robot.
+        result: Result of a run, for one robot with a safety guard.
 
     Yields:
         The map at each tick of the log. Every tick yields the same object, which
@@ -128,17 +136,17 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
 
 
 def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ...]]:
-    """Reads the inputs of the map from the log, at each tick (control period).
+    """Reads the inputs of the floor map from the log, at each tick (control period).
 
     Args:
-        result: Result of a run, for one guarded robot.
+        result: Result of a run, for one robot with a safety guard.
 
     Yields:
         Five arrays per tick. The first array has the (sensors,) ranges, m. The second
         array has the (sensors,) echoes, 0 or 1. The third array has the (sensors,) ages
         of the readings, s. The fourth array is the (3,) pose by odometry, m and rad.
-        The fifth array has the (2,) wheel speeds that were commanded before the tick,
-        rad/s.
+        The fifth array has the (2,) wheel speeds that were commanded at the previous
+        tick, rad/s.
     """
     scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
     sensors = scenario.sensing.ultrasonic
@@ -164,12 +172,14 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
 
 
 def known_space(result: RunResult, times: ArrayLike) -> KnownSpace | None:
-    """Reconstructs what a guarded robot knew of the floor at given times.
+    """Reconstructs what a robot with a safety guard knew of the floor at given times.
+
+    For each time, the function uses the nearest tick (control period). It uses no tick
+    twice.
 
     Args:
         result: Result of a run, for one robot.
-        times: (n,) times, s. For each time, the function uses the nearest tick (control
-            period). It uses no tick twice.
+        times: (n,) times, s.
 
     Returns:
         Map at these ticks. The grid contains all cells that were known at any of these

@@ -83,7 +83,10 @@ def following_error(result: RunResult) -> NDArray[np.float64]:
 
 
 def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
-    """Computes clearances. The source counts as a body, but not as an obstacle."""
+    """Computes the clearances and the time to contact.
+
+    The source counts as a body, but not as an obstacle.
+    """
     least, contact = proximity.least.tolist(), proximity.least_time_to_contact
     others = len(proximity.result.surroundings.obstacles)
     return {
@@ -95,9 +98,10 @@ def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
 
 
 def _goal_metrics(result: RunResult) -> dict[str, float | None]:
-    """Computes metrics of the way to the goal.
+    """Computes the metrics of the path to the goal.
 
-    P is in the goal if its distance from the target is at most ``goal_radius_m``.
+    The control point P is in the goal if its distance from the target is at most
+    ``goal_radius_m``.
     """
     columns, moves = result.columns, result.target_moves
     inside = columns["source_range_true"] <= result.goal_radius_m
@@ -115,9 +119,10 @@ def _goal_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _settling_time(result: RunResult, inside: NDArray[np.bool_]) -> float | None:
-    """Returns the time after which P stays in the goal until the run ends, s.
+    """Returns the settling time, s.
 
-    If the source is at rest, P also has to stay at rest.
+    After this time, the control point P stays in the goal until the run ends. If the
+    source is at rest, P also has to stay at rest.
     """
     stop, settled, least = result.scenario.stop, inside, 0.0
     if not result.target_moves:
@@ -141,8 +146,8 @@ def _speed_of_P(result: RunResult) -> NDArray[np.float64]:
 def _shortest_path(result: RunResult) -> float | None:
     """Returns the length of the shortest path from the start to the goal, m.
 
-    The path is that of a disc as wide as the robot. The path ends at the first point
-    from which P can reach into the goal.
+    The path is that of a disc as wide as the robot. It ends at the first point from
+    which the control point P can reach into the goal.
     """
     scenario = result.scenario
     around = result.surroundings
@@ -158,10 +163,10 @@ def _shortest_path(result: RunResult) -> float | None:
 
 
 def _spl(cause: str, length: float, shortest: float) -> float:
-    """Returns success weighted by path length (SPL, Anderson et al. 2018) for one run.
+    """Returns success weighted by path length (SPL) for one run.
 
-    The mean of these values over many runs is the SPL. The path includes all motion
-    until the run ends, also oscillation in the goal.
+    The SPL of Anderson et al. (2018) is the mean of these values over many runs. The
+    path includes all motion until the run ends, also oscillation in the goal.
     """
     if cause != "reached":
         return 0.0
@@ -264,9 +269,10 @@ def _force_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _impossible_speeds(result: RunResult) -> int | None:
-    """Counts the ticks with an assumed obstacle speed that no obstacle can have.
+    """Counts the ticks (control periods) with an impossible obstacle speed.
 
-    The limit is twice the top speed of the robot.
+    A speed that the control law assumes for an obstacle is impossible if it exceeds
+    twice the top speed of the robot.
     """
     columns, top = result.columns, result.scenario.only.robot.top_speed_m_s
     if "obstacle_speed_1" not in columns:
@@ -318,20 +324,21 @@ def _first_reaction(
     push: NDArray[np.float64],
     echoes: NDArray[np.float64],
 ) -> float:  # pragma: no cover  (compiled)
-    """Returns how near an obstacle is when the law first reacts to an obstacle.
+    """Returns how near an obstacle is when the control law first reacts to it.
 
     The law reacts at a tick (control period) if three conditions hold:
 
-    - The push is at least ``REACTION_N``.
+    - The repulsive force is at least ``REACTION_N``.
     - The nearest obstacle is nearer to the control point P than the target is.
-    - The distance of an echo from P differs from the distance of the nearest obstacle
-      by at most ``ECHO_M``.
+    - A collision vector agrees with this obstacle: its length differs from the distance
+      of the obstacle by at most ``ECHO_M``. A collision vector points from P to an
+      echo.
 
     Args:
         bodies: (m, n, 5) rectangles of the m bodies at n ticks. The last body is the
             target of the robot.
         p_WP: (2, n) positions of P in the world frame W, m.
-        push: (2, n) push of the law, N.
+        push: (2, n) repulsive force of the law in W, N.
         echoes: (k, 3, n) k collision vectors. Each has three entries: a number above 0
             if there is a vector, and its x and y in the robot frame B, m.
 
@@ -378,10 +385,9 @@ def _hearing_metrics(result: RunResult) -> dict[str, Any]:
 def frames_with_sound(result: RunResult) -> NDArray[np.bool_]:
     """(n,) whether an audio frame with sound ends at each tick (control period).
 
-    A frame has sound if the source sounds during at least half of the frame. The
-    schedule of the source decides when the source sounds. Therefore pauses within a
-    recording count as sound. The function includes the travel time of the sound, except
-    with ideal hearing.
+    A frame has sound if the source sounds during at least half of the frame. Only the
+    schedule of the source counts. Therefore a pause within a recording counts as sound.
+    The function includes the travel time of the sound, except with ideal hearing.
 
     Args:
         result: Result of a run, for one robot that hears.

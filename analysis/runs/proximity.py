@@ -24,8 +24,8 @@ PARTS = 10
 class Proximity:
     """Distances between the rectangle of a robot and all bodies that it can hit.
 
-    If the target of the robot is a body, it is the last of the bodies. The shape of the
-    robot is its real rectangle, not a disc around the rectangle.
+    The rectangle is the real outline of the robot, not an enclosing disc. If the target
+    of the robot is a body, it is the last body.
     """
 
     result: RunResult
@@ -37,9 +37,9 @@ class Proximity:
 
     @cached_property
     def bodies(self) -> NDArray[np.float64]:
-        """(m, n, 5) rectangles of the bodies at the ticks.
+        """(m, n, 5) rectangles of m bodies at n ticks (control periods).
 
-        If the target of the robot is a body, it is the last of the bodies.
+        If the target of the robot is a body, it is the last body.
         """
         around, time = self.result.surroundings, self.result.time
         bodies = [body.rectangles(time) for body in around.obstacles.values()]
@@ -57,17 +57,17 @@ class Proximity:
     def least(self) -> NDArray[np.float64]:
         """(m,) least clearance from each body, including the time between ticks, m.
 
-        A tick is a control period of 25 ms by default. The clearance at ticks alone is
-        too coarse for a body that passes quickly. Therefore the time between two ticks
-        is divided into ten parts if one of two conditions holds:
+        A tick is a control period of 25 ms by default. A body can pass the robot
+        between two ticks. Therefore the time between two ticks is divided into ten
+        parts if one of two conditions holds:
 
         - At one of the two ticks, the clearance from the nearest body is below
           ``NEAR_M``.
-        - At one of the two ticks, this clearance is below the distance that the robot
-          and the fastest body together cover between the two ticks.
+        - At one of the two ticks, this clearance is below a distance: the one that the
+          robot and the fastest body together cover between the two ticks.
 
-        Within these parts, the pose of the robot and the poses of other robots are
-        interpolated. The other bodies are at the exact poses of their paths.
+        Within these parts, the poses of all robots are interpolated. The other bodies
+        are at the exact poses of their paths.
         """
         clearance, least = self._clearances
         gone = np.hypot(*np.diff(self.robot[:, :2], axis=0).T)
@@ -94,8 +94,8 @@ class Proximity:
     def least_time_to_contact(self) -> float:
         """Least predicted time to a contact, over all ticks (control periods), s.
 
-        The prediction at a tick assumes that all bodies keep their heading and the
-        velocity of their center. The value is infinite if no contact is ever predicted.
+        The prediction at a tick assumes that no body turns, and that the center of each
+        body keeps its velocity. The value is infinite if no contact is ever predicted.
         """
         if len(self.result.time) < 2:
             return math.inf
@@ -113,9 +113,8 @@ def least_clearances(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     """Computes the least clearances between a moving rectangle and other rectangles.
 
-    The function skips a body at a time at which the circles around both rectangles are
-    far apart. The body then cannot be the nearest body, nor nearer than at an earlier
-    time.
+    To save time, the function skips a body at times at which the enclosing circles of
+    both rectangles are far apart.
 
     Args:
         robot: (n, 5) rectangle (x, y, theta, length, width) at n times, m and rad.

@@ -80,23 +80,27 @@ def write_replay(
 
     The scene shows:
 
-    - each robot with its wheels, its microphone bar and the cones of its range sensors;
-      a cone is brown while its sensor has an echo
+    - each robot with its wheels, its microphone bar, and the cones of its range sensors
     - the obstacles, the walls of the room, and trails of past positions
     - each source, with a ring that grows while the source sounds
-    - a ball at the position that the robot estimates for its source
-    - arrows for the forces of the law and for the commanded motion
+    - a ball at the source position that each robot estimates
+    - arrows for the forces of the control law and for the commanded motion
     - a touched object in red, with a star at the point of contact
 
-    For a robot with a guard, the scene also shows the floor that the robot knows to be
-    free, and dots at the origins of echoes. A circle shows the area that the guard
-    would keep free if the robot braked to rest now. The circle is gray if the guard
-    passed the command. It is orange if the guard reduced the command, and red if the
-    guard braked.
+    A cone is brown while its sensor has an echo.
+
+    For a robot with a safety guard, the scene also shows the floor that the robot knows
+    to be free. Dots show where echoes came from. A circle shows the area that the guard
+    keeps free. The center of the circle is the position at which the robot would come
+    to rest if it braked now. The color of the circle shows the action of the guard:
+
+    - gray: the guard passes the command of the law
+    - orange: the guard reduces the command
+    - red: the guard brakes
 
     For the guarded law, the scene also shows a ring around each body that the robot
     takes as moving. The radius of the ring is the uncertainty of the position. For a
-    search, the scene also shows the plume, and a lamp above each robot
+    search, the scene also shows the odor plume, and a lamp above each robot
     (``analysis.plumes.search_replay``).
 
     Around the scene, the page has:
@@ -113,8 +117,8 @@ def write_replay(
         result: Result of the run.
         path: The .html file.
         clearance: (n,) distance from each robot to the nearest body at the ticks
-            (control periods), m, by name of the robot. The page shows it as a curve. A
-            robot without an entry has no such curve.
+            (control periods), m, by name of the robot. The page shows these distances
+            as curves. A robot without an entry has no such curve.
 
     Raises:
         OSError: The file cannot be written.
@@ -374,7 +378,7 @@ def _record_rings(
 def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
     """Returns which ring of a source is visible at a given time.
 
-    While the source sounds, the rings appear in turn.
+    While the source sounds, its rings appear one after the other.
 
     Args:
         time: Time, s.
@@ -478,10 +482,10 @@ def _record_known_space(
 
 
 def known_times(result: RunResult) -> list[float]:
-    """Returns the times at which the robot's map of the floor is shown again, s.
+    """Returns the times at which the replay updates the floor that a robot knows, s.
 
-    The interval is 0.5 s. If the map has many cells, the interval is longer, so that
-    all maps together have at most ``MOST_CELLS`` cells.
+    The interval is 0.5 s. If the map has many cells, the interval is longer. Then all
+    displayed maps together have at most about ``MOST_CELLS`` cells.
     """
     end, scenario = result.simulated_s, result.scenario
     most = max(2, MOST_CELLS // scenario.follower.own_map.cells**2)
@@ -493,9 +497,9 @@ def known_times(result: RunResult) -> list[float]:
 def _record_guard(
     meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
-    """Records the edge of the disc that the guard keeps free.
+    """Records the edge of the disc that the safety guard keeps free.
 
-    If the robot braked now, its axle would come to rest at the center of the disc.
+    If the robot braked now, its axle would stop at the center of the disc.
     """
     motion = guarded_motion(result)
     if motion is None:
@@ -521,7 +525,7 @@ _EDGES = (
 def _record_tracked_bodies(
     meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
-    """Records a ring around each body that the law takes as moving.
+    """Records a ring around each body that the control law takes as moving.
 
     The radius of the ring shows the uncertainty of the position.
     """

@@ -84,7 +84,7 @@ def _ribbon(
 
     Args:
         meshcat: Scene of the replay.
-        path: Path of the band in Meshcat's scene tree.
+        path: Path of the band in the scene tree of the 3D viewer.
         points: (n, 2) points of the line, m.
         rgba: Color of the band.
         z: Height above the floor, m.
@@ -196,7 +196,7 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
     Args:
         meshcat: Scene of the replay.
         look: Run, colors and labels of the robot.
-        path: Path of the robot in Meshcat's scene tree.
+        path: Path of the robot in the scene tree of the 3D viewer.
         estimate: Path of the ball that shows the estimated source position.
     """
     scenario = look.result.scenario
@@ -258,8 +258,8 @@ def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> N
     m. A cone of 3 m, the full range, would hide the scene.
     """
     x, y, axis = sensor_pose(scenario, sensor)
-    # The axis of Meshcat's cone is z. The rotations tilt the cone forward, and then turn
-    # it to the axis of the sensor.
+    # The axis of Meshcat's cone is z. The rotations tilt the cone forward, and then
+    # turn it to the axis of the sensor.
     tilted = _placed(0.0, 0.5 * math.pi, axis, [x, y, SENSOR_HEIGHT_M])
     meshcat.SetTransform(path, tilted)
     length = 0.8
@@ -274,7 +274,7 @@ def add_gain_bar(meshcat: Meshcat, path: str, aside: float, colour: str) -> None
 
     Args:
         meshcat: Scene of the replay.
-        path: Path of the bar in Meshcat's scene tree, below the robot.
+        path: Path of the bar in the scene tree of the 3D viewer, below the robot.
         aside: Distance of the bar to the left of the robot's center line, m.
         colour: Color of the bar, as a key of ``COLOURS``.
     """
@@ -292,7 +292,7 @@ def add_source(
     Args:
         meshcat: Scene of the replay.
         source: Parameters of the source, such as its size.
-        path: Path of the source in Meshcat's scene tree.
+        path: Path of the source in the scene tree of the 3D viewer.
         role: Key of the color in ``COLOURS``: ``source``, or ``interferer`` if no robot
             follows the source.
     """
@@ -349,8 +349,8 @@ def add_hit(meshcat: Meshcat, scenario: Scenario, name: str) -> str | None:
         name: Name of the touched object.
 
     Returns:
-        Path of the red box in Meshcat's scene tree. The value is None if the touched
-        object is not an obstacle.
+        Path of the red box in the scene tree of the 3D viewer. The value is None if the
+        touched object is not an obstacle.
     """
     for obstacle in scenario.obstacles:
         if obstacle.name == name:
@@ -369,7 +369,7 @@ def add_star(
 
     Args:
         meshcat: Scene of the replay.
-        path: Path of the star in Meshcat's scene tree.
+        path: Path of the star in the scene tree of the 3D viewer.
         place: (2,) position of the point in the world frame W, m.
         radius: Distance from the center of the star to its tips, m.
     """
@@ -416,7 +416,7 @@ def add_trail(
 
     Args:
         meshcat: Scene of the replay.
-        path: Path of the piece in Meshcat's scene tree.
+        path: Path of the piece in the scene tree of the 3D viewer.
         points: (n, 2) points of the trail in the world frame W, m.
         colour: Color of the trail: a color of matplotlib, or a key of ``COLOURS``.
         thin: Whether the trail is narrow and lies below other trails.
@@ -436,7 +436,7 @@ def add_floor_part(
 
     Args:
         meshcat: Scene of the replay.
-        path: Path of the mesh in Meshcat's scene tree.
+        path: Path of the mesh in the scene tree of the 3D viewer.
         rectangles: (m, 4) rectangles in the world frame W: least x, greatest x, least
             y, greatest y, m.
         colour: Color of the rectangles: a color of matplotlib, or a key of ``COLOURS``.
@@ -457,7 +457,7 @@ def add_disc_edge(meshcat: Meshcat, path: str, radius: float, colour: str) -> No
 
     Args:
         meshcat: Scene of the replay.
-        path: Path of the circle in Meshcat's scene tree.
+        path: Path of the circle in the scene tree of the 3D viewer.
         radius: Radius of the circle, m.
         colour: Color of the circle: a color of matplotlib, or a key of ``COLOURS``.
     """

@@ -21,14 +21,19 @@ MEAN_S = 1.0
 def route_metrics(proximity: Proximity) -> dict[str, float | None]:
     """Computes the metrics of a robot that drives along a route.
 
+    The metrics are:
+
+    - median and maximum distance of the control point P from the path of the target, m
+    - ripple of the yaw rate, rad/s
+    - number of new routes
+    - least, greatest and last value of stiffness K (N/m) and damping D (N s/m), if the
+      control law adapts K and D
+
     Args:
         proximity: Distances between the robot and all bodies in the run.
 
     Returns:
-        Value of each metric, by name. The metrics are: distances of the control point P
-        from the path of the target, m; ripple of the yaw rate, rad/s; number of new
-        routes; and the least, greatest and last stiffness K and damping D, if the law
-        adapts them.
+        Value of each metric, by name.
     """
     result = proximity.result
     columns, tick_s = result.columns, result.scenario.tick_s
@@ -56,16 +61,14 @@ def route_metrics(proximity: Proximity) -> dict[str, float | None]:
 
 
 def near_and_after(clearance: ArrayLike, period_s: float) -> NDArray[np.bool_]:
-    """Finds the samples at which an obstacle is near or was near shortly before.
-
-    An obstacle is near if it is nearer than 1 m. The time after an encounter is 5 s.
+    """Returns when an obstacle is nearer than 1 m, or was so within the last 5 s.
 
     Args:
         clearance: (n,) clearance from the nearest obstacle at constant intervals, m.
         period_s: Interval, s.
 
     Returns:
-        (n,) whether an obstacle is near, or was near within the last 5 s.
+        (n,) whether one of these conditions holds, for each sample.
     """
     near = np.asarray(clearance, dtype=float) < MET_M
     ticks = np.arange(len(near))

@@ -47,24 +47,25 @@ LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.5
 
 
 def plot_trajectory(result: RunResult) -> Figure:
-    """Draws the run from above, in the world frame W, in m.
+    """Draws the run from above, in the world frame W.
 
-    At a few instants, labeled with their times, the picture shows:
+    At a few times, the picture shows:
 
     - the rectangle of the robot with its microphone bar
     - the source and the moving obstacles
-    - the cones of the range sensors, up to the range reading; ideal sensing has no
-      cones
+    - the cones of the range sensors, up to the range readings
 
-    For a robot with a guard, the floor that the robot knew at the end replaces the
-    cones. Crosses show the estimates of the source position after each audio frame that
-    the robot heard. Early estimates are faint, and late estimates are strong.
+    Labels show the times. With ideal obstacle sensing, there are no cones. For a robot
+    with a safety guard, the floor that the robot knew at the end replaces the cones.
+
+    Crosses show the source positions that the robot estimated. Early estimates are
+    faint, and late estimates are strong.
 
     Args:
         result: Result of the run.
 
     Returns:
-        The picture.
+        Picture with axes in m.
     """
     figure, axes = map_axes(result)
     draw_grid(axes)
@@ -193,8 +194,9 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
             has no panel of the clearance.
 
     Returns:
-        Picture with one panel per quantity. If the robot has a guard, two panels show
-        the actions of the guard, and its distance to spare.
+        Picture with one panel per quantity. If the robot has a safety guard, one panel
+        shows the actions of the guard. Another panel shows the distance that the robot
+        has to spare.
 
     Raises:
         InputError: ``clearance`` does not have one value per tick.

@@ -27,13 +27,13 @@ def shortest_path_length(
 ) -> float:
     """Computes the length of the shortest path of a disc to a circle around the goal.
 
-    The function uses A* on the visibility graph of the boxes. The boxes are grown by
-    the radius of the disc. The edges of the graph connect points on the outlines of the
-    grown boxes. The last leg of a path runs straight toward the goal. Polygons outside
-    the arcs replace the rounded corners.
+    The function grows the boxes by the radius of the disc. Then it runs A* on their
+    visibility graph, whose edges connect points on the outlines of the grown boxes. The
+    last leg of a path runs straight toward the goal. Polygons just outside the arcs
+    replace the rounded corners.
 
-    If the center of the disc starts nearer to a box than the radius, the box is grown
-    only up to the start.
+    If the disc overlaps a box at the start, this box grows only up to the center of the
+    disc.
 
     Args:
         start: (2,) initial position of the disc's center, m.
@@ -106,7 +106,7 @@ def _distance(
 def _beyond(
     point: NDArray[np.float64], box: NDArray[np.float64]
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance of a point from a box, m."""
+    """Returns the distance of a point from a box, m."""
     du, dv = beyond_rectangle(point, box)
     return math.hypot(du, dv)
 

@@ -26,9 +26,9 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
     """Computes the jerk as the second derivative of a velocity.
 
     The function fits a cubic polynomial to the velocity over 0.25 s by least squares (a
-    Savitzky-Golay filter). It does not resample the velocity, and slow motion remains
-    nearly unchanged. The result is 5 % too low for a sine of 1 Hz, 19 % too low at 2
-    Hz, and 79 % too low at 5 Hz.
+    Savitzky-Golay filter). It does not resample the velocity. Slow motion remains
+    nearly unchanged. The jerk of a sine is too low: by 5 % at 1 Hz, by 19 % at 2 Hz,
+    and by 79 % at 5 Hz.
 
     Args:
         velocity: (n,) or (n, k) velocities at constant intervals, m/s or rad/s.
@@ -51,9 +51,9 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
 
 @cache
 def _second_derivative(half: int) -> NDArray[np.float64]:
-    """Returns weights of samples for the second derivative of a fitted cubic.
+    """Returns the weights of samples for the second derivative of a fitted cubic.
 
-    There are 2 half + 1 samples at an interval of 1.
+    The weights apply to 2 half + 1 samples at an interval of 1.
     """
     square = np.arange(-half, half + 1.0) ** 2
     # The cubic's odd terms are orthogonal to the square less its mean.
@@ -88,7 +88,7 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
 def _arc_lengths(
     spectra: NDArray[np.complex128], highest: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(n,) ``spectral_arc_length`` of (n, lines) spectra, up to the highest line."""
+    """(n,) spectral arc lengths of (n, lines) spectra, up to the line ``highest``."""
     lengths = np.zeros(len(spectra))
     for k in range(len(spectra)):
         power = spectra[k].real ** 2 + spectra[k].imag ** 2

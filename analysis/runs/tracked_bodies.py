@@ -37,10 +37,12 @@ class TrackedBodies:
 def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
     """Reconstructs the moving bodies that a robot with the guarded law has tracked.
 
+    The guarded law is a control law that plans around moving bodies. For each time, the
+    function uses the nearest tick (control period). It uses no tick twice.
+
     Args:
         result: Result of a run, for one robot.
-        times: (n,) times, s. For each time, the function uses the nearest tick (control
-            period). It uses no tick twice.
+        times: (n,) times, s.
 
     Returns:
         Tracks at these ticks. The value is None for any other law, and if

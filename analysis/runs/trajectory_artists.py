@@ -40,8 +40,8 @@ CONE_INSTANTS = 4
 def times_apart(result: RunResult) -> list[float]:
     """Returns the times at which a picture shows the outline of the robot.
 
-    Between two of these times, the robot moves by at least 0.25 m. The last time is
-    always the end of the run, also after a shorter motion.
+    Between two of these times, the robot moves by at least 0.25 m. The last time is the
+    end of the run, even if the robot has moved less.
 
     Args:
         result: Result of a run, for one robot.
@@ -136,7 +136,7 @@ def _write_time(axes: Axes, rectangle: ArrayLike, time: float, colour: str) -> N
 def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
     """Draws the path of each source, its body at both ends, and dots at several times.
 
-    A source at rest has no labels with times.
+    For a moving source, labels show the times.
 
     Args:
         axes: Axes in the world frame W, m.
