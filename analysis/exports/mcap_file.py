@@ -60,8 +60,8 @@ def require_mcap() -> None:
 def write_mcap(run: RecordedRun, path: Path) -> None:
     """Writes a run as an MCAP file. docs/exports.md lists the topics of the file.
 
-    The times in the file start at 0, as in the run. The same run always produces the
-    same bytes.
+    The times in the file start at 0, as in the run. Two files of the same run have
+    equal bytes.
 
     Args:
         run: Scenario and table of the run.

@@ -78,9 +78,10 @@ class RecordedRun:
 
     @cached_property
     def robots(self) -> dict[str, Mapping[str, NDArray[np.float64]]]:
-        """(n,) array of each column by its name, for each robot by the robot's name.
+        """Columns of each robot, by name of the robot.
 
-        The names of the columns do not contain the name of the robot.
+        Each column is an (n,) array, by name of the column. These names do not contain
+        the name of the robot.
         """
         names = list(self.scenario.robots)
         columns = {

@@ -41,7 +41,7 @@ RING_S, RING_M_S, RING_M = 0.15, 3.0, 1.5
 class RunFrames:
     """Draws a run from above at any time of the run.
 
-    A frame shows:
+    The picture shows:
 
     - robots with their microphones, sensor cones and paths
     - sources, with rings while they sound

@@ -30,11 +30,11 @@ class Arrow(NamedTuple):
     """An arrow that starts at the control point P of a robot."""
 
     name: str
-    """Name of the arrow: attraction, repulsion, or law. The arrow law is the commanded
-    velocity of P."""
+    """``attraction``, ``repulsion``, or ``law``. The arrow ``law`` shows the commanded
+    velocity of the control point P."""
     vectors: NDArray[np.float64]
     """(n, 2) vectors in the world frame W at the ticks (control periods). The unit is N
-    for forces, and m/s for law."""
+    for forces, and m/s for the arrow ``law``."""
     m_per_unit: float
     """Length of the arrow per unit of its vector, m/N or s."""
 

@@ -27,8 +27,8 @@ class Layer(NamedTuple):
     colours: tuple[str, ...]
     """Colors of the sample beside the label."""
     paths: tuple[str, ...] = ()
-    """Paths in Meshcat's scene tree of the objects that the switch of this entry hides.
-    If there are no paths, the entry has no switch."""
+    """Paths of objects in the scene tree of the 3D viewer. The switch of this entry
+    hides these objects. If there are no paths, the entry has no switch."""
 
 
 class ReplayFacts(NamedTuple):
@@ -42,8 +42,8 @@ class ReplayFacts(NamedTuple):
     layers: Sequence[Layer]
     charts: Sequence[Chart]
     names: Sequence[tuple[str, str]]
-    """Pairs of a path in Meshcat's scene tree and the name of the object at this
-    path."""
+    """Pairs of a path in the scene tree of the 3D viewer, and the name of the object at
+    this path."""
     robots: Sequence[tuple[str, str]]
     """Pairs of path and name of each robot that the view can follow."""
     warnings: Sequence[str] = ()

@@ -33,7 +33,7 @@ class Chart(NamedTuple):
     """Values on the vertical axis with their names. With None, the axis shows
     numbers."""
     series: list[dict[str, Any]]
-    """Curves of the chart. Each curve has a label, a color, a style, times t, s, and
+    """Curves of the chart. Each curve has a label, a color, a style, times t in s, and
     values. The style is line, dashes, dots, or steps. With steps, each value holds from
     its time on. A value of None is a gap in the curve."""
     bursts: list[tuple[float, float]]

@@ -138,15 +138,19 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
 def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ...]]:
     """Reads the inputs of the floor map from the log, at each tick (control period).
 
+    Each tick has five arrays, in this order:
+
+    - (sensors,) ranges of the range sensors, m
+    - (sensors,) echoes, 1 or 0
+    - (sensors,) ages of the readings, s
+    - (3,) pose (x, y, theta) by odometry, m and rad
+    - (2,) speeds of the left and right wheel, as commanded at the previous tick, rad/s
+
     Args:
         result: Result of a run, for one robot with a safety guard.
 
     Yields:
-        Five arrays per tick. The first array has the (sensors,) ranges, m. The second
-        array has the (sensors,) echoes, 0 or 1. The third array has the (sensors,) ages
-        of the readings, s. The fourth array is the (3,) pose by odometry, m and rad.
-        The fifth array has the (2,) wheel speeds that were commanded at the previous
-        tick, rad/s.
+        The five arrays of each tick.
     """
     scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
     sensors = scenario.sensing.ultrasonic

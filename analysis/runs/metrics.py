@@ -166,7 +166,7 @@ def _spl(cause: str, length: float, shortest: float) -> float:
     """Returns success weighted by path length (SPL) for one run.
 
     The SPL of Anderson et al. (2018) is the mean of these values over many runs. The
-    path includes all motion until the run ends, also oscillation in the goal.
+    path length includes all motion until the run ends, such as oscillation in the goal.
     """
     if cause != "reached":
         return 0.0
@@ -184,8 +184,9 @@ def _way_metrics(proximity: Proximity) -> dict[str, float | None]:
 def _following_metrics(result: RunResult) -> dict[str, float | None]:
     """Computes metrics of how well the robot follows the source.
 
-    Following errors and bearings count from the end of the second burst on. The
-    fraction of following counts from the first detection on.
+    The metrics of the following error and of the bearing cover the time after the
+    second burst of the source. The metric ``following_fraction`` covers the time after
+    the first detection.
     """
     sound, columns = result.scenario.source.sound, result.columns
     settled = result.time >= sound.start_s + sound.period_s + sound.on_s

@@ -63,8 +63,8 @@ class Proximity:
 
         - At one of the two ticks, the clearance from the nearest body is below
           ``NEAR_M``.
-        - At one of the two ticks, this clearance is below a distance: the one that the
-          robot and the fastest body together cover between the two ticks.
+        - Between the two ticks, the robot and the fastest body together move farther
+          than the clearance at one of these ticks.
 
         Within these parts, the poses of all robots are interpolated. The other bodies
         are at the exact poses of their paths.

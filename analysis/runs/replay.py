@@ -155,13 +155,16 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
 
 
 def time_charts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> list[Chart]:
-    """Returns the curves of ``plot_time_series`` for each robot, as data.
+    """Returns the data of charts that show quantities of each robot over time.
 
-    Panels without a curve are omitted.
+    The quantities are those of ``plot_time_series``. Charts without a curve are
+    omitted.
 
     Args:
         result: Result of the run.
-        clearance: Clearance of each robot, as in ``write_replay``.
+        clearance: (n,) distance from each robot to the nearest body at the ticks
+            (control periods), m, by name of the robot. A robot without an entry has no
+            such chart.
 
     Returns:
         Charts of all robots, one robot after the other.
@@ -452,7 +455,7 @@ def _record_gains(
 def _record_known_space(
     meshcat: Meshcat, result: RunResult, look: Look, path: str
 ) -> None:
-    """Shows the floor that the robot knows to be free, and dots at origins of echoes."""
+    """Shows the floor that a robot knows to be free, and the origins of echoes as dots."""
     own = look.result
     if not has_known_space(own):
         return

@@ -252,10 +252,10 @@ def _add_microphones(meshcat: Meshcat, scenario: Scenario, path: str) -> None:
 
 
 def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> None:
-    """Adds two cones for a sensor: one with an echo, and one without an echo.
+    """Adds two cones for a range sensor: one for an echo, and one for no echo.
 
-    The recording shows one of the two cones at a time. Both cones have a length of 0.8
-    m. A cone of 3 m, the full range, would hide the scene.
+    The two cones have different colors. The recording shows one of them at a time. Both
+    cones are only 0.8 m long. A cone of 3 m, the full range, would hide the scene.
     """
     x, y, axis = sensor_pose(scenario, sensor)
     # The axis of Meshcat's cone is z. The rotations tilt the cone forward, and then

@@ -61,7 +61,7 @@ def route_metrics(proximity: Proximity) -> dict[str, float | None]:
 
 
 def near_and_after(clearance: ArrayLike, period_s: float) -> NDArray[np.bool_]:
-    """Returns when an obstacle is nearer than 1 m, or was so within the last 5 s.
+    """Returns when an obstacle is nearer than 1 m, or was nearer within the last 5 s.
 
     Args:
         clearance: (n,) clearance from the nearest obstacle at constant intervals, m.

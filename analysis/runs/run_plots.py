@@ -127,7 +127,7 @@ def _draw_odor(axes: Axes, result: RunResult) -> None:
 
 
 def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
-    """Returns the times at which the source that the robot hears is sounding.
+    """Returns the bursts of the source that the robot hears.
 
     If the robot listens to another robot that calls, the bursts begin after the call.
 

@@ -89,7 +89,7 @@ def write_run(
     - ``trajectory.parquet``: the table with one row per tick (control period)
     - ``replay.html``: the replay in three dimensions
     - ``trajectory.png``, ``time_series.png`` and ``diagram.svg``: the pictures
-    - ``report.html``: a page that shows all other files
+    - ``report.html``: a page with the pictures, and with links to other files
 
     With several robots, each robot has its own ``time_series_<name>.png`` and
     ``diagram_<name>.svg``. The file ``diagram.svg`` then shows how the robots are

@@ -257,9 +257,9 @@ def touching_point(
 ) -> NDArray[np.float64]:
     """Returns the point at which two rectangles touch.
 
-    The point is the mean of all corners of one rectangle that lie inside the other. If
-    there is no such corner, the point is the mean of the corners that are nearest to
-    the other rectangle.
+    The point is the mean of all corners of either rectangle that lie inside the other
+    rectangle. If there is no such corner, the point is the mean of the corners that are
+    nearest to the other rectangle.
 
     Args:
         a: (5,) first rectangle (x, y, theta, length, width), m and rad.

@@ -65,10 +65,12 @@ def _second_derivative(half: int) -> NDArray[np.float64]:
 def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
     """Computes the spectral arc length (SPARC), a measure of smoothness.
 
-    The value is minus the length of the curve of the speed's normalized magnitude
-    spectrum (Balasubramanian et al. 2012, 2015). A less smooth motion has a more
-    negative value. The measure applies to motions of a few seconds. Therefore longer
-    motions have to be divided into ``windows``.
+    The function computes the magnitude spectrum of the speed, and normalizes frequency
+    and magnitude to 1. The result is minus the length of this curve (Balasubramanian et
+    al. 2012, 2015). A less smooth motion has a more negative value.
+
+    The measure applies to motions of a few seconds. Longer motions have to be divided
+    with ``windows``.
 
     Args:
         speed: (..., n) speeds, m/s. No window may be at rest throughout.

@@ -1,4 +1,4 @@
-"""Reconstructs which bodies a guarded robot took as moving, from the log of a run."""
+"""Reconstructs which bodies a robot took as moving, from the log of a run."""
 
 from __future__ import annotations
 

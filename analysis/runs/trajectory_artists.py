@@ -134,9 +134,10 @@ def _write_time(axes: Axes, rectangle: ArrayLike, time: float, colour: str) -> N
 
 
 def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
-    """Draws the path of each source, its body at both ends, and dots at several times.
+    """Draws each source: its path, its body at both ends of the path, and several dots.
 
-    For a moving source, labels show the times.
+    The dots show the position of the source at the given times. For a moving source,
+    labels show the times.
 
     Args:
         axes: Axes in the world frame W, m.
@@ -194,7 +195,9 @@ def _draw_source(
 
 
 def draw_estimates(axes: Axes, look: Look) -> None:
-    """Draws a cross at the estimated source position after each heard audio frame.
+    """Draws the estimated source position for each audio frame that the robot heard.
+
+    Each estimate is a cross. Early estimates are faint.
 
     Args:
         axes: Axes in the world frame W, m.
