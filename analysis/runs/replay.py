@@ -455,7 +455,7 @@ def _record_gains(
 def _record_known_space(
     meshcat: Meshcat, result: RunResult, look: Look, path: str
 ) -> None:
-    """Shows the floor that a robot knows to be free, and the origins of echoes as dots."""
+    """Shows the floor that a robot knows to be free, and dots at echo positions."""
     own = look.result
     if not has_known_space(own):
         return
