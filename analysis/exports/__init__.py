@@ -1,1 +1,1 @@
-"""Runs for other programs: what columns mean, CSV, and MCAP of ROS 2 messages."""
+"""Exports runs to other programs, as CSV, Parquet or MCAP files with ROS 2 messages."""

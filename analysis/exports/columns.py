@@ -1,7 +1,8 @@
-"""What each column of a run's table means, and its unit.
+"""Defines the meaning and the unit of each column in the table of a run.
 
-Blocks name the columns of their output ports; units are those of their port tables, and
-``tests/analysis/exports/test_columns.py`` holds both against this list.
+The blocks of the model define the names of most columns. The port tables of the blocks
+define the units. ``tests/analysis/exports/test_columns.py`` checks that names and units
+agree with the definitions here.
 """
 
 from __future__ import annotations
@@ -19,18 +20,19 @@ if TYPE_CHECKING:
 
 
 class Column(NamedTuple):
-    """A column, or several that differ in a number k alone."""
+    """Meaning and unit of one column, or of columns that differ only in a number."""
 
     name: str
-    """With ``{k}`` where a number from 1 on stands."""
+    """Name of the column. ``{k}`` replaces a number that counts from 1."""
     unit: str
-    """``1``: none; ``0 or 1``: a truth value; ``number``: a code or a count."""
+    """Unit of the column. ``1`` means dimensionless, ``0 or 1`` means a truth value,
+    and ``number`` means a code or a count."""
     meaning: str
-    """One sentence."""
+    """Meaning of the column, as one phrase."""
 
 
 def _of(unit: str, **meanings: str) -> list[Column]:
-    """Columns of one unit."""
+    """Returns several columns with the same unit."""
     return [
         Column(name.replace("_K", "_{k}"), unit, text)
         for name, text in meanings.items()
@@ -38,7 +40,7 @@ def _of(unit: str, **meanings: str) -> list[Column]:
 
 
 def _xy(unit: str, name: str, meaning: str) -> list[Column]:
-    """Columns ``name_x`` and ``name_y``, of a vector in W unless the text says else."""
+    """Returns the columns ``name_x`` and ``name_y`` of a vector."""
     return [Column(f"{name}_{axis}", unit, f"{axis} of {meaning}") for axis in "xy"]
 
 
@@ -223,7 +225,7 @@ _SEARCHES = [
     ),
     *_of("s", sink_age_s="time since the sink received the last of these frames"),
 ]
-#: All columns that tables of runs can have, in the order of the signal.
+#: All columns that tables of runs can have. The order follows the flow of the signals.
 COLUMNS: tuple[Column, ...] = (
     *_MOTION,
     *_HEARING,
@@ -236,13 +238,15 @@ _BY_NAME = {column.name: column for column in COLUMNS}
 
 
 def column_of(name: str) -> Column | None:
-    """What a column of a table is.
+    """Returns the unit and the meaning of one column.
 
     Args:
-        name: As in the table; of several robots, the robot's name and a dot precede.
+        name: Name of the column in the table. With several robots, the name begins with
+            the name of the robot and a dot.
 
     Returns:
-        With that name and its number in the text; None of a user's own block.
+        Column with this name. If the name contains a number, the meaning contains this
+        number, too. The value is None for a column of a user's own block.
     """
     own = name.rpartition(".")[2]
     number = re.search(r"(?<=_)\d+", own)
@@ -255,18 +259,19 @@ def column_of(name: str) -> Column | None:
 
 
 def columns(of: RunResult | Iterable[str] | None = None) -> pd.DataFrame:
-    """The data dictionary: unit and meaning of the columns of a run's table.
+    """Returns a data dictionary with the unit and the meaning of each column of a run.
 
     Args:
-        of: A run, or names of columns; none: every column that there is, with
-            ``{k}`` in the place of numbers.
+        of: A run, or names of columns. With None, the result contains all columns that
+            exist, with ``{k}`` instead of numbers.
 
     Returns:
-        A row a column, by its name, with ``unit`` and ``meaning``; of a user's own
-        block both are empty.
+        Table with one row per column. The index is the name of the column, and the
+        columns are ``unit`` and ``meaning``. For a column of a user's own block, both
+        entries are empty.
 
     Raises:
-        InputError: A scenario is no run.
+        InputError: The argument is a scenario or a string instead of a run.
     """
     import pandas as pd
 

@@ -1,4 +1,4 @@
-"""Bodies and walls as ROS 2 markers, each in the frame of what it shows."""
+"""Converts bodies and walls to ROS 2 markers, each in the frame of its body."""
 
 from __future__ import annotations
 
@@ -13,23 +13,27 @@ from analysis.reporting.palette import COLOURS
 from diagrams import Scenario
 from systems.sound.parameters import RoomParameters
 
-#: Numbers of ``visualization_msgs/Marker``.
+#: Constants of ``visualization_msgs/Marker``.
 _CUBE, _LINE_LIST, _ADD = 1, 5, 0
-#: Heights of bodies, of which the model has the floor plan alone, m.
+#: Heights of the robots and of other bodies, m. The model contains no heights, so these
+#: values are only for the display.
 _ROBOT_M, _BODY_M = 0.16, 0.35
 #: Width of the edges of a room, m.
 _EDGE_M = 0.03
 
 
 def body_markers(scenario: Scenario, names: Mapping[str, str]) -> list[Message]:
-    """Robots, sources, obstacles and walls; they move with their frames.
+    """Returns markers of the robots, sources, obstacles and walls.
+
+    Each marker moves with its frame.
 
     Args:
-        scenario: What there is.
-        names: Of the frames, by the name of robot, source or obstacle.
+        scenario: Scenario that contains the bodies.
+        names: Name of the frame of each robot, source and obstacle, by the name of the
+            body.
 
     Returns:
-        A ``Marker`` each.
+        One ``Marker`` message per body, and one for the walls.
     """
     markers = [*_boxes(scenario, names)]
     if scenario.room is not None:
@@ -58,7 +62,7 @@ def _box(
 
 
 def _edges(room: RoomParameters) -> Message:
-    """The edges of a shoebox room, two ends each."""
+    """Returns a marker with the edges of a room, as pairs of end points."""
     low = np.array([*room.corner, 0.0])
     corners = [low + np.array(room.size_m) * k for k in np.ndindex(2, 2, 2)]
     ends = [

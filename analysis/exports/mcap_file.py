@@ -1,4 +1,4 @@
-"""A run as an MCAP file of ROS 2 messages, which Foxglove and PlotJuggler open."""
+"""Writes a run as an MCAP file of ROS 2 messages, for Foxglove and PlotJuggler."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import InputError
 
 _PACKAGES = ("mcap", "mcap_ros2")
-#: Columns that are told by messages of their own kind.
+#: Columns of poses, by topic. They become pose messages instead of single numbers.
 _POSES = {
     "pose": ("p_WB_x", "p_WB_y", "theta_WB"),
     "pose_estimated": ("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"),
@@ -38,15 +38,15 @@ _POSES = {
 }
 _VELOCITY = ("v_WB_x", "v_WB_y", "omega_WB")
 _ESTIMATE = ("p_WS_estimated_x", "p_WS_estimated_y", "target_valid")
-#: Topic, message, and what it says.
+#: Topic, type of the message, and message.
 _Entry = tuple[str, str, Message]
 
 
 def require_mcap() -> None:
-    """Asks whether MCAP files can be written here.
+    """Checks that the packages for MCAP files are installed.
 
     Raises:
-        InputError: A package is not installed; says how to install it.
+        InputError: A package is not installed. The message explains how to install it.
     """
     missing = [name for name in _PACKAGES if find_spec(name) is None]
     if missing:
@@ -58,13 +58,14 @@ def require_mcap() -> None:
 
 
 def write_mcap(run: RecordedRun, path: Path) -> None:
-    """Writes an MCAP file; docs/exports.md lists its topics.
+    """Writes a run as an MCAP file. docs/exports.md lists the topics of the file.
 
-    Times are those of the run, from 0. The same run gives the same bytes.
+    The times in the file start at 0, as in the run. Two files of the same run have
+    equal bytes.
 
     Args:
-        run: What happened.
-        path: The file.
+        run: Scenario and table of the run.
+        path: Path of the MCAP file.
 
     Raises:
         InputError: A package is not installed.
@@ -103,7 +104,7 @@ def _write(writer: Any, run: RecordedRun) -> None:
 
 
 def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
-    """What is said at each tick."""
+    """Yields the messages of each tick (control period)."""
     scenario = run.scenario
     bodies = scenario.sources | {each.name: each for each in scenario.obstacles}
     placed = {name: body.path().poses(run.time) for name, body in bodies.items()}
@@ -130,7 +131,7 @@ def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
 
 
 def _ros_names(names: Iterable[str]) -> dict[str, str]:
-    """Names that topics and frames may bear: letters, digits, underscores."""
+    """Returns valid and unique ROS names: only letters, digits and underscores."""
     found: dict[str, str] = {}
     for name in names:
         plain = _plain(name)
@@ -156,7 +157,11 @@ def _robot_frames(
     tick: int,
     time: float,
 ) -> Iterator[Message]:
-    """B, P, and the range sensors, which look along x of their frames."""
+    """Yields the transforms of the frames of one robot.
+
+    The frames are the robot frame B, a frame at the control point P, and a frame for
+    each range sensor. The x axis of a sensor's frame is the axis of its cone.
+    """
     base, ahead = f"{name}/base_link", robot.robot.control_point_m
     at = [float(own[key][tick]) for key in _POSES["pose"]]
     yield transform(time, WORLD_FRAME, base, at)
@@ -177,7 +182,7 @@ def _robot_entries(
     tick: int,
     time: float,
 ) -> Iterator[_Entry]:
-    """All that one robot's columns say at a tick."""
+    """Yields all messages of one robot at a tick, from the columns of its table."""
     told = {"t"}
     for topic, keys in _POSES.items():
         told.update(keys)
@@ -208,7 +213,7 @@ def _robot_entries(
 
 
 def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Message:
-    """A reading; infinite where there is no echo, as ROS has it."""
+    """Returns a range message. Without an echo, the range is infinite."""
     assert isinstance(robot, HasRangeSensors)
     sensor = robot.ultrasonic.sensors[k - 1]
     return stamped(

@@ -1,4 +1,4 @@
-"""What a run's directory keeps: its scenario, and what each robot did."""
+"""Loads the scenario and the table of a run, for example from its directory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from diagrams.running.run_result import RunResult
 
 SCENARIO_FILE, TABLE_FILE = "scenario.yaml", "trajectory.parquet"
-#: Without these there is nothing to see.
+#: Columns that every table must have.
 _NEEDED = (
     *("t", "p_WB_x", "p_WB_y", "theta_WB"),
     *("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"),
@@ -31,24 +31,31 @@ _NEEDED = (
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """A run as another program gets it."""
+    """A run as its scenario and its table, for the export to other programs."""
 
     scenario: Scenario
-    """The whole one."""
+    """The whole scenario, with all robots."""
     table: pd.DataFrame
-    """``RunResult.trajectory``."""
+    """Table of the run, from ``RunResult.trajectory``."""
 
     @classmethod
     def of(cls, result: RunResult) -> RecordedRun:
-        """From a run that has just ended."""
+        """Makes a recorded run from the result of a run."""
         return cls(result.full_scenario, result.trajectory)
 
     @classmethod
     def load(cls, directory: str | Path) -> RecordedRun:
-        """From the result directory of ``phonotaxis simulate``.
+        """Loads a recorded run from the result directory of ``phonotaxis simulate``.
+
+        Args:
+            directory: Result directory.
+
+        Returns:
+            The recorded run.
 
         Raises:
-            InputError: It is none, or its files do not belong together.
+            InputError: The directory is not a result directory, or its files do not
+                belong together.
         """
         folder = Path(directory)
         for name in (SCENARIO_FILE, TABLE_FILE):
@@ -71,7 +78,11 @@ class RecordedRun:
 
     @cached_property
     def robots(self) -> dict[str, Mapping[str, NDArray[np.float64]]]:
-        """(n,) columns by name, as if each robot were alone, by the robot's name."""
+        """Columns of each robot, by name of the robot.
+
+        Each column is an (n,) array, by name of the column. These names do not contain
+        the name of the robot.
+        """
         names = list(self.scenario.robots)
         columns = {
             str(name): self.table[name].to_numpy(dtype=float) for name in self.table
@@ -82,14 +93,14 @@ class RecordedRun:
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """(n,) of the ticks, s."""
+        """(n,) times of the ticks (control periods), s."""
         return next(iter(self.robots.values()))["t"]
 
 
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except (OSError, ValueError):  # a name that no file can have
+    except (OSError, ValueError):  # the name is not valid for a file
         return False
 
 

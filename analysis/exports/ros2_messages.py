@@ -1,13 +1,14 @@
-"""Definitions of ROS 2 messages, as an MCAP file carries them beside the messages.
+"""Contains the definitions of the ROS 2 messages in an MCAP file.
 
-Those of ROS 2 Jazzy, without comments, defaults and the constants that are not used.
+An MCAP file stores these definitions together with the messages. The definitions are
+those of ROS 2 Jazzy. They omit comments, default values, and unused constants.
 """
 
 from __future__ import annotations
 
 import re
 
-#: Fields of each message by its name, without ``msg/``.
+#: Fields of each message. The keys are the names of the messages without ``msg/``.
 DEFINITIONS = {
     "builtin_interfaces/Duration": """\
 int32 sec
@@ -134,13 +135,16 @@ _RULE = "=" * 80
 
 
 def message_definition(name: str) -> str:
-    """A message with all that it is made of, in the form of ROS 2's bags.
+    """Returns the definition of a message and of all its parts.
+
+    The text has the format of the bag files of ROS 2.
 
     Args:
-        name: As ``geometry_msgs/PoseStamped``.
+        name: Name of the message, such as ``geometry_msgs/PoseStamped``.
 
     Returns:
-        Its fields, then those of each part after a rule and its name.
+        Fields of the message, followed by the definition of each part. A line of equal
+        signs and the name of the part precede each definition.
     """
     needed, waiting = [], [name]
     while waiting:

@@ -1,4 +1,4 @@
-"""Values of ROS 2 messages: times, poses and transforms in the plane."""
+"""Makes values of ROS 2 messages: times, poses and transforms in the plane."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-#: Fields by name.
+#: A message, as its fields by name.
 Message = dict[str, Any]
-#: W.
+#: Name of the world frame W.
 WORLD_FRAME = "world"
 
 
 def stamped(time: float, frame: str, **fields: Any) -> Message:
-    """A message with a header.
+    """Returns a message with a header.
 
     Args:
-        time: s.
-        frame: In which its fields are.
-        **fields: All else.
+        time: Time stamp, s.
+        frame: Name of the frame in which the fields are given.
+        **fields: All other fields of the message.
 
     Returns:
         The message.
@@ -29,12 +29,12 @@ def stamped(time: float, frame: str, **fields: Any) -> Message:
 
 
 def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
-    """A ``Vector3`` or ``Point``.
+    """Returns a ``Vector3`` or ``Point`` message.
 
     Args:
-        x: Any unit.
-        y: The same.
-        z: The same.
+        x: x component, in any unit.
+        y: y component, in the same unit.
+        z: z component, in the same unit.
 
     Returns:
         The message.
@@ -43,16 +43,16 @@ def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
 
 
 def _turn(theta: float) -> Message:
-    """The rotation about z by an angle, rad."""
+    """Returns the quaternion of a rotation about z by an angle, rad."""
     return {**vector(z=math.sin(0.5 * theta)), "w": math.cos(0.5 * theta)}
 
 
 def pose(at: Sequence[float], height_m: float = 0.0) -> Message:
-    """A ``Pose``.
+    """Returns a ``Pose`` message.
 
     Args:
-        at: x, y, theta, m and rad.
-        height_m: Above the floor, m.
+        at: Pose (x, y, theta), m and rad.
+        height_m: Height above the floor, m.
 
     Returns:
         The message.
@@ -62,11 +62,11 @@ def pose(at: Sequence[float], height_m: float = 0.0) -> Message:
 
 
 def stamped_pose(time: float, at: Sequence[float]) -> Message:
-    """A ``PoseStamped`` in W.
+    """Returns a ``PoseStamped`` message in the world frame W.
 
     Args:
-        time: s.
-        at: x, y, theta, m and rad.
+        time: Time stamp, s.
+        at: Pose (x, y, theta) in W, m and rad.
 
     Returns:
         The message.
@@ -75,13 +75,13 @@ def stamped_pose(time: float, at: Sequence[float]) -> Message:
 
 
 def transform(time: float, parent: str, child: str, at: Sequence[float]) -> Message:
-    """A ``TransformStamped``.
+    """Returns a ``TransformStamped`` message.
 
     Args:
-        time: s.
-        parent: Name of a frame.
-        child: Name of the frame that is at the pose in it.
-        at: x, y, theta, m and rad.
+        time: Time stamp, s.
+        parent: Name of the parent frame.
+        child: Name of the child frame.
+        at: Pose (x, y, theta) of the child frame in the parent frame, m and rad.
 
     Returns:
         The message.

@@ -1,1 +1,1 @@
-"""A run seen from above as a film, with what its microphones heard."""
+"""Makes a movie of a run from above, with the sound at the robot's microphones."""

@@ -1,4 +1,7 @@
-"""Film files that appear whole or not at all: GIF by Pillow, MP4 by ffmpeg."""
+"""Encodes movies as GIF files with Pillow, or as MP4 files with ffmpeg.
+
+A file appears only after its encoding is complete.
+"""
 
 from __future__ import annotations
 
@@ -17,20 +20,21 @@ from numpy.typing import NDArray
 from analysis.run_error import RunError
 from systems.framework.input_error import InputError
 
-#: Pictures a second by the file's ending: a GIF counts time in hundredths of a second.
+#: Frames per second, by file extension. A GIF stores durations in units of 10 ms.
 FRAMES_PER_S = {".gif": 10.0, ".mp4": 25.0}
-#: What an MP4 needs of ffmpeg.
+#: Codecs of ffmpeg that an MP4 file needs.
 _CODECS = ("libx264", "aac")
 
 
 class MovieFile:
-    """Where a film goes; what can be known to fail is refused here.
+    """Output file of a movie. The constructor checks that the file can be written.
 
     Args:
-        path: Ends in .gif or .mp4; nothing is there yet, but its directory is.
+        path: Path that ends in .gif or .mp4. The directory must exist, but the file
+            must not exist.
 
     Raises:
-        InputError: The file cannot be made, or nothing is installed to encode it.
+        InputError: The file cannot be written, or no encoder is installed.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -40,7 +44,7 @@ class MovieFile:
             raise _refused(f"{path} is neither .gif nor .mp4; name a file of one kind")
         try:
             exists = self.path.exists()
-        except OSError as error:  # a name that is too long
+        except OSError as error:  # for example, the name is too long
             raise _refused(f"{path} is not a usable path ({error.strerror})") from None
         if exists:
             raise _refused(f"{path} already exists; name another file")
@@ -54,7 +58,7 @@ class MovieFile:
 
     @property
     def has_sound(self) -> bool:
-        """Whether it can have a track of sound."""
+        """Whether the file format supports sound."""
         return bool(self._ffmpeg)
 
     def write(
@@ -62,15 +66,16 @@ class MovieFile:
         frames: Iterable[NDArray[np.uint8]],
         sound: Path | None = None,
     ) -> None:
-        """Encodes pictures of the same size.
+        """Encodes frames of equal size, and writes the file.
 
         Args:
-            frames: (rows, columns, 3) each, red, green and blue.
-            sound: Sound file of a channel each microphone, the leftmost first; the
-                outer ones become left and right. None: silent.
+            frames: (rows, columns, 3) red, green and blue values of each frame.
+            sound: Sound file with one channel per microphone, the leftmost microphone
+                first. The two outer microphones become the left and the right channel.
+                With None, the movie is silent.
 
         Raises:
-            RunError: The encoder fails, or the disk does.
+            RunError: The encoder fails, or the file cannot be written.
         """
         handle, partial = tempfile.mkstemp(
             prefix=".movie.", suffix=self.path.suffix, dir=self.path.parent
@@ -113,7 +118,7 @@ class MovieFile:
         words += ["-r", f"{self.frames_per_s:g}", "-i", "-"]
         if sound is not None:
             words += ["-i", str(sound), "-af", _stereo(sound), "-c:a", "aac"]
-        # Even sizes and this format are what every player takes.
+        # All players support even sizes and this pixel format.
         words += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white"]
         words += ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
         with tempfile.TemporaryFile() as log:
@@ -130,7 +135,7 @@ class MovieFile:
                     for frame in pictures:
                         pipe.write(frame.tobytes())
             except BrokenPipeError:
-                pass  # its complaint says more
+                pass  # the log of ffmpeg contains the reason
             except BaseException:
                 process.kill()
                 process.wait()
@@ -143,7 +148,7 @@ class MovieFile:
 
 
 def _stereo(sound: Path) -> str:
-    """The filter that makes left and right of the outer microphones, loud enough."""
+    """Returns an ffmpeg filter that makes loud stereo from the outer microphones."""
     import soundfile
 
     last = soundfile.info(sound).channels - 1
@@ -151,15 +156,15 @@ def _stereo(sound: Path) -> str:
     samples, _ = soundfile.read(sound, dtype="float32")
     loudest = float(np.max(np.abs(samples), initial=0.0))
     gain = min(0.9 / loudest, 1e4) if loudest > 0.0 else 1.0
-    # Rates of converters that AAC does not know.
+    # AAC does not support all sample rates of the converters.
     return f"{pan},volume={gain:.6g},aresample=48000"
 
 
 def _find_ffmpeg() -> str:
-    """The program that encodes an MP4.
+    """Returns the path of the ffmpeg program that encodes MP4 files.
 
     Raises:
-        InputError: There is none, or it lacks a codec.
+        InputError: The program is not installed, or lacks a codec.
     """
     program = shutil.which("ffmpeg")
     if importlib.util.find_spec("imageio_ffmpeg") is not None:

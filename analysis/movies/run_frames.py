@@ -1,4 +1,4 @@
-"""The frames of a film: moving bodies are drawn over a background at rest."""
+"""Draws the frames of a movie, with moving bodies on a constant background."""
 
 from __future__ import annotations
 
@@ -30,21 +30,26 @@ from diagrams import RunResult
 from diagrams.scenario.bodies import microphones_W, robot_rectangle
 from systems.world.geometry import rectangle_corners
 
-#: Dots a picture's inch; pictures are 8 inch wide.
+#: Resolution of the frames, dots per inch. The frames are 8 inches wide.
 DPI = 90
-#: While a source sounds, a ring leaves it every RING_S and grows at RING_M_S to
-#: RING_M. Sound is a hundred times as fast.
+#: Rings around a source while it sounds. ``RING_S``: time between two rings, s.
+#: ``RING_M_S``: growth of the radius, m/s; sound is about a hundred times faster.
+#: ``RING_M``: largest radius, m.
 RING_S, RING_M_S, RING_M = 0.15, 3.0, 1.5
 
 
 class RunFrames:
-    """Draws a run from above at any time.
+    """Draws a run from above at any time of the run.
 
-    Robots with microphones, cones and trails, sources with rings while they sound,
-    where each robot takes its source to be, obstacles, walls, and what was hit.
+    The picture shows:
+
+    - robots with their microphones, sensor cones and paths
+    - sources, with rings while they sound
+    - the source position that each robot estimates
+    - obstacles, walls, and touched bodies
 
     Args:
-        result: The run.
+        result: Result of the run.
     """
 
     def __init__(self, result: RunResult) -> None:
@@ -94,20 +99,20 @@ class RunFrames:
         return patch
 
     def frames(self, frames_per_s: float) -> Iterator[NDArray[np.uint8]]:
-        """The pictures of a film, the last one at the end of the run.
+        """Yields the frames of a movie. The last frame shows the end of the run.
 
         Args:
-            frames_per_s: Pictures a second of the run.
+            frames_per_s: Number of frames per second of the run.
 
         Yields:
-            (rows, columns, 3) red, green and blue.
+            (rows, columns, 3) red, green and blue values of each frame.
         """
         count = max(1, round(self._result.simulated_s * frames_per_s))
         for number in range(count):
             yield self.frame(min((number + 1) / frames_per_s, self._result.simulated_s))
 
     def frame(self, time: float) -> NDArray[np.uint8]:
-        """The picture at a time, s, as of ``frames``."""
+        """Returns the frame at a time, s, in the format of ``frames``."""
         self._canvas.restore_region(self._rest)
         for artist in self._artists(time):
             self._axes.draw_artist(artist)
@@ -127,7 +132,7 @@ class RunFrames:
         return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
 
     def _artists(self, time: float) -> list[Any]:
-        """What is to be drawn, from below to above; it is in the axes."""
+        """Adds the moving objects to the axes, and returns them in drawing order."""
         found: list[Any] = []
         for obstacle in self._moving:
             pose = obstacle.path().pose(time)
@@ -167,7 +172,7 @@ class RunFrames:
     def _rings(
         self, center: tuple[float, float], since: float, lasts: float, color: str
     ) -> list[Any]:
-        """Rings of a burst that began so long ago and lasts so long, s."""
+        """Adds the rings of a burst, for the time since its start and its length, s."""
         found = []
         for left in np.arange(0.0, min(since, lasts), RING_S):
             radius = RING_M_S * (since - left)

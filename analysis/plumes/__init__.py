@@ -1,1 +1,1 @@
-"""What searches look like: plumes, phases, readings, in pictures and in replays."""
+"""Shows searches in pictures and replays: plumes, phases and sensor readings."""

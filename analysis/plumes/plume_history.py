@@ -1,4 +1,8 @@
-"""The plume of a run again, for pictures: it depends on nothing that robots do."""
+"""Recomputes the odor plume of a run for pictures.
+
+The plume does not depend on the robots. Therefore the scenario is sufficient for this
+computation.
+"""
 
 from __future__ import annotations
 
@@ -15,24 +19,25 @@ from systems.odor.odor_plume import concentration
 
 
 class PlumeInstant(NamedTuple):
-    """Wind and plume at an instant."""
+    """Wind and plume at one instant."""
 
     time_s: float
     wind: NDArray[np.float64]
-    """The port ``wind``."""
+    """Values of the port ``wind``."""
     plume: NDArray[np.float64]
-    """The port ``plume``."""
+    """Values of the port ``plume``."""
 
 
 def plume_history(scenario: Scenario, end_s: float) -> Iterator[PlumeInstant]:
-    """What the ports ``wind`` and ``plume`` of a run were, every 0.1 s.
+    """Recomputes the ports ``wind`` and ``plume`` of a run at intervals of 0.1 s.
 
     Args:
-        scenario: That was run; it has an odour.
+        scenario: Scenario of the run, with an odor source.
         end_s: Last instant, s.
 
     Yields:
-        The instants, from 0 on.
+        Wind and plume at each instant, starting at 0. If the scenario has no plume,
+        there are no instants.
     """
     blocks = world_blocks(scenario, world_seeds(scenario))
     if "plume" not in blocks:
@@ -43,7 +48,7 @@ def plume_history(scenario: Scenario, end_s: float) -> Iterator[PlumeInstant]:
     for tick in range(int(end_s / scenario.tick_s + 1e-9) + 1):
         if tick % wind_step.numbers.period == 0:
             yield PlumeInstant(tick * scenario.tick_s, wind.copy(), plume.copy())
-        # As in a run, each sees the other as it was before this tick.
+        # As in a run, the plume uses the wind from before this tick.
         before = wind.copy()
         wind_step.step(tick, wind, (), (), wind_step.numbers)
         plume_step.step(tick, plume, (before,), (), plume_step.numbers)
@@ -52,14 +57,14 @@ def plume_history(scenario: Scenario, end_s: float) -> Iterator[PlumeInstant]:
 def concentration_map(
     plume: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Concentration on the floor over a grid.
+    """Computes the concentration of the odor on a grid.
 
     Args:
-        plume: (n,) of the port ``plume``.
-        x: (n,) in W, m.
-        y: (m,) in W, m.
+        plume: Values of the port ``plume``.
+        x: (n,) x of the grid points in the world frame W, m.
+        y: (m,) y of the grid points in W, m.
 
     Returns:
-        (m, n) in units of the gas sensors' C1.
+        (m, n) concentrations, in units of C1, the constant of the gas sensors.
     """
     return np.array([[concentration(plume, u, v) for u in x] for v in y])

@@ -1,4 +1,4 @@
-"""Panels of a search for the picture over time."""
+"""Draws the panels of a search in the picture over time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from diagrams.running.stop_rules import ODOR_WITHIN_M
 from diagrams.scenario.participants import OdorSearcher
 from systems.search.song_rules import AIRFLOW_THRESHOLD
 
-#: Names of what a robot is at, by number, of each kind of search.
+#: Names of the phases of each kind of search. The index is the number of the phase.
 _PHASES = {
     "song2011": ("", "1 initial", "2 upwind", "3 gradient", "4 local"),
     "upwind_gradient": ("", "upwind", "across"),
@@ -22,13 +22,13 @@ _PHASES = {
 
 
 def search_panels(result: RunResult) -> list[Callable[[Axes, RunResult], None]]:
-    """What a robot sensed and did, above its speeds.
+    """Returns the panels that show what a searching robot sensed and did.
 
     Args:
-        result: Of one robot that searches.
+        result: Result of a run, for one robot that searches.
 
     Returns:
-        Panels, each called with its axes and the result.
+        Functions that draw one panel each. Their arguments are the axes and the result.
     """
     if result.scenario.only.searches == "odor":
         return [_distance, _gas, _airflow, _heading, _phase]
@@ -36,13 +36,17 @@ def search_panels(result: RunResult) -> list[Callable[[Axes, RunResult], None]]:
 
 
 def call_time(result: RunResult) -> float | None:
-    """When a robot was called, as the sink has heard it.
+    """Returns the time at which the sink first received a call.
+
+    The sink is the computer of the operator. After a robot has found the odor source,
+    it calls the other robots. The function uses the radio frame with which a robot
+    reports this find to the sink.
 
     Args:
-        result: Of one robot, or of all.
+        result: Result of a run, for one robot or all robots.
 
     Returns:
-        s; None where nobody calls.
+        Time, s. The value is None if the sink received no such frame.
     """
     times = [
         float(result.time[np.argmax(values > 0.5)])
@@ -71,7 +75,7 @@ def _distance(axes: Axes, result: RunResult) -> None:
 def _curves(
     axes: Axes, result: RunResult, curves: Sequence[tuple[str, str, str]], width: float
 ) -> None:
-    """Columns, their labels and colours; angles are not joined where they wrap."""
+    """Draws columns with labels and colors, with gaps where angles wrap."""
     for name, label, colour in curves:
         values = result.columns[name].copy()
         values[1:][np.abs(np.diff(values)) > 180.0] = np.nan

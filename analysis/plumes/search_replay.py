@@ -1,4 +1,4 @@
-"""Plume, phases and radio of searches in a replay."""
+"""Shows the plume, the phases and the radio of searches in a replay."""
 
 from __future__ import annotations
 
@@ -15,15 +15,19 @@ from diagrams import RunResult
 from systems.odor.odor_plume import PUFF_SIZE, PUFFS_BEGIN
 from systems.odor.parameters import CONTAINER_M
 
-#: The plume is shown so often, s, and by so many discs, from the source downwind.
+#: Display of the plume. ``_PERIOD_S``: interval between two displays, s. ``_DISCS``:
+#: number of discs, from the source downwind.
 _PERIOD_S, _DISCS = 0.5, 30
-#: Discs are so far apart, m, and each shows the puff next to its distance.
+#: Difference between the distances of two discs from the source, m. Each disc shows the
+#: puff that is nearest to its distance.
 _APART_M = 0.15
+#: Radius of a disc before scaling, m.
 _RADIUS_M = 1.0
 #: Height of the container, m.
 _HEIGHT_M = 0.12
-#: Lamp over a robot, m; its colours by what the robot is at.
+#: Height of the lamp above a robot, m.
 _LAMP_M = 0.32
+#: Color of the lamp for each state of the robot.
 _LAMPS = {
     "rests": Rgba(0.6, 0.6, 0.6),
     "senses": Rgba(0.94, 0.89, 0.26),
@@ -31,20 +35,22 @@ _LAMPS = {
     "found": Rgba(0.0, 0.62, 0.45),
     "gave up": Rgba(0.84, 0.37, 0.0),
 }
-#: A frame of radio is seen as a flash of so long, s.
+#: Duration of the flash for a radio frame, s.
 _FLASH_S = 0.25
 
 
 def record_switch(
     meshcat: Meshcat, path: str, times: Iterable[float], states: Iterable[bool]
 ) -> None:
-    """Records visibility where it changes; the first state counts from 0 s.
+    """Records the visibility of an object each time that it changes.
+
+    The first state counts from 0 s on.
 
     Args:
-        meshcat: Records already.
-        path: Of what is seen or not.
-        times: Of the states, s.
-        states: Whether it is seen.
+        meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
+        path: Path of the object in the scene tree of the 3D viewer.
+        times: Times of the states, s.
+        states: Whether the object is visible, for each time.
     """
     last: bool | None = None
     for time, state in zip(times, states, strict=True):
@@ -61,17 +67,24 @@ def record_switch(
 def record_searches(
     meshcat: Meshcat, result: RunResult, paths: Mapping[str, str]
 ) -> None:
-    """Records all that searches add to a replay.
+    """Records the objects that a search adds to a replay.
 
-    The container of the odour and puffs of its plume as discs; over each robot that
-    searches a lamp: grey while it rests, yellow while it senses or listens, blue while
-    it moves, green when it has found, orange when it gave up; and a white flash for
-    each of its frames that the sink has heard.
+    The added objects are:
+
+    - the container of the odor source
+    - discs for puffs of the plume
+    - a lamp above each searching robot
+    - a white flash above a robot for each of its radio frames that the sink receives
+
+    The sink is the computer of the operator. The lamp is gray while the robot rests,
+    yellow while it senses or listens, and blue while it moves. It is green after the
+    robot has found the source, and orange after it has given up.
 
     Args:
-        meshcat: Records already.
-        result: The run.
-        paths: Of the robots in Meshcat's tree, by name.
+        meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
+        result: Result of the run.
+        paths: Paths of the robots in the scene tree of the 3D viewer, by name of the
+            robot.
     """
     if result.full_scenario.odor is not None:
         _record_plume(meshcat, result)
@@ -84,7 +97,7 @@ def record_searches(
 
 
 def _placed(x: float, y: float, z: float) -> RigidTransform:
-    place: Any = np.array([x, y, z])  # untyped: Drake's stubs take ndarray amiss
+    place: Any = np.array([x, y, z])  # Drake's type stubs reject arrays
     return RigidTransform(place)
 
 
@@ -125,7 +138,10 @@ def _record_plume(meshcat: Meshcat, result: RunResult) -> None:
 
 
 def _nearest(away: NDArray[np.float64], distance: float) -> int | None:
-    """Number of the puff next to a distance; none where there is none."""
+    """Returns the number of the puff nearest to a given distance, or None.
+
+    The value is None if no puff is within ``_APART_M`` of the distance.
+    """
     if not len(away):
         return None
     k = int(np.abs(away - distance).argmin())

@@ -1,1 +1,1 @@
-"""What a replay has beside its scene: legend, switches, clock, curves over time."""
+"""Adds legend, switches, clock and curves over time to the 3D scene of a replay."""

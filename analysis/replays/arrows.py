@@ -1,4 +1,4 @@
-"""What pulls, pushes and commands a robot, as arrows over it in a replay."""
+"""Shows the forces on a robot and its commanded motion as arrows in a replay."""
 
 from __future__ import annotations
 
@@ -14,35 +14,44 @@ from analysis.reporting.palette import COLOURS
 from diagrams import RunResult
 from systems.world.geometry import rotate
 
-#: Arrows are recorded so often; a browser interpolates, 1/s.
+#: Rate at which arrows are recorded, 1/s. The browser interpolates between these times.
 ARROWS_PER_S = 8.0
-#: Length of the greatest force, and of the shortest arrow, m.
+#: Lengths of arrows, m. ``LONGEST_M``: arrow of the greatest force.
+#: ``SHORTEST_M``: shortest arrow.
 LONGEST_M, SHORTEST_M = 0.8, 1e-3
-#: Over the microphones, m.
+#: Height of the arrows, m. They are above the microphones.
 HEIGHT_M = 0.36
-#: Half widths of shaft and head, m, and where the head begins on an arrow of 1 m.
+#: Shape of an arrow. ``SHAFT_M``: half of the width of the shaft, m. ``HEAD_M``: half
+#: of the width of the head, m. ``NECK``: start of the head as a fraction of the length.
 SHAFT_M, HEAD_M, NECK = 0.02, 0.055, 0.75
 
 
 class Arrow(NamedTuple):
-    """An arrow that begins at P."""
+    """An arrow that starts at the control point P of a robot."""
 
     name: str
-    """attraction, repulsion, or law."""
+    """``attraction``, ``repulsion``, or ``law``. The arrow ``law`` shows the commanded
+    velocity of the control point P."""
     vectors: NDArray[np.float64]
-    """(n, 2) in W at the ticks: N of forces, m/s of law."""
+    """(n, 2) vectors in the world frame W at the ticks (control periods). The unit is N
+    for forces, and m/s for the arrow ``law``."""
     m_per_unit: float
-    """Length of the arrow for 1 of the unit, m."""
+    """Length of the arrow per unit of its vector, m/N or s."""
 
 
 def scale_m_n(result: RunResult) -> float | None:
-    """Length of 1 N, so that the greatest force of a run is seen whole, m.
+    """Returns the length of an arrow for a force of 1 N.
+
+    With this length, the arrow of the greatest force is at most 0.8 m long. The
+    greatest force is the 99th percentile of all forces in the run. A short contact with
+    a very large force therefore does not make all other arrows short.
 
     Args:
-        result: The run of one robot, or of several.
+        result: Result of the run, for one robot or several robots.
 
     Returns:
-        One of 1, 2, 5 times a power of ten, m; none where no law tells forces.
+        Length, m. The value is 1, 2 or 5 times a power of ten. It is None if no control
+        law logs its forces.
     """
     sizes = [
         np.hypot(*own.vector(name))
@@ -52,24 +61,26 @@ def scale_m_n(result: RunResult) -> float | None:
     ]
     if not sizes:
         return None
-    # A moment of contact must not shrink all else.
+    # A short contact must not make all other arrows short.
     greatest = max(float(np.percentile(np.concatenate(sizes), 99.0)), 1e-3)
     power = 10.0 ** np.floor(np.log10(LONGEST_M / greatest))
     return float(max(k * power for k in (1, 2, 5) if k * power * greatest <= LONGEST_M))
 
 
 def arrows(own: RunResult, m_per_n: float | None) -> list[Arrow]:
-    """The arrows of one robot.
+    """Returns the arrows of one robot.
 
-    Forces, where its law tells them, and the velocity of P that its wheels are told to
-    give it, as far as it would get in a second.
+    If the control law logs its forces, two arrows show the attraction and the
+    repulsion. One arrow shows the velocity of the control point P that the wheel
+    commands would cause. Its length is the distance that P would move in 1 s.
 
     Args:
-        own: The run of that robot.
-        m_per_n: Length of 1 N, m, from ``scale_m_n`` of the whole run.
+        own: Result of the run, for this robot.
+        m_per_n: Length of an arrow for a force of 1 N, m, from ``scale_m_n`` of the
+            whole run.
 
     Returns:
-        One to three.
+        One or three arrows.
     """
     found = []
     if m_per_n is not None and "attraction_x" in own.columns:
@@ -81,7 +92,7 @@ def arrows(own: RunResult, m_per_n: float | None) -> list[Arrow]:
 
 
 def _commanded(own: RunResult) -> NDArray[np.float64]:
-    """(n, 2) velocity of P in W that the commanded wheel speeds would give, m/s."""
+    """(n, 2) velocity of P in W that the wheel commands would cause, m/s."""
     robot, theta = own.scenario.only.robot, own.columns["theta_WB"]
     left = robot.wheel_radius_m * own.columns["wheel_speed_left"]
     right = robot.wheel_radius_m * own.columns["wheel_speed_right"]
@@ -92,14 +103,15 @@ def _commanded(own: RunResult) -> NDArray[np.float64]:
 def record_arrows(
     meshcat: Meshcat, own: RunResult, path: str, m_per_n: float | None
 ) -> None:
-    """Records the arrows of one robot, flat over it.
+    """Records the arrows of one robot, as flat objects above the robot.
 
     Args:
-        meshcat: Records already.
-        own: The run of that robot.
-        path: Of the robot in Meshcat's tree; arrows are at ``forces/`` and ``law/``
-            and this.
-        m_per_n: Length of 1 N, m, from ``scale_m_n`` of the whole run.
+        meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
+        own: Result of the run, for this robot.
+        path: Path of the robot in the scene tree of the 3D viewer. ``arrow_path``
+            derives the paths of the arrows from this path.
+        m_per_n: Length of an arrow for a force of 1 N, m, from ``scale_m_n`` of the
+            whole run.
     """
     end = own.simulated_s
     times = np.unique([*np.arange(0.0, end, 1.0 / ARROWS_PER_S), end])
@@ -111,13 +123,13 @@ def record_arrows(
         vectors = arrow.m_per_unit * arrow.vectors[ticks]
         lengths = np.clip(np.hypot(*vectors.T), SHORTEST_M, 2.0 * LONGEST_M)
         yaw = 0.0
-        # No two in one plane, which would flicker.
+        # The arrows have different heights. Surfaces in one plane would flicker.
         height = HEIGHT_M + 0.004 * number
         for time, p, v, length in zip(times, places, vectors, lengths, strict=True):
-            # An arrow without length keeps its direction, and does not spin.
+            # An arrow without length keeps its direction.
             if length > SHORTEST_M:
                 yaw = float(np.arctan2(v[1], v[0]))
-            spot: Any = np.array([*p, height])  # untyped: Drake's stubs take it amiss
+            spot: Any = np.array([*p, height])  # Drake's type stubs reject arrays
             pose = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), spot)
             meshcat.SetTransform(place, pose, float(time))
             wide = min(1.0, float(length) / 0.3)
@@ -126,20 +138,20 @@ def record_arrows(
 
 
 def arrow_path(robot: str, name: str) -> str:
-    """Where an arrow of a robot is in Meshcat's tree.
+    """Returns the path of an arrow in the scene tree of Meshcat (Drake's 3D viewer).
 
     Args:
-        robot: Path of the robot there.
-        name: Of the arrow.
+        robot: Path of the robot in the scene tree.
+        name: Name of the arrow.
 
     Returns:
-        Path without a slash in front.
+        Path without a leading slash.
     """
     return f"law/{robot}" if name == "law" else f"forces/{robot}/{name}"
 
 
 def _add(meshcat: Meshcat, path: str, colour: str) -> None:
-    """An arrow of 1 m along x."""
+    """Adds an arrow of 1 m length along x."""
     x = [0.0, NECK, NECK, 0.0, NECK, 1.0, NECK]
     y = [-SHAFT_M, -SHAFT_M, SHAFT_M, SHAFT_M, -HEAD_M, 0.0, HEAD_M]
     vertices: Any = np.asfortranarray(np.vstack([x, y, np.zeros(7)]))

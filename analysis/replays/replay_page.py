@@ -1,4 +1,4 @@
-"""Clock, legend, switches and curves round the page that Meshcat makes."""
+"""Adds a clock, a legend, switches and curves to the page that Meshcat makes."""
 
 from __future__ import annotations
 
@@ -13,49 +13,52 @@ from analysis.replays.time_charts import Chart
 from analysis.reporting.html_page import COLOURS_CSS
 
 _HERE = Path(__file__).parent
-#: How Meshcat's page gives its viewer a message.
+#: Call in Meshcat's page that passes a message to the viewer.
 _HANDLE = "viewer.handle_command_bytearray("
 _SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
 class Layer(NamedTuple):
-    """An entry of the legend."""
+    """An entry in the legend of a replay."""
 
     label: str
     meaning: str
-    """A few words more; may be empty."""
+    """Short explanation; may be empty."""
     colours: tuple[str, ...]
-    """Of its swatch."""
+    """Colors of the sample beside the label."""
     paths: tuple[str, ...] = ()
-    """In Meshcat's tree, of what its switch hides; none: it has no switch."""
+    """Paths of objects in the scene tree of the 3D viewer. The switch of this entry
+    hides these objects. If there are no paths, the entry has no switch."""
 
 
 class ReplayFacts(NamedTuple):
-    """What the page says and shows beside the scene."""
+    """Texts and data that the page shows in addition to the 3D scene."""
 
     title: str
     end_s: float
     bounds_m: tuple[float, float, float, float]
-    """Least and greatest x, least and greatest y of what must be in view, m."""
+    """Part of the floor that must be in view: least x, greatest x, least y, greatest y,
+    m."""
     layers: Sequence[Layer]
     charts: Sequence[Chart]
     names: Sequence[tuple[str, str]]
-    """Paths in Meshcat's tree, and names of what is there."""
+    """Pairs of a path in the scene tree of the 3D viewer, and the name of the object at
+    this path."""
     robots: Sequence[tuple[str, str]]
-    """Paths and names of what the view can follow."""
+    """Pairs of path and name of each robot that the view can follow."""
     warnings: Sequence[str] = ()
-    """About the scenario, below the legend."""
+    """Warnings about the scenario, which the page shows below the legend."""
 
 
 def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
-    """Meshcat's page with ours round its scene.
+    """Returns the page of Meshcat (Drake's 3D viewer) with added controls and charts.
 
     Args:
-        meshcat_page: From ``Meshcat.StaticHtml``.
-        facts: What to show.
+        meshcat_page: HTML text from ``Meshcat.StaticHtml``.
+        facts: Texts and data that the page shows in addition to the scene.
 
     Returns:
-        HTML that needs no network.
+        HTML text of a page that needs no network.
     """
     data = {
         "end_s": facts.end_s,
@@ -63,7 +66,7 @@ def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
         "names": facts.names,
         "charts": [chart._asdict() for chart in facts.charts],
     }
-    # No text of a scenario ends the script early.
+    # The replacement prevents a text of the scenario from ending the script early.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace(
         "<", "\\u003c"
     )
@@ -74,7 +77,7 @@ def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
     )
     style = f"{COLOURS_CSS}\n{(_HERE / 'replay.css').read_text('utf-8')}"
     script = (_HERE / "replay.js").read_text("utf-8")
-    # Each message to the scene arrives by itself: the page waits for the last one.
+    # The messages to the scene arrive one by one. The page waits for the last message.
     messages = meshcat_page.count(_HANDLE)
     waiting = (
         f"<script>let messagesLeft = {messages}; function handleMessage(bytes) "
@@ -167,7 +170,7 @@ def _quantities(facts: ReplayFacts) -> str:
     options = []
     for robot, charts in groupby(enumerate(facts.charts), lambda pair: pair[1].robot):
         inner = "".join(
-            # The group is not seen once one is chosen.
+            # Each option contains the robot's name, because a closed list hides groups.
             f'<option value="{k}">{html.escape(_whose(chart))}</option>'
             for k, chart in charts
         )

@@ -1,4 +1,4 @@
-"""The curves of the picture over time as data, for a page to draw them."""
+"""Converts the curves of a picture over time to data that a page can draw."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from numpy.typing import NDArray
 
 from diagrams import RunResult
 
-#: A curve has so many points at most; a screen shows no more.
+#: Largest number of points of a curve. A screen cannot show more points.
 MOST_POINTS = 1200
 
 
 class Chart(NamedTuple):
-    """One quantity of one robot over time."""
+    """Data of a chart that shows one quantity of one robot over time."""
 
     title: str
-    """With its unit."""
+    """Name of the quantity, with its unit."""
     robot: str
-    """Whose; empty where there is one."""
+    """Name of the robot. It is empty if there is only one robot."""
     limits: tuple[float, float]
-    """Of the axis."""
+    """Least and greatest value on the vertical axis."""
     ticks: list[tuple[float, str]] | None
-    """Names of values; none: the values are numbers."""
+    """Values on the vertical axis with their names. With None, the axis shows
+    numbers."""
     series: list[dict[str, Any]]
-    """Label, colour, style, t in s, and values; none is a gap.
-
-    The style is line, dashes, dots, or steps: each value holds from its t on.
-    """
+    """Curves of the chart. Each curve has a label, a color, a style, times t in s, and
+    values. The style is line, dashes, dots, or steps. With steps, each value holds from
+    its time on. A value of None is a gap in the curve."""
     bursts: list[tuple[float, float]]
-    """When what is heard sounds, s."""
+    """Start and end of each burst of the source that the robot hears, s."""
 
 
 def time_chart(
@@ -46,23 +46,25 @@ def time_chart(
     robot: str,
     bursts: list[tuple[float, float]],
 ) -> Chart:
-    """What a panel of the picture over time shows, as data.
+    """Converts one panel of a picture over time to data.
 
     Args:
-        panel: Draws it, as of ``analysis.runs.run_plots.time_panels``.
-        own: The run of one robot.
-        robot: Its name; empty where it is the only one.
-        bursts: When what it hears sounds, s.
+        panel: Function that draws the panel, from
+            ``analysis.runs.run_plots.time_panels``.
+        own: Result of a run, for one robot.
+        robot: Name of the robot. It is empty if there is only one robot.
+        bursts: Start and end of each burst that the robot hears, s.
 
     Returns:
-        Its curves and dots; without any ``series`` is empty.
+        Chart with the curves and dots of the panel. If the panel has no curves,
+        ``series`` is empty.
     """
     axes = Figure().subplots()
     panel(axes, own)
     series = []
     for line in axes.get_lines():
         in_data = line.get_transform().contains_branch_seperately(axes.transData)
-        if in_data[1]:  # else it is upright, and marks a moment
+        if in_data[1]:  # otherwise, the line is vertical and marks a time
             series.append(_series(line, None if in_data[0] else own.simulated_s))
     ticks = None
     if isinstance(axes.yaxis.get_major_locator(), FixedLocator):
@@ -80,7 +82,16 @@ def time_chart(
 
 
 def _series(line: Line2D, across_s: float | None) -> dict[str, Any]:
-    """One curve; of a line from side to side its length, s."""
+    """Converts one line of a panel to the data of a curve.
+
+    Args:
+        line: Line of the panel.
+        across_s: Duration of the run, s, for a horizontal line over the whole panel.
+            For all other lines, it is None.
+
+    Returns:
+        Label, color, style, times and values of the curve.
+    """
     t = np.asarray(line.get_xdata(), dtype=float).reshape(-1)
     values = np.asarray(line.get_ydata(), dtype=float).reshape(-1)
     dots = line.get_linestyle() == "None"
@@ -91,7 +102,7 @@ def _series(line: Line2D, across_s: float | None) -> dict[str, Any]:
     step = max(1, math.ceil(len(t) / MOST_POINTS))
     style = _style(line)
     if style == "steps":
-        # Thinned, it would lose what lasts for a tick.
+        # All steps are kept. Otherwise, steps of a single tick would be lost.
         (t, values), step = _steps(t, values), 1
     label = str(line.get_label())
     return {
@@ -113,7 +124,7 @@ def _style(line: Line2D) -> str:
 def _steps(
     t: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The begin of each value, and the end of the last."""
+    """Returns the first sample of each constant part, and the last sample."""
     new = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
     return np.r_[t[new], t[-1:]], np.r_[values[new], values[-1:]]
 

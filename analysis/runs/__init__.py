@@ -1,1 +1,1 @@
-"""What a run did: metrics, pictures, replay, its files."""
+"""Evaluates a run: metrics, pictures, replay, and files."""

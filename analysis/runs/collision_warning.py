@@ -1,4 +1,4 @@
-"""What the robot's cones knew of a body that it then touched."""
+"""Computes how early the range sensors saw a body that the robot then touched."""
 
 from __future__ import annotations
 
@@ -11,19 +11,30 @@ from diagrams.running.run_result import RunResult
 from systems.framework.compiling import njit
 from systems.world.geometry import fan_ranges
 
-#: An echo is a body's if the range that was read is so near to that body's, m.
+#: An echo belongs to a body if the range reading differs from the true range of this
+#: body by at most this distance, m.
 SAME_M = 0.03
 
 
 def collision_warning(result: RunResult) -> dict[str, float | None]:
-    """How a collision came about, as far as the sensors are concerned.
+    """Computes how early the range sensors saw the body that the robot touched.
+
+    The result has these entries:
+
+    - ``contact_warning_s``: time from the first echo of the body to the contact, s. The
+      value is None if the body never caused an echo.
+    - ``contact_unseen_s``: time from the last echo of the body to the contact, s. The
+      value is None if the body never caused an echo.
+    - ``contact_push_n``: magnitude of the repulsive force of the control law at the
+      last tick (control period), N. The force can come from any obstacle. The value is
+      None if the law does not log its forces.
+
+    Args:
+        result: Result of a run, for one robot.
 
     Returns:
-        ``contact_warning_s`` and ``contact_unseen_s``, from the first and from the
-        last echo of the body to the contact, none: never heard of; and
-        ``contact_push_n``, the law's push at the last tick, whatever it was that
-        pushed, none of a law that does not say. All none without a collision; empty
-        without cones.
+        Value of each entry, by name. If the run had no collision, all values are None.
+        If the robot has no range sensors, the dictionary is empty.
     """
     hit, columns = result.collision, result.columns
     if "range_1" not in columns:
@@ -43,7 +54,7 @@ def collision_warning(result: RunResult) -> dict[str, float | None]:
 
 
 def _echoes(result: RunResult, name: str) -> NDArray[np.bool_]:
-    """(n,) whether any cone's echo was that body's, at the ticks."""
+    """(n,) whether any sensor had an echo of the named body, at each tick."""
     scenario, columns = result.scenario, result.columns
     sensors, control_point_m = (
         scenario.sensing.ultrasonic,
@@ -66,7 +77,7 @@ def _cone_ranges(
     half_angles: NDArray[np.float64],
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(n, cones) true ranges of (n, 5) rectangles, m; see ``fan_ranges``."""
+    """(n, sensors) true ranges of one moving rectangle, m; see ``fan_ranges``."""
     ranges = np.empty((len(poses), axes.size))
     for i in range(len(poses)):
         ranges[i] = fan_ranges(

@@ -1,4 +1,4 @@
-"""Parts of the floor that appear and go again, as few rectangles as will do."""
+"""Divides the changing parts of the floor into a small number of rectangles."""
 
 from __future__ import annotations
 
@@ -11,34 +11,38 @@ from analysis.runs.known_space import KnownSpace
 
 
 class FloorLayer(NamedTuple):
-    """Cells that come and go together."""
+    """A group of floor cells that appear together and disappear together."""
 
     begin: int
-    """Number of the time from which on they are there."""
+    """Index of the first time at which the cells are present."""
     end: int
-    """From which on they are not; the number of all times: they stay."""
+    """Index of the first time at which the cells are absent again. If the cells stay,
+    this index is the number of times."""
     rectangles: NDArray[np.float64]
-    """(m, 4) least and greatest x, least and greatest y, m."""
+    """(m, 4) rectangles that cover the cells: least x, greatest x, least y, greatest y,
+    m."""
 
 
 def floor_layers(
     known: KnownSpace, cells: NDArray[np.bool_], *, whole: bool = True
 ) -> list[FloorLayer]:
-    """Cells by the times at which they come and go.
+    """Groups floor cells by the times at which they appear and disappear.
 
-    A cell that stays is in one layer alone, so that all of them take little more than
-    the last picture of the floor.
+    A cell that stays is in only one layer. Therefore all layers together need little
+    more memory than the last state of the floor.
 
     Args:
-        known: Times, and places of the cells.
-        cells: (n, i, j) which of them are there at each time.
-        whole: Whether neighbours are merged; else each cell has its own rectangle.
+        known: Map that contains the times and the positions of the cells.
+        cells: (n, i, j) whether each cell is present at each of the n times.
+        whole: Whether neighboring cells are merged into larger rectangles. If not, each
+            cell has its own rectangle.
 
     Returns:
-        Layers that do not overlap at any time, by the times at which they begin.
+        Layers in the order of the times at which they begin. No two layers overlap at
+        any time.
     """
     count = len(cells)
-    # Of each cell that is there, from which time on it is not.
+    # For each cell that is present: index of the time at which it disappears.
     ends = np.full(cells.shape, count)
     for k in range(count - 2, -1, -1):
         ends[k] = np.where(cells[k + 1], ends[k + 1], k + 1)
@@ -53,19 +57,20 @@ def floor_layers(
 
 
 def merged_cells(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Rectangles that cover some cells, each cell once.
+    """Finds rectangles that together cover each given cell exactly once.
 
     Args:
-        cells: (i, j) which.
+        cells: (i, j) whether each cell has to be covered.
 
     Returns:
-        (m, 4) of each first i, the i after its last, and the same of j.
+        (m, 4) rectangles, as four indices: the first i, the i after the last, the first
+        j, and the j after the last.
     """
     wide = cells.shape[0]
     padded = np.pad(cells, ((0, 1), (1, 1))).astype(np.int8)
     growing: dict[tuple[int, int], int] = {}
     found: list[tuple[int, int, int, int]] = []
-    # The last row is empty: there all rectangles that still grow end.
+    # The last row is empty. All rectangles that still grow end there.
     for i in range(wide + 1):
         edges = np.flatnonzero(np.diff(padded[i]))
         runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
@@ -77,7 +82,7 @@ def merged_cells(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def _single_cells(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """As ``merged_cells``, a rectangle a cell."""
+    """Returns one rectangle per cell, in the format of ``merged_cells``."""
     i, j = np.nonzero(cells)
     return np.column_stack([i, i + 1, j, j + 1])
 
@@ -85,14 +90,16 @@ def _single_cells(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
 def clipped(
     rectangles: NDArray[np.float64], within: tuple[float, float, float, float]
 ) -> NDArray[np.float64]:
-    """What of some rectangles lies within another one.
+    """Clips rectangles to the inside of another rectangle.
 
     Args:
-        rectangles: (m, 4) least and greatest x, least and greatest y, m.
-        within: The same of the other, m.
+        rectangles: (m, 4) rectangles to clip: least x, greatest x, least y, greatest y,
+            m.
+        within: Rectangle that limits the others: least x, greatest x, least y, greatest
+            y, m.
 
     Returns:
-        (k, 4) as they are left; those outside are left out.
+        (k, 4) clipped rectangles, m. Rectangles that lie outside are removed.
     """
     x_low, x_high, y_low, y_high = within
     low, high = [x_low, x_low, y_low, y_low], [x_high, x_high, y_high, y_high]

@@ -1,4 +1,8 @@
-"""What a guard did in a run, and where the robot could have come to rest."""
+"""Finds what a safety guard did in a run, and where the robot could have stopped.
+
+A guard limits the commands of the control law. The robot can then always brake to rest
+on floor that is known to be free.
+"""
 
 from __future__ import annotations
 
@@ -13,33 +17,37 @@ from systems.safety.braking import BrakingNumbers, braked, roll_on, rolled_speed
 from systems.safety.motion_guard import MotionGuard
 from systems.safety.sensing_monitor import SENSING_FAULTS
 
-#: What a guard does with a command, by its number in a run's table.
+#: Actions of a guard. The index is the number in the table of a run.
 GUARD_ACTIONS = ("passed", "slowed", "turned", "braked", "halted")
-#: Braking ends once the rims are so slow, m/s; the motors' lag leaves no way then.
+#: Speed of the wheel rims below which braking ends, m/s. At this speed, the lag of the
+#: motors causes practically no further motion.
 _REST_M_S = 1e-4
 
 
 @dataclass(frozen=True)
 class GuardedMotion:
-    """What a guard did at the ticks of a run."""
+    """Actions of a safety guard at the ticks (control periods) of a run."""
 
     actions: NDArray[np.int64]
-    """(n,) places in ``GUARD_ACTIONS``."""
+    """(n,) action of the guard at each tick, as an index into ``GUARD_ACTIONS``."""
     resting_poses: NDArray[np.float64]
-    """(n, 3) x, y, theta at which the robot would rest if it braked from then on, in
-    the frame of the odometry, m and rad."""
+    """(n, 3) poses (x, y, theta) at which the robot would come to rest if it braked
+    from each tick on. The poses are in the frame of the odometry, m and rad."""
     keep_m: float
-    """Radius of the disc about the axle that the guard keeps in free space, m."""
+    """Radius of a disc about the axle, m. The guard keeps this disc in free space."""
 
 
 def guarded_motion(result: RunResult) -> GuardedMotion | None:
-    """What a guard did in a run.
+    """Finds what the safety guard did at each tick (control period) of a run.
+
+    The guard limits the commands of the control law.
 
     Args:
-        result: The run of one robot.
+        result: Result of a run, for one robot.
 
     Returns:
-        What it did; None without a guard.
+        Actions of the guard, and resting poses of the robot. The value is None if the
+        robot has no guard.
     """
     columns, scenario = result.columns, result.scenario
     if scenario.only.own_guard is None or "guard_action" not in columns:
@@ -54,7 +62,7 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
     names = "p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"
     poses = np.column_stack([columns[name] for name in names])
     sides = "wheel_speed_left", "wheel_speed_right"
-    # Of the tick before each, from rest.
+    # Commands of the previous tick. The robot starts at rest.
     commands = np.column_stack([np.r_[0.0, columns[name][:-1]] for name in sides])
     return GuardedMotion(
         np.rint(columns["guard_action"]).astype(np.int64),
@@ -65,16 +73,17 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
 
 @dataclass(frozen=True)
 class Halt:
-    """Why and when a guard has halted a robot whose sensing it could not trust."""
+    """A halt of the robot by its guard because of one fault of the sensing."""
 
     fault: str
-    """One of ``SENSING_FAULTS``."""
+    """Name of the fault, from ``SENSING_FAULTS``."""
     sensor: int
-    """Its number, from the left, from 1; 0: the odometry."""
+    """Number of the faulty range sensor. The sensors are numbered from 1, starting at
+    the left. 0 is the odometry."""
     start_s: float
-    """When it was first found."""
+    """Time at which the guard first found the fault, s."""
     duration_s: float
-    """For how long in all."""
+    """Total time for which the fault was present, s."""
 
     def __str__(self) -> str:
         who = f"sensor {self.sensor} {self.fault}" if self.sensor else self.fault
@@ -82,13 +91,14 @@ class Halt:
 
 
 def halts_of(result: RunResult) -> list[Halt]:
-    """What was wrong with a guarded robot's sensing, by its beginning.
+    """Lists the sensing faults for which the safety guard halted a robot.
 
     Args:
-        result: The run of one robot.
+        result: Result of a run, for one robot.
 
     Returns:
-        One for each fault of each sensor; none where nothing was found.
+        One halt per fault of each sensor, sorted by start time. The list is empty if
+        there was no fault.
     """
     columns, found = result.columns, []
     if "sensing_fault" not in columns:
@@ -110,12 +120,18 @@ def _resting_poses(
     commands: NDArray[np.float64],
     numbers: BrakingNumbers,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Where braking ends, as the guard reckons it.
+    """Computes where the robot would come to rest if it braked at each tick.
+
+    A tick is a control period. The braking model is that of the safety guard.
 
     Args:
-        poses: (n, 3) at the ticks, m and rad.
-        commands: (n, 2) of the tick before each, left and right wheel, rad/s.
-        numbers: How the robot brakes.
+        poses: (n, 3) poses (x, y, theta) of the robot at the ticks, m and rad.
+        commands: (n, 2) commands of the previous tick, for each tick: speeds of the
+            left and right wheel, rad/s.
+        numbers: Braking model of the robot.
+
+    Returns:
+        (n, 3) resting poses (x, y, theta) in the frame of ``poses``, m and rad.
     """
     rests = np.empty(poses.shape)
     speeds, kept = (0.0, 0.0), numbers.part.kept**numbers.parts

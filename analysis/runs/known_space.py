@@ -1,4 +1,8 @@
-"""What a guarded robot knew of the floor, worked out again from its log."""
+"""Reconstructs a robot's map of the floor from the log of a run.
+
+Only robots with a safety guard have such a map. The guard keeps a robot on floor that
+the map shows as free.
+"""
 
 from __future__ import annotations
 
@@ -14,60 +18,72 @@ from systems.framework.block import RunFacts
 from systems.safety.free_space import FreeSpace
 from systems.safety.free_space_map import FreeSpaceMap
 
-#: Columns of a run without which the map cannot be worked out.
+#: Columns of the pose by odometry, which the reconstruction of the map needs.
 _POSE = ("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated")
+#: Columns of the wheel speeds, which the reconstruction of the map needs, too.
 _WHEELS = ("wheel_speed_left", "wheel_speed_right")
-#: What a user's own block must not stand in for: its ages or its map are not ours.
+#: Parts of the robot that must be blocks of this project. For a block of a user's own,
+#: the ages of readings or the rules of the map are unknown.
 _OURS = ("ultrasonic", "free_space")
 
 
 @dataclass(frozen=True)
 class KnownSpace:
-    """What was known of the floor at some times, in square cells.
+    """Map of the floor that a robot with a safety guard knew at several times.
 
-    The frame is that of the odometry: it is W at the start, and drifts from it.
+    The map consists of square cells. All positions are in the frame of the odometry. At
+    the start, this frame equals the world frame W. During the run, it drifts away from
+    W.
     """
 
     times: NDArray[np.float64]
-    """(n,) of ticks, ascending, s."""
+    """(n,) ascending times of ticks (control periods), s."""
     corner_m: tuple[float, float]
     """Least x and y of cell (0, 0), m."""
     cell_m: float
     """Side of a cell, m."""
     free: NDArray[np.bool_]
-    """(n, i, j) cells that counted as seen free; i along x, j along y."""
+    """(n, i, j) whether each cell counted as free at each time; i is along x, and j is
+    along y."""
     hits: NDArray[np.float64]
-    """(n, i, j) how often an echo came from about there since a cell was last seen
-    free; 0 where it counts as free."""
+    """(n, i, j) weighted number of echoes from each cell since the cell was last seen
+    free. The number is 0 if the cell counts as free."""
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
-        """Least and greatest x, least and greatest y of the cells, m."""
+        """Least x, greatest x, least y and greatest y of all cells, m."""
         _, wide, deep = self.free.shape
         x, y = self.corner_m
         return x, x + wide * self.cell_m, y, y + deep * self.cell_m
 
     def middles(self, cells: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Places of some cells.
+        """Returns the center of each selected cell.
 
         Args:
-            cells: (i, j) which.
+            cells: (i, j) whether each cell is selected.
 
         Returns:
-            (m, 2) their middles, m.
+            (m, 2) positions of the centers of the selected cells, m.
         """
         counted = np.argwhere(cells).astype(np.float64)
         return np.array(self.corner_m) + (counted + 0.5) * np.float64(self.cell_m)
 
 
 def has_known_space(result: RunResult) -> bool:
-    """Whether a run's log tells what the robot knew.
+    """Returns whether the log of a run is sufficient to reconstruct the robot's map.
+
+    Three conditions must hold:
+
+    - The robot has a safety guard, which uses a map of free floor.
+    - The blocks of the range sensors and of the map are not a user's own blocks.
+    - The log contains the poses, the wheel speeds and the sensor readings.
 
     Args:
-        result: The run of one robot.
+        result: Result of a run.
 
     Returns:
-        Whether it has a guard, and sensors and a map of ours.
+        Whether all conditions hold. The value is False for the joint result of several
+        robots.
     """
     scenario = result.scenario
     if result.several or scenario.only.own_guard is None:
@@ -83,13 +99,16 @@ def has_known_space(result: RunResult) -> bool:
 
 
 def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
-    """The map at each tick, entered anew by the block's own step.
+    """Reconstructs the map of free floor at each tick (control period) of a run.
+
+    The function feeds the log to the step of the block ``FreeSpaceMap``.
 
     Args:
-        result: The run of one guarded robot.
+        result: Result of a run, for one robot with a safety guard.
 
     Yields:
-        The same map at every tick of the log, changed: copy what is to be kept.
+        The map at each tick of the log. Every tick yields the same object, which
+        changes at the next tick. Copy all values that you need later.
     """
     scenario, tick_s = result.scenario, result.scenario.tick_s
     sensors = scenario.sensing.ultrasonic
@@ -117,19 +136,27 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
 
 
 def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ...]]:
-    """What the range sensors read at each tick, and where the robot took itself to be.
+    """Reads the inputs of the floor map from the log, at each tick (control period).
+
+    Each tick has five arrays, in this order:
+
+    - (sensors,) ranges of the range sensors, m
+    - (sensors,) echoes, 1 or 0
+    - (sensors,) ages of the readings, s
+    - (3,) pose (x, y, theta) by odometry, m and rad
+    - (2,) speeds of the left and right wheel, as commanded at the previous tick, rad/s
 
     Args:
-        result: The run of one guarded robot.
+        result: Result of a run, for one robot with a safety guard.
 
     Yields:
-        (sensors,) ranges, m, echoes, 0 or 1, and ages of them, s, (3,) the pose by
-        the odometry, m and rad, and (2,) the wheel speeds commanded until then, rad/s.
+        The five arrays of each tick.
     """
     scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
     sensors = scenario.sensing.ultrasonic
     ticks = np.rint(result.time / tick_s).astype(np.int64)
-    # Of sensors that fire in turn the log does not tell which one has just fired.
+    # The log does not contain the sensor that has just fired. The schedule of the
+    # sensors determines the ages of their readings.
     since = (ticks[:, None] - sensors.turns(tick_s)) % sensors.round_ticks(tick_s)
     ranges, echo, poses, wheels = (
         np.column_stack([columns[name] for name in names])
@@ -140,7 +167,8 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
             _WHEELS,
         )
     )
-    # A row has the command from its tick on; until then it was that of the row before.
+    # A row contains the command from its tick on. Before this tick, the command of the
+    # previous row applied.
     wheels = np.vstack([np.zeros(2), wheels[:-1]])
     for row in range(len(ticks)):
         age = since[row] * tick_s
@@ -148,15 +176,18 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
 
 
 def known_space(result: RunResult, times: ArrayLike) -> KnownSpace | None:
-    """What a guarded robot knew of the floor.
+    """Reconstructs what a robot with a safety guard knew of the floor at given times.
+
+    For each time, the function uses the nearest tick (control period). It uses no tick
+    twice.
 
     Args:
-        result: The run of one robot.
-        times: (n,) at which, s; of each the nearest tick is taken, once.
+        result: Result of a run, for one robot.
+        times: (n,) times, s.
 
     Returns:
-        What it knew, on the cells that were known at one of the times; None without a
-        guard, or where a block of a user's own stands in for the sensors or the map.
+        Map at these ticks. The grid contains all cells that were known at any of these
+        ticks. The value is None if ``has_known_space`` is False.
     """
     if not has_known_space(result):
         return None
@@ -172,16 +203,16 @@ def known_space(result: RunResult, times: ArrayLike) -> KnownSpace | None:
 
 
 def _numbered(name: str, scenario: Scenario) -> list[str]:
-    """Columns of a quantity of each sensor."""
+    """Returns the column names of one quantity, one name per sensor."""
     return [f"{name}_{k}" for k in range(1, scenario.sensing.ultrasonic.count + 1)]
 
 
-#: Of a map's cells that are known: the first one's i and j, which are free, and hits.
+#: Known part of a map: i and j of its first cell, free cells, and hits.
 _View = tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.float64]]
 
 
 def _view(space: FreeSpace) -> _View:
-    """The known cells of a map in the order of their places."""
+    """Copies the known part of a map, with the cells in spatial order."""
     cells = len(space.free_until)
     first = space.first.copy()
     at = np.ix_(*((first[:, None] + np.arange(cells)) % cells))
@@ -198,7 +229,7 @@ def _view(space: FreeSpace) -> _View:
 def _on_one_grid(
     times: NDArray[np.float64], views: list[_View], cell_m: float
 ) -> KnownSpace:
-    """Views of different parts of the floor on the least grid that holds them all."""
+    """Puts views of different parts of the floor on the smallest common grid."""
     filled = [view for view in views if view[1].size] or views[:1]
     low = np.min([first for first, _, _ in filled], axis=0)
     high = np.max([first + free.shape for first, free, _ in filled], axis=0)

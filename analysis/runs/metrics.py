@@ -1,4 +1,4 @@
-"""Figures of merit of a run; docs/metrics.md defines each in words."""
+"""Computes the metrics of a run. docs/metrics.md defines each metric in words."""
 
 from __future__ import annotations
 
@@ -26,24 +26,33 @@ from diagrams.running.stop_rules import REST_SPEED_M_S, ROUNDING_S
 from systems.framework.compiling import njit
 from systems.world.geometry import beyond_rectangle, control_point_velocity
 
-#: A detection is off when it is farther from the source than this, m.
+#: Position error above which an estimate is an outlier, m.
 OUTLIER_M = 0.5
-#: Movements of so long have their smoothness measured, s.
+#: Length of the windows over which the smoothness of the motion is computed, s.
 WINDOW_S = 4.0
-#: A window that is never faster is a rest, not a movement, m/s.
+#: If the robot is always slower than this in a window, the window counts as rest, m/s.
 MOVING_M_S = 0.05
-#: Slower turning is no turning, rad/s.
+#: Least turn rate that counts as turning, rad/s.
 TURNING_RAD_S = 0.1
-#: The law has reacted when it pushes this hard, N: 0.13 m/s^2 at 3.94 kg.
+#: Least push that counts as a reaction of the law, N. It accelerates 3.94 kg by
+#: 0.13 m/s^2.
 REACTION_N = 0.5
-#: An echo this near to an obstacle's true distance is that obstacle's, m.
+#: An echo belongs to an obstacle if its distance differs from the true distance of this
+#: obstacle by at most this value, m.
 ECHO_M = 0.2
 
 
 def run_metrics(result: RunResult) -> dict[str, float | None]:
-    """All metrics of a run, SI units; None where one does not apply.
+    """Computes all metrics of a run, in SI units.
 
-    Of several robots, names begin with that of the robot and a dot.
+    If a metric does not apply to the run, its value is None. If the run has several
+    robots, each name begins with the name of the robot and a dot.
+
+    Args:
+        result: Result of a run, for one robot or several robots.
+
+    Returns:
+        Value of each metric, by name.
     """
     if result.several:
         return {
@@ -68,13 +77,16 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def following_error(result: RunResult) -> NDArray[np.float64]:
-    """Distance of P from the source, less the follow distance, (n,) m."""
+    """(n,) distance from P to the source minus the follow distance, at each tick, m."""
     distance = result.columns["source_range_true"]
     return distance - result.scenario.only.follow_distance_m
 
 
 def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
-    """The source counts as a body, but not as an obstacle."""
+    """Computes the clearances and the time to contact.
+
+    The source counts as a body, but not as an obstacle.
+    """
     least, contact = proximity.least.tolist(), proximity.least_time_to_contact
     others = len(proximity.result.surroundings.obstacles)
     return {
@@ -86,7 +98,11 @@ def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
 
 
 def _goal_metrics(result: RunResult) -> dict[str, float | None]:
-    """The goal: the radius of a resting source, the band of a moving one."""
+    """Computes the metrics of the path to the goal.
+
+    The control point P is in the goal if its distance from the target is at most
+    ``goal_radius_m``.
+    """
     columns, moves = result.columns, result.target_moves
     inside = columns["source_range_true"] <= result.goal_radius_m
     entries = np.flatnonzero(inside)
@@ -103,7 +119,11 @@ def _goal_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _settling_time(result: RunResult, inside: NDArray[np.bool_]) -> float | None:
-    """Since when P has been in the goal and, where the source rests, at rest."""
+    """Returns the settling time, s.
+
+    After this time, the control point P stays in the goal until the run ends. If the
+    source is at rest, P also has to stay at rest.
+    """
     stop, settled, least = result.scenario.stop, inside, 0.0
     if not result.target_moves:
         settled = inside & (_speed_of_P(result) < REST_SPEED_M_S)
@@ -116,7 +136,7 @@ def _settling_time(result: RunResult, inside: NDArray[np.bool_]) -> float | None
 
 
 def _speed_of_P(result: RunResult) -> NDArray[np.float64]:
-    """(n,) m/s."""
+    """(n,) speed of the control point P at each tick, m/s."""
     theta, turning = result.columns["theta_WB"], result.columns["omega_WB"]
     velocity = *result.vector("v_WB"), turning
     offset = result.scenario.only.robot.control_point_m
@@ -124,7 +144,11 @@ def _speed_of_P(result: RunResult) -> NDArray[np.float64]:
 
 
 def _shortest_path(result: RunResult) -> float | None:
-    """Of a disc as wide as the robot, to where P can be at the goal radius."""
+    """Returns the length of the shortest path from the start to the goal, m.
+
+    The path is that of a disc as wide as the robot. It ends at the first point from
+    which the control point P can reach into the goal.
+    """
     scenario = result.scenario
     around = result.surroundings
     boxes = [b.rectangle(0.0) for b in around.obstacles.values() if not b.path.moves]
@@ -139,9 +163,10 @@ def _shortest_path(result: RunResult) -> float | None:
 
 
 def _spl(cause: str, length: float, shortest: float) -> float:
-    """One run's term of SPL (Anderson et al. 2018): its mean over runs is SPL.
+    """Returns success weighted by path length (SPL) for one run.
 
-    The whole way to the rest counts, swinging in the goal included.
+    The SPL of Anderson et al. (2018) is the mean of these values over many runs. The
+    path length includes all motion until the run ends, such as oscillation in the goal.
     """
     if cause != "reached":
         return 0.0
@@ -150,14 +175,19 @@ def _spl(cause: str, length: float, shortest: float) -> float:
 
 
 def _way_metrics(proximity: Proximity) -> dict[str, float | None]:
-    """Of a sound that is followed, or of a route."""
+    """Returns the metrics of following a sound, or the metrics of driving a route."""
     if proximity.result.scenario.only.kind != "router":
         return _following_metrics(proximity.result)
     return route_metrics(proximity)
 
 
 def _following_metrics(result: RunResult) -> dict[str, float | None]:
-    """From the end of the second burst on; the share from the first detection on."""
+    """Computes metrics of how well the robot follows the source.
+
+    The metrics of the following error and of the bearing cover the time after the
+    second burst of the source. The metric ``following_fraction`` covers the time after
+    the first detection.
+    """
     sound, columns = result.scenario.source.sound, result.columns
     settled = result.time >= sound.start_s + sound.period_s + sound.on_s
     errors = np.abs(following_error(result))
@@ -176,7 +206,7 @@ def _following_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
-    """Of the origin of B and of the heading."""
+    """Computes the smoothness of the motion of B's origin, and of the heading."""
     columns, tick_s = result.columns, result.scenario.tick_s
     velocity = result.vector("v_WB")
     linear = _lengths(jerk(velocity.T, tick_s).T)
@@ -205,7 +235,7 @@ def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _effort_metrics(result: RunResult) -> dict[str, float | None]:
-    """What the law and the wheels were asked for."""
+    """Computes the effort of the law and of the wheels."""
     columns, robot = result.columns, result.scenario.only.robot
     wheels = np.array([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
     variation = np.mean(np.abs(np.diff(wheels))) if len(result.time) > 1 else 0.0
@@ -224,12 +254,12 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _force_metrics(result: RunResult) -> dict[str, float | None]:
-    """Of a law that says its forces."""
+    """Computes the effort from the forces of the law, if the law logs its forces."""
     if "repulsion_x" not in result.columns:
         return {"control_effort_rms_n": None, "push_work_j": None}
     repulsion = result.vector("repulsion")
     force = result.vector("attraction") + repulsion
-    # The push of a tick changes the velocity from that of the row before to its own.
+    # The push at a tick changes the velocity of the previous row to that of this row.
     after = result.vector("v_WP")
     before = np.column_stack([np.zeros(2), after[:, :-1]])
     push = np.sum(repulsion * (before + after) / 2.0, axis=0)
@@ -240,7 +270,11 @@ def _force_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _impossible_speeds(result: RunResult) -> int | None:
-    """Ticks at which the law took an obstacle to be faster than any can be."""
+    """Counts the ticks (control periods) with an impossible obstacle speed.
+
+    A speed that the control law assumes for an obstacle is impossible if it exceeds
+    twice the top speed of the robot.
+    """
     columns, top = result.columns, result.scenario.only.robot.top_speed_m_s
     if "obstacle_speed_1" not in columns:
         return None
@@ -249,7 +283,7 @@ def _impossible_speeds(result: RunResult) -> int | None:
 
 
 def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
-    """How far the robot is from where its wheels tell it to be."""
+    """Computes the errors of the pose by odometry, and the slip of the wheels."""
     columns = result.columns
     error = _lengths(result.vector("p_WB_estimated") - result.vector("p_WB"))
     turned = columns["theta_WB_estimated"] - columns["theta_WB"]
@@ -267,7 +301,7 @@ def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _reaction_distance(proximity: Proximity) -> float | None:
-    """From P to the nearest obstacle when the law first pushes back from it."""
+    """Returns the distance from P to the nearest obstacle at the first reaction, m."""
     result, columns = proximity.result, proximity.result.columns
     known = {"repulsion_x", "feature_1"}.issubset(columns)
     if not result.surroundings.obstacles or not known:
@@ -291,16 +325,27 @@ def _first_reaction(
     push: NDArray[np.float64],
     echoes: NDArray[np.float64],
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance from P to the nearest obstacle at the first reaction to it, m.
+    """Returns how near an obstacle is when the control law first reacts to it.
+
+    The law reacts at a tick (control period) if three conditions hold:
+
+    - The repulsive force is at least ``REACTION_N``.
+    - The nearest obstacle is nearer to the control point P than the target is.
+    - A collision vector agrees with this obstacle: its length differs from the distance
+      of the obstacle by at most ``ECHO_M``. A collision vector points from P to an
+      echo.
 
     Args:
-        bodies: (m, n, 5) rectangles, what is followed last.
-        p_WP: (2, n) m.
-        push: (2, n) of the law, N.
-        echoes: (k, 3, n) whether there is one, and where it is in B, m.
+        bodies: (m, n, 5) rectangles of the m bodies at n ticks. The last body is the
+            target of the robot.
+        p_WP: (2, n) positions of P in the world frame W, m.
+        push: (2, n) repulsive force of the law in W, N.
+        echoes: (k, 3, n) k collision vectors. Each has three entries: a number above 0
+            if there is a vector, and its x and y in the robot frame B, m.
 
     Returns:
-        Infinite where there was none.
+        Distance from P to the nearest obstacle, m. It is infinite if the law never
+        reacted.
     """
     for i in range(push.shape[1]):
         if math.hypot(push[0, i], push[1, i]) < REACTION_N:
@@ -319,13 +364,13 @@ def _first_reaction(
 
 
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:
-    """How many frames with sound were heard, and how good the fresh estimates were."""
+    """Counts the audio frames that the robot heard, and computes estimation errors."""
     columns, new = result.columns, _new_frames(result)
     sounding = new & _sounding(result)
     heard = new & (columns["detected"] > 0.5)
     ranged = heard & (columns["range_valid"] > 0.5)
     away = result.vector("p_WS_estimated") - result.vector("p_WS")
-    # The target goes by an estimate from the tick after it on.
+    # The target uses an estimate from the next tick on.
     error = _lengths(away[:, 1:][:, ranged[:-1]])
     return {
         "frames_with_sound": int(np.count_nonzero(sounding)),
@@ -339,20 +384,27 @@ def _hearing_metrics(result: RunResult) -> dict[str, Any]:
 
 
 def frames_with_sound(result: RunResult) -> NDArray[np.bool_]:
-    """(n,) whether a frame ends at a tick that held sound for half or more.
+    """(n,) whether an audio frame with sound ends at each tick (control period).
 
-    The sound arrives by what it takes for the way, but with ideal hearing. The gate
-    tells: a recording's own pauses count as sound.
+    A frame has sound if the source sounds during at least half of the frame. Only the
+    schedule of the source counts. Therefore a pause within a recording counts as sound.
+    The function includes the travel time of the sound, except with ideal hearing.
+
+    Args:
+        result: Result of a run, for one robot that hears.
+
+    Returns:
+        (n,) whether a frame with sound ends at each tick.
     """
     return _new_frames(result) & _sounding(result)
 
 
 def _sounding(result: RunResult) -> NDArray[np.bool_]:
-    """(n,) whether the last frame held sound for half or more."""
+    """(n,) whether at least half of the last audio frame has sound, at each tick."""
     scenario, time = result.scenario, result.time
     travel = np.zeros(len(time))
     if scenario.follower.hearing == "audio":
-        # The distance as it is at the frame's end, half a frame too late.
+        # The distance is that at the end of the frame, which is half a frame too late.
         travel = result.columns["source_range_true"] / scenario.sound_speed_m_s
     elif not scenario.follower.ideal_hearing.burst_gaps:
         return np.ones(len(time), dtype=bool)
@@ -362,7 +414,7 @@ def _sounding(result: RunResult) -> NDArray[np.bool_]:
 
 
 def _new_frames(result: RunResult) -> NDArray[np.bool_]:
-    """(n,) whether a frame of the run ends at a tick."""
+    """(n,) whether an audio frame ends at each tick."""
     tick_s = result.scenario.tick_s
     ticks_a_frame = round(result.scenario.follower.microphones.frame_s / tick_s)
     ticks = np.rint(result.time / tick_s).astype(int)
@@ -371,7 +423,7 @@ def _new_frames(result: RunResult) -> NDArray[np.bool_]:
 
 
 def _lengths(vectors: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """(n,) of x and y; ``numpy.hypot`` takes three times as long."""
+    """(n,) lengths of vectors. The function ``numpy.hypot`` is three times slower."""
     x, y = vectors
     lengths: NDArray[np.float64] = np.sqrt(x * x + y * y)
     return lengths
@@ -386,7 +438,7 @@ def _rms(values: NDArray[np.float64]) -> float | None:
 
 
 def _quantile(values: NDArray[np.float64], q: float) -> float | None:
-    """Interpolated as ``numpy.quantile`` does, which takes many times as long."""
+    """Returns a quantile, interpolated as by ``numpy.quantile``, but much faster."""
     if not len(values):
         return None
     place = q * (len(values) - 1)

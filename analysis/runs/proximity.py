@@ -1,4 +1,4 @@
-"""How near the robot came to what it can hit: clearance and time to contact."""
+"""Computes how near a robot came to other bodies: clearance and time to contact."""
 
 from __future__ import annotations
 
@@ -14,30 +14,33 @@ from diagrams.scenario.bodies import rectangles_at
 from systems.framework.compiling import njit
 from systems.world.geometry import contact_time, rectangle_clearance
 
-#: Below this clearance the time between two ticks is searched, m, and below what robot
-#: and body cover in it.
+#: Clearance below which the clearances between two ticks are computed, too, m.
 NEAR_M = 0.1
-#: Parts into which a tick is cut there.
+#: Number of parts into which the time between two ticks is then divided.
 PARTS = 10
 
 
 @dataclass(frozen=True)
 class Proximity:
-    """The robot's footprint beside all bodies, of which it follows the last.
+    """Distances between the rectangle of a robot and all bodies that it can hit.
 
-    The footprint is the real rectangle, not a disc round it.
+    The rectangle is the real outline of the robot, not an enclosing disc. If the target
+    of the robot is a body, it is the last body.
     """
 
     result: RunResult
 
     @cached_property
     def robot(self) -> NDArray[np.float64]:
-        """(n, 5) the robot's rectangle at the ticks."""
+        """(n, 5) rectangles (x, y, theta, length, width) of the robot at the ticks."""
         return rectangles_at(self.result.poses("WB"), self.result.scenario.only.size)
 
     @cached_property
     def bodies(self) -> NDArray[np.float64]:
-        """(m, n, 5) the bodies' rectangles at the ticks, what is followed last."""
+        """(m, n, 5) rectangles of m bodies at n ticks (control periods).
+
+        If the target of the robot is a body, it is the last body.
+        """
         around, time = self.result.surroundings, self.result.time
         bodies = [body.rectangles(time) for body in around.obstacles.values()]
         if around.goal is None:
@@ -47,17 +50,24 @@ class Proximity:
 
     @property
     def clearance(self) -> NDArray[np.float64]:
-        """(n,) distance to the nearest body at the ticks, m; negative depth inside."""
+        """(n,) distance to the nearest body at the ticks, m; negative inside a body."""
         return self._clearances[0]
 
     @cached_property
     def least(self) -> NDArray[np.float64]:
-        """(m,) least clearance from each body, between ticks too, m.
+        """(m,) least clearance from each body, including the time between ticks, m.
 
-        A tick's clearance says little about a box that passes in 25 ms. Where
-        it is below ``NEAR_M``, or below what both cover in the tick, the tick is cut
-        into ten: the robot's pose is interpolated, the bodies are where their paths
-        say, and other robots on straight lines between ticks.
+        A tick is a control period of 25 ms by default. A body can pass the robot
+        between two ticks. Therefore the time between two ticks is divided into ten
+        parts if one of two conditions holds:
+
+        - At one of the two ticks, the clearance from the nearest body is below
+          ``NEAR_M``.
+        - Between the two ticks, the robot and the fastest body together move farther
+          than the clearance at one of these ticks.
+
+        Within these parts, the poses of all robots are interpolated. The other bodies
+        are at the exact poses of their paths.
         """
         clearance, least = self._clearances
         gone = np.hypot(*np.diff(self.robot[:, :2], axis=0).T)
@@ -82,10 +92,10 @@ class Proximity:
 
     @cached_property
     def least_time_to_contact(self) -> float:
-        """Time to the first contact if all went on as at a tick, the least, s.
+        """Least predicted time to a contact, over all ticks (control periods), s.
 
-        Every rectangle keeps its heading and the velocity of its centre;
-        infinite where nothing would touch.
+        The prediction at a tick assumes that no body turns, and that the center of each
+        body keeps its velocity. The value is infinite if no contact is ever predicted.
         """
         if len(self.result.time) < 2:
             return math.inf
@@ -101,24 +111,27 @@ class Proximity:
 def least_clearances(
     robot: NDArray[np.float64], bodies: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Least clearances of a rectangle from others, at times and of others.
+    """Computes the least clearances between a moving rectangle and other rectangles.
 
-    A body is passed over where the circles round both are so far apart that it
-    is neither the nearest one nor as near as before.
+    To save time, the function skips a body at times at which the enclosing circles of
+    both rectangles are far apart.
 
     Args:
-        robot: (n, 5) at n times.
-        bodies: (m, n, 5) the others.
+        robot: (n, 5) rectangle (x, y, theta, length, width) at n times, m and rad.
+        bodies: (m, n, 5) rectangles of the m other bodies at these times, m and rad.
 
     Returns:
-        (n,) and (m,) m; negative where they overlap.
+        Two arrays. The first array has the (n,) clearance from the nearest body at each
+        time, m. The second array has the (m,) least clearance from each body over all
+        times, m. If rectangles overlap, the clearance is negative.
     """
     count, ticks = bodies.shape[:2]
     nearest, least = np.full(ticks, np.inf), np.full(count, np.inf)
     reaches = _reaches(robot, bodies)
     first = 0
     for i in range(ticks):
-        # What was nearest at the last tick is first, so that others are passed over.
+        # The body that was nearest at the last tick comes first. Then the function can
+        # skip more of the other bodies.
         begin = first
         for j in range(count):
             k = (begin + j) % count
@@ -139,13 +152,18 @@ def _least_contact_time(
     velocity: NDArray[np.float64],
     bodies: NDArray[np.float64],
 ) -> float:  # pragma: no cover  (compiled)
-    """Least contact time over ticks and bodies, s.
+    """Computes the least predicted time to a contact, over all ticks and bodies.
+
+    A tick is a control period.
 
     Args:
-        time: (n,) of the ticks, s.
-        robot: (n, 5) rectangles.
-        velocity: (2, n) of the robot, m/s.
-        bodies: (m, n, 5) rectangles.
+        time: (n,) times of the ticks, s.
+        robot: (n, 5) rectangles (x, y, theta, length, width) of the robot, m and rad.
+        velocity: (2, n) velocity of the robot, m/s.
+        bodies: (m, n, 5) rectangles of the bodies, m and rad.
+
+    Returns:
+        Least time to a contact, s. It is infinite if no contact is predicted.
     """
     least, reaches = np.inf, _reaches(robot, bodies)
     for k in range(len(bodies)):
@@ -155,8 +173,8 @@ def _least_contact_time(
             vy = velocity[1, i] - _rate(time, y, i)
             apart = _gap(robot[i], bodies[k, i], reaches[k])
             if apart > 0.0:
-                # The circles touch first, if ever, and their gap closes no faster
-                # than their centres come nearer now.
+                # If there is a contact, the circles touch first. Their gap closes at
+                # most as fast as their centers now approach each other.
                 dx, dy = x[i] - robot[i, 0], y[i] - robot[i, 1]
                 nearing = (dx * vx + dy * vy) / (apart + reaches[k])
                 if nearing <= 0.0 or apart >= least * nearing:
@@ -169,7 +187,7 @@ def _least_contact_time(
 def _reaches(
     robot: NDArray[np.float64], bodies: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(m,) radii of the circles round robot and body together, m."""
+    """(m,) radius of the circle around the robot plus that around each body, m."""
     reaches = np.empty(len(bodies))
     for k in range(len(bodies)):
         a, b = robot[0], bodies[k, 0]
@@ -181,7 +199,7 @@ def _reaches(
 def _gap(
     a: NDArray[np.float64], b: NDArray[np.float64], reach: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Between the circles round two rectangles, m; negative where they overlap."""
+    """Gap between the circles around two rectangles, m; negative if they overlap."""
     dx, dy = a[0] - b[0], a[1] - b[1]
     return math.sqrt(dx * dx + dy * dy) - reach
 
@@ -190,7 +208,7 @@ def _gap(
 def _rate(
     time: NDArray[np.float64], values: NDArray[np.float64], i: int
 ) -> float:  # pragma: no cover  (compiled)
-    """Derivative at a tick, of a parabola through its neighbours."""
+    """Derivative of the values at a tick, from a parabola through the neighbors."""
     if i == 0:
         return (values[1] - values[0]) / (time[1] - time[0])
     before = time[i] - time[i - 1]

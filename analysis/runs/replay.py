@@ -1,4 +1,4 @@
-"""A run as a page that plays in a browser, with nothing else needed."""
+"""Writes a run as an HTML page that plays the run in a browser, without other files."""
 
 from __future__ import annotations
 
@@ -43,28 +43,31 @@ from diagrams.scenario.bodies import RecordedPath
 from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
 from systems.sound.parameters import SoundParameters
 
-#: Meshcat records at most so many frames a second.
+#: Largest number of frames per second that Meshcat records.
 FRAMES_PER_S = 32.0
-#: Length of a piece of trail, s.
+#: Duration of one piece of a trail, s.
 TRAIL_PIECE_S = 0.5
-#: Time for which one ring of the sound is seen, s.
+#: Time for which each ring of a source is visible, s.
 RING_S = 0.0625
-#: Gains that a robot shows as bars: how far to the left, m, and in which colour.
+#: Gains that the replay shows as bars on a robot. Each entry has the name of the gain,
+#: the distance of the bar to the left of the center line, m, and the key of its color.
 GAIN_BARS = (
     ("stiffness", 0.05, "source"),
     ("damping", 0.0, "robot"),
     ("contact_stiffness", -0.05, "obstacle"),
 )
-#: Height of a bar at the start, m, and how many times that it gets at most.
+#: Sizes of the bars. ``BAR_M``: initial height, m. ``MOST_HIGH``: largest ratio of the
+#: height to the initial height.
 BAR_M, MOST_HIGH = 0.15, 10.0
-#: What a robot knows of the floor is shown anew so often, s.
+#: Interval between two displays of the floor that a robot knows, s.
 KNOWN_PERIOD_S = 0.5
-#: A map takes so many ticks to enter all that was seen at the first one.
+#: Number of ticks (control periods) in which a map enters its first readings.
 FIRST_TICKS = 3
-#: Bodies are shown as tracked that are so likely, with rings of these radii, m.
+#: Least probability of a tracked body that the replay shows.
 LEAST_EXISTS = 0.3
+#: Radii of the rings around tracked bodies, m.
 TRACKED_M = (0.1, 0.2, 0.4, 0.8)
-#: Cells of all these maps at most.
+#: Largest number of cells of all displayed maps together.
 MOST_CELLS = 30_000_000
 
 
@@ -73,30 +76,49 @@ def write_replay(
     path: str | Path,
     clearance: Mapping[str, ArrayLike] | None = None,
 ) -> None:
-    """Writes a self-contained page that plays the run.
+    """Writes a self-contained page that plays the run in three dimensions.
 
-    The robot with its microphone bar, wheels and cones (a cone is brown
-    while it has an echo), the obstacles, the sources, each with a ring that grows
-    while it sounds, where the robot takes its source to be (a ball), the forces of
-    its law and the way that it commands (arrows), the walls of the room, and
-    trails; what was hit turns red under a star. Of a guarded robot also the floor that
-    it knows to be free, dots where
-    echoes came from, and a circle about the place where it could rest by now: the
-    edge of what the guard keeps free, grey where it passed what the law commanded,
-    orange where it gave less, red where it braked. Of the guarded law also a ring about
-    each body that it takes to move, as wide as it is unsure of its place. Of searches
-    also the plume, and a lamp over each robot (``analysis.plumes.search_replay``).
+    The scene shows:
 
-    Round the scene: a clock that can be moved, a legend whose layers can be switched
-    off, the warnings about the scenario, and curves over time whose cursor follows the
-    clock. ``#t=2.5`` behind the address begins there. The page needs a browser with
-    WebGL, but no network.
+    - each robot with its wheels, its microphone bar, and the cones of its range sensors
+    - the obstacles, the walls of the room, and trails of past positions
+    - each source, with a ring that grows while the source sounds
+    - a ball at the source position that each robot estimates
+    - arrows for the forces of the control law and for the commanded motion
+    - a touched object in red, with a star at the point of contact
+
+    A cone is brown while its sensor has an echo.
+
+    For a robot with a safety guard, the scene also shows the floor that the robot knows
+    to be free. Dots show where echoes came from. A circle shows the area that the guard
+    keeps free. The center of the circle is the position at which the robot would come
+    to rest if it braked now. The color of the circle shows the action of the guard:
+
+    - gray: the guard passes the command of the law
+    - orange: the guard reduces the command
+    - red: the guard brakes
+
+    For the guarded law, the scene also shows a ring around each body that the robot
+    takes as moving. The radius of the ring is the uncertainty of the position. For a
+    search, the scene also shows the odor plume, and a lamp above each robot
+    (``analysis.plumes.search_replay``).
+
+    Around the scene, the page has:
+
+    - a clock with a slider
+    - a legend, with switches for its layers
+    - the warnings about the scenario
+    - curves over time, with a cursor that follows the clock
+
+    If the address ends with ``#t=2.5``, the replay begins at 2.5 s. The page needs a
+    browser with WebGL, but no network.
 
     Args:
-        result: The run.
+        result: Result of the run.
         path: The .html file.
-        clearance: (n,) distance of each robot to the nearest body at the ticks, m, by
-            its name, for a curve of it; none leaves it out.
+        clearance: (n,) distance from each robot to the nearest body at the ticks
+            (control periods), m, by name of the robot. The page shows these distances
+            as curves. A robot without an entry has no such curve.
 
     Raises:
         OSError: The file cannot be written.
@@ -133,16 +155,19 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
 
 
 def time_charts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> list[Chart]:
-    """What ``plot_time_series`` shows of each robot, as data.
+    """Returns the data of charts that show quantities of each robot over time.
 
-    Panels without a curve are left out.
+    The quantities are those of ``plot_time_series``. Charts without a curve are
+    omitted.
 
     Args:
-        result: The run.
-        clearance: As of ``write_replay``.
+        result: Result of the run.
+        clearance: (n,) distance from each robot to the nearest body at the ticks
+            (control periods), m, by name of the robot. A robot without an entry has no
+            such chart.
 
     Returns:
-        Charts, robot after robot.
+        Charts of all robots, one robot after the other.
     """
     found = []
     for name, own in result.robots.items():
@@ -156,7 +181,7 @@ def time_charts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> list[C
 
 @contextmanager
 def _quiet_drake() -> Iterator[None]:
-    """Drake announces the address of a server that nobody is meant to open."""
+    """Suppresses Drake's message with the address of a server that no user needs."""
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.WARNING)
@@ -182,42 +207,44 @@ def _build_scene(meshcat: Meshcat, result: RunResult) -> None:
 
 
 def source_path(scenario: Scenario, name: str) -> str:
-    """Where a source is in Meshcat's tree: the only one is ``source``.
+    """Returns the path of a source in the scene tree of Meshcat (Drake's 3D viewer).
 
     Args:
-        scenario: Says whether there are several sources.
-        name: Of the source.
+        scenario: Scenario that contains the source. If the scenario has only one
+            source, the path is ``source``.
+        name: Name of the source.
 
     Returns:
-        Path without a slash in front.
+        Path without a leading slash.
     """
     return f"sources/{name}" if len(scenario.sources) > 1 else "source"
 
 
 def robot_path(own: RunResult, result: RunResult) -> str:
-    """Where one robot of a run is in Meshcat's tree: the only one is ``robot``.
+    """Returns the path of a robot in the scene tree of Meshcat (Drake's 3D viewer).
 
     Args:
-        own: The run of that robot.
-        result: The run of all of them.
+        own: Result of the run, for this robot.
+        result: Result of the run, for all robots. If there is only one robot, the path
+            is ``robot``.
 
     Returns:
-        Path without a slash in front.
+        Path without a leading slash.
     """
     return f"robots/{own.name}" if result.several else "robot"
 
 
 def estimate_path(robot: str) -> str:
-    """Where the ball is that shows where a robot takes the source to be."""
+    """Returns the path of the ball at the source position that a robot estimates."""
     return robot.replace("robot", "estimate", 1)
 
 
 def record_run(meshcat: Meshcat, result: RunResult) -> None:
-    """Records all motion of a run; the bodies must have been made before.
+    """Records all motion of a run. The objects of the scene must already exist.
 
     Args:
-        meshcat: Records already.
-        result: The run.
+        meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
+        result: Result of the run.
     """
     frames = np.arange(0.0, result.simulated_s + 0.5 / FRAMES_PER_S, 1.0 / FRAMES_PER_S)
     scenario = result.full_scenario
@@ -258,7 +285,7 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
 def _record_follow_distance(
     meshcat: Meshcat, own: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
-    """A ring about what is followed, on which P is to be."""
+    """Records a circle around the target, at the follow distance of P."""
     if (
         own.scenario.only.searches is not None
         or not own.scenario.only.follow_distance_m
@@ -271,7 +298,7 @@ def _record_follow_distance(
 
 
 def _record_collision(meshcat: Meshcat, own: RunResult, path: str) -> None:
-    """From the collision on a star over the place, and what was hit in red."""
+    """Shows a star and the touched object in red from the time of the collision on."""
     if own.collision is None:
         return
     star, times = f"collision/{path}", (0.0, own.collision.time)
@@ -285,7 +312,7 @@ def _record_collision(meshcat: Meshcat, own: RunResult, path: str) -> None:
 def _at_frames(
     result: RunResult, values: NDArray[np.float64], frames: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(n, 3) poses at the ticks, interpolated to the frames."""
+    """(n, 3) poses at the ticks, interpolated to the times of the replay's frames."""
     unwrapped = np.column_stack([values[:, :2], np.unwrap(values[:, 2])])
     return RecordedPath(result.time, unwrapped).poses(frames)
 
@@ -319,7 +346,7 @@ def _record_robot(
 
 
 def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
-    """Angles of wheels that roll without slip on the robot's path, (n,) rad."""
+    """(n,) angles of both wheels for rolling without slip on the robot's path, rad."""
     robot, path = result.scenario.only.robot, result.poses("WB")
     theta = np.unwrap(path[:, 2])
     between = 0.5 * (theta[1:] + theta[:-1])
@@ -333,7 +360,7 @@ def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
 
 
 def _called_on(own: RunResult, sound: SoundParameters) -> SoundParameters:
-    """The sound of a robot's loudspeaker, from its call on if it calls."""
+    """Returns the sound of a robot's loudspeaker, delayed until the robot calls."""
     if own.scenario.only.searches != "odor":
         return sound
     since = call_time(own)
@@ -352,14 +379,16 @@ def _record_rings(
 
 
 def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
-    """Which ring is seen at a time, s: each in turn while the source sounds.
+    """Returns which ring of a source is visible at a given time.
+
+    While the source sounds, its rings appear one after the other.
 
     Args:
-        time: s.
-        bursts: Begin and end of each, s, that do not overlap.
+        time: Time, s.
+        bursts: Start and end of each burst, s. The bursts do not overlap.
 
     Returns:
-        Index into ``RINGS``, or None in silence.
+        Index into ``RINGS``. The value is None if the source is silent at this time.
     """
     for start, end in bursts:
         if start <= time < end:
@@ -368,7 +397,10 @@ def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
 
 
 def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
-    """The ball jumps when a frame is heard and rests in between."""
+    """Records the ball at the estimated source position.
+
+    The ball jumps when the robot hears an audio frame, and rests otherwise.
+    """
     if "p_WS_estimated_x" not in result.columns:
         return
     valid = result.columns["target_valid"] > 0.5
@@ -380,7 +412,7 @@ def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
             continue
         x, y = places[tick]
         if tick and valid[tick - 1]:
-            # Without this the ball would glide here from the last burst on.
+            # This keyframe keeps the ball at rest until the new estimate.
             x_0, y_0 = places[tick - 1]
             before = float(result.time[tick - 1])
             meshcat.SetTransform(path, upright(x_0, y_0, height, 0.0), before)
@@ -395,7 +427,7 @@ def _record_target(
     frames: NDArray[np.float64],
     colour: str,
 ) -> None:
-    """The ball is the target on the way, and leaves a thin line."""
+    """Records the ball at the target on the route, and the thin trail of the target."""
     places = result.vector("target").T
     flat = np.column_stack([places, np.zeros(len(places))])
     height = replay_scene.SOURCE_HEIGHT_M
@@ -408,7 +440,7 @@ def _record_target(
 def _record_gains(
     meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
-    """Bars on the back of a robot whose gains adapt: as high as they were at first."""
+    """Records one bar per adapted gain; the height is relative to the initial gain."""
     for name, aside, colour in GAIN_BARS:
         if name not in result.columns or result.columns[name][0] <= 0.0:
             continue
@@ -423,7 +455,7 @@ def _record_gains(
 def _record_known_space(
     meshcat: Meshcat, result: RunResult, look: Look, path: str
 ) -> None:
-    """Parts of the floor, seen while the robot knows them; and dots of echoes."""
+    """Shows the floor that a robot knows to be free, and dots at echo positions."""
     own = look.result
     if not has_known_space(own):
         return
@@ -431,7 +463,8 @@ def _record_known_space(
     if known is None:
         return
     floor = replay_scene.floor_rectangle(result)
-    # Of several robots no two are in one plane, which would flicker.
+    # The floors of several robots have different heights. Surfaces in one plane would
+    # flicker.
     above = 0.0005 * [*result.robots].index(own.name)
     dots = 0.25 * known.cell_m * np.array([1.0, -1.0, 1.0, -1.0])
     for name, cells, colour, height, inset in (
@@ -452,9 +485,10 @@ def _record_known_space(
 
 
 def known_times(result: RunResult) -> list[float]:
-    """When the floor that a robot knows is shown anew, s.
+    """Returns the times at which the replay updates the floor that a robot knows, s.
 
-    Each half second, or so seldom that fine cells do not fill the memory.
+    The interval is 0.5 s. If the map has many cells, the interval is longer. Then all
+    displayed maps together have at most about ``MOST_CELLS`` cells.
     """
     end, scenario = result.simulated_s, result.scenario
     most = max(2, MOST_CELLS // scenario.follower.own_map.cells**2)
@@ -466,7 +500,10 @@ def known_times(result: RunResult) -> list[float]:
 def _record_guard(
     meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
-    """The edge of the disc that the guard keeps free, about where robots can rest."""
+    """Records the edge of the disc that the safety guard keeps free.
+
+    If the robot braked now, its axle would stop at the center of the disc.
+    """
     motion = guarded_motion(result)
     if motion is None:
         return
@@ -479,7 +516,8 @@ def _record_guard(
         record_switch(meshcat, edge, result.time, seen)
 
 
-#: Edges of the guarded disc, their colours, and what the guard did meanwhile.
+#: Edges of the guarded disc: name, key of the color, and actions of the guard for which
+#: the edge is visible.
 _EDGES = (
     ("passed", "passed", (PASSED,)),
     ("lessened", "lessened", (SLOWED, TURNED)),
@@ -490,7 +528,10 @@ _EDGES = (
 def _record_tracked_bodies(
     meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
-    """A ring about each body that the law takes to move, as wide as it is unsure."""
+    """Records a ring around each body that the control law takes as moving.
+
+    The radius of the ring shows the uncertainty of the position.
+    """
     tracked = tracked_bodies(result, frames)
     if tracked is None:
         return
@@ -522,7 +563,10 @@ def _record_trail(
     *,
     thin: bool = False,
 ) -> None:
-    """Pieces that are there from the start and seen once they are driven."""
+    """Adds the pieces of a trail, and records when each piece becomes visible.
+
+    A piece becomes visible when the body has driven along the piece.
+    """
     step = max(1, round(TRAIL_PIECE_S / result.scenario.tick_s))
     for number, start in enumerate(range(0, len(points) - 1, step)):
         piece = points[start : start + step + 1]

@@ -1,4 +1,4 @@
-"""What a replay shows, for its legend, and what of it can be switched off."""
+"""Lists the layers of a replay for its legend, and which layers can be hidden."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from diagrams import RunResult
 def replay_layers(
     result: RunResult, paths: dict[str, str], estimates: dict[str, str]
 ) -> list[Layer]:
-    """The legend of a replay.
+    """Returns the entries of the legend of a replay.
 
     Args:
-        result: The run.
-        paths: Of the robots in Meshcat's tree, by name.
-        estimates: Likewise of the balls where they take the source to be.
+        result: Result of the run.
+        paths: Paths of the robots in the scene tree of Meshcat (Drake's 3D viewer), by
+            name of the robot.
+        estimates: Paths of the balls that show the estimated source position of each
+            robot, by name of the robot.
 
     Returns:
-        What has no switch first.
+        Entries of the legend. Entries without a switch come first.
     """
     return [
         *_bodies(result),

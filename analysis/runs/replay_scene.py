@@ -1,7 +1,7 @@
-"""The bodies of a replay: what Meshcat is given before anything moves.
+"""Adds the objects of a replay to the scene of Meshcat (Drake's 3D viewer).
 
-Meshcat records how objects move and whether they are visible, not that they
-come into being; so everything that is ever seen is made here.
+Meshcat records the motion and the visibility of objects, but not their creation.
+Therefore the functions here create all objects before the recording starts.
 """
 
 from __future__ import annotations
@@ -22,18 +22,20 @@ from diagrams import RunResult, Scenario
 from diagrams.scenario.participants import SourceParameters
 from systems.base.robot import microphones_B
 
-#: Heights are not modelled; these look right, m.
+#: Heights of the objects, m. The model has no heights, so these values are only for the
+#: display.
 ROBOT_HEIGHT_M = 0.16
 MICROPHONE_HEIGHT_M = 0.30
 SOURCE_HEIGHT_M = 0.30
 OBSTACLE_HEIGHT_M = 0.35
 SENSOR_HEIGHT_M = 0.14
 WHEEL_WIDTH_M = 0.035
-#: The body carries the microphone bar, which is wider; m of the bar's width.
+#: Width of the body divided by the width of the microphone bar, which is wider.
 BODY_WIDTH_FRACTION = 0.45
-#: Size of the numbers on the floor, of the width of what is shown: on a telephone, too.
+#: Size of the numbers on the floor divided by the width of the view. The numbers are
+#: readable on a phone, too.
 NUMBER_SHARE = 0.028
-#: Radii of the ring that grows while the source sounds, m.
+#: Radii of the rings of a source, m. While the source sounds, they appear in turn.
 RINGS = (0.28, 0.38, 0.48, 0.58, 0.68)
 
 
@@ -42,16 +44,16 @@ def _colour(role: str, alpha: float = 1.0) -> Rgba:
 
 
 def upright(x: float, y: float, z: float, yaw: float = 0.0) -> RigidTransform:
-    """A body at a height above the floor, turned about the vertical.
+    """Returns the pose of an upright body at a given height.
 
     Args:
-        x: In the frame that it is put into, m.
-        y: In the same one, m.
-        z: Height, m.
-        yaw: Angle about the vertical, counterclockwise, rad.
+        x: x of the body in its parent frame, m.
+        y: y of the body in its parent frame, m.
+        z: Height above the floor, m.
+        yaw: Angle about the vertical axis, counterclockwise, rad.
 
     Returns:
-        The body's pose.
+        Pose of the body in the parent frame.
     """
     return _placed(0.0, 0.0, yaw, [x, y, z])
 
@@ -63,12 +65,12 @@ def _placed(
 
 
 def _plain(values: ArrayLike) -> Any:
-    """An array in column order, untyped: Drake's stubs take ndarray amiss."""
+    """Returns an untyped array in column order, as Drake's type stubs require."""
     return np.asfortranarray(values)
 
 
 def _put(meshcat: Meshcat, path: str, shape: Any, rgba: Rgba, *place: float) -> None:
-    """A body; its place is what ``upright`` takes."""
+    """Adds an object at a pose; ``place`` has the arguments of ``upright``."""
     meshcat.SetObject(path, shape, rgba)
     meshcat.SetTransform(path, upright(*place))
 
@@ -76,7 +78,18 @@ def _put(meshcat: Meshcat, path: str, shape: Any, rgba: Rgba, *place: float) -> 
 def _ribbon(
     meshcat: Meshcat, path: str, points: ArrayLike, rgba: Rgba, z: float, width: float
 ) -> None:
-    """A flat band along (n, 2) points, m: lines are a pixel wide in most browsers."""
+    """Adds a flat band along a line.
+
+    Most browsers draw lines only one pixel wide.
+
+    Args:
+        meshcat: Scene of the replay.
+        path: Path of the band in the scene tree of the 3D viewer.
+        points: (n, 2) points of the line, m.
+        rgba: Color of the band.
+        z: Height above the floor, m.
+        width: Width of the band, m.
+    """
     middle = np.asarray(points, dtype=float)
     along = np.gradient(middle, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
@@ -91,14 +104,14 @@ def _ribbon(
 
 
 def add_floor(meshcat: Meshcat, result: RunResult) -> None:
-    """A floor that holds the whole run, a line a metre, and numbers of x.
+    """Adds a floor for the whole run, with one grid line per meter and labels of x.
 
-    The numbers stand where the view of the whole run has its near edge: the floor goes
-    on beyond, and is cut there.
+    The labels are at the near edge of the initial view. The floor extends beyond this
+    edge.
 
     Args:
-        meshcat: The scene.
-        result: The run.
+        meshcat: Scene of the replay.
+        result: Result of the run.
     """
     x_low, x_high, y_low, y_high = floor_rectangle(result)
     x, y = (x_low + x_high) / 2.0, (y_low + y_high) / 2.0
@@ -119,18 +132,28 @@ def add_floor(meshcat: Meshcat, result: RunResult) -> None:
 
 
 def shown_rectangle(result: RunResult) -> tuple[float, float, float, float]:
-    """Least x, greatest x, least y, greatest y of what the first view holds, m.
+    """Returns the part of the floor that the initial view shows.
 
     Args:
-        result: The run.
+        result: Result of the run.
+
+    Returns:
+        Least x, greatest x, least y, greatest y in the world frame W, m.
     """
     return bounds(result, margin=0.5)
 
 
 def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
-    """Smallest x, largest x, smallest y, largest y of the floor, whole metres.
+    """Returns the edges of the floor in the world frame W.
 
-    At least the scenario's arena, about the middle of the run.
+    The floor contains the whole run. It is at least as large as the arena of the
+    scenario.
+
+    Args:
+        result: Result of the run.
+
+    Returns:
+        Least x, greatest x, least y, greatest y, as whole meters.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
     width, depth = result.full_scenario.arena_m
@@ -155,7 +178,7 @@ def _segments(
 
 
 def _write(meshcat: Meshcat, path: str, text: TextPath) -> None:
-    """Outlines of letters on the floor: Meshcat has no text."""
+    """Draws the outlines of letters on the floor, because Meshcat cannot draw text."""
     starts: list[NDArray[np.float64]] = []
     ends: list[NDArray[np.float64]] = []
     for polygon in text.to_polygons():
@@ -166,13 +189,15 @@ def _write(meshcat: Meshcat, path: str, text: TextPath) -> None:
 
 
 def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
-    """A robot about the origin of B: body, wheels, microphone bar, cones.
+    """Adds a robot with body, wheels, microphone bar and sensor cones.
+
+    The robot is at the origin of its body frame B.
 
     Args:
-        meshcat: The scene.
-        look: The robot.
-        path: Where it is in Meshcat's tree.
-        estimate: Where the ball is that shows where it takes the source to be.
+        meshcat: Scene of the replay.
+        look: Run, colors and labels of the robot.
+        path: Path of the robot in the scene tree of the 3D viewer.
+        estimate: Path of the ball that shows the estimated source position.
     """
     scenario = look.result.scenario
     robot = scenario.only.robot
@@ -196,7 +221,7 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
 
 
 def _add_wheel(meshcat: Meshcat, scenario: Scenario, path: str, y: float) -> None:
-    """A wheel that can be seen to turn: its axle is the z axis of ``wheel``."""
+    """Adds a wheel with a visible spoke; its axle is the z axis of ``wheel``."""
     radius = scenario.only.robot.wheel_radius_m
     meshcat.SetTransform(path, _placed(-0.5 * math.pi, 0.0, 0.0, [0.0, y, radius]))
     tyre = Cylinder(radius, WHEEL_WIDTH_M)
@@ -208,7 +233,7 @@ def _add_wheel(meshcat: Meshcat, scenario: Scenario, path: str, y: float) -> Non
 def _add_goal(
     meshcat: Meshcat, goal: tuple[float, float], colour: str, robot: str
 ) -> None:
-    """A flat disc on the floor where P is to come to rest."""
+    """Adds a flat disc on the floor at the goal of the control point P."""
     disc = Cylinder(0.08, 0.01)
     _put(meshcat, f"goals/{robot}", disc, _colour(colour, 0.6), *goal, 0.006)
 
@@ -227,12 +252,14 @@ def _add_microphones(meshcat: Meshcat, scenario: Scenario, path: str) -> None:
 
 
 def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> None:
-    """Both looks of a cone; the recording shows one at a time.
+    """Adds two cones for a range sensor: one for an echo, and one for no echo.
 
-    A cone without an echo is short: at its full 3 m it would hide the scene.
+    The two cones have different colors. The recording shows one of them at a time. Both
+    cones are only 0.8 m long. A cone of 3 m, the full range, would hide the scene.
     """
     x, y, axis = sensor_pose(scenario, sensor)
-    # The cone's axis is z: tilt it forward, then turn it to the sensor's axis.
+    # The axis of Meshcat's cone is z. The rotations tilt the cone forward, and then
+    # turn it to the axis of the sensor.
     tilted = _placed(0.0, 0.5 * math.pi, axis, [x, y, SENSOR_HEIGHT_M])
     meshcat.SetTransform(path, tilted)
     length = 0.8
@@ -243,13 +270,13 @@ def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> N
 
 
 def add_gain_bar(meshcat: Meshcat, path: str, aside: float, colour: str) -> None:
-    """A bar 1 m high on a robot's back, to be scaled to what a gain is.
+    """Adds a bar of 1 m height on the back of a robot. The replay scales its height.
 
     Args:
-        meshcat: The scene.
-        path: Where it is in Meshcat's tree, below the robot.
-        aside: To the left of the axle, m.
-        colour: A key of ``COLOURS``.
+        meshcat: Scene of the replay.
+        path: Path of the bar in the scene tree of the 3D viewer, below the robot.
+        aside: Distance of the bar to the left of the robot's center line, m.
+        colour: Color of the bar, as a key of ``COLOURS``.
     """
     _put(meshcat, f"{path}/bar", Box(0.03, 0.03, 1.0), _colour(colour), 0.0, 0.0, 0.5)
     meshcat.SetTransform(path, upright(0.0, aside, ROBOT_HEIGHT_M))
@@ -258,13 +285,16 @@ def add_gain_bar(meshcat: Meshcat, path: str, aside: float, colour: str) -> None
 def add_source(
     meshcat: Meshcat, source: SourceParameters, path: str, role: str = "source"
 ) -> None:
-    """The master robot about the origin of S, its loudspeaker and its rings.
+    """Adds a source with its body, its loudspeaker and its rings.
+
+    The source is at the origin of its frame S.
 
     Args:
-        meshcat: The scene.
-        source: Size, and whether there is a body.
-        path: Where it is in Meshcat's tree.
-        role: Key of its colour: ``source``, or ``interferer`` if nobody follows it.
+        meshcat: Scene of the replay.
+        source: Parameters of the source, such as its size.
+        path: Path of the source in the scene tree of the 3D viewer.
+        role: Key of the color in ``COLOURS``: ``source``, or ``interferer`` if no robot
+            follows the source.
     """
     if source.body:
         body = Box(source.length_m, source.width_m, SOURCE_HEIGHT_M)
@@ -285,7 +315,7 @@ def add_source(
 
 
 def _add_loudspeaker(meshcat: Meshcat, path: str, height: float, colour: str) -> None:
-    """On a body of some height, m, with rings of its colour."""
+    """Adds a loudspeaker at a height, m, and rings in the color of its body."""
     horn = Cylinder(0.07, 0.06)
     dark, above = Rgba(0.15, 0.15, 0.15), height + 0.03
     _put(meshcat, f"{path}/loudspeaker", horn, dark, 0.0, 0.0, above)
@@ -297,11 +327,11 @@ def _add_loudspeaker(meshcat: Meshcat, path: str, height: float, colour: str) ->
 
 
 def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
-    """The boxes where they are at the start.
+    """Adds all obstacles at their initial poses.
 
     Args:
-        meshcat: The scene.
-        scenario: Has the obstacles.
+        meshcat: Scene of the replay.
+        scenario: Scenario that contains the obstacles.
     """
     for obstacle in scenario.obstacles:
         path, height = f"obstacles/{obstacle.name}", OBSTACLE_HEIGHT_M
@@ -311,15 +341,16 @@ def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
 
 
 def add_hit(meshcat: Meshcat, scenario: Scenario, name: str) -> str | None:
-    """An obstacle in the colour of what was hit, over its grey.
+    """Adds a red box around an obstacle that the robot touched.
 
     Args:
-        meshcat: The scene.
-        scenario: Has the obstacles.
-        name: Of what was hit.
+        meshcat: Scene of the replay.
+        scenario: Scenario that contains the obstacles.
+        name: Name of the touched object.
 
     Returns:
-        Its path in Meshcat's tree; none where it is no obstacle.
+        Path of the red box in the scene tree of the 3D viewer. The value is None if the
+        touched object is not an obstacle.
     """
     for obstacle in scenario.obstacles:
         if obstacle.name == name:
@@ -334,13 +365,13 @@ def add_hit(meshcat: Meshcat, scenario: Scenario, name: str) -> str | None:
 def add_star(
     meshcat: Meshcat, path: str, place: ArrayLike, *, radius: float = 0.16
 ) -> None:
-    """The edge of a star over a place: what lies under it stays visible.
+    """Adds the outline of a star above a point. Objects below the star stay visible.
 
     Args:
-        meshcat: The scene.
-        path: Where it is in Meshcat's tree.
-        place: (2,) in W, m.
-        radius: To its tips, m.
+        meshcat: Scene of the replay.
+        path: Path of the star in the scene tree of the 3D viewer.
+        place: (2,) position of the point in the world frame W, m.
+        radius: Distance from the center of the star to its tips, m.
     """
     turns = np.pi * (0.5 + np.arange(11) / 5.0)
     reach = radius * np.where(np.arange(11) % 2, 0.45, 1.0)[:, None]
@@ -350,11 +381,11 @@ def add_star(
 
 
 def add_room(meshcat: Meshcat, scenario: Scenario) -> None:
-    """The walls of the room, so low that one sees over them.
+    """Adds the walls of the room. They are low, so that they do not hide the robots.
 
     Args:
-        meshcat: The scene.
-        scenario: May have a room.
+        meshcat: Scene of the replay.
+        scenario: Scenario with or without a room.
     """
     if scenario.room is None:
         return
@@ -381,14 +412,14 @@ def add_trail(
     *,
     thin: bool = False,
 ) -> None:
-    """One piece of a trail on the floor, through (n, 2) points in W, m.
+    """Adds one piece of a trail on the floor.
 
     Args:
-        meshcat: The scene.
-        path: Where it is in Meshcat's tree.
-        points: (n, 2) in W, m.
-        colour: As matplotlib takes it, or a key of ``COLOURS``.
-        thin: Below others, which hide it where they are one.
+        meshcat: Scene of the replay.
+        path: Path of the piece in the scene tree of the 3D viewer.
+        points: (n, 2) points of the trail in the world frame W, m.
+        colour: Color of the trail: a color of matplotlib, or a key of ``COLOURS``.
+        thin: Whether the trail is narrow and lies below other trails.
     """
     height, width = (0.005, 0.015) if thin else (0.008, 0.03)
     _ribbon(meshcat, path, points, _colour(colour), height, width)
@@ -401,14 +432,15 @@ def add_floor_part(
     colour: str,
     height: float,
 ) -> None:
-    """Rectangles of the floor in one colour, a mesh of two triangles each.
+    """Adds rectangles of one color to the floor, as one mesh of triangles.
 
     Args:
-        meshcat: The scene.
-        path: Where it is in Meshcat's tree.
-        rectangles: (m, 4) least and greatest x, least and greatest y in W, m.
-        colour: As matplotlib takes it, or a key of ``COLOURS``.
-        height: Above the floor, m.
+        meshcat: Scene of the replay.
+        path: Path of the mesh in the scene tree of the 3D viewer.
+        rectangles: (m, 4) rectangles in the world frame W: least x, greatest x, least
+            y, greatest y, m.
+        colour: Color of the rectangles: a color of matplotlib, or a key of ``COLOURS``.
+        height: Height above the floor, m.
     """
     x_low, x_high, y_low, y_high = np.asarray(rectangles, dtype=float).T
     x = np.column_stack([x_low, x_high, x_high, x_low]).ravel()
@@ -421,13 +453,13 @@ def add_floor_part(
 
 
 def add_disc_edge(meshcat: Meshcat, path: str, radius: float, colour: str) -> None:
-    """The edge of a disc about the origin, on the floor.
+    """Adds a circle around the origin, on the floor.
 
     Args:
-        meshcat: The scene.
-        path: Where it is in Meshcat's tree.
-        radius: m.
-        colour: As matplotlib takes it, or a key of ``COLOURS``.
+        meshcat: Scene of the replay.
+        path: Path of the circle in the scene tree of the 3D viewer.
+        radius: Radius of the circle, m.
+        colour: Color of the circle: a color of matplotlib, or a key of ``COLOURS``.
     """
     turns = np.linspace(0.0, 2.0 * math.pi, 73)
     circle = radius * np.column_stack([np.cos(turns), np.sin(turns)])
@@ -435,10 +467,10 @@ def add_disc_edge(meshcat: Meshcat, path: str, radius: float, colour: str) -> No
 
 
 def set_stage(meshcat: Meshcat) -> None:
-    """Even light and a plain background; the page chooses the view.
+    """Sets even light and a plain background. The page of the replay chooses the view.
 
     Args:
-        meshcat: The scene.
+        meshcat: Scene of the replay.
     """
     lamps = ("SpotLight", "PointLightNegativeX", "PointLightPositiveX")
     for path in ("/Grid", "/Axes", *(f"/Lights/{lamp}" for lamp in lamps)):

@@ -1,4 +1,4 @@
-"""How a robot on a route kept to its way, and what its gains did."""
+"""Computes metrics of a robot on a route: deviation, yaw ripple and adapted gains."""
 
 from __future__ import annotations
 
@@ -9,26 +9,35 @@ from scipy.spatial import KDTree
 
 from analysis.runs.proximity import Proximity
 
-#: An obstacle is met while the body is nearer to it than this, m: the S of Engelbrecht
-#: 2021; and for so long after, s.
+#: Limits of an encounter with an obstacle. ``MET_M``: greatest clearance during the
+#: encounter, m (the distance S of Engelbrecht 2021). ``AFTER_S``: time after the
+#: encounter that still counts, s.
 MET_M, AFTER_S = 1.0, 5.0
-#: What is slower than this is a turn, not a ripple, s.
+#: Length of the moving mean of the yaw rate, s. Slower changes count as turns, not as
+#: ripple.
 MEAN_S = 1.0
 
 
 def route_metrics(proximity: Proximity) -> dict[str, float | None]:
-    """Of a robot on a route.
+    """Computes the metrics of a robot that drives along a route.
+
+    The metrics are:
+
+    - median and maximum distance of the control point P from the path of the target, m
+    - ripple of the yaw rate, rad/s
+    - number of new routes
+    - least, greatest and last value of stiffness K (N/m) and damping D (N s/m), if the
+      control law adapts K and D
 
     Args:
-        proximity: Of its run.
+        proximity: Distances between the robot and all bodies in the run.
 
     Returns:
-        Distances of P from its way, m; ripple of the yaw rate, rad/s; how often a way
-        was planned anew; and least, greatest and last K and D where they adapt.
+        Value of each metric, by name.
     """
     result = proximity.result
     columns, tick_s = result.columns, result.scenario.tick_s
-    # The target goes along the way, and at the end is ahead of P.
+    # The target moves along the route. At the end of the run, it is ahead of P.
     off = KDTree(result.vector("target").T).query(result.vector("p_WP").T)[0]
     met = np.zeros(len(result.time), dtype=bool)
     if len(proximity.bodies):
@@ -52,14 +61,14 @@ def route_metrics(proximity: Proximity) -> dict[str, float | None]:
 
 
 def near_and_after(clearance: ArrayLike, period_s: float) -> NDArray[np.bool_]:
-    """When an obstacle is nearer than 1 m, or was within the last 5 s.
+    """Returns when an obstacle is nearer than 1 m, or was nearer within the last 5 s.
 
     Args:
-        clearance: (n,) of the body at even intervals, m.
-        period_s: Of these, s.
+        clearance: (n,) clearance from the nearest obstacle at constant intervals, m.
+        period_s: Interval, s.
 
     Returns:
-        (n,).
+        (n,) whether one of these conditions holds, for each sample.
     """
     near = np.asarray(clearance, dtype=float) < MET_M
     ticks = np.arange(len(near))
@@ -70,15 +79,15 @@ def near_and_after(clearance: ArrayLike, period_s: float) -> NDArray[np.bool_]:
 def yaw_ripple(
     rate: ArrayLike, where: NDArray[np.bool_], period_s: float
 ) -> float | None:
-    """RMS of a yaw rate less its moving mean over 1 s, rad/s.
+    """Computes the RMS value of a yaw rate minus its moving mean over 1 s.
 
     Args:
-        rate: (n,) at even intervals, rad/s.
-        where: (n,) which of them count.
+        rate: (n,) yaw rates at constant intervals, rad/s.
+        where: (n,) whether each sample counts.
         period_s: Interval, s.
 
     Returns:
-        None where nothing counts.
+        RMS value, rad/s. The value is None if no sample counts.
     """
     if not np.any(where):
         return None

@@ -1,4 +1,4 @@
-"""A run as one page: how it went, its pictures, its figures, its files."""
+"""Writes a run as one HTML page with its outcome, pictures, metrics and files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from analysis.reporting.html_page import (
 from analysis.runs.scene import run_title
 from diagrams import RunResult
 
-#: What lies beside the page, and what is in it.
+#: Other files in the directory of the page, and their contents.
 _FILES = {
     "replay.html": "the run in three dimensions, with curves over time",
     "trajectory.parquet": "one row per tick, SI units",
@@ -36,16 +36,17 @@ def run_page(
     summary: Mapping[str, Any],
     directory: Path,
 ) -> str:
-    """The whole page; it shows what of the run is in its directory.
+    """Returns an HTML page about a run, with links to the files in its directory.
 
     Args:
-        result: The run.
-        rows: From ``summary_rows``.
-        summary: From ``run_summary``.
-        directory: Where the page will be.
+        result: Result of the run.
+        rows: Rows of the summary, from ``summary_rows``.
+        summary: Summary as a dictionary, from ``run_summary``.
+        directory: Directory of the run, which will contain the page. The page shows
+            only pictures and files that are in this directory.
 
     Returns:
-        HTML.
+        HTML text of the page.
     """
 
     def there(name: str) -> bool:
@@ -82,7 +83,7 @@ def _anchor(title: str) -> str:
 def _summary(
     result: RunResult, rows: Mapping[str, str], *, has_replay: bool
 ) -> list[str]:
-    """Warnings, and of several robots a list for each below the list of all."""
+    """Returns the warnings and the summary, with a list of rows per robot."""
     begin = 0
     parts = [note(f"Warning: `{x.field}`: {x.message}") for x in result.warnings]
     names = list(rows)
@@ -119,7 +120,7 @@ def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
     names = list(result.several)
     if not names:
         return [text, fact_table(metrics)]
-    # A row for each metric, in the order of the first robot that has it.
+    # One row per metric, in the order of the first robot that has this metric.
     own = dict.fromkeys(
         key.partition(".")[2] for key in metrics if key.partition(".")[0] in names
     )

@@ -1,4 +1,4 @@
-"""Pictures of a run: seen from above, and over time."""
+"""Draws pictures of a run: the run from above, and quantities over time."""
 
 from __future__ import annotations
 
@@ -34,26 +34,38 @@ from analysis.runs.trajectory_artists import (
 from diagrams import RunResult
 from systems.framework.input_error import InputError
 
-#: Draws one quantity of one robot over time.
+#: Function that draws one quantity of one robot over time.
 Panel = Callable[[Axes, RunResult], None]
 
-#: Letters of a title that a picture has room for beside one another.
+#: Largest number of characters per line of a title.
 LONGEST_LINE = 80
 
-#: The width at which the pictures are meant to be read, inch.
+#: Width of the pictures, inch.
 WIDTH_IN = 8.0
-#: Room round the map for labels, title and legend, inch.
+#: Space around the map for labels, title and legend, inch.
 LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.5
 
 
 def plot_trajectory(result: RunResult) -> Figure:
-    """The run seen from above, in W, m.
+    """Draws the run from above, in the world frame W.
 
-    Drawn at a few instants, with the time beside: the robot's footprint with
-    its microphone bar, the source, moving obstacles and the sensor cones, up
-    to the range read (no cones with ideal sensing). Estimates of the source
-    are drawn where a frame was heard, faint ones early, strong ones late. Of a
-    guarded robot, what it knew of the floor at the end stands for the cones.
+    At a few times, the picture shows:
+
+    - the rectangle of the robot with its microphone bar
+    - the source and the moving obstacles
+    - the cones of the range sensors, up to the range readings
+
+    Labels show the times. With ideal obstacle sensing, there are no cones. For a robot
+    with a safety guard, the floor that the robot knew at the end replaces the cones.
+
+    Crosses show the source positions that the robot estimated. Early estimates are
+    faint, and late estimates are strong.
+
+    Args:
+        result: Result of the run.
+
+    Returns:
+        Picture with axes in m.
     """
     figure, axes = map_axes(result)
     draw_grid(axes)
@@ -63,7 +75,7 @@ def plot_trajectory(result: RunResult) -> Figure:
         if known is None:
             draw_cones(axes, look.result, times_apart(look.result))
         else:
-            # What the cones have seen: they would hide it.
+            # The map replaces the cones, which would hide the map.
             draw_known_space(axes, look, known)
     draw_room(axes, result)
     draw_obstacles(axes, result)
@@ -90,7 +102,7 @@ def plot_trajectory(result: RunResult) -> Figure:
 
 
 def _draw_odor(axes: Axes, result: RunResult) -> None:
-    """The plume at the end, and what smells."""
+    """Draws the odor source, and its plume at the end of the run."""
     odor = result.full_scenario.odor
     assert odor is not None
     last = None
@@ -115,13 +127,15 @@ def _draw_odor(axes: Axes, result: RunResult) -> None:
 
 
 def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
-    """When what a robot hears sounds; what is called on from the call on.
+    """Returns the bursts of the source that the robot hears.
+
+    If the robot listens to another robot that calls, the bursts begin after the call.
 
     Args:
-        result: The run of one robot.
+        result: Result of a run, for one robot.
 
     Returns:
-        From and to, s, of each burst; none of a robot that drives to a goal.
+        Start and end of each burst, s. The list is empty if the robot drives to a goal.
     """
     if result.scenario.only.has_goal:
         return []
@@ -136,16 +150,17 @@ def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
 
 
 def map_axes(result: RunResult) -> tuple[Figure, Axes]:
-    """Axes to one scale that hold all bodies, with room below for the legend.
+    """Makes axes with equal scales that show all bodies, with space for a legend below.
 
-    The picture is never taller or flatter than can be read: instead, more of
-    the floor is shown.
+    The aspect ratio of the axes is limited. If necessary, the axes show more of the
+    floor.
 
     Args:
-        result: The run.
+        result: Result of the run.
 
     Returns:
-        The figure, and its axes in W, m.
+        Two values. The first value is the figure. The second value is its axes, in the
+        world frame W, m.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
     width = WIDTH_IN - LEFT_IN - RIGHT_IN
@@ -168,19 +183,23 @@ def map_axes(result: RunResult) -> tuple[Figure, Axes]:
 
 
 def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> Figure:
-    """What was heard, felt and done over time; bursts of the source are shaded.
+    """Draws measured, estimated and commanded quantities over time.
+
+    Bursts of the source are shaded.
 
     Args:
-        result: The run of one robot.
-        clearance: (n,) distance from the robot to the nearest body at each
-            tick, m (``analysis.runs.proximity``); none leaves its panel out.
+        result: Result of a run, for one robot.
+        clearance: (n,) distance from the robot to the nearest body at each tick
+            (control period), m (``analysis.runs.proximity``). With None, the picture
+            has no panel of the clearance.
 
     Returns:
-        The picture, a panel for each quantity; with a guard also what it did, and
-        what it had to spare.
+        Picture with one panel per quantity. If the robot has a safety guard, one panel
+        shows the actions of the guard. Another panel shows the distance that the robot
+        has to spare.
 
     Raises:
-        InputError: ``clearance`` has not one value a tick.
+        InputError: ``clearance`` does not have one value per tick.
     """
     hears = not result.scenario.only.has_goal
     panels = time_panels(result)
@@ -202,7 +221,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     for axes in all_axes:
         for start, end in bursts:
             axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
-            # Yellow on white is hard to see: a line along the foot is not.
+            # Yellow is hard to see on white. The line at the bottom is easy to see.
             axes.axvspan(start, end, ymax=0.025, color=COLOURS["sounding"], linewidth=0)
         draw_grid(axes, "y")
         axes.legend(
@@ -222,20 +241,20 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
 
 
 def time_panels(result: RunResult) -> list[Panel]:
-    """What is drawn of a run over time, beside its clearance.
+    """Returns all panels of a run's picture over time, except that of the clearance.
 
     Args:
-        result: The run of one robot.
+        result: Result of a run, for one robot.
 
     Returns:
-        Panels, each called with its axes and the result.
+        Functions that draw one panel each. Their arguments are the axes and the result.
     """
     panels: list[Panel] = (
         [_goal] if result.scenario.only.has_goal else [_range, _bearing]
     )
     if result.scenario.only.searches is not None:
         panels = search_panels(result)
-    if "attraction_x" in result.columns:  # a law may tell no forces
+    if "attraction_x" in result.columns:  # not all laws log forces
         panels.append(_forces)
     if "stiffness" in result.columns:
         panels.append(_gains)
@@ -272,7 +291,7 @@ def _range(axes: Axes, result: RunResult) -> None:
         _heard(axes, result, columns["source_range"])
     axes.axhline(follow, color="black", ls="--", lw=1.0, label="follow distance")
     axes.set_ylabel("range of\nsource (m)")
-    # A wild estimate must not squeeze the rest into a line.
+    # The limit keeps the curves readable if an estimate is far away.
     axes.set_ylim(0.0, 1.3 * max(follow, float(np.max(columns["source_range_true"]))))
 
 
@@ -292,7 +311,7 @@ def _goal(axes: Axes, result: RunResult) -> None:
 
 def _bearing(axes: Axes, result: RunResult) -> None:
     true = np.degrees(result.columns["source_bearing_true"])
-    # Else a line would cross the whole panel where the bearing wraps.
+    # Without a gap, a line would cross the whole panel where the bearing wraps.
     true[1:][np.abs(np.diff(true)) > 180.0] = np.nan
     axes.plot(result.time, true, color=COLOURS["source"], label="true")
     if "source_bearing" in result.columns:
@@ -328,7 +347,7 @@ def _speeds(axes: Axes, result: RunResult) -> None:
         label = f"{side} wheel, command"
         axes.plot(result.time, rim, color=COLOURS[side], lw=1.0, label=label)
     axes.plot(result.time, forward, color=COLOURS["robot"], label="robot, forward")
-    if "wanted_speed" in columns:  # a guard may let less through
+    if "wanted_speed" in columns:  # a guard may reduce the command
         _wanted(axes, result.time, columns["wanted_speed"])
     axes.set_ylabel("speed (m/s)")
 
@@ -343,7 +362,7 @@ def _turning(axes: Axes, result: RunResult) -> None:
 
 
 def _wanted(axes: Axes, time: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    """What the law commands."""
+    """Draws the command of the law, which a guard may reduce."""
     label = "wanted by the law"
     axes.plot(time, values, "--", color=COLOURS["law"], lw=1.0, label=label)
 
@@ -353,7 +372,7 @@ def _guard_actions(axes: Axes, result: RunResult) -> None:
     for number, name in enumerate(GUARD_ACTIONS):
         done = actions == number
         colour = COLOURS["empty" if number == 0 else "source"]
-        # The edge hides seams between ticks.
+        # The edges hide gaps between the bars of neighboring ticks.
         axes.broken_barh(
             [(time, tick_s) for time in result.time[done]],
             (number - 0.35, 0.7),
@@ -363,7 +382,7 @@ def _guard_actions(axes: Axes, result: RunResult) -> None:
             zorder=2,
             label=f"{name}: {100.0 * np.mean(done):.0f} %",
         )
-    # From bar to bar; a page that draws curves alone has this one.
+    # This curve shows the same actions for pages that draw only curves.
     axes.plot(
         result.time,
         actions,
@@ -398,13 +417,16 @@ def _guard_distances(axes: Axes, result: RunResult) -> None:
 
 
 def clearance_panel(clearance: ArrayLike) -> Panel:
-    """The panel of the distance to the nearest body, with its least.
+    """Returns a panel that shows the distance to the nearest body over time.
+
+    The panel marks the least distance.
 
     Args:
-        clearance: (n,) at the ticks, m.
+        clearance: (n,) distance to the nearest body at the ticks (control periods), m.
 
     Returns:
-        As of ``time_panels``.
+        Function that draws the panel. Its arguments are the axes and the result of the
+        run.
     """
     distance = np.asarray(clearance, dtype=float)
 

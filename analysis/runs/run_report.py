@@ -1,4 +1,4 @@
-"""Writes a run's result directory and its one-screen summary."""
+"""Writes the files of a run, and a summary that fits on one screen."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from systems.search.search_ending import fault_names
 
 
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
-    """The JSON document of a run.
+    """Returns the summary of a run as a JSON document.
 
     Args:
-        result: The run.
-        out: The result directory, to be named; None: there is none.
+        result: Result of the run.
+        out: Directory of the run, which the summary names. With None, the summary names
+            no directory.
 
     Returns:
-        Plain values, to be written as JSON.
+        Dictionary of plain values, which can be written as JSON.
     """
     document = {
         "schema_version": SCHEMA_VERSION,
@@ -78,20 +79,27 @@ def write_run(
     *,
     pictures: bool = True,
 ) -> None:
-    """Writes everything about a run into a directory that exists.
+    """Writes all files of a run into an existing directory.
 
-    ``scenario.yaml`` (effective, can be run again) and ``scenario.schema.json``,
-    ``summary.json``, ``trajectory.parquet``, ``replay.html``, the pictures
-    ``trajectory.png``, ``time_series.png`` and ``diagram.svg``, and ``report.html``,
-    which shows all of them. Of several robots each has its own
-    ``time_series_<name>.png`` and ``diagram_<name>.svg``, and ``diagram.svg`` shows how
-    they are joined.
+    The files are:
+
+    - ``scenario.yaml``: the complete scenario, which can be run again
+    - ``scenario.schema.json``: the schema of this scenario file
+    - ``summary.json``: the summary
+    - ``trajectory.parquet``: the table with one row per tick (control period)
+    - ``replay.html``: the replay in three dimensions
+    - ``trajectory.png``, ``time_series.png`` and ``diagram.svg``: the pictures
+    - ``report.html``: a page with the pictures, and with links to other files
+
+    With several robots, each robot has its own ``time_series_<name>.png`` and
+    ``diagram_<name>.svg``. The file ``diagram.svg`` then shows how the robots are
+    connected.
 
     Args:
-        result: The run.
-        summary: From ``run_summary``.
-        directory: Exists.
-        pictures: Off: no PNG and no SVG.
+        result: Result of the run.
+        summary: Summary of the run, from ``run_summary``.
+        directory: Existing directory.
+        pictures: Whether to write the PNG and SVG files.
     """
     from analysis.runs.replay import write_replay
     from analysis.runs.run_page import run_page
@@ -130,14 +138,14 @@ def _write_pictures(
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
-    """The run on one screen.
+    """Returns the summary of a run as text that fits on one screen.
 
     Args:
-        result: The run.
-        summary: From ``run_summary``.
+        result: Result of the run.
+        summary: Summary of the run, from ``run_summary``.
 
     Returns:
-        Lines without an end of line after the last one.
+        Lines of text. The last line has no line end.
     """
     return "\n".join(
         f"{name.split('.')[-1]:<21} {value}"
@@ -146,14 +154,15 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
 
 
 def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
-    """The rows of the terminal summary of a run, by name.
+    """Returns the rows of a run's summary for the terminal.
 
     Args:
-        result: The run.
-        summary: From ``run_summary``.
+        result: Result of the run.
+        summary: Summary of the run, from ``run_summary``.
 
     Returns:
-        Of several robots, what one did is named by it, a dot, and what it is.
+        Text of each row, by name of the row. With several robots, the names of a
+        robot's rows begin with the name of the robot and a dot.
     """
     timing = summary["timing"]
     scenario = result.full_scenario
@@ -181,7 +190,7 @@ def _ended(result: RunResult) -> str:
 def _robot_rows(
     result: RunResult, metrics: dict[str, Any], prefix: str
 ) -> dict[str, str]:
-    """What one robot did; names of rows and metrics begin with the prefix."""
+    """Returns the rows of one robot; their names and metrics begin with the prefix."""
     robot, stop = result.scenario.only, result.scenario.stop
 
     def metric(name: str) -> Any:
@@ -214,7 +223,7 @@ def _robot_rows(
 
 
 def _search_rows(result: RunResult, metric: Callable[[str], Any]) -> dict[str, str]:
-    """What a search took, and what it found to be broken."""
+    """Returns the effort of a search, and the faults that the search has found."""
     efficiency = metric("path_efficiency")
     rows = {
         "steps": f"{metric('search_steps'):.0f} in {metric('search_time_s'):.0f} s",

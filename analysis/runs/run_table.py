@@ -1,4 +1,4 @@
-"""Columns of a sweep's table, and which runs they are of."""
+"""Lists the metrics of a sweep's table, and the runs over which each metric counts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from diagrams.running.stop_rules import SUCCESSFUL
 
-#: Figures that any run has, however it ended.
+#: Metrics of all runs, with any ending.
 ALL_RUNS = (
     "minimum_clearance_m",
     "minimum_obstacle_clearance_m",
@@ -26,7 +26,7 @@ ALL_RUNS = (
     "greatest_stiffness_n_m",
     "last_stiffness_n_m",
 )
-#: Figures that a collision or a jam would cut short: of successful runs alone.
+#: Metrics of successful runs only. An early end of a run would change their values.
 SUCCESSES = (
     "time_to_goal_s",
     "path_length_m",
@@ -51,7 +51,7 @@ SUCCESSES = (
 
 
 def successes(rows: pd.DataFrame) -> NDArray[np.bool_]:
-    """(n,) whether each run did what it should."""
+    """(n,) whether each run was successful."""
     return rows["cause"].isin(SUCCESSFUL).to_numpy()
 
 
@@ -61,14 +61,15 @@ def collisions(rows: pd.DataFrame) -> NDArray[np.bool_]:
 
 
 def column(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
-    """A figure of each run; NaN where it has none.
+    """Returns one metric of each run.
 
     Args:
-        rows: n runs.
-        name: Of the column; there may be none of that name.
+        rows: Table of n runs.
+        name: Name of the metric's column. The table may lack this column.
 
     Returns:
-        (n,) in the figure's unit.
+        (n,) values in the unit of the metric. The value is NaN for a run without this
+        metric.
     """
     if name not in rows:
         return np.full(len(rows), np.nan)
@@ -76,37 +77,39 @@ def column(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
 
 
 def bootstrap_seed(seed: int, name: str) -> int:
-    """Seed of the bootstrap of a figure.
+    """Returns the random seed for the bootstrap of a metric.
 
     Args:
-        seed: Of the sweep.
-        name: Of the figure.
+        seed: Seed of the sweep.
+        name: Name of the metric.
 
     Returns:
-        32 bits: figures are resampled independently of each other.
+        Seed of 32 bits. Each metric has its own seed, so that the samples of the
+        metrics are independent.
     """
     return crc32(json.dumps([seed, name]).encode())
 
 
 @dataclass(frozen=True)
 class WarningCount:
-    """In how many runs a field of the scenario was warned about."""
+    """A warning about a field of the scenario, with the number of affected runs."""
 
     field: str
     runs: int
     message: str
-    """Of the first of these runs."""
+    """Message of the first run with this warning."""
 
 
 def warning_counts(rows: pd.DataFrame) -> list[WarningCount]:
-    """The warnings of many runs, field by field.
+    """Counts the warnings of many runs, for each field of the scenario.
 
     Args:
-        rows: Runs; their column ``warnings`` is JSON, as ``summary.json`` has it. There
-            may be none of that name.
+        rows: Table of runs. The column ``warnings`` contains JSON in the format of
+            ``summary.json``. The table may lack this column.
 
     Returns:
-        The commonest first; empty where there are no warnings.
+        Counts, the most frequent warning first. The list is empty if there are no
+        warnings.
     """
     runs, messages = Counter[str](), dict[str, str]()
     for text in rows.get("warnings", ()):
@@ -114,6 +117,6 @@ def warning_counts(rows: pd.DataFrame) -> list[WarningCount]:
         runs.update({each["field"] for each in told})
         for each in told:
             messages.setdefault(each["field"], each["message"])
-    # In the order of the messages, so that no order of a set shows.
+    # Equal counts keep the order of the messages, because the order of a set is random.
     fields = sorted(messages, key=lambda field: -runs[field])
     return [WarningCount(name, runs[name], messages[name]) for name in fields]

@@ -1,4 +1,4 @@
-"""Where things are at a time: shared by all pictures."""
+"""Computes which objects a picture shows, and where they are at a given time."""
 
 from __future__ import annotations
 
@@ -20,32 +20,33 @@ from systems.sound.parameters import SoundParameters
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
 from systems.world.parameters import ObstacleParameters
 
-#: Spacings of instants that a reader can count in, s.
+#: Intervals between times of a picture, s. A reader can count easily with these values.
 _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
 
 
 def tick_at(result: RunResult, time: float) -> int:
-    """Index of the tick nearest to a time in s.
+    """Returns the number of the tick (control period) that is nearest to a given time.
 
     Args:
-        result: The run.
-        time: s; before the start or after the end, the first or last tick is meant.
+        result: Result of the run.
+        time: Time, s. For a time outside the run, the function returns the first or the
+            last tick.
 
     Returns:
-        Row of ``trajectory``, from 0.
+        Row of the table ``trajectory``, counted from 0.
     """
     return int(np.argmin(np.abs(result.time - time)))
 
 
 def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
-    """Evenly spaced instants from the start, at most so many, s.
+    """Returns times at constant intervals, starting at 0.
 
     Args:
-        result: The run.
-        most: At least 2.
+        result: Result of the run.
+        most: Largest number of times; at least 2.
 
     Returns:
-        (n,) ascending from 0, s.
+        (n,) ascending times, s.
     """
     end = result.simulated_s
     period = next((p for p in _NICE_PERIODS_S if end / p < most), end / (most - 1))
@@ -53,28 +54,29 @@ def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
 
 
 class Look(NamedTuple):
-    """How one robot is shown."""
+    """Colors and labels of one robot in pictures."""
 
     result: RunResult
-    """What it did."""
+    """Result of the run, for this robot."""
     colour: str
-    """Of its path and its body."""
+    """Color of the robot's path and body."""
     estimates: str
-    """Colour of where it takes the source to be."""
+    """Color of the source positions that the robot estimates."""
     path_label: str = "path of the control point P"
     body_label: str = "robot with its microphones"
-    """Empty: the path's colour tells."""
+    """Label of the body. It is empty if the color of the path identifies the body."""
     estimates_label: str = "estimates of the source; faint ones are early"
     seen: str = COLOURS["seen"]
-    """Of the floor that it knows to be free, much lightened."""
+    """Color of the floor that the robot knows to be free. Pictures lighten this
+    color."""
     echoes: str = COLOURS["echoes"]
-    """Colour of where its echoes came from."""
+    """Color of the positions from which echoes came."""
     seen_label: str = "seen as free at the end"
     echoes_label: str = "places that echoes came from"
 
 
 def looks(result: RunResult) -> list[Look]:
-    """Each robot of a run, in colours of its own where there are several."""
+    """Returns the look of each robot; each of several robots has its own colors."""
     if not result.several:
         look = Look(result, COLOURS["robot"], COLOURS["estimate"])
         deaf = result.scenario.only.has_goal
@@ -100,21 +102,21 @@ def looks(result: RunResult) -> list[Look]:
 
 
 def lightened(colour: str, part: float) -> str:
-    """A colour laid thinly on white.
+    """Mixes a color with white.
 
     Args:
-        colour: As matplotlib takes it.
-        part: How much of it is left.
+        colour: Color in any format of matplotlib.
+        part: Fraction of the color in the mixture, 0 to 1.
 
     Returns:
-        The light colour.
+        Lighter color, as a hexadecimal string.
     """
     red, green, blue = (1.0 - part * (1.0 - level) for level in to_rgb(colour))
     return to_hex((red, green, blue))
 
 
 def run_title(result: RunResult) -> str:
-    """What was run and how it ended, on one line."""
+    """Returns the name, the law and the ending of a run on one line."""
     told = result.several and result.cause not in SUCCESSFUL
     who = f"{result.name} " if told else ""
     scenario = result.full_scenario
@@ -122,27 +124,27 @@ def run_title(result: RunResult) -> str:
 
 
 def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
-    """Every burst that begins before an end.
+    """Returns all bursts of a sound that begin before a given time.
 
     Args:
-        sound: Has the schedule.
-        end: s; a burst that is under way is cut off there.
+        sound: Parameters of the sound, which contain the schedule of the bursts.
+        end: Time, s. A burst that lasts longer ends at this time.
 
     Returns:
-        From and to, s, of each.
+        Start and end of each burst, s.
     """
     starts = np.arange(sound.start_s, end, sound.period_s)
     return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
 
 
 def logged_sensors(result: RunResult) -> range:
-    """The range sensors whose readings a run has logged.
+    """Returns the numbers of the range sensors with readings in the log of a run.
 
     Args:
-        result: The run of one robot.
+        result: Result of a run, for one robot.
 
     Returns:
-        Their numbers, from 0; none without cones.
+        Numbers of the sensors, from 0. The range is empty if the log has no readings.
     """
     robot = result.scenario.only
     if isinstance(robot, HasRangeSensors) and "range_1" in result.columns:
@@ -151,14 +153,14 @@ def logged_sensors(result: RunResult) -> range:
 
 
 def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
-    """(x, y, theta) of an ultrasonic sensor in B, m and rad.
+    """Returns the pose of an ultrasonic sensor in the robot frame B.
 
     Args:
-        scenario: Places and axes of the sensors.
-        sensor: Its number, from 0.
+        scenario: Scenario with the positions and the axes of the sensors.
+        sensor: Number of the sensor, from 0.
 
     Returns:
-        x, y, theta of the sensor's frame U in B, m and rad.
+        x, y, theta of the sensor frame U in B, m and rad.
     """
     own = scenario.sensing.ultrasonic.sensors[sensor]
     x, y = own.position_m
@@ -169,14 +171,14 @@ def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
 def compose(
     pose_WB: NDArray[np.float64], pose_BU: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """A pose in B as one in W.
+    """Converts a pose in the robot frame B to a pose in the world frame W.
 
     Args:
-        pose_WB: (3,) x, y, theta, m and rad.
-        pose_BU: x, y, theta, m and rad.
+        pose_WB: (3,) pose (x, y, theta) of B in W, m and rad.
+        pose_BU: Pose (x, y, theta) in B, m and rad.
 
     Returns:
-        x, y, theta of pose_WU, m and rad; the angle is not wrapped.
+        x, y, theta of the pose in W, m and rad. The angle is not wrapped.
     """
     dx, dy = rotate(pose_WB[2], pose_BU[0], pose_BU[1])
     return pose_WB[0] + dx, pose_WB[1] + dy, pose_WB[2] + pose_BU[2]
@@ -185,30 +187,30 @@ def compose(
 def moving_and_static(
     scenario: Scenario,
 ) -> tuple[list[ObstacleParameters], list[ObstacleParameters]]:
-    """The obstacles that move, and those that never do."""
+    """Returns two lists: the obstacles that ever move, and the obstacles at rest."""
     moving = [o for o in scenario.obstacles if o.path().moves]
     return moving, [o for o in scenario.obstacles if not o.path().moves]
 
 
 def followed_sources(scenario: Scenario) -> set[str]:
-    """Names of the sources that a robot follows; the others interfere."""
+    """Returns the names of the sources that a robot follows."""
     return {scenario.target(name) for name in scenario.robots}.intersection(
         scenario.sources
     )
 
 
 def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
-    """Smallest x, largest x, smallest y, largest y of all bodies ever, m.
+    """Returns a rectangle that contains all bodies during the whole run.
 
-    With the walls of the room, where there is one. Estimates do not count: a wild one
-    would shrink all else.
+    The rectangle includes the walls of the room, if there is a room. It ignores
+    estimated positions, because a large error would enlarge the picture too much.
 
     Args:
-        result: The run.
-        margin: To be left about the bodies' middles, m.
+        result: Result of the run.
+        margin: Space around the centers of the bodies, m.
 
     Returns:
-        In W, m.
+        Least x, greatest x, least y, greatest y in the world frame W, m.
     """
     scenario, times = result.full_scenario, picture_times(result, most=60)
     centres = [
@@ -229,7 +231,13 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
 
 
 def contact_point(result: RunResult) -> NDArray[np.float64]:
-    """Where the robot touched what it hit, (2,) in W, m.
+    """Returns the point at which the robot touched the other body.
+
+    Args:
+        result: Result of a run that ended in a collision.
+
+    Returns:
+        (2,) position in the world frame W, m.
 
     Raises:
         InputError: The run had no collision.
@@ -247,17 +255,18 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
 def touching_point(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Where two rectangles touch.
+    """Returns the point at which two rectangles touch.
 
-    The mean of the corners of either that lie in the other, or of the nearest
-    ones if none does.
+    The point is the mean of all corners of either rectangle that lie inside the other
+    rectangle. If there is no such corner, the point is the mean of the corners that are
+    nearest to the other rectangle.
 
     Args:
-        a: (5,) x, y, theta, length, width, m and rad.
-        b: (5,) of the other one, in the same frame.
+        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
+        b: (5,) second rectangle in the same frame, m and rad.
 
     Returns:
-        (2,) in that frame, m.
+        (2,) position in the same frame, m.
     """
     corners = np.concatenate([rectangle_corners(a), rectangle_corners(b)])
     others = [b] * 4 + [a] * 4

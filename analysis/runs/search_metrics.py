@@ -1,4 +1,4 @@
-"""Figures of merit of a search step by step."""
+"""Computes the metrics of a robot that searches a source step by step."""
 
 from __future__ import annotations
 
@@ -7,21 +7,22 @@ from numpy.typing import NDArray
 
 from analysis.runs.proximity import Proximity
 
-#: Arms of the hearing robot and of the one that it comes to, m (Song 2011, 2.1, 3.1):
-#: nearer than this their brackets can touch.
+#: Sum of the arm lengths of two robots, m: of the listening robot and of the calling
+#: robot (Song 2011, 2.1, 3.1). At a smaller distance, the arms can touch.
 ARMS_M = 0.15 + 0.20
-#: Slower is no driving, m/s.
+#: Least speed that counts as driving, m/s.
 _DRIVING_M_S = 0.02
 
 
 def search_metrics(proximity: Proximity) -> dict[str, float | None]:
-    """Metrics of one robot that searched, SI units; None where one does not apply.
+    """Computes the metrics of one robot that searched, in SI units.
 
     Args:
-        proximity: Of its run.
+        proximity: Distances between the robot and all bodies in the run.
 
     Returns:
-        By name, as docs/metrics.md defines them.
+        Value of each metric, by name. docs/metrics.md defines the metrics. If a metric
+        does not apply to the run, its value is None.
     """
     result = proximity.result
     columns, time = result.columns, result.time

@@ -1,4 +1,4 @@
-"""The shortest way of a disc round boxes: what a path length is compared with."""
+"""Computes the shortest path of a disc around boxes, as a reference for real paths."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from systems.framework.compiling import njit
 from systems.world.geometry import beyond_rectangle, segment_clearance
 
-#: Tangents that a quarter circle round a corner is made of: 0.6 % too long.
+#: Number of tangents that replace a quarter circle around a corner. Their total length
+#: is 0.6 % longer than the arc.
 TANGENTS = 6
-#: A way may cut this deep into a rounded box, m: it lies on its outline.
+#: Depth to which a path may cut into a grown box, m. A path lies on the outline of the
+#: box, so rounding errors can put it slightly inside.
 GRAZE_M = 1e-6
 
 
@@ -23,22 +25,27 @@ def shortest_path_length(
     boxes: ArrayLike,
     radius: float,
 ) -> float:
-    """Length of the shortest way of a disc's centre into a circle round the goal.
+    """Computes the length of the shortest path of a disc to a circle around the goal.
 
-    A* over the visibility graph of the boxes, grown by the disc's radius: legs
-    run between points of their outlines, the last one straight at the goal.
-    The rounded corners are polygons outside the arcs. A box nearer to the start
-    than the radius is grown as far as the start allows.
+    The function grows the boxes by the radius of the disc. Then it runs A* on their
+    visibility graph, whose edges connect points on the outlines of the grown boxes. The
+    last leg of a path runs straight toward the goal. Polygons just outside the arcs
+    replace the rounded corners.
+
+    If the disc overlaps a box at the start, this box grows only up to the center of the
+    disc.
 
     Args:
-        start: (2,) m.
-        goal: (2,) m.
-        goal_radius: The way ends at this distance from the goal, m.
-        boxes: (n, 5) rectangles at rest, see ``systems.world.geometry``.
-        radius: Of the disc, m.
+        start: (2,) initial position of the disc's center, m.
+        goal: (2,) position of the goal, m.
+        goal_radius: Radius of the circle around the goal, m. The path ends at this
+            circle.
+        boxes: (n, 5) rectangles (x, y, theta, length, width) at rest, m and rad.
+        radius: Radius of the disc, m.
 
     Returns:
-        m; 0 from within the circle, infinite where there is no way.
+        Length of the path, m. It is 0 if the start is inside the circle, and infinite
+        if there is no path.
     """
     ends = np.asarray([start, goal], dtype=float)
     rectangles = np.asarray(boxes, dtype=float).reshape(-1, 5)
@@ -53,7 +60,7 @@ def _search(
     boxes: NDArray[np.float64],
     radius: float,
 ) -> float:  # pragma: no cover  (compiled)
-    """A* from the start; the straight distance to the goal is its bound."""
+    """Runs A* from the start, with the straight distance to the circle as heuristic."""
     radii = np.array([min(radius, _beyond(start, box)) for box in boxes])
     points = np.empty((1 + 4 * TANGENTS * len(boxes), 2))
     points[0] = start
@@ -76,7 +83,7 @@ def _search(
         if bound >= best:
             return best
         done[here] = True
-        # A goal's disc may hold points; from there the last leg has no length.
+        # For a point inside the goal circle, the last leg has the length 0.
         share = to_goal[here] / max(_distance(points[here], goal), 1e-12)
         last = points[here] + share * (goal - points[here])
         if _free(points[here], last, boxes, radii):
@@ -99,7 +106,7 @@ def _distance(
 def _beyond(
     point: NDArray[np.float64], box: NDArray[np.float64]
 ) -> float:  # pragma: no cover  (compiled)
-    """Distance of a point from a box, m."""
+    """Returns the distance of a point from a box, m."""
     du, dv = beyond_rectangle(point, box)
     return math.hypot(du, dv)
 
@@ -108,7 +115,7 @@ def _beyond(
 def _outline(
     box: NDArray[np.float64], radius: float, corners: NDArray[np.float64]
 ) -> None:  # pragma: no cover  (compiled)
-    """Sets the corners of a polygon just outside the box grown by the radius."""
+    """Computes the corners of a polygon just outside a box grown by a radius."""
     step = 0.5 * math.pi / TANGENTS
     arc = radius / math.cos(0.5 * step)
     c, s = math.cos(box[2]), math.sin(box[2])
@@ -127,7 +134,7 @@ def _free(
     boxes: NDArray[np.float64],
     radii: NDArray[np.float64],
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a leg keeps its distances from all boxes."""
+    """Whether a straight leg keeps the required distance from each box."""
     for k in range(len(boxes)):
         if segment_clearance(start, end, boxes[k]) < radii[k] - GRAZE_M:
             return False

@@ -1,4 +1,4 @@
-"""How smoothly a body moves: jerk, spectral arc length, turning to and fro."""
+"""Computes the smoothness of a motion: jerk, spectral arc length, turn reversals."""
 
 from __future__ import annotations
 
@@ -11,29 +11,33 @@ from scipy.fft import rfft
 
 from systems.framework.compiling import njit
 
-#: Half of the time over which ``jerk`` fits a cubic, s: 5 samples at 25 ms.
+#: Half of the time over which ``jerk`` fits a cubic, s. At 25 ms, this is 5 samples.
 JERK_HALF_WINDOW_S = 0.125
-#: ``spectral_arc_length``: highest frequency, Hz, and least relative magnitude.
+#: Highest frequency of ``spectral_arc_length``, Hz.
 CUTOFF_HZ = 10.0
+#: Least relative magnitude of ``spectral_arc_length``.
 THRESHOLD = 0.05
-#: Zeros are appended to this many times the samples, as a power of two.
+#: Zero padding of ``spectral_arc_length``. The number of samples is rounded up to a
+#: power of 2 and multiplied by 2**PADDING. Zeros fill the rest.
 PADDING = 4
 
 
 def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
-    """Second derivative of a velocity, of a cubic fitted over 0.25 s.
+    """Computes the jerk as the second derivative of a velocity.
 
-    A least-squares cubic over 0.25 s (a Savitzky-Golay filter) resamples
-    nothing and passes slow motion: a sine of 1 Hz comes out 5 % low, of 2 Hz
-    19 %, of 5 Hz 79 %.
+    The function fits a cubic polynomial to the velocity over 0.25 s by least squares (a
+    Savitzky-Golay filter). It does not resample the velocity. Slow motion remains
+    nearly unchanged. The jerk of a sine is too low: by 5 % at 1 Hz, by 19 % at 2 Hz,
+    and by 79 % at 5 Hz.
 
     Args:
-        velocity: (n,) or (n, k) at even intervals, m/s (or rad/s).
+        velocity: (n,) or (n, k) velocities at constant intervals, m/s or rad/s.
         period: Interval, s.
 
     Returns:
-        (m,) or (m, k), m/s^3: samples whose window is whole, 10 fewer than n at 25 ms;
-        empty where there is none.
+        (m,) or (m, k) jerk, m/s^3 or rad/s^3. The result contains only samples with a
+        complete fitting window. At an interval of 25 ms, m is n - 10. If no window is
+        complete, the result is empty.
     """
     velocity = np.asarray(velocity, dtype=float)
     half = max(2, round(JERK_HALF_WINDOW_S / period))
@@ -47,7 +51,10 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
 
 @cache
 def _second_derivative(half: int) -> NDArray[np.float64]:
-    """Weights of 2 half + 1 samples, one apart, in that of the fitted cubic."""
+    """Returns the weights of samples for the second derivative of a fitted cubic.
+
+    The weights apply to 2 half + 1 samples at an interval of 1.
+    """
     square = np.arange(-half, half + 1.0) ** 2
     # The cubic's odd terms are orthogonal to the square less its mean.
     square -= np.mean(square)
@@ -56,18 +63,21 @@ def _second_derivative(half: int) -> NDArray[np.float64]:
 
 
 def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
-    """SPARC: minus the length of the speed's normalised magnitude spectrum.
+    """Computes the spectral arc length (SPARC), a measure of smoothness.
 
-    Balasubramanian et al. 2012, 2015; zero for no movement at all frequencies,
-    more negative the less smooth. Made for movements of a few seconds: long
-    ones are cut into ``windows``.
+    The function computes the magnitude spectrum of the speed, and normalizes frequency
+    and magnitude to 1. The result is minus the length of this curve (Balasubramanian et
+    al. 2012, 2015). A less smooth motion has a more negative value.
+
+    The measure applies to motions of a few seconds. Longer motions have to be divided
+    with ``windows``.
 
     Args:
-        speed: (..., n) m/s; a window at rest throughout has no arc length.
-        rate_hz: Rate of the samples, Hz.
+        speed: (..., n) speeds, m/s. No window may be at rest throughout.
+        rate_hz: Sample rate, Hz.
 
     Returns:
-        (...) dimensionless.
+        (...) spectral arc lengths, dimensionless.
     """
     speed = np.asarray(speed, dtype=float)
     count = 2 ** (math.ceil(math.log2(speed.shape[-1])) + PADDING)
@@ -80,7 +90,7 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
 def _arc_lengths(
     spectra: NDArray[np.complex128], highest: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(n,) ``spectral_arc_length`` of (n, lines) spectra, up to the highest line."""
+    """(n,) spectral arc lengths of (n, lines) spectra, up to the line ``highest``."""
     lengths = np.zeros(len(spectra))
     for k in range(len(spectra)):
         power = spectra[k].real ** 2 + spectra[k].imag ** 2
@@ -95,17 +105,20 @@ def _arc_lengths(
 
 
 def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
-    """LDLJ: -ln of T^3 / v_peak^2 times the integral of v''^2.
+    """Computes the log dimensionless jerk (LDLJ), a measure of smoothness.
 
-    Balasubramanian et al. 2015, with plain differences as there; more negative
-    the less smooth.
+    The value is -ln(T^3 / v_peak^2 * J). T is the duration, v_peak is the largest
+    speed, and J is the integral of the squared second derivative of the speed.
+    Derivatives are plain differences (Balasubramanian et al. 2015). A less smooth
+    motion has a more negative value.
 
     Args:
-        speed: (..., n) m/s; neither at rest throughout nor of constant slope.
-        rate_hz: Rate of the samples, Hz.
+        speed: (..., n) speeds, m/s. No window may have a constant slope throughout;
+            this includes windows at rest.
+        rate_hz: Sample rate, Hz.
 
     Returns:
-        (...) dimensionless.
+        (...) values, dimensionless.
     """
     speed = np.asarray(speed, dtype=float)
     duration = speed.shape[-1] / rate_hz
@@ -115,14 +128,14 @@ def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float
 
 
 def windows(values: ArrayLike, length: int) -> NDArray[np.float64]:
-    """Consecutive windows; an incomplete last one is left out.
+    """Divides values into consecutive windows, and omits an incomplete last window.
 
     Args:
-        values: (n,) in any unit.
-        length: Values in a window.
+        values: (n,) values in any unit.
+        length: Number of values per window.
 
     Returns:
-        (n // length, length).
+        (n // length, length) windows.
     """
     values = np.asarray(values, dtype=float)
     count = len(values) // length
@@ -130,14 +143,14 @@ def windows(values: ArrayLike, length: int) -> NDArray[np.float64]:
 
 
 def turn_reversals(turn_rate: ArrayLike, least: float) -> int:
-    """How often a body turns back: changes of side of its turn rate.
+    """Counts how often a body reverses its direction of turning.
 
     Args:
-        turn_rate: (n,) rad/s.
-        least: Rates below this are no turn, rad/s.
+        turn_rate: (n,) turn rates, rad/s.
+        least: Least turn rate that counts as turning, rad/s.
 
     Returns:
-        A count; pauses between two turns do not matter.
+        Number of reversals. A pause between two turns has no effect on this number.
     """
     rate = np.asarray(turn_rate, dtype=float)
     sides = np.sign(rate[np.abs(rate) >= least])

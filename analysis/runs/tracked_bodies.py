@@ -1,4 +1,4 @@
-"""Where a guarded robot took bodies to be that move, worked out again from its log."""
+"""Reconstructs which bodies a robot took as moving, from the log of a run."""
 
 from __future__ import annotations
 
@@ -16,33 +16,37 @@ from systems.planning.hazards import Hazards, make_hazards, track_hazards
 
 @dataclass(frozen=True)
 class TrackedBodies:
-    """The tracks of a robot at some times.
+    """A robot's tracks of moving bodies at several times.
 
-    The frame is that of the odometry: it is W at the start, and drifts from it.
+    All positions are in the frame of the odometry. At the start, this frame equals the
+    world frame W. During the run, it drifts away from W.
     """
 
     times: NDArray[np.float64]
-    """(n,) of ticks, ascending, s."""
+    """(n,) ascending times of ticks (control periods), s."""
     exists: NDArray[np.float64]
-    """(n, tracks) probability that the body is there; 0 of an empty track."""
+    """(n, tracks) probability that the body exists; 0 for an unused track."""
     places: NDArray[np.float64]
-    """(n, tracks, 2) mean of the particles, m; NaN of an empty track."""
+    """(n, tracks, 2) mean position of the particles, m; NaN for an unused track."""
     velocities: NDArray[np.float64]
-    """(n, tracks, 2) m/s; likewise."""
+    """(n, tracks, 2) mean velocity of the particles, m/s; NaN for an unused track."""
     spreads: NDArray[np.float64]
-    """(n, tracks) standard deviation of the place, m; likewise."""
+    """(n, tracks) standard deviation of the position, m; NaN for an unused track."""
 
 
 def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
-    """What a robot with the guarded law took to move.
+    """Reconstructs the moving bodies that a robot with the guarded law has tracked.
+
+    The guarded law is a control law that plans around moving bodies. For each time, the
+    function uses the nearest tick (control period). It uses no tick twice.
 
     Args:
-        result: The run of one robot.
-        times: (n,) at which, s; of each the nearest tick is taken, once.
+        result: Result of a run, for one robot.
+        times: (n,) times, s.
 
     Returns:
-        Its tracks; None with another law, or where a block of a user's own stands in
-        for the sensors or the map.
+        Tracks at these ticks. The value is None for any other law, and if
+        ``has_known_space`` is False.
     """
     scenario, columns = result.scenario, result.columns
     if scenario.only.law != "guarded" or not has_known_space(result):
@@ -75,7 +79,7 @@ def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
 
 
 def _view(hazards: Hazards) -> tuple[NDArray[np.float64], ...]:
-    """Existence, place, velocity and spread of each track."""
+    """Returns probability, mean position, mean velocity and spread of each track."""
     exists, particles = hazards.exists.copy(), hazards.particles
     weights = particles.weight[:, :, None]
     motions = np.stack([particles.x, particles.y, particles.vx, particles.vy], axis=2)

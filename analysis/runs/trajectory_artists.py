@@ -1,4 +1,4 @@
-"""What the picture of a run from above is made of."""
+"""Draws the parts of the picture that shows a run from above."""
 
 from __future__ import annotations
 
@@ -30,16 +30,24 @@ from diagrams.scenario.bodies import microphones_W, robot_rectangle
 from diagrams.scenario.participants import SourceParameters
 from systems.world.geometry import rectangle_corners
 
-#: A body is drawn again when it has moved so far, m.
+#: Least distance that a robot or a source moves between two drawn times, m. For
+#: obstacles, half of this distance applies.
 APART_M = 0.25
-#: Instants at which the cones are drawn.
+#: Largest number of times at which the cones are drawn.
 CONE_INSTANTS = 4
 
 
 def times_apart(result: RunResult) -> list[float]:
-    """Instants at which the robot is clear of its last footprint, s.
+    """Returns the times at which a picture shows the outline of the robot.
 
-    The end of the run is always one of them.
+    Between two of these times, the robot moves by at least 0.25 m. The last time is the
+    end of the run, even if the robot has moved less.
+
+    Args:
+        result: Result of a run, for one robot.
+
+    Returns:
+        Ascending times, s.
     """
     path, end = result.poses("WB"), result.simulated_s
     kept: list[float] = []
@@ -59,12 +67,12 @@ def _apart(
 
 
 def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
-    """The path of P, and footprints with their microphones at some times, s.
+    """Draws the path of the control point P, and the robot's outline at several times.
 
     Args:
-        axes: Where to draw, in W, m.
-        look: The robot's run, colours and labels.
-        times: Of the footprints, s.
+        axes: Axes in the world frame W, m.
+        look: Run, colors and labels of the robot.
+        times: Times of the outlines, s.
     """
     result, colour, scenario = look.result, look.colour, look.result.scenario
     axes.plot(
@@ -95,7 +103,7 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
 
 
 def _draw_target(axes: Axes, look: Look) -> None:
-    """Where the target has been, and the goal."""
+    """Draws the path of the target on the route, and the goal."""
     several = look.result.whole is not None
     axes.plot(
         *look.result.vector("target"),
@@ -121,19 +129,20 @@ def _draw_body(axes: Axes, rectangle: ArrayLike, **style: Any) -> None:
 
 
 def _write_time(axes: Axes, rectangle: ArrayLike, time: float, colour: str) -> None:
-    """The time beside a body, on its right until all labels are spread."""
+    """Writes the time beside a body, on its right until all labels are moved apart."""
     axes.add_artist(BodyLabel(f"{round(time, 1):g} s", rectangle, colour))
 
 
 def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
-    """The path of each source, its body at both ends, dots at some times, s.
+    """Draws each source: its path, its body at both ends of the path, and several dots.
 
-    What rests has no times beside it.
+    The dots show the position of the source at the given times. For a moving source,
+    labels show the times.
 
     Args:
-        axes: Where to draw, in W, m.
-        result: The run.
-        times: Of the dots, s.
+        axes: Axes in the world frame W, m.
+        result: Result of the run.
+        times: Times of the dots, s.
     """
     sources = result.full_scenario.sources
     followed = followed_sources(result.full_scenario)
@@ -158,7 +167,7 @@ def _draw_source(
         label = f"path of {what}"
         axes.plot(*path[:, :2].T, "--", color=colour, label=label, zorder=3)
     if not source.body:
-        # A loudspeaker alone, which nothing can hit.
+        # This source is a loudspeaker without a body, so no robot can touch it.
         place = path[-1, :2]
         axes.plot(*place, "D", color=colour, label=what, ls="none", ms=6, zorder=4)
         return
@@ -186,16 +195,18 @@ def _draw_source(
 
 
 def draw_estimates(axes: Axes, look: Look) -> None:
-    """A cross a heard frame, where the robot then took the source to be.
+    """Draws the estimated source position for each audio frame that the robot heard.
+
+    Each estimate is a cross. Early estimates are faint.
 
     Args:
-        axes: Where to draw, in W, m.
-        look: The robot's run, colours and labels.
+        axes: Axes in the world frame W, m.
+        look: Run, colors and labels of the robot.
     """
     result, columns = look.result, look.result.columns
     if "target_valid" not in columns or "detected" not in columns:
         return
-    # The target goes by an estimate from the tick after it on.
+    # The target uses an estimate from the next tick on.
     heard = (columns["detected"][:-1] > 0.5) & (columns["target_valid"][1:] > 0.5)
     if not heard.any():
         return
@@ -213,20 +224,23 @@ def draw_estimates(axes: Axes, look: Look) -> None:
         linewidths=0.9,
         zorder=6,
     )
-    # A legend's sample would else be as faint as the first estimate.
+    # Without this empty plot, the sample in the legend would be as faint as the first
+    # estimate.
     axes.scatter([], [], color=colour, marker="x", s=16, label=look.estimates_label)
 
 
 def draw_known_space(axes: Axes, look: Look, known: KnownSpace) -> None:
-    """What the robot knew last: floor seen free, and a dot where echoes came from.
+    """Draws the floor that a robot knew to be free at the end of the run.
+
+    Dots show positions from which echoes came.
 
     Args:
-        axes: Where to draw, in the frame of the odometry, m.
-        look: The robot's colours and labels.
-        known: Of that robot.
+        axes: Axes in the frame of the odometry, m.
+        look: Colors and labels of the robot.
+        known: Map of the floor that this robot knew.
     """
     free, echoed = known.free[-1], known.middles(known.hits[-1] > 0.0)
-    # Thin, for what is drawn on it, and for floor that several robots know.
+    # The color is transparent, because other objects and other robots' floors overlap.
     colour = to_rgba(look.seen, 0.13)
     layer = np.zeros((*free.T.shape, 4))
     layer[free.T] = colour
@@ -238,7 +252,7 @@ def draw_known_space(axes: Axes, look: Look, known: KnownSpace) -> None:
         interpolation="nearest",
         zorder=0.3,
     ).set_gid("seen free")
-    # A picture takes the axes for itself.
+    # ``imshow`` changes the limits of the axes. This call restores them.
     axes.axis(limits)
     axes.scatter(
         [],
@@ -261,11 +275,13 @@ def draw_known_space(axes: Axes, look: Look, known: KnownSpace) -> None:
 
 
 def draw_obstacles(axes: Axes, result: RunResult) -> None:
-    """Resting boxes filled; moving ones in outline, with the time beside.
+    """Draws obstacles at rest as filled boxes, and moving obstacles as outlines.
+
+    Labels beside the outlines show the time.
 
     Args:
-        axes: Where to draw, in W, m.
-        result: The run.
+        axes: Axes in the world frame W, m.
+        result: Result of the run.
     """
     colour = COLOURS["obstacle"]
     moving, static = moving_and_static(result.full_scenario)
@@ -295,12 +311,12 @@ def draw_obstacles(axes: Axes, result: RunResult) -> None:
 
 
 def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
-    """The sensor cones at a few of the times, s, up to the range that they read.
+    """Draws the cones of the range sensors at several times, up to the range readings.
 
     Args:
-        axes: Where to draw, in W, m.
-        result: The run of one robot.
-        times: s; of many only some are used.
+        axes: Axes in the world frame W, m.
+        result: Result of a run, for one robot.
+        times: Times, s. If there are many times, the function uses only some of them.
     """
     sensors = logged_sensors(result)
     if not sensors:
@@ -336,11 +352,11 @@ _CONE_LABELS = {True: "ultrasonic cone with an echo", False: "cone without an ec
 
 
 def draw_room(axes: Axes, result: RunResult) -> None:
-    """The walls of the room.
+    """Draws the walls of the room, if the scenario has a room.
 
     Args:
-        axes: Where to draw, in W, m.
-        result: The run.
+        axes: Axes in the world frame W, m.
+        result: Result of the run.
     """
     room = result.full_scenario.room
     if room is None:
@@ -360,12 +376,15 @@ def draw_room(axes: Axes, result: RunResult) -> None:
 
 
 def draw_collision(axes: Axes, result: RunResult, star: float = 19.0) -> None:
-    """What the robot touched, as it was then, and a star that leaves it in sight.
+    """Draws the touched body at the time of the collision, and the contact point.
+
+    A star marks the contact point. The star is only an outline, so that it does not
+    hide the bodies.
 
     Args:
-        axes: Where to draw, in W, m.
-        result: The run.
-        star: Its size, in points.
+        axes: Axes in the world frame W, m.
+        result: Result of the run.
+        star: Size of the star, in points.
     """
     if result.collision is None:
         return
