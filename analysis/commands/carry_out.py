@@ -15,7 +15,7 @@ from analysis.commands.progress import Progress
 
 
 def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> None:
-    """Runs a subcommand: prepares and runs its job, writes files, and prints the result.
+    """Runs a subcommand: prepares and runs its job, writes files, and prints results.
 
     Args:
         command: The subcommand.

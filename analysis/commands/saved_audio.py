@@ -69,7 +69,7 @@ class SavedAudio:
 
     @property
     def heard(self) -> Path:
-        """The file with the sound at the first listening robot; complete after the run."""
+        """File of the sound at the first listening robot; complete after the run."""
         assert self._files is not None
         return self._files.first_heard
 

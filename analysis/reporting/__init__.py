@@ -1,1 +1,1 @@
-"""What reports share: HTML, tables, plain values, intervals, result directories."""
+"""Code that reports share: HTML, tables, plain values, intervals, result directories."""
