@@ -72,9 +72,10 @@ class BodyLabel(Annotation):
 
 
 def spread_labels(axes: Axes) -> None:
-    """Moves all labels so that they cover each other and the drawing as little as possible.
+    """Moves all labels to places where they cover as little of the picture as possible.
 
-    If a label is 8 points or more away from its body, a thin line connects the two.
+    A label covers another label only if there is no other place. If a label is 8 points
+    or more away from its body, a thin line connects the two.
 
     Args:
         axes: Axes with the complete drawing. Their limits must be final.
@@ -137,7 +138,7 @@ def spread_labels(axes: Axes) -> None:
 
 
 def _to_edge(half: NDArray[np.float64], unit: NDArray[np.float64]) -> Any:
-    """Vector from the center of a label to its edge, in the direction of a unit vector."""
+    """Vector from the center of a label to its edge, along a unit vector."""
     return unit * np.min(half / np.maximum(np.abs(unit), 1e-9))
 
 

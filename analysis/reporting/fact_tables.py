@@ -32,7 +32,7 @@ _LONGEST = 8
 
 
 def readable_name(name: str) -> str:
-    """Makes a name readable: `top_kinetic_energy_j` becomes 'top kinetic energy (J)'."""
+    """Makes a name readable: `top_energy_j` becomes 'top energy (J)'."""
     for ending, unit in _UNITS.items():
         if name.endswith(ending):
             return f"{_words(name.removesuffix(ending))} ({unit})"

@@ -90,7 +90,7 @@ def links(targets: Iterable[tuple[str, str]]) -> str:
 
 
 def note(text: str) -> str:
-    """Makes a highlighted paragraph, which readers need before they read the numbers."""
+    """Makes a highlighted paragraph to read before the numbers."""
     return f'<p class="note">{_inline(text)}</p>'
 
 

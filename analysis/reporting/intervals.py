@@ -17,7 +17,7 @@ class Interval(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """An estimated value with its 95 % confidence interval; NaN if there are no data."""
+    """An estimated value with its 95 % confidence interval; NaN without data."""
 
     value: float
     low: float

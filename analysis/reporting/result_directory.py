@@ -173,7 +173,7 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
 
 
 def _make(path: Path) -> list[Path]:
-    """Creates a directory; returns all directories that were created, innermost first."""
+    """Creates a directory; returns all directories that it created, innermost first."""
     missing = [p for p in (path, *path.parents) if not p.exists()]
     try:
         path.mkdir(parents=True, exist_ok=True)
