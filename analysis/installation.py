@@ -40,8 +40,8 @@ class Diagnosis:
 
     name: str
     verdict: Literal["ok", "note", "bad"]
-    """``ok``: the part works. ``note``: an optional part is missing. ``bad``: runs would
-    fail."""
+    """``ok``: the part works. ``note``: an optional part is missing. ``bad``: runs
+    would fail."""
     found: str
     remedy: str = ""
     """Advice to the user; empty if nothing needs to be done."""

@@ -57,7 +57,7 @@ def failure_text(error: Exception) -> str:
 
 
 def _where(error: BaseException) -> str:
-    """File and line that raised the exception; the last of our own files if possible."""
+    """File and line that raised the exception; prefers the last of our own files."""
     frames = traceback.extract_tb(error.__traceback__)
     named = [(_inside(Path(frame.filename)), frame.lineno) for frame in frames]
     ours = [at for at in named if at[0].parts[0] in _OURS]

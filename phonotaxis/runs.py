@@ -39,7 +39,7 @@ class RunResult(diagrams.RunResult):
         )
 
     def summary(self) -> dict[str, Any]:
-        """Returns the JSON document of ``phonotaxis simulate``: metrics, timing, versions."""
+        """Returns the JSON document of ``phonotaxis simulate``."""
         from analysis.runs.run_report import run_summary
 
         return run_summary(self, None)
@@ -74,7 +74,7 @@ class RunResult(diagrams.RunResult):
         return plot_time_series(self, Proximity(self).clearance)
 
     def replay(self, path: str | Path) -> Path:
-        """Writes an HTML page that replays the run in a browser without a network connection.
+        """Writes an HTML page that replays the run in a browser, without a network.
 
         Args:
             path: The .html file.

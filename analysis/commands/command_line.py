@@ -322,7 +322,7 @@ def _complain(faults: Sequence[tuple[str, str]], *, as_json: bool) -> None:
     told = [(field, _short(field, message)) for field, message in faults[:MOST_FAULTS]]
     if as_json:
         errors = [{"field": field, "message": text} for field, text in told]
-        with suppress(OSError):  # else standard error has to tell
+        with suppress(OSError):  # otherwise, standard error states the faults
             print(json.dumps({"error": errors[0], "errors": errors}), flush=True)
             return
     for field, message in told:

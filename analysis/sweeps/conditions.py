@@ -22,15 +22,16 @@ class Conditions(Parameters):
     """Distances that a layout must keep, and a path that it must leave free."""
 
     start_distance_m: NonNegativeLength = 0.0
-    """Least distance of any body from each robot's wheel axle midpoint, the origin of B,
-    at the start, m."""
+    """Least distance between each robot and any body at time zero, m. The distance
+    starts at the midpoint of the robot's wheel axle, the origin of B."""
     source_distance_m: NonNegativeLength = 0.0
     """Least distance between the outlines of a source and an obstacle during the whole
     run, m."""
     way_radius_m: Length | None = None
-    """Radius of a disc, m. Between the bodies at rest, a path must be free for this
-    disc. The path leads the disc's center, the origin of B, from each robot's start to
-    a place where P is at the follow distance from the source."""
+    """Radius of a disc, m. A path between the obstacles at rest must be free for this
+    disc. The path begins at each robot's start. The path ends where the control point
+    P can be at the follow distance from the source. The center of the disc is the
+    origin of B."""
 
     def check(self, scenario: Scenario) -> None:
         """Checks whether a layout fulfills the conditions.

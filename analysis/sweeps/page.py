@@ -209,7 +209,7 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
 
 
 def _commands(points: list[SweepPoint], results: pd.DataFrame, out: Path) -> list[str]:
-    """Commands that repeat the first failed runs, sorted by cause; errors come first."""
+    """Commands that repeat the first failed runs of each cause, errors first."""
     parts = [paragraph("Each command repeats one run and makes its replay.")]
     causes = [c for c in results["cause"].value_counts().index if c not in SUCCESSFUL]
     for cause in sorted(causes, key=lambda cause: cause != FAILED):

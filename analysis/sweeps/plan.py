@@ -44,7 +44,7 @@ class SweepPoint:
     """One run of a sweep."""
 
     index: int
-    """Number of the run in the sweep: ``run`` times the number of cells, plus ``cell``."""
+    """Number of the run in the sweep: ``run`` times number of cells, plus ``cell``."""
     cell: int
     """Number of the cell of the grid, from 0."""
     run: int
@@ -130,10 +130,11 @@ class SweepPlan(Parameters):
 
     @cached_property
     def base(self) -> dict[str, Any]:
-        """Fields of the scenario file after ``set`` is applied; never change the mapping.
+        """Fields of the scenario file after ``set`` is applied.
 
-        If another field of the sweep sets an element of a list, the mapping contains
-        the whole list. That is the case even if the scenario file omits the list.
+        The caller must not change this mapping. If another field of the sweep sets an
+        element of a list, the mapping contains the whole list. That is the case even if
+        the scenario file omits the list.
         """
         data = written_fields(self.source)
         _state_lists(data, scenario_from_mapping(data), self.set)
