@@ -20,10 +20,10 @@ class RunError(Exception):
 
 @contextlib.contextmanager
 def no_exit() -> Iterator[None]:
-    """Turns an attempt to end the process within the ``with`` block into an error.
+    """Turns any attempt to end the process within the ``with`` block into an error.
 
-    Code of a user or of Drake may call ``sys.exit``, for example. This function
-    converts every exception that is not an ``Exception``, including interrupts.
+    For example, code of a user or of Drake may call ``sys.exit``. The function converts
+    every exception that is not an ``Exception``, including interrupts.
     ``Interrupts.watched`` later recognizes the interrupts.
 
     Raises:

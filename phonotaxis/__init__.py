@@ -1,4 +1,4 @@
-"""Public functions and classes for scripts and notebooks: a sound-following robot.
+"""A robot that follows a sound past obstacles: functions for scripts and notebooks.
 
 The package loads each part only when the part is used. ``import phonotaxis`` therefore
 takes no noticeable time. The names in ``__all__`` are public. CONTRIBUTING.md states

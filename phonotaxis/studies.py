@@ -171,7 +171,9 @@ def compare(
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> ComparisonResult:
-    """Compares laws on the same random layouts.
+    """Compares control laws on the same random layouts.
+
+    A layout is one random variant of the positions and motions of all bodies.
 
     Args:
         *scenarios: Names of scenarios in the library, YAML files of layouts, or YAML
@@ -190,7 +192,7 @@ def compare(
         progress: Function that is called with the number of finished runs.
 
     Returns:
-        Rates, medians and pairs of laws. The directory contains them, too, with
+        Rates, medians and pairs of laws. The directory also contains them, with
         pictures.
 
     Raises:

@@ -22,9 +22,9 @@ def completed_by(argument: Any, words: dict[str, str] | str) -> None:
 
     Args:
         argument: Argument of a parser, as returned by ``add_argument``.
-        words: ``file`` or ``directory``; or a mapping from each shell to the name of
-            the shell function that prints the words. The package shtab describes both
-            forms.
+        words: Either ``file`` or ``directory``, or a mapping. The mapping contains for
+            each shell the name of a shell function that prints the possible words. The
+            package shtab defines this format.
     """
     argument.complete = words
 

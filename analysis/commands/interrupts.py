@@ -18,9 +18,9 @@ class _Interrupt(KeyboardInterrupt):
     """An interrupt, as a subclass of ``KeyboardInterrupt``.
 
     Python may evaluate code from a string, for example while Drake is imported. If
-    ``KeyboardInterrupt`` itself leaves this code, Python dies of the signal when the
-    process ends. That happens even if the exception was caught. A subclass avoids the
-    problem.
+    ``KeyboardInterrupt`` itself is raised in this code, Python ends later as if a
+    signal had killed the process. That happens even if the exception is caught. A
+    subclass avoids the problem.
     """
 
 

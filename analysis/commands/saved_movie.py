@@ -21,8 +21,8 @@ class SavedMovie:
         scenario: Scenario of the run.
         place: Result directory of the run. Its hidden directory holds the sound until
             the movie is written.
-        saved: Sound files of ``--save-audio``, which then also serve the movie. None if
-            the user did not give this option.
+        saved: Sound files of the option ``--save-audio``, which the movie then uses,
+            too. None if the user did not give this option.
 
     Raises:
         InputError: The file cannot be made, or no encoder for it is installed.

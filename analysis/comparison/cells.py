@@ -91,12 +91,13 @@ class LawCell:
 def make_cell(
     scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int
 ) -> LawCell:
-    """Summarizes one cell of a comparison: the runs of one law on all layouts.
+    """Summarizes one cell of a comparison: all runs of one control law on a scenario.
 
     Args:
         scenario: Name of the scenario.
         fields: Values of the cell's fields by dotted path, including ``law``.
-        rows: Results of the cell's runs, one row per run, in the order of the layouts.
+        rows: Results of the cell's runs. The table has one row for each random layout,
+            always in the same order.
         seed: Seed of the bootstrap.
 
     Returns:

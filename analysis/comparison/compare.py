@@ -63,8 +63,8 @@ class PreparedComparison:
 
         Returns:
             A pair of results. The first is a mapping from each scenario's name to its
-            comparison. The second is a list of the pairs of laws, each over all
-            scenarios together.
+            comparison. The second is a list of pairs of control laws, each compared
+            over all scenarios together.
 
         Raises:
             RunError: Every run failed.
@@ -94,7 +94,9 @@ def prepare_comparison(
     workers: int | None = None,
     resume: bool = False,
 ) -> PreparedComparison:
-    """Draws and checks all layouts, and opens the directories of the results.
+    """Draws all layouts of a comparison, checks them, and opens the result directories.
+
+    A layout is one random variant of the positions and motions of all bodies.
 
     Args:
         plans: Plan of each scenario, by the scenario's name; see ``comparison_plan``.

@@ -1,7 +1,8 @@
-"""Results of a sweep over laws: statistics of each law, and of each pair of laws.
+"""Results of a sweep over control laws: statistics of each law and each pair of laws.
 
-A sweep runs many variants of a scenario. In a paired sweep, every law meets the same
-layouts with the same seeds. The two runs of a pair therefore differ in the law only.
+A sweep runs many variants of a scenario. A layout is one variant of the positions and
+motions of all bodies. In a paired sweep, every law meets the same layouts with the same
+seeds. The two runs of a pair therefore differ in the law only.
 """
 
 from __future__ import annotations
@@ -63,11 +64,12 @@ class Comparison:
 
 
 def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Comparison:
-    """Summarizes a paired sweep, in which all laws meet the same layouts.
+    """Summarizes a sweep in which all control laws meet the same layouts.
 
-    Rates have Wilson's confidence intervals. Medians have confidence intervals from
-    order statistics. All intervals have a confidence of 95 %. A run that raised an
-    error counts as a failure.
+    A layout is one variant of the positions and motions of all bodies. Rates have
+    Wilson's confidence intervals. Medians have confidence intervals from order
+    statistics. All intervals have a confidence of 95 %. A run that raised an error
+    counts as a failure.
 
     Args:
         plan: Plan of the sweep. Its grid contains ``law`` and possibly other fields.
@@ -75,8 +77,8 @@ def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Compari
         scenario: Name of the scenario.
 
     Returns:
-        One cell for each law and each value of the other fields, and every pair of
-        cells that differ in exactly one field.
+        Cells and pairs. A cell combines all layouts of one law and one value of each
+        other field. A pair compares two cells that differ in exactly one field.
     """
     cells = [
         make_cell(scenario, fields, rows, plan.seed)

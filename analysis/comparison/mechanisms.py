@@ -17,7 +17,7 @@ LATE_S = 1.0
 
 
 def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
-    """Determines the mechanism of each failed run.
+    """Determines why each failed run failed, as the name of a mechanism.
 
     The mechanism of a collision depends on the echoes of the body that the robot hit
     (docs/results_laws.md):
@@ -38,16 +38,16 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     - ``lost``: The robot lost the source.
     - ``astray``: The robot did not follow the moving source for long enough.
     - ``diverged``: The robot drove too far from the source.
-    - ``no way found``: The law reported that there is no path.
+    - ``no way found``: The control law reported that there is no path.
     - ``failed``: The run raised an error.
 
     Args:
         rows: Results of runs with sensor cones, from
-            ``analysis.sweeps.store.load_results``, with an additional column
-            ``tick_s``.
+            ``analysis.sweeps.store.load_results``, with an additional column ``tick_s``
+            (control period, s).
 
     Returns:
-        Name of the mechanism for each row; missing if the run succeeded.
+        Name of the mechanism for each row. The name is missing if the run succeeded.
     """
     cause = rows["cause"].astype("object")
     names = cause.where(~cause.isin(SUCCESSFUL))

@@ -49,19 +49,20 @@ class PairedMedian:
 def paired_rate(
     first: ArrayLike, second: ArrayLike, confidence: float = 0.95
 ) -> PairedRate:
-    """Compares how often two methods have an outcome, for example success.
+    """Compares how often two methods have an outcome, for example a collision.
 
-    The confidence interval is the adjusted Wald interval of Bonett and Price (2012).
-    Its coverage is good even for rare outcomes and small samples.
+    Both methods run on the same n layouts. The confidence interval is the adjusted Wald
+    interval of Bonett and Price (2012). This interval keeps its coverage even for rare
+    outcomes and small samples.
 
     Args:
         first: (n,) whether the first method had the outcome on each layout, n >= 1.
-        second: (n,) whether the second method had the outcome on the same layouts.
+        second: (n,) whether the second method had the outcome on each layout.
         confidence: Confidence level of the interval, between 0 and 1.
 
     Returns:
-        Difference of the two rates, from -1 to 1, with its confidence interval and the
-        exact McNemar test.
+        Difference of the two rates, from -1 to 1, with its confidence interval. The
+        result also contains the p-value of the exact McNemar test.
     """
     from scipy.stats import binomtest, norm
 
@@ -87,17 +88,18 @@ def paired_rate(
 def paired_median(
     first: ArrayLike, second: ArrayLike, *, confidence: float = 0.95
 ) -> PairedMedian:
-    """Compares the values of a metric between two methods on the same layouts.
+    """Compares the values of a metric between two methods.
+
+    Both methods run on the same n layouts.
 
     Args:
-        first: (n,) values of the first method; NaN where the run has no value.
-        second: (n,) values of the second method on the same layouts; NaN where the run
-            has no value.
+        first: (n,) values of the first method. NaN if a run has no value.
+        second: (n,) values of the second method. NaN if a run has no value.
         confidence: Confidence level of the interval, between 0 and 1.
 
     Returns:
-        Medians and their interval in the unit of the metric. All are None if no layout
-        has values of both methods.
+        Medians, and the interval of the median difference, in the unit of the metric.
+        All are None if no layout has values of both methods.
     """
     from scipy.stats import wilcoxon
 

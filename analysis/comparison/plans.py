@@ -44,15 +44,16 @@ def comparison_plan(
     settings: dict[str, Any] | None = None,
     grid: Mapping[str, Sequence[Any]] | None = None,
 ) -> SweepPlan:
-    """Plans the runs that compare laws on the layouts of one scenario.
+    """Plans the runs that compare control laws on the layouts of one scenario.
 
-    The plan is a paired sweep: every law meets the same layouts with the same seeds.
+    A layout is one variant of the positions and motions of all bodies. Every law meets
+    the same layouts with the same seeds.
 
     Args:
-        scenario: One of three things. A library name stands for the layouts in the
-            library. A YAML file of layouts is a sweep file without ``grid``, ``runs``
-            and ``pair``. A YAML file of a scenario leads to runs that differ only in
-            their random numbers.
+        scenario: One of three things. A library name selects layouts of the library. A
+            YAML file of layouts is a sweep file without ``grid``, ``runs`` and
+            ``pair``. A YAML file of a scenario has a single layout, and its runs differ
+            only in their random numbers.
         laws: Laws to compare. Each run uses one law for all robots. None means the laws
             of the papers and driving without avoidance. For a scenario with routes,
             None means the laws for routes.
@@ -62,7 +63,7 @@ def comparison_plan(
         grid: Lists of values of other fields to compare, by dotted path.
 
     Returns:
-        The sweep. ``law`` is the first field of its grid, and ``pair`` is true.
+        Plan of the sweep. ``law`` is the first field of its grid, and ``pair`` is true.
 
     Raises:
         InputError: An argument is unknown or not valid. The message names the field.

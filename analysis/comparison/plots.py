@@ -32,10 +32,9 @@ _METRICS = {
 
 
 def plot_rates(comparisons: Sequence[Comparison]) -> Figure:
-    """Draws two rates and two medians of every law, with 95 % confidence intervals.
+    """Draws the success rate, the collision rate and two medians of every control law.
 
-    The rates are those of success and of collision. Each scenario has one row of
-    panels.
+    All values have 95 % confidence intervals. Each scenario has one row of panels.
     """
     rows, columns = len(comparisons), 2 + len(_METRICS)
     tallest = max(len(comparison.cells) for comparison in comparisons)

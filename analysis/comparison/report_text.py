@@ -92,11 +92,11 @@ def warning_texts(cells: Sequence[LawCell]) -> list[str]:
     """Lists the warnings of a scenario's runs.
 
     Args:
-        cells: Cells of all laws.
+        cells: Summary of the runs of each control law.
 
     Returns:
-        One line for each field with warnings. The line states how many runs of each law
-        had the warning, and its first message.
+        One line for each field with warnings. The line states the number of affected
+        runs of each law, and the text of the first warning.
     """
     counts, messages = dict[str, list[str]](), dict[str, str]()
     for cell in cells:
@@ -128,10 +128,10 @@ def rate_text(rate: Mean) -> str:
 
 
 def median_text(cell: LawCell, column: MedianColumn) -> str:
-    """Writes a median of a law with its confidence interval.
+    """Writes a median of a control law with its confidence interval.
 
     Args:
-        cell: Cell of the law.
+        cell: Summary of the runs of the law.
         column: Metric of the median, and format of the numbers.
 
     Returns:

@@ -61,12 +61,12 @@ _VERDICT_CLASSES = {
 
 
 def heading(level: int, text: str, anchor: str = "") -> str:
-    """Makes a heading.
+    """Makes a heading of a page.
 
     Args:
         level: Level from 1 to 4.
         text: Plain text.
-        anchor: Target name for links. If empty, no links lead to the heading.
+        anchor: Identifier that links to this heading use. Empty if no link leads here.
 
     Returns:
         HTML.
@@ -116,7 +116,7 @@ def table(
 ) -> str:
     """Makes a table whose columns are as wide as their contents.
 
-    Numbers are aligned to the right. Verdicts have colors.
+    Numbers are aligned to the right. Verdicts, for example "pass", have colors.
 
     Args:
         headings: One heading for each column. If all are empty, the table has no row of
@@ -127,7 +127,7 @@ def table(
         dense: Whether to use small type, for matrices.
 
     Returns:
-        HTML. If the table is too wide for the page, the table can be scrolled.
+        HTML. If the table is wider than the page, the reader can scroll the table.
     """
     kind = ' class="dense"' if dense else ""
     top = f"<caption>{_inline(caption)}</caption>" if caption else ""
@@ -192,15 +192,15 @@ def _inline(text: str) -> str:
 
 
 def figure_html(figure: Figure, name: str, caption: str, *, scale: bool = False) -> str:
-    """Makes a matplotlib figure part of the page, as inline SVG.
+    """Makes a matplotlib figure part of an HTML page, as inline SVG.
 
     Args:
-        figure: Figure of matplotlib.
-        name: Name of letters, digits and underscores, different for each figure of a
-            page.
+        figure: The figure.
+        name: Beginning of all identifiers in the SVG: letters, digits and underscores.
+            Each figure of a page needs a different name.
         caption: Text below the figure.
-        scale: Whether lightness encodes a value. If so, the dark mode of the page keeps
-            the colors of the figure.
+        scale: Whether the lightness of a color represents a value in this figure. If
+            true, the page does not change the colors in dark mode.
 
     Returns:
         HTML. The same figure always gives the same HTML.
@@ -250,12 +250,12 @@ def file_links(files: Iterable[tuple[str, str]]) -> str:
 
 
 def equation(tex: str, name: str, text: str) -> str:
-    """Makes a formula on a line of its own.
+    """Shows a formula on a line of its own.
 
     Args:
         tex: Formula in matplotlib's subset of TeX, without dollar signs.
-        name: Name of letters, digits and underscores, different for each figure of a
-            page.
+        name: Beginning of all identifiers in the SVG: letters, digits and underscores.
+            Each figure of a page needs a different name.
         text: Formula in words or plain characters, for screen readers.
 
     Returns:
@@ -273,9 +273,9 @@ def equation(tex: str, name: str, text: str) -> str:
 def _embed(svg: str, name: str, label: str) -> str:
     """Turns the text of an SVG file into an element of an HTML page.
 
-    Identifiers must be unique on the page. If the SVG refers to an identifier, the
-    function puts the figure's name in front of the identifier. The function removes all
-    other identifiers.
+    Identifiers must be unique on the page. If another part of the SVG refers to an
+    identifier, the function puts the figure's name in front of the identifier. The
+    function removes all other identifiers.
     """
     svg = svg[svg.index("<svg") :].strip()
     svg = re.sub(r"(?s)<metadata>.*?</metadata>", "", svg)
@@ -300,10 +300,10 @@ def section(
     level: int = 2,
     fresh: bool = False,
 ) -> str:
-    """Makes a section: a heading, followed by parts of the page.
+    """Makes a section of a page: a heading and the parts below the heading.
 
     Args:
-        anchor: Target name for links from the table of contents.
+        anchor: Identifier that links to this section use.
         title: Plain text of the heading.
         parts: Parts in HTML.
         level: Level of the heading, from 1 to 4.

@@ -111,15 +111,16 @@ def bootstrap_interval(
 def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
     """Computes a confidence interval of a median from order statistics.
 
-    The interval is valid for any distribution. The number of samples below the true
-    median has a binomial distribution. This distribution determines the ranks of the
-    two samples that bound the interval. At 95 % confidence, fewer than six samples are
-    too few for such a pair. The interval is then the range of the samples.
+    The interval is valid for any distribution of the samples. The number of samples
+    below the true median has a binomial distribution. This distribution determines
+    which two of the sorted samples bound the interval. At 95 % confidence, this needs
+    at least six samples. With fewer samples, the interval extends from the least to the
+    greatest sample.
 
     Args:
         values: (n,) independent samples, n >= 1.
         confidence: Least probability that an interval of this kind contains the true
-            value.
+            median.
 
     Returns:
         Both ends of the interval. Each end is one of the samples.

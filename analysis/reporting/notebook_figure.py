@@ -11,10 +11,11 @@ _DPI = 100
 
 
 class NotebookFigure(Figure):
-    """A matplotlib figure that a notebook shows if it is the last value of a cell.
+    """A matplotlib figure that a notebook shows as the last value of a cell.
 
-    Figures of pyplot do the same, but pyplot keeps all figures in memory and chooses a
-    window system. Figures of this class belong to their callers only.
+    Notebooks show figures of pyplot in the same way. But pyplot keeps all figures in
+    memory and chooses a window system. A figure of this class can be deleted like any
+    other object.
     """
 
     def _repr_png_(self) -> bytes:

@@ -88,13 +88,15 @@ def luminance(colour: Any) -> float:
 def contrast(first: Any, second: Any) -> float:
     """Computes the contrast ratio of two colors, as defined by WCAG 2.2.
 
+    The ratio is (L1 + 0.05) / (L2 + 0.05), where L1 and L2 are the luminances of the
+    lighter and the darker color. The number 0.05 represents stray light.
+
     Args:
         first: Color in any form of matplotlib.
         second: Color in any form of matplotlib.
 
     Returns:
-        Ratio of the luminances, from 1 to 21. The function first adds 0.05 to each
-        luminance, for stray light.
+        Ratio from 1 to 21.
     """
     less, more = sorted((luminance(first), luminance(second)))
     return (more + 0.05) / (less + 0.05)

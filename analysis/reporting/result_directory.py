@@ -24,7 +24,8 @@ class ResultDirectory:
 
         Args:
             path: The directory.
-            made: Directories that were created for this purpose, innermost first.
+            made: New directories among ``path`` and its parents, innermost first.
+                ``undo`` removes them.
 
         Raises:
             InputError: Another process has locked the directory, or the directory is no
@@ -53,14 +54,14 @@ class ResultDirectory:
             self._lock = -1
 
     def undo(self, *, contents: bool = False) -> None:
-        """Removes the directories that were created, if they are empty, and unlocks.
+        """Unlocks the directory, and removes it if this process created it.
 
-        The removal includes parent directories. Directories that existed before are
-        kept.
+        Parent directories that this process created are removed, too. Directories that
+        are not empty are kept, unless ``contents`` is true.
 
         Args:
-            contents: Whether to remove the result directory with all its contents. This
-                applies only if the directory was created for this purpose.
+            contents: Whether to remove the result directory together with its contents,
+                if this process created the directory.
         """
         if contents and self.path in self._made:
             shutil.rmtree(self.path, ignore_errors=True)
@@ -131,8 +132,8 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
 
     Args:
         out: Directory that the user named.
-        parent: Whether the directory may contain files. If true, the result directory
-            is created inside this directory.
+        parent: Whether ``out`` is only the parent of the new directory. If true,
+            ``out`` may contain files.
 
     Returns:
         Absolute path without symbolic links.

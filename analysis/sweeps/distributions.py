@@ -191,12 +191,12 @@ class Distribution(Parameters):
         return self.choice is None and self.boxes is None and self.sector is None
 
     def draw(self, generator: np.random.Generator, count: int = 1) -> list[Any]:
-        """Draws a value once, for one or several fields.
+        """Draws one value, and derives from it the values of one or several fields.
 
         Args:
             generator: Generator of random numbers.
-            count: Number of fields that get a value. If ``each`` is set, the same as
-                its number of entries.
+            count: Number of fields. If ``each`` is set, it has one entry for each
+                field.
 
         Returns:
             Value for each field, as plain Python types.

@@ -143,7 +143,7 @@ class Marginal:
     labels: tuple[str, ...]
     """Names of the choices; empty if the field is a number."""
     estimates: tuple[Estimate, ...]
-    """Estimate of the quantity in each bin."""
+    """Estimate of the quantity in each bin, with its confidence interval."""
 
 
 def marginal(

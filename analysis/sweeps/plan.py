@@ -132,9 +132,9 @@ class SweepPlan(Parameters):
     def base(self) -> dict[str, Any]:
         """Fields of the scenario file after ``set`` is applied.
 
-        The caller must not change this mapping. If another field of the sweep sets an
-        element of a list, the mapping contains the whole list. That is the case even if
-        the scenario file omits the list.
+        The caller must not change this mapping. Another field of the sweep may set an
+        element of a list. The mapping then contains the whole list, even if the
+        scenario file omits the list.
         """
         data = written_fields(self.source)
         _state_lists(data, scenario_from_mapping(data), self.set)
@@ -195,14 +195,14 @@ class SweepPlan(Parameters):
         return points
 
     def check(self) -> None:
-        """Checks the first cells of the grid quickly, before all runs are drawn.
+        """Checks the first 64 cells of the grid, before all runs are drawn.
 
-        Each cell is checked without draws and with the first draws. Values are rejected
-        only if both scenarios are not valid. ``points`` is slower, but finds all
-        faults.
+        Each cell is checked without random draws, and with the first draws. A cell is
+        rejected only if both scenarios are not valid. This check is quick. ``points``
+        is slower, but finds all faults.
 
         Raises:
-            InputError: The scenario of one of the first 64 cells is not valid.
+            InputError: One of these cells is not valid.
         """
         drawn = dict(self._draws([self.seed, 0, 0]))
         for cell, fields in enumerate(self.cells()[:_FIRST_CELLS]):

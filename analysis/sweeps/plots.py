@@ -170,15 +170,16 @@ def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
 
 
 def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
-    """Draws each quantity over one drawn field.
+    """Draws each quantity as a function of one randomly drawn field.
 
-    A field of the grid may have a few values only. The first such field has one curve
-    for each of its values. Each curve combines the runs over all other fields.
+    If a field of the grid has few enough values, the picture has one curve for each of
+    these values. If several fields have, the first field is used. Each curve combines
+    the runs over all other fields.
 
     Args:
         plan: Plan of the sweep.
         results: Results of the sweep, from ``load_results``.
-        key: Key of ``plan.draw``, for the horizontal axis.
+        key: Key of the drawn field in ``plan.draw``.
 
     Returns:
         Picture with one panel for each quantity.

@@ -66,13 +66,13 @@ class WorkerProcess:
         self._send(task)
 
     def receive(self) -> Outcome | None:
-        """Waits for the next message of the process.
+        """Waits for the next message of the worker process.
 
         Returns:
             Result of a task. None if the message says that the process is ready.
 
         Raises:
-            EOFError: The process has ended.
+            EOFError: The process ended after it was ready.
             WorkerError: The process ended before it was ready.
         """
         try:

@@ -43,14 +43,14 @@ class PreparedSweep:
     """Whether to use the compiled engine for scenarios that do not choose an engine."""
 
     def run(self, progress: Callable[[int], None] | None = None) -> pd.DataFrame:
-        """Does all runs that are not in the directory yet.
+        """Does all runs of the sweep whose results are not in the directory yet.
 
         Args:
             progress: Function that is called a few times per second with the number of
                 finished runs. If it raises an exception, the sweep ends.
 
         Returns:
-            Table of the results, as from ``load_results``.
+            Table with one row per run, as from ``load_results``.
 
         Raises:
             StoreError: The disk is full or faulty.
@@ -174,7 +174,7 @@ def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
         engine: Engine that did the run: ``drake`` or ``compiled``.
 
     Returns:
-        One line with quotes for a shell.
+        Command in one line, with quotes for the shell.
     """
     words = ["phonotaxis", "simulate", str(out / "scenario.yaml")]
     for path, value in point.fields.items():
@@ -185,10 +185,11 @@ def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
 
 
 def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
-    """Builds one block diagram for each text or group among the values of the fields.
+    """Builds the block diagrams of some runs, to find faults before the sweep starts.
 
-    Some faults appear only when the diagram is built, for example an unknown law. The
-    function finds these faults before the sweep starts.
+    Some faults appear only when a diagram is built, for example an unknown law. The
+    function builds the diagram of the first run. It also builds the diagram of every
+    run in which a field has a new text or mapping as its value.
 
     Returns:
         Whether to use the compiled engine for scenarios that do not choose an engine.
