@@ -124,7 +124,7 @@ def sweep(
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> SweepResult:
-    """Runs many variants of a scenario, from a grid and from random draws.
+    """Runs many variants of a scenario, from a grid of values and from random draws.
 
     Args:
         plan: Plan of the sweep, or its YAML file (docs/compare.md).
@@ -241,9 +241,9 @@ def stability(
     Args:
         scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
             path of a YAML file.
-        laws: Names of the laws to compare, as a list or as one text with commas.
-            ``all`` means all laws that avoid obstacles, or all laws for routes. If
-            empty, the law of the scenario.
+        laws: Names of the control laws to compare, as a list or as one text with
+            commas. ``all`` means all laws that avoid obstacles, or all laws for routes.
+            If empty, the law of the scenario.
         robot: Name of the robot to analyze. None means the first robot.
         full: Whether to include the parts that take minutes.
         progress: Function that is called with the name of each part before its

@@ -217,9 +217,8 @@ def _prepare_process() -> None:
 def _read_utf_8() -> None:
     """Makes UTF-8 the encoding in which this process opens text files.
 
-    While Drake is loaded, it reads some of its own Python files, which are UTF-8. Drake
-    reads them in the encoding of the locale. If this encoding is ASCII, loading Drake
-    fails.
+    Some Python files of Drake are UTF-8, but Drake reads them in the encoding of the
+    locale. If this encoding is ASCII, loading Drake fails.
 
     Raises:
         InputError: The system has no locale with UTF-8.

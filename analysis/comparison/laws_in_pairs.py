@@ -64,7 +64,7 @@ class Comparison:
 
 
 def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Comparison:
-    """Summarizes a sweep in which all control laws meet the same layouts.
+    """Summarizes a parameter sweep in which all control laws meet the same layouts.
 
     A layout is one variant of the positions and motions of all bodies. Rates have
     Wilson's confidence intervals. Medians have confidence intervals from order

@@ -44,9 +44,9 @@ def comparison_page(
     The page shows the pictures and replays that exist in its directory.
 
     Args:
-        summary: Document from ``compare_summary``.
-        comparisons: Cells and pairs of each scenario, by the scenario's name.
-        pooled: Pairs of laws over all scenarios together.
+        summary: JSON document from ``compare_summary``.
+        comparisons: Results of each scenario, by the scenario's name.
+        pooled: Comparisons of each pair of control laws over all scenarios together.
         directory: Directory that the page will be written to.
 
     Returns:

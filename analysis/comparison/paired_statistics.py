@@ -99,7 +99,8 @@ def paired_median(
 
     Returns:
         Medians, and the interval of the median difference, in the unit of the metric.
-        All are None if no layout has values of both methods.
+        The result also contains the p-value of the Wilcoxon signed-rank test. If no
+        layout has values of both methods, these numbers are None.
     """
     from scipy.stats import wilcoxon
 

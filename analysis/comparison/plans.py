@@ -63,7 +63,8 @@ def comparison_plan(
         grid: Lists of values of other fields to compare, by dotted path.
 
     Returns:
-        Plan of the sweep. ``law`` is the first field of its grid, and ``pair`` is true.
+        Plan of the parameter sweep. ``law`` is the first field of its grid, and
+        ``pair`` is true.
 
     Raises:
         InputError: An argument is unknown or not valid. The message names the field.
@@ -124,7 +125,7 @@ def comparison_plans(
     Args:
         scenarios: Names or files of scenarios; see ``comparison_plan``. If empty, the
             experiments of the papers.
-        laws: Names of laws, separated by commas. None means the default of
+        laws: Names of control laws, separated by commas. None means the default of
             ``comparison_plan``.
         velocity_terms: ``printed``, ``closing``, or both separated by a comma.
         runs: Number of layouts per scenario.

@@ -37,8 +37,8 @@ def compare_summary(
 
     Args:
         prepared: Plans and directory of the comparison.
-        comparisons: Cells and pairs of each scenario, by the scenario's name.
-        pooled: Pairs of laws over all scenarios together.
+        comparisons: Results of each scenario, by the scenario's name.
+        pooled: Comparisons of each pair of control laws over all scenarios together.
 
     Returns:
         Plain values that can be written as JSON.
@@ -81,17 +81,17 @@ def write_comparison(
     The function writes these files into the directory of the comparison:
 
     - ``summary.json``: the JSON document.
-    - ``rates.png``: rates and medians of all laws.
+    - ``rates.png``: rates and medians of all control laws.
     - One picture of example runs per scenario.
     - ``report.html``: a page that shows the results and the pictures.
-    - ``examples/``: a scenario file for each example, so that users can repeat the run,
-      and a replay of each law's typical run.
+    - ``examples/``: a scenario file for each example, so that users can repeat the run.
+      For the typical run of each law, the folder also contains a replay.
 
     Args:
         prepared: Prepared comparison, whose directory exists.
-        comparisons: Cells and pairs of each scenario, by the scenario's name.
-        pooled: Pairs of laws over all scenarios together.
-        summary: Document from ``compare_summary``.
+        comparisons: Results of each scenario, by the scenario's name.
+        pooled: Comparisons of each pair of laws over all scenarios together.
+        summary: JSON document from ``compare_summary``.
     """
     from analysis.comparison.page import comparison_page
     from analysis.comparison.plots import plot_examples, plot_rates

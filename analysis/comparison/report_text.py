@@ -41,9 +41,9 @@ def compare_text(
     """Makes the tables of a comparison for a terminal.
 
     Args:
-        summary: Document from ``compare_summary``.
-        comparisons: Cells and pairs of each scenario, by the scenario's name.
-        pooled: Pairs of laws over all scenarios together.
+        summary: JSON document from ``compare_summary``.
+        comparisons: Results of each scenario, by the scenario's name.
+        pooled: Comparisons of each pair of control laws over all scenarios together.
 
     Returns:
         Lines of text, without a newline after the last line.

@@ -1,8 +1,8 @@
-"""Runs of a sweep on a Dask cluster.
+"""Runs of a parameter sweep on a Dask cluster.
 
 Each thread of a Dask worker runs the scenarios in a ``WorkerProcess``, as a local sweep
-does. The reason is memory: Drake never frees blocks that are written in Python, and a
-Dask worker lives for a long time.
+does. This limits the use of memory: Drake never frees blocks that are written in
+Python, and a Dask worker lives for a long time.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def _trouble(client: Any) -> str:
 def run_on_cluster(
     tasks: Iterator[Task], pulse: Callable[[], None], *, client: Any
 ) -> Generator[Outcome]:
-    """Runs the tasks of a sweep on a cluster.
+    """Runs the tasks of a parameter sweep on a cluster.
 
     If a Dask worker is lost, other workers repeat its runs. If a run takes several
     workers down with it, this run counts as failed.
@@ -141,14 +141,14 @@ class _Patience:
         self._seen, self._warned = monotonic(), False
 
     def watch(self, threads: int) -> None:
-        """Warns after 5 s without workers, and ends the sweep after 600 s.
+        """Warns after 5 s without workers, and raises an error after 600 s.
 
         Args:
             threads: Number of threads that all workers of the cluster have at this
                 time.
 
         Raises:
-            WorkerError: There have been no workers for ``PATIENCE_S``.
+            WorkerError: There have been no workers for ``PATIENCE_S``, 600 s.
         """
         if threads:
             self._seen, self._warned = monotonic(), False

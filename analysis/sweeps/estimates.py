@@ -102,7 +102,10 @@ def ended(results: pd.DataFrame) -> pd.DataFrame:
 def figure_table(
     plan: SweepPlan, results: pd.DataFrame
 ) -> tuple[list[str], list[list[str]]]:
-    """Makes the table of estimates for each cell of the grid, with intervals.
+    """Makes a table of the estimates of a parameter sweep, with confidence intervals.
+
+    The table has one row for each cell of the grid. A cell is one combination of the
+    values in the grid.
 
     Args:
         plan: Plan of the sweep.
@@ -121,14 +124,16 @@ def figure_table(
 
 
 def by_cell(plan: SweepPlan, results: pd.DataFrame) -> list[pd.DataFrame]:
-    """Splits the runs of a sweep by the cells of its grid.
+    """Splits the runs of a parameter sweep by the cells of its grid.
+
+    A cell is one combination of the values in the grid.
 
     Args:
         plan: Plan of the sweep.
         results: Results of the sweep, from ``load_results``.
 
     Returns:
-        Runs of each cell, in the order of ``plan.cells()``.
+        Table of the runs of each cell, in the order of ``plan.cells()``.
     """
     return [results[results["cell"] == k] for k in range(len(plan.cells()))]
 
@@ -149,13 +154,14 @@ class Marginal:
 def marginal(
     plan: SweepPlan, key: str, runs: pd.DataFrame, quantity: Quantity
 ) -> Marginal:
-    """Estimates a quantity as a function of one drawn field.
+    """Estimates a quantity as a function of one randomly drawn field.
 
-    The runs are sorted into bins by the value of the field. Numbers are split into bins
-    with about the same number of runs. Other values have one bin for each choice.
+    The runs are sorted into bins by the value of the field. If the field is a number,
+    the bins have about the same number of runs. Otherwise, each possible value has a
+    bin.
 
     Args:
-        plan: Plan of the sweep.
+        plan: Plan of the parameter sweep.
         key: Key of ``plan.draw``. If the key lists several paths, the first path
             represents all of them.
         runs: Runs that came to an end; see ``ended``.
@@ -189,7 +195,7 @@ def shown(quantity: Quantity, estimate: Estimate) -> str:
     """Writes an estimate with its confidence interval for readers.
 
     Args:
-        quantity: Quantity that was estimated.
+        quantity: Quantity that was estimated: a rate or a median.
         estimate: Value and both ends of its interval, in the unit of the quantity.
 
     Returns:
@@ -205,13 +211,13 @@ def shown(quantity: Quantity, estimate: Estimate) -> str:
 
 
 def cell_label(fields: dict[str, Any]) -> str:
-    """Describes a cell of the grid: the last part of each path, and its value.
+    """Describes a cell of a grid, which is one combination of values, in a short text.
 
     Args:
         fields: Values of the grid's fields in this cell, by dotted path.
 
     Returns:
-        The text, or ``all runs`` if there are no fields.
+        Last part of each path with its value, or ``all runs`` if there are no fields.
     """
     pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
     return ", ".join(pairs) or "all runs"

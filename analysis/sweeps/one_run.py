@@ -89,7 +89,7 @@ def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
     """Rejects results in which every run failed.
 
     Args:
-        tables: Results of each sweep, from ``load_results``.
+        tables: Results of each parameter sweep, from ``load_results``.
         out: Directory of the results, for the message.
 
     Raises:
@@ -170,7 +170,7 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     The table has these columns:
 
     - Each entry of the row, except mappings.
-    - Each field of the sweep, by its dotted path.
+    - Each field of the parameter sweep, by its dotted path.
     - Each metric.
 
     Numbers are float64, and missing numbers are NaN. Numbers and seeds of runs are

@@ -18,7 +18,7 @@ def check_options(
     scheduler: str | None = None,
     resume: bool = False,
 ) -> None:
-    """Checks the options of a sweep before anything is computed.
+    """Checks the options of a parameter sweep before anything is computed.
 
     Args:
         out: Directory of the results. None means the next number under results/.

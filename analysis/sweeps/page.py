@@ -44,14 +44,16 @@ def write_sweep(
     results: pd.DataFrame,
     summary: dict[str, Any],
 ) -> None:
-    """Writes ``summary.json`` and ``report.html`` into the directory of a sweep.
+    """Writes the summary and the HTML page of a parameter sweep into its directory.
+
+    The files are ``summary.json`` and ``report.html``.
 
     Args:
         plan: Plan of the sweep.
         points: All runs of the plan.
         results: Results of the sweep, from ``load_results``.
-        summary: Document from ``sweep_summary``. It names the directory, which must
-            exist.
+        summary: JSON document from ``sweep_summary``. It names the directory, which
+            must exist.
     """
     out = Path(summary["out"])
     write_json(summary, out / "summary.json")
@@ -66,13 +68,13 @@ def sweep_page(
     results: pd.DataFrame,
     summary: dict[str, Any],
 ) -> str:
-    """Makes the HTML page of a sweep.
+    """Makes the HTML page of a parameter sweep.
 
     Args:
         plan: Plan of the sweep.
         points: All runs of the plan.
         results: Results of the sweep, from ``load_results``.
-        summary: Document from ``sweep_summary``.
+        summary: JSON document from ``sweep_summary``.
 
     Returns:
         HTML.

@@ -58,10 +58,11 @@ class SweepPoint:
 
 
 class SweepPlan(Parameters):
-    """Plan of a sweep: which variants of a scenario to run; see docs/compare.md.
+    """Plan of a parameter sweep: the variants of a scenario to run.
 
-    A field has a dotted path, as for ``--set``. A key of ``draw`` may list several
-    paths, separated by commas. All these fields then get the same drawn value.
+    The format is described in docs/compare.md. A field has a dotted path, for example
+    ``source.speed_m_s``. A key of ``draw`` may list several paths, separated by commas.
+    All these fields then get the same drawn value.
     """
 
     name: str = Field(default="sweep", min_length=1, pattern=r"^[^\n]*$")
@@ -132,9 +133,9 @@ class SweepPlan(Parameters):
     def base(self) -> dict[str, Any]:
         """Fields of the scenario file after ``set`` is applied.
 
-        The caller must not change this mapping. Another field of the sweep may set an
-        element of a list. The mapping then contains the whole list, even if the
-        scenario file omits the list.
+        The caller must not change this mapping. Another field of the parameter sweep
+        may set an element of a list. The mapping then contains the whole list, even if
+        the scenario file omits the list.
         """
         data = written_fields(self.source)
         _state_lists(data, scenario_from_mapping(data), self.set)
@@ -197,9 +198,10 @@ class SweepPlan(Parameters):
     def check(self) -> None:
         """Checks the first 64 cells of the grid, before all runs are drawn.
 
-        Each cell is checked without random draws, and with the first draws. A cell is
-        rejected only if both scenarios are not valid. This check is quick. ``points``
-        is slower, but finds all faults.
+        A cell is one combination of the values in the grid. Each cell is checked
+        without random draws, and with the first draws. A cell is rejected only if both
+        scenarios are not valid. This check is quick. ``points`` is slower, but finds
+        all faults.
 
         Raises:
             InputError: One of these cells is not valid.
@@ -309,7 +311,7 @@ class SweepPlan(Parameters):
 
 
 def load_sweep(path: str | Path) -> SweepPlan:
-    """Loads the plan of a sweep from a file.
+    """Loads the plan of a parameter sweep from a file.
 
     Args:
         path: YAML file with the fields of ``SweepPlan``. Relative paths in the file
@@ -356,10 +358,10 @@ def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
 def _state_lists(
     data: dict[str, Any], scenario: Scenario, paths: Iterable[str]
 ) -> None:
-    """Adds lists to the fields of a scenario, so that their elements can be set.
+    """Adds lists to the fields of a scenario, so that their elements can be set later.
 
-    A list is added if a path leads into it and the fields do not contain it yet. The
-    list gets its value in the scenario.
+    A list is added if a path leads into the list and the fields do not contain it yet.
+    The added list has its value from ``scenario``.
 
     Args:
         data: Fields of a scenario, changed in place.

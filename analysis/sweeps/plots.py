@@ -44,7 +44,7 @@ def plot_heat_maps(
     """Draws a heat map of each quantity over two fields of the grid.
 
     Args:
-        plan: Plan of the sweep.
+        plan: Plan of the parameter sweep.
         results: Results of the sweep, from ``load_results``.
         x: Dotted path of the field along the horizontal axis.
         y: Dotted path of the field along the vertical axis.
@@ -152,12 +152,12 @@ def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
     """Draws each quantity over the only field of the grid, with 95 % intervals.
 
     Args:
-        plan: Plan of the sweep, whose grid has one field.
+        plan: Plan of the parameter sweep, whose grid has one field.
         results: Results of the sweep, from ``load_results``.
         x: Dotted path of this field.
 
     Returns:
-        Picture with one panel for each quantity.
+        Picture with one panel for each quantity, for example the success rate.
     """
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
@@ -177,7 +177,7 @@ def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
     the runs over all other fields.
 
     Args:
-        plan: Plan of the sweep.
+        plan: Plan of the parameter sweep.
         results: Results of the sweep, from ``load_results``.
         key: Key of the drawn field in ``plan.draw``.
 

@@ -110,7 +110,7 @@ class WorkerProcess:
 def run_locally(
     tasks: Iterator[Task], pulse: Callable[[], None], *, workers: int
 ) -> Generator[Outcome]:
-    """Runs the tasks of a sweep in local processes.
+    """Runs the tasks of a parameter sweep in local processes.
 
     A worker process may end during a run, for example if the system is out of memory.
     The run is then tried once more.

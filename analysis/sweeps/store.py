@@ -1,4 +1,4 @@
-"""The directory of a sweep, which keeps every finished run at once.
+"""The directory of a parameter sweep, which keeps every finished run at once.
 
 While a sweep is running, each finished run adds a line to ``runs.jsonl``. When all runs
 are finished, ``runs.parquet`` replaces this file.
@@ -47,7 +47,8 @@ class SweepStore:
         """Opens the directory of a plan's sweep, or creates the directory.
 
         Args:
-            out: Directory of the sweep. None means the next number under results/.
+            out: Directory of the parameter sweep. None means the next number under
+                results/.
             plan: Plan of the sweep.
             points: All runs of the plan, sorted by their number.
 
@@ -157,7 +158,7 @@ class SweepStore:
 
 
 def load_results(out: str | Path) -> pd.DataFrame:
-    """Loads the finished runs of a sweep, even while the sweep is running.
+    """Loads the finished runs of a parameter sweep, even while the sweep is running.
 
     Args:
         out: Directory of the sweep.
@@ -185,7 +186,7 @@ def trajectory_path(out: Path, index: int) -> Path:
     """Returns the file of a run's trajectory.
 
     Args:
-        out: Directory of the sweep.
+        out: Directory of the parameter sweep.
         index: Number of the run, from 0.
 
     Returns:

@@ -24,7 +24,7 @@ _NO_METRICS = ("index", "cell", "run", "seed", "redraws", "wall_s")
 def sweep_summary(
     plan: SweepPlan, points: list[SweepPoint], results: pd.DataFrame, out: Path
 ) -> dict[str, Any]:
-    """Makes the JSON document of a sweep.
+    """Makes the JSON document of a parameter sweep.
 
     Args:
         plan: Plan of the sweep.
@@ -92,10 +92,11 @@ def _plain(estimate: Estimate, name: str) -> dict[str, float | None]:
 
 
 def sweep_text(plan: SweepPlan, results: pd.DataFrame) -> str:
-    """Makes a text with the estimates of each cell and the warnings of each field.
+    """Makes a text of the results of a parameter sweep.
 
-    Each cell has one line, with 95 % confidence intervals. Each field with warnings has
-    one line.
+    Each cell of the grid has one line with its estimates and their 95 % confidence
+    intervals. A cell is one combination of the values in the grid. Each field with
+    warnings has one line.
 
     Args:
         plan: Plan of the sweep.

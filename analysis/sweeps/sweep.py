@@ -43,7 +43,7 @@ class PreparedSweep:
     """Whether to use the compiled engine for scenarios that do not choose an engine."""
 
     def run(self, progress: Callable[[int], None] | None = None) -> pd.DataFrame:
-        """Does all runs of the sweep whose results are not in the directory yet.
+        """Does all runs of a parameter sweep that are not in its directory yet.
 
         Args:
             progress: Function that is called a few times per second with the number of
@@ -102,7 +102,7 @@ def prepare_sweep(
     scheduler: str | None = None,
     resume: bool = False,
 ) -> PreparedSweep:
-    """Draws and checks all runs, then opens the directory of the results.
+    """Draws and checks all runs of a parameter sweep, then opens its directory.
 
     Args:
         plan: Plan of the sweep.
@@ -142,7 +142,7 @@ def run_sweep(
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> pd.DataFrame:
-    """Prepares and runs a sweep; see ``prepare_sweep`` and ``PreparedSweep.run``.
+    """Prepares a parameter sweep and does all its runs.
 
     Args:
         plan: Plan of the sweep.
@@ -166,7 +166,7 @@ def run_sweep(
 
 
 def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
-    """Returns the shell command that repeats one run of a sweep.
+    """Returns the shell command that repeats one run of a parameter sweep.
 
     Args:
         out: Directory of the sweep, which contains the scenario file.
@@ -185,11 +185,11 @@ def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
 
 
 def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
-    """Builds the block diagrams of some runs, to find faults before the sweep starts.
+    """Builds the block diagrams of some runs, to find faults before all runs start.
 
-    Some faults appear only when a diagram is built, for example an unknown law. The
-    function builds the diagram of the first run. It also builds the diagram of every
-    run in which a field has a new text or mapping as its value.
+    Some faults appear only when a diagram is built, for example an unknown control law.
+    The function builds the diagram of the first run. It also builds the diagram of
+    every run in which a field has a new text or mapping as its value.
 
     Returns:
         Whether to use the compiled engine for scenarios that do not choose an engine.

@@ -12,7 +12,7 @@ SWEEP_SCHEMA_FILE = Path(__file__).with_name("sweep.schema.json")
 
 
 def read_sweep(path: str | Path) -> dict[str, Any]:
-    """Reads the fields of a sweep without checking them.
+    """Reads the fields of a parameter sweep without checking them.
 
     Args:
         path: YAML file with the fields of ``SweepPlan``. Relative paths in the file

@@ -1,4 +1,4 @@
-"""A worker process that does runs of a sweep for another process.
+"""A worker process that does runs of a parameter sweep for another process.
 
 The worker loads all code that a run needs once. Then the worker forks a child process,
 which does the runs. Drake never frees blocks that are written in Python, so that the
