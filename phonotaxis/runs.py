@@ -52,11 +52,11 @@ class RunResult(diagrams.RunResult):
                 signals of the sensors and the actuators over time.
 
         Returns:
-            The figure. Its method ``savefig`` writes it to a file.
+            The figure. Its method ``savefig`` writes the figure to a file.
 
         Raises:
-            InputError: ``what`` is unknown. Or the run has several robots, and each
-                robot has its own time series.
+            InputError: ``what`` is unknown. Or ``what`` is ``time_series`` and the run
+                has several robots. Each robot then has time series of its own.
         """
         from analysis.runs.proximity import Proximity
         from analysis.runs.run_plots import plot_time_series, plot_trajectory

@@ -177,7 +177,8 @@ def compare(
 
     Args:
         *scenarios: Names of scenarios in the library, YAML files of layouts, or YAML
-            files of scenarios. Without any, the four experiments of the papers.
+            files of scenarios. If none are given, the four experiments of the papers
+            are run.
         laws: Names of the laws, as a list or as one text with commas. None means the
             laws of the papers and driving without avoidance. For a scenario with
             routes, None means the laws for routes.
@@ -243,7 +244,7 @@ def stability(
             path of a YAML file.
         laws: Names of the control laws to compare, as a list or as one text with
             commas. ``all`` means all laws that avoid obstacles, or all laws for routes.
-            If empty, the law of the scenario.
+            An empty list means the law of the scenario.
         robot: Name of the robot to analyze. None means the first robot.
         full: Whether to include the parts that take minutes.
         progress: Function that is called with the name of each part before its

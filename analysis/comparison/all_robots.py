@@ -17,11 +17,10 @@ _WORST = ("minimum_", "least_"), ("_max_", "greatest_")
 
 
 def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
-    """Adds the metrics of all robots together to the results of a sweep.
+    """Adds the metrics of all robots together to the results of a parameter sweep.
 
-    A sweep runs many variants of a scenario. Its results have one row per run and, for
-    several robots, the columns of each robot. The value for all robots depends on the
-    metric:
+    The results have one row per run. If there are several robots, the results have
+    separate columns for each robot. The value for all robots depends on the metric:
 
     - Least distances and least times to contact: the smallest value of any robot.
     - Greatest values: the largest value of any robot.
@@ -35,7 +34,7 @@ def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
         robots: Names of the robots. With one robot, the table already has the metrics.
 
     Returns:
-        The table with the added columns; the same table for one robot.
+        The table with the added columns. With one robot, the table is unchanged.
     """
     if len(robots) < 2:
         return table

@@ -120,22 +120,23 @@ def comparison_plans(
     settings: Iterable[str] = (),
     grid: Iterable[str] = (),
 ) -> dict[str, SweepPlan]:
-    """Plans a comparison for each scenario of a command line.
+    """Plans a comparison of control laws for each scenario of a command line.
 
     Args:
-        scenarios: Names or files of scenarios; see ``comparison_plan``. If empty, the
-            experiments of the papers.
-        laws: Names of control laws, separated by commas. None means the default of
+        scenarios: Names or files of scenarios; see ``comparison_plan``. An empty list
+            means the experiments of the papers.
+        laws: Names of laws, separated by commas. None means the default of
             ``comparison_plan``.
         velocity_terms: ``printed``, ``closing``, or both separated by a comma.
-        runs: Number of layouts per scenario.
+        runs: Number of layouts per scenario. Each layout is a variant of the positions
+            and motions of all bodies.
         seed: Whole number as text. None means the default seed.
         settings: Values of other fields, each in the form ``key=value``.
         grid: Lists of values to compare, each in the form ``key=[value, ...]``.
 
     Returns:
-        Plans in the order of ``scenarios``, by the scenario's name without folder and
-        file ending.
+        Plans in the order of ``scenarios``. The key of a plan is the scenario's name,
+        without folder and file ending.
 
     Raises:
         InputError: An argument is not valid. The message names the option or the field.

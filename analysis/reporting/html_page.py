@@ -66,7 +66,7 @@ def heading(level: int, text: str, anchor: str = "") -> str:
     Args:
         level: Level from 1 to 4.
         text: Plain text.
-        anchor: Identifier that links to this heading use. Empty if no link leads here.
+        anchor: Identifier of the heading, for links. Empty if there are no such links.
 
     Returns:
         HTML.
@@ -303,7 +303,7 @@ def section(
     """Makes a section of a page: a heading and the parts below the heading.
 
     Args:
-        anchor: Identifier that links to this section use.
+        anchor: Identifier of the section, for links.
         title: Plain text of the heading.
         parts: Parts in HTML.
         level: Level of the heading, from 1 to 4.

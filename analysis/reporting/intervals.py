@@ -39,7 +39,8 @@ def with_interval(
         value: Estimated value.
         low: Lower end of the interval.
         high: Upper end of the interval.
-        form: Format of all three numbers, as for ``format``. Zeros have no minus sign.
+        form: Format of all three numbers, for Python's function ``format``. Zeros never
+            have a minus sign.
         unit: Unit after the value, with a leading space.
         factor: Factor that multiplies all three numbers before they are written.
 

@@ -169,13 +169,17 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 
     The table has these columns:
 
-    - Each entry of the row, except mappings.
+    - Each value of the row that is not a mapping.
     - Each field of the parameter sweep, by its dotted path.
+    - The ending of each robot, for example ``<name>.cause``, if there are several.
     - Each metric.
 
-    Numbers are float64, and missing numbers are NaN. Numbers and seeds of runs are
-    integers. These values are JSON text: warnings, fields whose values are lists or
-    mappings, and fields with values of different types.
+    The types are as follows:
+
+    - ``index``, ``cell``, ``run``, ``seed`` and ``redraws`` are integers.
+    - Metrics and times are float64. A missing number is NaN.
+    - Warnings are JSON text.
+    - A field is JSON text if its values are lists or mappings, or have different types.
 
     Args:
         rows: Rows of ``Outcome``, in any order.

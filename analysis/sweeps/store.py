@@ -1,4 +1,4 @@
-"""The directory of a parameter sweep, which keeps every finished run at once.
+"""The directory of a parameter sweep, which saves each run as soon as the run ends.
 
 While a sweep is running, each finished run adds a line to ``runs.jsonl``. When all runs
 are finished, ``runs.parquet`` replaces this file.

@@ -16,7 +16,7 @@ def listing(
     Args:
         plural: Key of the list in the JSON document.
         about: Key of each entry's text in the JSON document.
-        rows: Returns a mapping from each name to one line of text.
+        rows: Function that returns a mapping from each name to one line of text.
 
     Returns:
         The job, which writes no files.
