@@ -96,8 +96,8 @@ def run_on_cluster(
 ) -> Generator[Outcome]:
     """Runs the tasks of a parameter sweep on a cluster.
 
-    If a Dask worker is lost, other workers repeat its runs. If a run takes several
-    workers down with it, this run counts as failed.
+    If a Dask worker is lost, other workers repeat its runs. If several workers are lost
+    during the same run, this run counts as failed.
 
     Args:
         tasks: Tasks to run.
