@@ -1,1 +1,1 @@
-"""Data in, data out; plots and reports on top, in files of their own."""
+"""Analysis of runs and models: computations on data, with plots and reports on top."""

@@ -1,4 +1,4 @@
-"""What of an installation works, and how to mend what does not."""
+"""Checks of the installation, with a remedy for each fault."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
 
-#: A run's files take some MB, compiled code some hundred.
+#: Least free space on the disk, MB. The files of a run take some MB, and compiled code
+#: takes some hundred MB.
 LEAST_FREE_MB = 500
-#: Packages by the module whose loading shows that they work.
+#: Packages, each with a module. If the module can be loaded, the package works.
 _PACKAGES = {
     "drake": "pydrake.systems.framework",
     "numpy": "numpy",
@@ -35,21 +36,22 @@ _BROWSERS = ("chromium", "google-chrome", "chromium-browser", "firefox")
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """One thing that was looked at."""
+    """Result of the check of one part of the installation."""
 
     name: str
     verdict: Literal["ok", "note", "bad"]
-    """``note``: something optional is missing; ``bad``: runs would fail."""
+    """``ok``: the part works. ``note``: an optional part is missing. ``bad``: runs
+    would fail."""
     found: str
     remedy: str = ""
-    """What to do; empty: nothing."""
+    """Advice to the user; empty if nothing needs to be done."""
 
 
 def examine() -> list[Diagnosis]:
-    """Looks at everything that runs need, and at what is of use besides.
+    """Checks everything that runs need, and some optional parts.
 
     Returns:
-        A finding each.
+        One result for each checked part.
     """
     return [
         _python(),

@@ -1,4 +1,4 @@
-"""Failures that are not bad input, and how a command reports them."""
+"""Failures other than bad input, and their messages to the user."""
 
 from __future__ import annotations
 
@@ -15,16 +15,19 @@ _OURS = ("systems", "diagrams", "analysis", "phonotaxis")
 
 
 class RunError(Exception):
-    """A run that began and could not go on, in one line."""
+    """A run started but could not continue; the message has one line."""
 
 
 @contextlib.contextmanager
 def no_exit() -> Iterator[None]:
-    """Within it, whatever raises something that is no Exception has failed.
+    """Turns any attempt to end the process within the ``with`` block into an error.
+
+    For example, code of a user or of Drake may call ``sys.exit``. The function converts
+    every exception that is not an ``Exception``, including interrupts.
+    ``Interrupts.watched`` later recognizes the interrupts.
 
     Raises:
-        RunError: Something did, as ``sys.exit`` in a user's block or in Drake. An
-            interrupt becomes one, too: ``Interrupts.watched`` knows it.
+        RunError: The block raised such an exception.
     """
     try:
         yield
@@ -38,7 +41,7 @@ def no_exit() -> Iterator[None]:
 
 
 def failure_text(error: Exception) -> str:
-    """One line about an exception that is no complaint about input."""
+    """Describes an exception other than an input error in one line."""
     if isinstance(error, RunError):
         text = str(error)
     elif isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
@@ -54,7 +57,7 @@ def failure_text(error: Exception) -> str:
 
 
 def _where(error: BaseException) -> str:
-    """File and line that raised; the last of ours, where there is one."""
+    """File and line that raised the exception; prefers the last of our own files."""
     frames = traceback.extract_tb(error.__traceback__)
     named = [(_inside(Path(frame.filename)), frame.lineno) for frame in frames]
     ours = [at for at in named if at[0].parts[0] in _OURS]

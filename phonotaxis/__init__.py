@@ -1,7 +1,8 @@
-"""A robot that follows a sound past obstacles: what scripts and notebooks import.
+"""A robot that follows a sound past obstacles: functions for scripts and notebooks.
 
-Nothing is loaded until it is used, so that ``import phonotaxis`` takes no time.
-What stands in ``__all__`` is public; CONTRIBUTING.md says what that promises.
+The package loads each part only when the part is used. ``import phonotaxis`` therefore
+takes no noticeable time. The names in ``__all__`` are public. CONTRIBUTING.md states
+which changes of public names are allowed.
 """
 
 from __future__ import annotations
@@ -55,10 +56,10 @@ __all__ = [
     "sweep",
 ]
 
-#: Of the package, as installed.
+#: Version of the installed package.
 __version__: str
 
-#: The module that each public name is in; the imports above tell type checkers.
+#: Module of each public name. Type checkers use the imports above instead.
 _HOMES = {
     "ArrayGeometry": "analysis.recordings.array_geometry",
     "ComparisonResult": "phonotaxis.studies",
@@ -83,7 +84,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Loads a public name when it is first asked for."""
+    """Loads a public name when it is used for the first time."""
     value: Any
     if name == "__version__":
         from importlib.metadata import version
@@ -102,17 +103,19 @@ def __dir__() -> list[str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command.
+    """Runs a command of the command line.
 
     Args:
-        arguments: Words after the program's name; none: those of the process,
-            which has nothing to do afterwards.
+        arguments: Words after the name of the program. None means the words of this
+            process, which must then end after the command.
 
     Returns:
-        Exit status: 0 done, 2 bad input, 1 anything else.
+        Exit status: 0 if the command succeeded, 2 if the input is not valid, 1 after
+        any other failure.
     """
     try:
-        # What loads, loads in here: an interrupt may strike meanwhile.
+        # All imports are inside the ``try`` statement, because an interrupt may come
+        # while they run.
         from analysis.commands.interrupts import Interrupts
 
         with Interrupts(last=arguments is None) as interrupts:
@@ -121,7 +124,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             words = sys.argv[1:] if arguments is None else arguments
             status = run_words(list(words), interrupts)
             if arguments is None:
-                # All is written; what a user's module prints at exit is no result.
+                # The results are written. Text that a user's module prints at exit is
+                # not a result and goes to standard error.
                 sys.stdout = sys.stderr
             return status
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""``python -m phonotaxis``: the command line."""
+"""``python -m phonotaxis``: runs the command line."""
 
 from __future__ import annotations
 

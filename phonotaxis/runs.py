@@ -1,4 +1,4 @@
-"""A run, and what can be made of it."""
+"""Single runs of a scenario, and the pictures and files that show a run."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ __all__ = ["RunResult", "simulate"]
 
 @dataclass(frozen=True, repr=False)
 class RunResult(diagrams.RunResult):
-    """What a run did, with its pictures and files."""
+    """Result of a run, with methods that make pictures and files."""
 
     @classmethod
     def of(cls, result: diagrams.RunResult) -> RunResult:
-        """The same result, each robot's included."""
+        """Converts a result of ``diagrams``, including the results of each robot."""
         values = {each.name: getattr(result, each.name) for each in fields(result)}
         values["several"] = {name: cls.of(own) for name, own in result.several.items()}
         return cls(**values)
@@ -39,22 +39,24 @@ class RunResult(diagrams.RunResult):
         )
 
     def summary(self) -> dict[str, Any]:
-        """The JSON document of ``phonotaxis simulate``: metrics, timing, versions."""
+        """Returns the JSON document of ``phonotaxis simulate``."""
         from analysis.runs.run_report import run_summary
 
         return run_summary(self, None)
 
     def plot(self, what: Literal["trajectory", "time_series"] = "trajectory") -> Figure:
-        """A picture of the run.
+        """Draws the run.
 
         Args:
-            what: The run seen from above, or what was heard, felt and done over time.
+            what: ``trajectory`` for the run seen from above. ``time_series`` for the
+                signals of the sensors and the actuators over time.
 
         Returns:
-            The figure; ``savefig`` writes it.
+            The figure. Its method ``savefig`` writes the figure to a file.
 
         Raises:
-            InputError: There is no such picture, or several robots have one each.
+            InputError: ``what`` is unknown. Or ``what`` is ``time_series`` and the run
+                has several robots. Each robot then has time series of its own.
         """
         from analysis.runs.proximity import Proximity
         from analysis.runs.run_plots import plot_time_series, plot_trajectory
@@ -72,16 +74,16 @@ class RunResult(diagrams.RunResult):
         return plot_time_series(self, Proximity(self).clearance)
 
     def replay(self, path: str | Path) -> Path:
-        """Writes a page that plays the run in a browser, without network.
+        """Writes an HTML page that replays the run in a browser, without a network.
 
         Args:
             path: The .html file.
 
         Returns:
-            The file.
+            Path of the file.
 
         Raises:
-            OSError: It cannot be written.
+            OSError: The file cannot be written.
         """
         from analysis.runs.replay import write_replay
 
@@ -95,10 +97,10 @@ class RunResult(diagrams.RunResult):
             path: The .mcap file.
 
         Returns:
-            The file.
+            Path of the file.
 
         Raises:
-            InputError: The packages for it are not installed.
+            InputError: The packages that write MCAP files are not installed.
             OSError: The file cannot be written.
         """
         from analysis.exports.mcap_file import write_mcap
@@ -108,46 +110,50 @@ class RunResult(diagrams.RunResult):
         return Path(path)
 
     def to_csv(self, path: str | Path) -> Path:
-        """Writes ``trajectory`` as text, a row a tick; no digit is lost.
+        """Writes the table ``trajectory`` as a CSV file.
+
+        The file has one row per tick (tick = control period). Its numbers have all
+        digits, so that reading the file gives the same numbers.
 
         Args:
             path: The .csv file.
 
         Returns:
-            The file.
+            Path of the file.
 
         Raises:
-            OSError: It cannot be written.
+            OSError: The file cannot be written.
         """
         self.trajectory.to_csv(path, index=False)
         return Path(path)
 
     def to_parquet(self, path: str | Path) -> Path:
-        """Writes ``trajectory`` as Apache Parquet.
+        """Writes the table ``trajectory`` as an Apache Parquet file.
 
         Args:
             path: The .parquet file.
 
         Returns:
-            The file.
+            Path of the file.
 
         Raises:
-            OSError: It cannot be written.
+            OSError: The file cannot be written.
         """
         self.trajectory.to_parquet(path, index=False)
         return Path(path)
 
     def save(self, directory: str | Path | None = None) -> Path:
-        """Writes all that ``phonotaxis simulate`` does into a new directory.
+        """Writes all files of ``phonotaxis simulate`` into a new directory.
 
         Args:
-            directory: It; none: the next number under ``results``.
+            directory: New or empty directory. None means the next number under
+                ``results``.
 
         Returns:
-            The directory.
+            Path of the directory.
 
         Raises:
-            InputError: It is in use, or cannot be made or written.
+            InputError: The directory is in use, or cannot be created or written.
         """
         from analysis.reporting.result_directory import whole_directory
         from analysis.runs.run_report import run_summary, write_run
@@ -167,17 +173,22 @@ def simulate(
     """Runs a scenario to its end.
 
     Args:
-        scenario: What to run: from ``load_scenario``, or a name or file for it.
-        engine: ``drake``, or ``compiled``: the same blocks in one compiled loop,
-            faster after a first run that compiles them; none: that of the scenario.
-        progress: Called with the simulated time, s, once a simulated second.
-        audio: Opened files for what is heard and played; none: nothing is saved.
+        scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
+            path of a YAML file.
+        engine: ``drake`` or ``compiled``. The compiled engine runs the same blocks in
+            one compiled loop. Its first run compiles the loop, and later runs are
+            faster than with Drake. None means the engine of the scenario.
+        progress: Function that is called once per simulated second with the simulated
+            time in seconds.
+        audio: Open files for the sound that the robot hears and plays. None means that
+            no sound is saved.
 
     Returns:
-        What happened.
+        Result of the run.
 
     Raises:
-        InputError: Something of the scenario is no good; names field and remedy.
+        InputError: The scenario is not valid. The message names the field and the
+            remedy.
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)

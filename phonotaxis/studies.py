@@ -1,4 +1,4 @@
-"""Many runs, laws side by side, and stability: what a script gets of them."""
+"""Studies of many runs: sweeps, comparisons of laws, and stability analysis."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ __all__ = [
 
 @dataclass(frozen=True, repr=False)
 class SweepResult:
-    """Many runs in one table."""
+    """Results of a sweep: many runs in one table."""
 
     plan: SweepPlan
     table: pd.DataFrame
-    """A row a run: its fields, how it ended, metrics (docs/compare.md)."""
+    """Table with one row per run: fields, ending and metrics (docs/compare.md)."""
     summary: dict[str, Any]
-    """The JSON document of ``phonotaxis sweep``."""
+    """JSON document of ``phonotaxis sweep``."""
     out: Path
-    """The directory, with ``report.html``."""
+    """Directory of the results, which contains ``report.html``."""
 
     def __repr__(self) -> str:
         return f"<SweepResult {self.plan.name}: {len(self.table)} runs in {self.out}>"
 
     def __str__(self) -> str:
-        """Tables on one screen."""
+        """Tables of the results, for a terminal."""
         from analysis.sweeps.summary import sweep_text
 
         return sweep_text(self.plan, self.table)
@@ -53,22 +53,22 @@ class SweepResult:
 
 @dataclass(frozen=True, repr=False)
 class ComparisonResult:
-    """Laws side by side on the same layouts."""
+    """Results of a comparison of laws on the same layouts."""
 
     comparisons: dict[str, Comparison]
-    """Cells and pairs by name of the scenario."""
+    """Cells and pairs of each scenario, by the scenario's name."""
     pooled: list[Pair]
     """Pairs of laws over all scenarios together."""
     summary: dict[str, Any]
     """The JSON document of ``phonotaxis compare``."""
     out: Path
-    """The directory."""
+    """Directory of the results."""
 
     def __repr__(self) -> str:
         return f"<ComparisonResult {', '.join(self.comparisons)} in {self.out}>"
 
     def __str__(self) -> str:
-        """Tables on one screen."""
+        """Tables of the results, for a terminal."""
         from analysis.comparison.report_text import compare_text
 
         return compare_text(self.summary, self.comparisons, self.pooled)
@@ -76,10 +76,10 @@ class ComparisonResult:
 
 @dataclass(frozen=True, repr=False)
 class StabilityResult:
-    """The stability of a scenario's loop, under one law or several."""
+    """Stability of a scenario's control loop, under one law or several laws."""
 
     analyses: list[LawAnalysis]
-    """One a law."""
+    """Analysis of each law."""
     summary: dict[str, Any]
     """The JSON document of ``phonotaxis stability``."""
 
@@ -88,22 +88,23 @@ class StabilityResult:
         return f"<StabilityResult {self.summary['scenario']}: {laws}>"
 
     def __str__(self) -> str:
-        """The verdicts on one screen."""
+        """Verdicts on the stability, for a terminal."""
         from analysis.stability.report_files import stability_text
 
         return stability_text(self.summary)
 
     def save(self, directory: str | Path | None = None) -> Path:
-        """Writes all that ``phonotaxis stability`` does into a new directory.
+        """Writes all files of ``phonotaxis stability`` into a new directory.
 
         Args:
-            directory: It; none: the next number under ``results``.
+            directory: New or empty directory. None means the next number under
+                ``results``.
 
         Returns:
-            The directory; ``report.html`` is in it.
+            Path of the directory, which contains ``report.html``.
 
         Raises:
-            InputError: It is in use, or cannot be made or written.
+            InputError: The directory is in use, or cannot be created or written.
         """
         from analysis.reporting.result_directory import whole_directory
         from analysis.stability.report_files import stability_document, write_stability
@@ -123,21 +124,22 @@ def sweep(
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> SweepResult:
-    """Runs many scenarios, drawn from distributions and grids.
+    """Runs many variants of a scenario, from a grid of values and from random draws.
 
     Args:
-        plan: What to run, or the YAML file that says it (docs/compare.md).
-        out: A new directory; none: the next number under ``results``.
-        workers: Number of local processes; none: one a core.
-        scheduler: Address of a Dask scheduler to use instead.
-        resume: Whether ``out`` may hold runs of the same plan, which are kept.
-        progress: Called with the number of runs done.
+        plan: Plan of the sweep, or its YAML file (docs/compare.md).
+        out: New or empty directory. None means the next number under ``results``.
+        workers: Number of local processes. None means one process per processor core.
+        scheduler: Address of a Dask scheduler, which then replaces the local processes.
+        resume: Whether ``out`` may contain runs of the same plan. These runs are kept.
+        progress: Function that is called with the number of finished runs.
 
     Returns:
-        Table and summary; the directory has them, too, and a page.
+        Table and summary of the runs. The directory contains both, and an HTML page.
 
     Raises:
-        InputError: Something of that is no good; says what, and the remedy.
+        InputError: An argument or the plan is not valid. The message states the fault
+            and the remedy.
         RunError: Every run failed.
     """
     from analysis.sweeps.one_run import require_runs
@@ -169,27 +171,34 @@ def compare(
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> ComparisonResult:
-    """Runs laws side by side on the same random layouts.
+    """Compares control laws on the same random layouts.
+
+    A layout is one random variant of the positions and motions of all bodies.
 
     Args:
-        *scenarios: Library names, YAML files of layouts, or YAML files of
-            scenarios; none: the papers' four experiments.
-        laws: What to compare, in one text parted by commas or one by one; none: the
-            papers' and no avoidance, or those for routes.
-        runs: Layouts a scenario, each met by every law.
-        seed: Of layouts and noise.
-        settings: Further fields of the scenarios, by dotted path.
-        grid: Further fields to compare, with their values.
-        out: A new directory; none: the next number under ``results``.
-        workers: Number of processes; none: one a core.
-        resume: Whether ``out`` may hold runs of the same comparison.
-        progress: Called with the number of runs done.
+        *scenarios: Names of scenarios in the library, YAML files of layouts, or YAML
+            files of scenarios. If none are given, the four experiments of the papers
+            are run.
+        laws: Names of the laws, as a list or as one text with commas. None means the
+            laws of the papers and driving without avoidance. For a scenario with
+            routes, None means the laws for routes.
+        runs: Number of layouts per scenario. Every law meets each layout.
+        seed: Seed of the layouts and the noise.
+        settings: Values of other fields of the scenarios, by dotted path.
+        grid: Lists of values of other fields to compare, by dotted path.
+        out: New or empty directory. None means the next number under ``results``.
+        workers: Number of processes. None means one process per processor core.
+        resume: Whether ``out`` may contain runs of the same comparison. These runs are
+            kept.
+        progress: Function that is called with the number of finished runs.
 
     Returns:
-        Rates, medians and pairs; the directory has them, too, with pictures.
+        Rates, medians and pairs of laws. The directory also contains them, with
+        pictures.
 
     Raises:
-        InputError: Something of that is no good; says what, and the remedy.
+        InputError: An argument is not valid. The message states the fault and the
+            remedy.
         RunError: Every run failed.
     """
     from analysis.comparison.compare import prepare_comparison
@@ -225,22 +234,28 @@ def stability(
     full: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> StabilityResult:
-    """Analyses the stability of a scenario's loop.
+    """Analyzes the stability of a scenario's control loop.
+
+    If the scenario has several robots, only one robot is analyzed. A warning of the
+    logger ``phonotaxis`` names the other robots.
 
     Args:
-        scenario: From ``load_scenario``, or a name or file for it.
-        laws: To compare, in one text parted by commas or one by one; ``all``: those
-            that avoid obstacles, or drive on a route; none: the scenario's.
-        robot: Of several robots, the one to analyse, alone; none: the first.
-        full: Everything, also what takes minutes.
-        progress: Called with the name of each part before it is computed.
+        scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
+            path of a YAML file.
+        laws: Names of the control laws to compare, as a list or as one text with
+            commas. ``all`` means all laws that avoid obstacles, or all laws for routes.
+            An empty list means the law of the scenario.
+        robot: Name of the robot to analyze. None means the first robot.
+        full: Whether to include the parts that take minutes.
+        progress: Function that is called with the name of each part before its
+            computation.
 
     Returns:
-        Every part's data, and verdicts. Where other robots are left out, a warning
-        of the logger ``phonotaxis`` names them.
+        Data of every part, and the verdicts on the stability.
 
     Raises:
-        InputError: There is no such law or robot, or it has no linear model.
+        InputError: The law or the robot does not exist, or the robot has no linear
+            model.
     """
     from analysis.stability.choice import chosen_laws, chosen_robot
     from analysis.stability.law_analysis import analyse_law
@@ -263,5 +278,5 @@ def stability(
 
 
 def _names(laws: str | Iterable[str]) -> list[str]:
-    """A text would be read letter by letter."""
+    """Splits a text at commas; otherwise Python would read each letter as a name."""
     return laws.split(",") if isinstance(laws, str) else list(laws)

@@ -1,1 +1,1 @@
-"""The command line: one file a subcommand, and the path that all take."""
+"""The command line: one file for each subcommand, and the code that they share."""

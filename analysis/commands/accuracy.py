@@ -1,4 +1,4 @@
-"""``phonotaxis accuracy``: the papers' localisation tables, ours, and the bound."""
+"""``phonotaxis accuracy``: localization errors of the papers and of this package."""
 
 from __future__ import annotations
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
-#: The names stand in ``phonotaxis laws`` alone: to load them takes seconds.
+#: Help text of law arguments. The text does not list the laws, because loading their
+#: names takes seconds.
 LAW_HELP = "a name (phonotaxis laws lists them), or package.module:Name"
 
-#: Functions of shells that complete them, which ``phonotaxis completion`` writes.
+#: Names of the shell functions that complete scenarios and laws, by shell.
+#: ``phonotaxis completion`` writes these functions.
 SCENARIO_WORDS, LAW_WORDS = (
     {"bash": name, "zsh": name, "fish": f"({name})"}
     for name in ("_phonotaxis_scenario_or_file", "_phonotaxis_law_or_file")
@@ -16,22 +18,24 @@ SCENARIO_WORDS, LAW_WORDS = (
 
 
 def completed_by(argument: Any, words: dict[str, str] | str) -> None:
-    """What a shell completes an argument with.
+    """Sets how a shell completes an argument when the user presses the tab key.
 
     Args:
-        argument: What ``add_argument`` returns.
-        words: Functions by shell, ``file`` or ``directory``; see shtab.
+        argument: Argument of a parser, as returned by ``add_argument``.
+        words: Either ``file`` or ``directory``, or a mapping. The mapping contains for
+            each shell the name of a shell function that prints the possible words. The
+            package shtab defines this format.
     """
     argument.complete = words
 
 
 def take_json(parser: ArgumentParser) -> None:
-    """``--json``."""
+    """Adds the option ``--json``."""
     parser.add_argument("--json", action="store_true", help="print one JSON document")
 
 
 def take_output(parser: ArgumentParser) -> None:
-    """``--out`` and ``--json``."""
+    """Adds the options ``--out`` and ``--json``."""
     out = parser.add_argument(
         "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
     )
@@ -40,7 +44,7 @@ def take_output(parser: ArgumentParser) -> None:
 
 
 def take_scenario(parser: ArgumentParser) -> None:
-    """A scenario, and the options that change its fields."""
+    """Adds the scenario argument and the options that change fields of the scenario."""
     scenario = parser.add_argument(
         "scenario", nargs="?", default="default", help="library name or YAML file"
     )
@@ -67,7 +71,7 @@ def take_scenario(parser: ArgumentParser) -> None:
 
 
 def overrides(options: Namespace) -> list[str]:
-    """The options that stand for fields, after --set so that they win."""
+    """Lists the settings of all options; options for one field override ``--set``."""
     found = list(options.set)
     for option, field in (
         ("seed", "seed"),

@@ -1,4 +1,4 @@
-"""``phonotaxis calibrate``: places of microphones from sounds at known places."""
+"""``phonotaxis calibrate``: microphone positions from sounds at known positions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The path that every subcommand takes: prepare, run, write, print."""
+"""The steps of every subcommand: prepare, run, write the files, print."""
 
 from __future__ import annotations
 
@@ -15,25 +15,27 @@ from analysis.commands.progress import Progress
 
 
 def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> None:
-    """Does what a subcommand is asked for.
+    """Runs a subcommand: prepares and runs its job, writes files, and prints results.
 
     Args:
         command: The subcommand.
-        options: Its words.
-        interrupts: Of the process.
+        options: Parsed options of the command line.
+        interrupts: Handler of Ctrl-C and SIGTERM in this process.
 
     Raises:
-        InputError: Something of the input is no good.
-        RunError: The run failed, or was interrupted and left something behind.
-        KeyboardInterrupt: It was interrupted and left nothing behind.
+        InputError: The input is not valid.
+        RunError: The run failed. Or an interrupt stopped the run, and some results
+            remain on the disk.
+        KeyboardInterrupt: An interrupt stopped the run, and no results remain.
     """
     job: Job[Any] | None = None
     try:
         with ExitStack() as stack, interrupts.watched():
-            # Loads most of the libraries, so that it has to be watched.
+            # This import loads most of the libraries, so an interrupt may hit it.
             from analysis.run_error import RunError, no_exit
 
-            # Only the result goes to standard output, not what a user's code prints.
+            # Output of a user's code goes to standard error, so that standard output
+            # contains the result only.
             with no_exit(), _output_of(command):
                 job = command.prepare(options, partial(_take, stack, interrupts))
                 found, summary = _run(job, interrupts)
@@ -59,7 +61,7 @@ def _output_of(command: Command) -> AbstractContextManager[Any]:
 
 
 def _left(job: Job[Any]) -> str:
-    """What an interrupt leaves behind, in words."""
+    """Describes the results that remain on the disk after an interrupt."""
     if job.kept is None:
         return job.left()
     return (
@@ -78,7 +80,7 @@ def _take(stack: ExitStack, interrupts: Interrupts, out: str | None) -> Place:
 def _run(job: Job[Any], interrupts: Interrupts) -> tuple[Any, dict[str, Any]]:
     done = job.kept() if job.kept is not None else 0.0
     with Progress(interrupts, job.total, job.unit, done) as progress:
-        # Compiled callbacks make a SystemError of what strikes inside them.
+        # An interrupt inside a compiled callback would become a SystemError.
         with interrupts.held() if job.total else nullcontext():
             found = job.run(progress)
         summary = job.summary(found)

@@ -1,4 +1,4 @@
-"""What a subcommand says of itself; ``carry_out`` does with it what all need."""
+"""Descriptions of a subcommand and of its job, for ``carry_out``."""
 
 from __future__ import annotations
 
@@ -15,62 +15,65 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class Place:
-    """A result directory that appears whole, or not at all."""
+    """A result directory that appears complete at the end, or not at all."""
 
     out: Path
-    """Where it will be, as the user is told."""
+    """Final path of the directory, as messages to the user show it."""
     directory: Path
-    """Where its files are written meanwhile."""
+    """Hidden directory that holds the files until the command ends."""
 
 
-#: Takes the directory that ``--out`` names, or the next number under results/.
+#: Reserves the result directory: the one of ``--out``, or else the next number under
+#: results/.
 Take = Callable[[str | None], Place]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job(Generic[Found]):
-    """What a command has to do, its input accepted."""
+    """The work of a command after the command has accepted the input."""
 
     run: Callable[[Progress], Found]
-    """Finds out what the command is asked for."""
+    """Does the work of the command and returns the result."""
     summary: Callable[[Found], dict[str, Any]]
-    """The JSON document."""
+    """Makes the JSON document from the result."""
     text: Callable[[Found, dict[str, Any]], str]
-    """The same for a terminal."""
+    """Makes the text for a terminal from the result and the JSON document."""
     out: Path | None = None
-    """The result directory, where there is one."""
+    """Result directory; None if the command writes no files."""
     write: Callable[[Found, dict[str, Any]], None] = lambda found, summary: None
-    """Writes its files."""
+    """Writes the files of the result directory."""
     where: str = "\nresults in {out}"
-    """Ends the text."""
+    """Last line of the text, if there is a result directory."""
     total: float = 0.0
-    """What ``run`` counts on the progress bar; nothing: it has none, and an
-    interrupt strikes at once."""
+    """Total of the progress bar, in ``unit``. If 0, there is no bar, and an interrupt
+    stops ``run`` at any point."""
     unit: str = ""
-    """Of what it counts."""
+    """Unit of the progress bar, for example runs."""
     kept: Callable[[], int] | None = None
-    """Number of runs in ``out``, which an interrupt leaves there for ``--resume``."""
+    """Returns the number of runs in ``out``. After an interrupt, these runs remain for
+    ``--resume``."""
     left: Callable[[], str] = lambda: ""
-    """Says what an interrupt of it leaves behind, if it leaves anything."""
+    """Describes the files that remain after an interrupt; empty if there are none."""
     remarks: Callable[[Found], Sequence[str]] = lambda found: ()
-    """Lines for standard error."""
+    """Returns remarks about the result, one line each, for standard error."""
     demand: Callable[[Found], None] = lambda found: None
-    """Raises RunError, after all has been printed, if this is no success."""
+    """Raises RunError if the result is no success; called after all output."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """A subcommand."""
+    """A subcommand of ``phonotaxis``."""
 
     name: str
     help: str
-    """One line."""
+    """One line about the command, for the help."""
     add_arguments: Callable[[ArgumentParser], None]
     prepare: Callable[[Namespace, Take], Job[Any]]
-    """Loads and checks the input."""
+    """Loads and checks the input, and returns the job."""
     examples: tuple[str, ...] = ()
-    """Words after the program's name, for the help."""
+    """Example command lines for the help, without the name of the program."""
     prints: bool = False
-    """Whether its run prints on standard output; it runs no code of a user's then."""
+    """Whether the job prints on standard output while it runs. Such a command must
+    not run a user's code."""
     was: str = ""
-    """A name that it had, by which it still can be called."""
+    """Former name of the command, which still works."""

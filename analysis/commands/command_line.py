@@ -1,4 +1,4 @@
-"""The parser, and what becomes of an error."""
+"""The parser of the command line, and the reports of errors."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from analysis.commands.exporting import columns, export
 from analysis.commands.interrupts import Interrupts
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-#: Locales with UTF-8, of which a system has at least one.
+#: Locales with UTF-8. Most systems have at least one of them.
 _UTF_8_LOCALES = ("C.UTF-8", "UTF-8", "en_US.UTF-8")
-#: So many faults of one input are told.
+#: Largest number of faults of one input that are printed.
 MOST_FAULTS = 20
-#: By name, in the order of the help.
+#: All subcommands by name, in the order of the help.
 COMMANDS: dict[str, Command] = {
     module.COMMAND.name: module.COMMAND
     for module in (
@@ -65,14 +65,14 @@ COMMANDS: dict[str, Command] = {
 
 
 class _UsageError(Exception):
-    """Words of the command line that make no command."""
+    """The words of the command line do not form a valid command."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """One that raises what is wrong, and names what may have been meant."""
+    """Parser that raises an exception for wrong words and suggests similar words."""
 
     def print_help(self, file: Any = None) -> None:
-        # That of argparse says nothing when standard output cannot be written.
+        # The method of argparse hides errors of standard output.
         (file or sys.stdout).write(self.format_help())
 
     #: Parsers of the subcommands, by name.
@@ -88,18 +88,21 @@ class _Parser(argparse.ArgumentParser):
         raise _UsageError(f"{message}{hint}; see {self.prog} --help")
 
     def refuse(self, command: str, words: Sequence[str]) -> NoReturn:
-        """Raises what is wrong with words that a subcommand does not know.
+        """Raises an error about words that a subcommand does not know.
+
+        The message suggests a similar option of the subcommand. If there is no similar
+        option, the message names the other subcommands that have the unknown option.
 
         Args:
             command: Name of the subcommand.
-            words: One or more.
+            words: Unknown words of the command line, at least one.
         """
         hint = ""
         if option := re.search(r"--([\w-]+)", " ".join(words)):
             from diagrams.scenario.suggestions import did_you_mean
 
             options = {name: _options(parser) for name, parser in self.below.items()}
-            # Without the dashes, which would make all options alike.
+            # The names have no dashes, which would make all options look similar.
             hint = did_you_mean(option[1], options[command]).replace("'", "'--", 1)
             others = [name for name, own in options.items() if option[1] in own]
             if others and not hint:
@@ -109,12 +112,12 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _options(parser: argparse.ArgumentParser) -> list[str]:
-    """Names of a parser's options, without their dashes."""
+    """Lists the names of a parser's options, without their dashes."""
     return re.findall(r"--([\w-]+)", parser.format_usage())
 
 
 class _Version(argparse.Action):
-    """Prints the version, which is looked up only then."""
+    """Prints the version; looks the version up only when the user requests it."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         from importlib.metadata import version
@@ -124,17 +127,19 @@ class _Version(argparse.Action):
 
 
 def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
-    """Runs a command.
+    """Runs the command that the words of a command line request.
 
     Args:
-        words: Those after the program's name.
-        interrupts: Of the process.
+        words: Words of the command line after the name of the program.
+        interrupts: Handler of Ctrl-C and SIGTERM in this process.
 
     Returns:
-        Exit status: 0 done, 2 bad input, 1 anything else.
+        Exit status: 0 if the command succeeded, 2 if the input is not valid, 1 after
+        any other failure.
 
     Raises:
-        KeyboardInterrupt: It was interrupted, and nothing was written.
+        KeyboardInterrupt: An interrupt stopped the command, and no results were
+            written.
     """
     try:
         _prepare_process()
@@ -158,7 +163,7 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
 
 
 def _drop_unwritable() -> None:
-    """Drops output that cannot be written, else Python complains about it at exit."""
+    """Drops output that cannot be written, to avoid an error at Python's exit."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -166,7 +171,7 @@ def _drop_unwritable() -> None:
 
 
 def _by_new_names(words: Sequence[str]) -> Sequence[str]:
-    """The same words, but for a command that is called by a name that it had."""
+    """Replaces a former name of a command with its present name."""
     for command in COMMANDS.values():
         if words and command.was and words[0] == command.was:
             print(
@@ -178,14 +183,19 @@ def _by_new_names(words: Sequence[str]) -> Sequence[str]:
 
 
 def _prepare_process() -> None:
-    """Makes a process fit for a command, however it was started.
+    """Prepares the process for a command, regardless of how the process was started.
 
-    Standard streams that are closed lead nowhere: a result file must not get their
-    numbers. Characters that a terminal cannot show are escaped. Pictures go to
-    files, whatever a notebook has chosen. What takes long says so.
+    The function makes these changes:
+
+    - Closed standard streams are redirected to the null device. Otherwise, a result
+      file could get the descriptor of a standard stream.
+    - Characters that the terminal cannot show are escaped.
+    - Matplotlib draws into files only, even if a notebook has chosen another backend.
+    - Log messages of the package go to standard error.
+    - Text files are read as UTF-8.
 
     Raises:
-        InputError: Files would be read in another encoding than UTF-8.
+        InputError: The process cannot read files as UTF-8.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
@@ -207,8 +217,8 @@ def _prepare_process() -> None:
 def _read_utf_8() -> None:
     """Makes UTF-8 the encoding in which this process opens text files.
 
-    Drake opens Python files of its own, which are UTF-8, in the encoding of the locale,
-    so that it cannot be loaded where that is ASCII.
+    Some Python files of Drake are UTF-8, but Drake reads them in the encoding of the
+    locale. If this encoding is ASCII, loading Drake fails.
 
     Raises:
         InputError: The system has no locale with UTF-8.
@@ -232,10 +242,13 @@ def _bad_locale(why: str) -> Exception:
 
 
 def _check_words(words: Sequence[str]) -> None:
-    """Refuses names of files that this process cannot read or open.
+    """Rejects file names that this process cannot read or open.
+
+    The check covers the words of the command line and the name of the current
+    directory.
 
     Raises:
-        InputError: The locale's encoding is another than the names'.
+        InputError: A name is not valid in the encoding of the locale.
     """
     encoding = sys.getfilesystemencoding()
     if encoding == "utf-8":
@@ -246,7 +259,7 @@ def _check_words(words: Sequence[str]) -> None:
 
 
 def make_parser() -> _Parser:
-    """The parser of the whole command line."""
+    """Makes the parser of the whole command line."""
     parser = _Parser(
         prog="phonotaxis",
         description="A robot that follows a sound.",
@@ -276,7 +289,7 @@ def make_parser() -> _Parser:
 
 
 def _report(error: Exception, words: Sequence[str]) -> int:
-    """Says in a line each what an exception means; returns the exit status."""
+    """Prints one line for each fault of an exception; returns the exit status."""
     if "--debug" in words:
         traceback.print_exception(error)
     faults: list[tuple[str, str]]
@@ -285,7 +298,7 @@ def _report(error: Exception, words: Sequence[str]) -> int:
     elif isinstance(error, UnicodeEncodeError) and (
         sys.getfilesystemencoding() != "utf-8"
     ):
-        # A file's name that stands in a scenario, for example.
+        # For example, a scenario contains the name of a file.
         return _report(_bad_locale(str(error)), words)
     elif isinstance(error, ImportError):
         text = f"{error}; the installation is incomplete; install phonotaxis again"
@@ -308,7 +321,7 @@ def _complain(faults: Sequence[tuple[str, str]], *, as_json: bool) -> None:
     told = [(field, _short(field, message)) for field, message in faults[:MOST_FAULTS]]
     if as_json:
         errors = [{"field": field, "message": text} for field, text in told]
-        with suppress(OSError):  # else standard error has to tell
+        with suppress(OSError):  # otherwise, standard error states the faults
             print(json.dumps({"error": errors[0], "errors": errors}), flush=True)
             return
     for field, message in told:

@@ -1,4 +1,4 @@
-"""``phonotaxis design``: the laws' gains from stated requirements."""
+"""``phonotaxis design``: gains of the laws from stated requirements."""
 
 from __future__ import annotations
 

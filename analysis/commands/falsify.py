@@ -1,4 +1,4 @@
-"""``phonotaxis falsify``: makes a guarded robot try to hit obstacles at rest."""
+"""``phonotaxis falsify``: tries to drive a guarded robot into obstacles at rest."""
 
 from __future__ import annotations
 

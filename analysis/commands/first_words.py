@@ -1,4 +1,4 @@
-"""What a command says before it loads what simulates, which takes seconds."""
+"""A message that a command prints before slow imports, which take seconds."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import sys
 
 
 def say(text: str) -> None:
-    """Tells a terminal what begins; a pipe gets nothing.
+    """Prints a message on standard error if standard error is a terminal.
 
     Args:
-        text: As 'simulating default'.
+        text: Name of the work that begins, for example 'simulating default'.
     """
     if sys.stderr.isatty():
         print(f"phonotaxis: {text} ...", file=sys.stderr, flush=True)

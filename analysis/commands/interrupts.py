@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: when they may strike, and that none is lost."""
+"""Ctrl-C and SIGTERM: when they may stop the work, and how none of them is lost."""
 
 from __future__ import annotations
 
@@ -10,28 +10,34 @@ from importlib.machinery import ExtensionFileLoader
 from types import FrameType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)
-#: An interrupt that could not strike, or was swallowed, tries again after this, s.
+#: If an interrupt had to wait or was swallowed, it is raised again after this time, s.
 _AGAIN_S = 0.1
 
 
 class _Interrupt(KeyboardInterrupt):
-    """An interrupt, but not ``KeyboardInterrupt`` itself.
+    """An interrupt, as a subclass of ``KeyboardInterrupt``.
 
-    Where that one leaves a string that is evaluated, as in Drake's imports, Python
-    dies of the signal at its end, even if it was caught.
+    Python may evaluate code from a string, for example while Drake is imported. If
+    ``KeyboardInterrupt`` itself is raised in this code, Python ends later as if a
+    signal had killed the process. That happens even if the exception is caught. A
+    subclass avoids the problem.
     """
 
 
 class Interrupts:
-    """The interrupts of a command, as KeyboardInterrupt.
+    """Raises a ``KeyboardInterrupt`` when the process receives Ctrl-C or SIGTERM.
 
-    A C extension that an interrupt strikes while it is loaded prints what it likes
-    and raises something else: the interrupt waits. Callbacks of compiled code may
-    swallow it: it strikes again until it is noticed.
+    Two cases need special care:
+
+    - While Python loads a C extension, an interrupt would make the extension print text
+      and raise other exceptions. The interrupt therefore waits until the extension is
+      loaded.
+    - Callbacks of compiled code may swallow the exception. The interrupt is therefore
+      raised again every 0.1 s until the main program notices it.
 
     Args:
-        last: Whether the process ends with the command: nothing is left then that
-            an interrupt could stop, and Python's own end must not be cut short.
+        last: Whether the process ends with the command. If so, signals are ignored from
+            the end of the command on. They then cannot disturb the shutdown of Python.
     """
 
     def __init__(self, *, last: bool = False) -> None:
@@ -42,7 +48,7 @@ class Interrupts:
     def __enter__(self) -> Interrupts:
         self._before = {each: signal.signal(each, self._strike) for each in _SIGNALS}
         self._hook, sys.unraisablehook = sys.unraisablehook, self._swallowed
-        # Only now: one that strikes again needs the handler of the alarm.
+        # Release comes last, because a repeated interrupt needs the alarm's handler.
         self.release()
         return self
 
@@ -60,45 +66,48 @@ class Interrupts:
                 raise _Interrupt
 
     def _swallowed(self, ignored: sys.UnraisableHookArgs) -> None:
-        # Python prints what a callback, as numba's, has swallowed: not ours.
+        # Python prints exceptions that a callback swallowed, for example a callback of
+        # numba. Our own interrupts are not printed.
         if not issubclass(ignored.exc_type, _Interrupt):
             self._hook(ignored)
 
     def check(self) -> None:
-        """Lets an interrupt through that was held back.
+        """Raises an interrupt that was held back.
 
         Raises:
-            KeyboardInterrupt: There was one.
+            KeyboardInterrupt: There was an interrupt.
         """
         if self._struck:
             raise KeyboardInterrupt
 
     def take(self) -> None:
-        """One has ended what goes on until then: it counts no longer."""
+        """Forgets the last interrupt, because the command treats it as a normal end."""
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         self._struck = False
 
     def release(self) -> None:
-        """From here on interrupts strike where they come.
+        """Lets interrupts stop the work at any point from now on.
 
         Raises:
-            KeyboardInterrupt: There was one before.
+            KeyboardInterrupt: There was an interrupt before this call.
         """
         self._held = False
         self.check()
 
     def hold(self) -> None:
-        """From here on they wait for ``check`` or ``release``."""
+        """Makes later interrupts wait for the next call of ``check`` or ``release``."""
         self._held = True
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Within it they wait for ``check`` or the end.
+        """Makes interrupts wait within the ``with`` block.
 
-        After an exception they go on waiting: nothing must stop what cleans up.
+        An interrupt waits until ``check`` is called or the block ends. If the block
+        raises an exception, interrupts keep waiting afterwards, so that they cannot
+        stop the cleanup.
 
         Raises:
-            KeyboardInterrupt: There was one, before or within it.
+            KeyboardInterrupt: There was an interrupt before or within the block.
         """
         self.check()
         before, self._held = self._held, True
@@ -108,12 +117,14 @@ class Interrupts:
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """Within it whatever an interrupt led to counts as that interrupt.
+        """Raises ``KeyboardInterrupt`` if an interrupt came within the ``with`` block.
 
-        Afterwards they wait: nothing must stop what cleans up or puts in place.
+        An interrupt within the block may lead to another exception, or to none. In both
+        cases, this method raises ``KeyboardInterrupt``. After the block, interrupts
+        wait, so that they cannot stop the cleanup or the move of result files.
 
         Raises:
-            KeyboardInterrupt: There was one, even if it seemed to do nothing.
+            KeyboardInterrupt: There was an interrupt, even if it had no visible effect.
         """
         try:
             yield
@@ -127,7 +138,7 @@ class Interrupts:
 
 
 def _loads_extension(frame: FrameType | None) -> bool:
-    """Whether what runs was called by the initialisation of a C extension."""
+    """Whether this frame or one of its callers is loading a C extension."""
     while frame is not None:
         if isinstance(frame.f_locals.get("self"), ExtensionFileLoader):
             return True

@@ -1,4 +1,4 @@
-"""``phonotaxis listen``: every source with an identity, while it sounds."""
+"""``phonotaxis listen``: tracks the sound sources in a live or recorded sound."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from analysis.listening.sound_stream import SoundStream
     from analysis.listening.step_views import Teller
 
-# From thread to thread; a tenth of what Python takes.
+# Longest time until Python switches threads, s; a tenth of Python's default.
 _SWITCH_S = 5e-4
 
 
@@ -82,7 +82,7 @@ def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
     hearing = LiveHearing(stream, geometry, teller.name_fault)
 
     def run(progress: Progress) -> HeardStream:
-        # Whoever listens must not wait long for the thread that looks at channels.
+        # The listening thread must not wait long for the thread that checks channels.
         sys.setswitchinterval(_SWITCH_S)
         with teller:
             try:

@@ -1,4 +1,4 @@
-"""``phonotaxis locate``: bearing and range over time of a recording."""
+"""``phonotaxis locate``: bearing and range of the source in a recording, over time."""
 
 from __future__ import annotations
 

@@ -12,13 +12,16 @@ if TYPE_CHECKING:
 
 
 class Progress:
-    """A bar on a terminal, nothing in a pipe. Each call lets interrupts through.
+    """Shows a progress bar on a terminal, and nothing if standard error is a pipe.
+
+    Interrupts wait between the calls of this object. Each call lets a waiting interrupt
+    stop the command.
 
     Args:
-        interrupts: They are held back between the calls.
-        total: What there is to do; nothing: there is no bar.
-        unit: Of what is counted.
-        done: What has been done before.
+        interrupts: Handler of Ctrl-C and SIGTERM.
+        total: Total amount of work, in ``unit``. If 0, there is no bar.
+        unit: Unit of the work, for example runs.
+        done: Amount of work that was done before the bar starts, in ``unit``.
     """
 
     def __init__(
@@ -42,24 +45,30 @@ class Progress:
             self._bar.close()
 
     def __call__(self, done: float) -> None:
-        """Shows how much is done.
+        """Shows how much work is done.
+
+        Args:
+            done: Amount of finished work, in the unit of the bar.
 
         Raises:
-            KeyboardInterrupt: An interrupt has come meanwhile.
+            KeyboardInterrupt: An interrupt came since the last call.
         """
         if self._bar is not None:
             self._bar.update(done - self._bar.n)
         self._interrupts.check()
 
     def take_interrupt(self) -> None:
-        """An interrupt is how the command ends well."""
+        """Forgets the last interrupt, because the command treats it as a normal end."""
         self._interrupts.take()
 
     def step(self, title: str) -> None:
-        """Names what comes next; what came before is done.
+        """Names the next step of the work, and counts the previous step as done.
+
+        Args:
+            title: Name of the next step.
 
         Raises:
-            KeyboardInterrupt: As a call.
+            KeyboardInterrupt: An interrupt came since the last call.
         """
         if self._bar is not None:
             self._bar.set_description(title)

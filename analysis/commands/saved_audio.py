@@ -1,4 +1,4 @@
-"""``--save-audio``: a directory for the sound of a run, kept however the run ends."""
+"""``--save-audio``: a directory for the sound of a run, kept even if the run fails."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ if TYPE_CHECKING:
 
 
 class SavedAudio:
-    """Where the sound goes, and how far it got.
+    """The sound files of a run, and how much sound has been written.
 
-    Unlike a result directory it is not written aside first: what was heard before an
-    interrupt, or a full disk, stays and can be read.
+    The sound is written directly into its final directory. A result directory, in
+    contrast, appears only when it is complete. If an interrupt or a full disk ends the
+    run, the sound up to this time remains and can be read.
 
     Args:
-        directory: One that does not exist yet, or is empty.
-        out: The result directory, which would replace what is in it.
-        scenario: What is to be run.
+        directory: New or empty directory for the sound files.
+        out: Result directory of the run. The sound directory must not be inside it,
+            because ``out`` is replaced at the end.
+        scenario: Scenario of the run.
 
     Raises:
-        InputError: The directory cannot be used, or there is nothing to hear.
+        InputError: The directory cannot be used, or the scenario has no sound to save.
     """
 
     def __init__(self, directory: str, out: Path, scenario: Scenario) -> None:
@@ -45,13 +47,13 @@ class SavedAudio:
 
     @contextmanager
     def opened(self) -> Iterator[RunAudio]:
-        """The files, for the time of the run.
+        """Opens the sound files for the duration of the run.
 
         Yields:
-            What ``simulate`` takes.
+            The open files, which ``simulate`` takes as ``audio``.
 
         Raises:
-            InputError: Somebody else has taken the directory meanwhile.
+            InputError: Another process took the directory after this object was made.
         """
         from analysis.reporting.result_directory import take_directory
         from diagrams import RunAudio
@@ -62,34 +64,34 @@ class SavedAudio:
             with RunAudio(self._scenario, self._path) as self._files:
                 yield self._files
         finally:
-            # Directories that were made, and stayed empty.
+            # Remove directories that were made for the sound and stayed empty.
             taken.undo()
 
     @property
     def heard(self) -> Path:
-        """What the first robot that listens has heard; the file is closed by then."""
+        """File of the sound at the first listening robot; complete after the run."""
         assert self._files is not None
         return self._files.first_heard
 
     def left(self) -> str:
-        """What an interrupt leaves, in words; nothing where there is nothing."""
+        """Says what sound remains after an interrupt; an empty text if none remains."""
         if self._files is None or self._files.until_s == 0.0:
             return ""
         return f"the sound until {self._files.until_s:g} s is in {self._shown}"
 
     def facts(self) -> dict[str, Any]:
-        """The directory, and what stands in which file, as plain values."""
+        """The directory, and the contents of each file, as plain values."""
         assert self._files is not None
         return {"directory": str(self._shown), **self._files.facts()}
 
     def text(self) -> str:
-        """The line of a summary."""
+        """The line of the run's summary about the sound."""
         return f"{'sound':<21} {self._shown}"
 
 
 @contextmanager
 def _naming_option() -> Iterator[None]:
-    """Errors of a directory name this option."""
+    """Makes errors about a directory name the option ``--save-audio``."""
     from systems.framework.input_error import InputError
 
     try:

@@ -1,4 +1,4 @@
-"""``--movie``: a film of a run, with what its first robot heard."""
+"""``--movie``: a movie of a run, with the sound that its first robot heard."""
 
 from __future__ import annotations
 
@@ -14,16 +14,18 @@ if TYPE_CHECKING:
 
 
 class SavedMovie:
-    """Where the film goes, and where its sound is until then.
+    """The movie of a run, and the sound files that the movie needs.
 
     Args:
-        file: Ends in .gif or .mp4; nothing is there yet.
-        scenario: What is to be run.
-        place: Of the results; its directory takes the sound meanwhile.
-        saved: What saves the sound anyway; none: nothing does.
+        file: New file that ends in .gif or .mp4.
+        scenario: Scenario of the run.
+        place: Result directory of the run. Its hidden directory holds the sound until
+            the movie is written.
+        saved: Sound files of the option ``--save-audio``, which the movie then uses,
+            too. None if the user did not give this option.
 
     Raises:
-        InputError: The file cannot be made, or nothing is installed to encode it.
+        InputError: The file cannot be made, or no encoder for it is installed.
     """
 
     def __init__(
@@ -51,10 +53,11 @@ class SavedMovie:
 
     @contextmanager
     def opened(self) -> Iterator[RunAudio | None]:
-        """What listens to the run, for the time of the run.
+        """Opens the sound files for the duration of the run.
 
         Yields:
-            What ``simulate`` takes.
+            The open files, which ``simulate`` takes as ``audio``. None for a silent
+            movie.
         """
         from diagrams import RunAudio
 
@@ -68,13 +71,13 @@ class SavedMovie:
             yield None
 
     def write(self, result: RunResult) -> None:
-        """Writes the film.
+        """Writes the movie.
 
         Args:
-            result: The run.
+            result: Result of the run that the movie shows.
 
         Raises:
-            RunError: The encoder fails, or the disk does.
+            RunError: The encoder failed, or the file could not be written to the disk.
         """
         from analysis.movies.run_frames import RunFrames
 
@@ -88,5 +91,5 @@ class SavedMovie:
         shutil.rmtree(self._directory, ignore_errors=True)
 
     def text(self) -> str:
-        """The line of a summary."""
+        """The line of the run's summary about the movie."""
         return f"{'movie':<21} {self._shown}"

@@ -1,4 +1,4 @@
-"""``phonotaxis sweep``: many scenarios, drawn from distributions and grids."""
+"""``phonotaxis sweep``: runs variants of a scenario, from a grid and random draws."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Laws side by side on the same layouts, and the papers' claims judged."""
+"""Comparisons of laws on the same layouts."""

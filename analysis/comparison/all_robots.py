@@ -1,4 +1,4 @@
-"""What several robots did together: one figure of each kind a run."""
+"""Metrics of several robots together: one value of each metric per run."""
 
 from __future__ import annotations
 
@@ -9,26 +9,32 @@ import pandas as pd
 
 from analysis.runs.run_table import ALL_RUNS, SUCCESSES, column
 
-#: Of times that of the robot that took longest counts.
+#: Metrics for which the largest value of any robot counts: the last arrival.
 _LAST = ("time_to_goal_s",)
-#: Of minima and maxima the worst robot's.
+#: Metrics for which the worst robot counts. The first part lists beginnings of the
+#: names of minima. The second part lists pieces of the names of maxima.
 _WORST = ("minimum_", "least_"), ("_max_", "greatest_")
 
 
 def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
-    """A sweep's results with figures of all robots together beside each one's own.
+    """Adds the metrics of all robots together to the results of a parameter sweep.
 
-    Least distances and times to contact are those of the robot that had the least,
-    greatest ones of that with the greatest, and a time to the goal is that of the last
-    one there; of everything else it is the mean over robots. A run in which a robot
-    lacks a figure has none.
+    The results have one row per run. If there are several robots, the results have
+    separate columns for each robot. The value for all robots depends on the metric:
+
+    - Least distances and least times to contact: the smallest value of any robot.
+    - Greatest values: the largest value of any robot.
+    - Time to the goal: the time of the robot that arrives last.
+    - Every other metric: the mean over the robots.
+
+    If one robot has no value of a metric in a run, the value for all robots is NaN.
 
     Args:
-        table: See ``analysis.sweeps.store.load_results``.
-        robots: Names of the robots. A table of one robot already has its figures.
+        table: Results of the sweep, from ``analysis.sweeps.store.load_results``.
+        robots: Names of the robots. With one robot, the table already has the metrics.
 
     Returns:
-        The table, or one with more columns.
+        The table with the added columns. With one robot, the table is unchanged.
     """
     if len(robots) < 2:
         return table

@@ -1,4 +1,4 @@
-"""All runs of one law on one scenario's layouts, summarised."""
+"""Summary of all runs of one law on the layouts of one scenario."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
 
 @dataclass(frozen=True)
 class Mean:
-    """A rate or a mean with its interval."""
+    """A rate or a mean, with its confidence interval."""
 
     estimate: float
     low: float
@@ -41,7 +41,7 @@ class Mean:
 
 @dataclass(frozen=True)
 class Median:
-    """A median with its interval, over the runs that have the figure."""
+    """A median over the runs that have the metric, with its confidence interval."""
 
     median: float
     low: float
@@ -51,55 +51,58 @@ class Median:
 
 @dataclass(frozen=True)
 class ExampleRun:
-    """A run to look at."""
+    """A run of a cell that the report shows as an example."""
 
     kind: ExampleKind
-    """Its place among the cell's runs, ordered by success, then by clearance."""
+    """Position among the cell's runs, ordered by success and then by clearance."""
     index: int
-    """Its number in the sweep."""
+    """Number of the run in the sweep."""
     cause: str
 
 
 @dataclass(frozen=True)
 class LawCell:
-    """All runs of one law on one experiment's layouts."""
+    """Summary of all runs of one law on the layouts of one scenario."""
 
     scenario: str
     law: str
     fields: dict[str, Any]
-    """Further fields of the grid, with their values."""
+    """Values of the other fields of the grid, by dotted path."""
     runs: int
     causes: dict[str, int]
-    """How many runs ended so; collisions with whose fault it was in brackets."""
+    """Number of runs by cause of their end. The cause of a collision states in
+    brackets who was at fault."""
     mechanisms: dict[str, int]
-    """How many runs failed so; see ``failure_mechanisms``."""
+    """Number of failed runs by mechanism; see ``failure_mechanisms``."""
     success: Mean
     collision: Mean
     spl: Mean | None
-    """Success weighted by path length; none where the source moves."""
+    """Success weighted by path length; None if the source moves."""
     metrics: dict[str, Median]
     examples: tuple[ExampleRun, ...]
     warnings: list[WarningCount] = field(default_factory=list)
 
     @property
     def label(self) -> str:
-        """The law, and what else sets the cell apart."""
+        """The law, followed by the values of the further fields."""
         return ", ".join([self.law, *(str(v) for v in self.fields.values())])
 
 
 def make_cell(
     scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int
 ) -> LawCell:
-    """Summarises a cell of a sweep.
+    """Summarizes one cell of a comparison: all runs of one control law on a scenario.
 
     Args:
-        scenario: Its name.
-        fields: Values of the grid.
-        rows: Its runs, in the order of the layouts.
-        seed: Of the bootstrap.
+        scenario: Name of the scenario.
+        fields: Values of the cell's fields by dotted path, including ``law``.
+        rows: Results of the cell's runs. The table has one row for each random layout,
+            always in the same order.
+        seed: Seed of the bootstrap.
 
     Returns:
-        Rates, medians with intervals, causes and examples.
+        Rates and medians with their confidence intervals, causes of the endings, and
+        example runs.
     """
     others = {key: value for key, value in fields.items() if key != "law"}
     success, collision = successes(rows), collisions(rows)
@@ -130,10 +133,10 @@ def make_cell(
 
 
 def _examples(rows: pd.DataFrame, success: NDArray[np.bool_]) -> tuple[ExampleRun, ...]:
-    """First, middle and last of the runs by success, then by clearance."""
+    """Worst, typical and best run, ordered by success and then by clearance."""
     clearance = column(rows, "minimum_clearance_m")
     order = np.lexsort((clearance, success))
-    # A run that raised an error has no clearance, and nothing to look at.
+    # A run that raised an error has no clearance and cannot be shown.
     order = order[np.isfinite(clearance[order])]
     if len(order) == 0:
         return ()
@@ -155,7 +158,7 @@ def _causes(rows: pd.DataFrame) -> dict[str, int]:
 
 
 def _mechanisms(rows: pd.DataFrame) -> dict[str, int]:
-    """Commonest first; none with ideal sensing, which has no cones."""
+    """Counts the failure mechanisms, most frequent first; empty with ideal sensing."""
     if "contact_warning_s" not in rows:
         return {}
     counts = failure_mechanisms(rows).value_counts()

@@ -1,4 +1,4 @@
-"""Runs laws side by side on the same random layouts."""
+"""Runs of several laws on the same random layouts."""
 
 from __future__ import annotations
 
@@ -21,45 +21,50 @@ from analysis.sweeps.options import check_options
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 
-#: In the directory of a comparison, beside a folder and a picture of each scenario.
+#: Names in the directory of a comparison. The directory also contains a folder and a
+#: picture for each scenario.
 SUMMARY, REPORT, RATES, EXAMPLES = (
     "summary.json",
     "report.html",
     "rates.png",
     "examples",
 )
-#: Ending of a scenario's picture; it is named as its folder.
+#: Ending of a scenario's picture. The rest of its name is the name of the folder.
 PICTURE = ".png"
 
 
 @dataclass(frozen=True)
 class PreparedComparison:
-    """A comparison that has only to be run; see ``prepare_comparison``."""
+    """A comparison that is ready to run; see ``prepare_comparison``."""
 
     out: Path
     sweeps: dict[str, PreparedSweep]
-    """By name of the scenario; the folder of each has that name where it can."""
+    """Sweep of each scenario, by the scenario's name. The folder of a sweep has the
+    same name if the file system allows it."""
 
     @property
     def runs(self) -> int:
-        """Runs of all experiments and laws together."""
+        """Total number of runs, over all scenarios and laws."""
         return sum(len(sweep.points) for sweep in self.sweeps.values())
 
     @property
     def done(self) -> int:
-        """Those of them that are done."""
+        """Number of runs that are already done."""
         return sum(len(sweep.store.done) for sweep in self.sweeps.values())
 
     def run(
         self, progress: Callable[[int], None] | None = None
     ) -> tuple[dict[str, Comparison], list[Pair]]:
-        """Does the runs and summarises each scenario.
+        """Does the runs, and summarizes the results of each scenario.
 
         Args:
-            progress: Called a few times a second with the number of runs done.
+            progress: Function that is called a few times per second with the number of
+                finished runs.
 
         Returns:
-            Comparisons by name of the scenario, and the pairs of all together.
+            A pair of results. The first is a mapping from each scenario's name to its
+            comparison. The second is a list of pairs of control laws, each compared
+            over all scenarios together.
 
         Raises:
             RunError: Every run failed.
@@ -89,19 +94,23 @@ def prepare_comparison(
     workers: int | None = None,
     resume: bool = False,
 ) -> PreparedComparison:
-    """Draws and checks all layouts, and opens the directories of the runs.
+    """Draws all layouts of a comparison, checks them, and opens the result directories.
+
+    A layout is one random variant of the positions and motions of all bodies.
 
     Args:
-        plans: By name of the scenario; see ``comparison_plan``.
-        out: The directory; none: the next number under results/.
-        workers: Number of processes; none: one a core.
-        resume: Whether ``out`` may hold runs of the same comparison.
+        plans: Plan of each scenario, by the scenario's name; see ``comparison_plan``.
+        out: Directory of the comparison. None means the next number under results/.
+        workers: Number of processes. None means one process per processor core.
+        resume: Whether ``out`` may contain runs of the same comparison. These runs are
+            kept.
 
     Returns:
-        The comparison, to be run once; its directories are locked until then.
+        The comparison, which can be run once. Its directories are locked until then.
 
     Raises:
-        InputError: Something of that is no good; says what, and the remedy.
+        InputError: An argument or a plan is not valid. The message states the fault and
+            the remedy.
     """
     check_options(out, workers=workers, resume=resume)
     directory = Path(out).expanduser() if out is not None else None

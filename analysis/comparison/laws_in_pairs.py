@@ -1,7 +1,8 @@
-"""What a sweep over laws says: each law's figures, and the laws in pairs.
+"""Results of a sweep over control laws: statistics of each law and each pair of laws.
 
-Every law meets the same layouts with the same seeds, so that pairs of runs
-differ in nothing but the law.
+A sweep runs many variants of a scenario. A layout is one variant of the positions and
+motions of all bodies. In a paired sweep, every law meets the same layouts with the same
+seeds. The two runs of a pair therefore differ in the law only.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from diagrams.scenario.scenario import scenario_from_mapping
 
 @dataclass(frozen=True)
 class Pair:
-    """Two cells that differ in one field, run by run."""
+    """Comparison of two cells that differ in one field, layout by layout."""
 
     scenario: str
     field: str
@@ -45,36 +46,39 @@ class Pair:
     """Value of the field in the first cell."""
     second: Any
     fields: dict[str, Any]
-    """What both cells have in common."""
+    """Fields with the same value in both cells."""
     success: PairedRate
     collision: PairedRate
     metrics: dict[str, PairedMedian]
     encounters: dict[str, PairedMedian]
-    """Those of successful runs, of layouts on which both laws pushed back from an
-    obstacle: elsewhere nothing tells the laws apart but the source's own body."""
+    """Metrics over the layouts on which both laws succeeded and both had repulsion from
+    an obstacle. On other layouts, the laws differ only near the body of the source."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A sweep's cells and pairs."""
+    """Cells of a sweep, and the pairs of these cells."""
 
     cells: list[LawCell]
     pairs: list[Pair]
 
 
 def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Comparison:
-    """Summarises a paired sweep over laws.
+    """Summarizes a parameter sweep in which all control laws meet the same layouts.
 
-    Rates have Wilson's intervals, and medians have intervals from order statistics
-    (95 %). A run that raised an error counts as no success.
+    A layout is one variant of the positions and motions of all bodies. Rates have
+    Wilson's confidence intervals. Medians have confidence intervals from order
+    statistics. All intervals have a confidence of 95 %. A run that raised an error
+    counts as a failure.
 
     Args:
-        plan: Its grid has ``law``, and perhaps more fields.
-        table: Its results; see ``analysis.sweeps.store.load_results``.
-        scenario: Name of the experiment.
+        plan: Plan of the sweep. Its grid contains ``law`` and possibly other fields.
+        table: Results of the sweep, from ``analysis.sweeps.store.load_results``.
+        scenario: Name of the scenario.
 
     Returns:
-        A cell a law, and every two laws on the same layouts.
+        Cells and pairs. A cell combines all layouts of one law and one value of each
+        other field. A pair compares two cells that differ in exactly one field.
     """
     cells = [
         make_cell(scenario, fields, rows, plan.seed)
@@ -85,7 +89,7 @@ def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Compari
 
 
 def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]:
-    """Pairs that differ in one field, over all experiments and other fields."""
+    """Compares each pair of values of a field over all scenarios together."""
     groups: dict[tuple[str, str, str], list[_Neighbours]] = {}
     for plan, table in sweeps:
         for one in _neighbours(plan, table):
@@ -96,7 +100,7 @@ def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]
 
 @dataclass(frozen=True)
 class _Neighbours:
-    """Runs of two cells that differ in one field, layout by layout."""
+    """Runs of two cells that differ in one field, in the same order of layouts."""
 
     field: str
     first: Any
@@ -107,7 +111,7 @@ class _Neighbours:
 
 
 def _runs(plan: SweepPlan, table: pd.DataFrame) -> list[pd.DataFrame]:
-    """Each cell's rows in the order of the layouts."""
+    """Rows of each cell, in the order of the layouts."""
     scenario = scenario_from_mapping(plan.base)
     robots = list(scenario.robots)
     if "tick_s" not in table:  # else it is swept or drawn
@@ -156,7 +160,7 @@ def _pair(scenario: str, runs: _Neighbours) -> Pair:
 
 
 def _pushed(rows: pd.DataFrame) -> NDArray[np.bool_]:
-    """(n,) whether the law pushed back from an obstacle at all."""
+    """(n,) whether each run had any repulsion from an obstacle."""
     return np.isfinite(column(rows, "reaction_distance_m"))
 
 
@@ -166,7 +170,7 @@ def _medians(
     names: Sequence[str],
     chosen: NDArray[np.bool_],
 ) -> dict[str, PairedMedian]:
-    """Figures of the chosen pairs; those that no pair has are left out."""
+    """Compares each metric over the chosen pairs; omits metrics without values."""
     medians = {
         name: paired_median(column(first, name)[chosen], column(second, name)[chosen])
         for name in names

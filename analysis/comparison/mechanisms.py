@@ -1,4 +1,4 @@
-"""Why runs failed, from what the sensors knew: rules over a sweep's table."""
+"""Causes of failed runs, derived by rules from the sensor data in a sweep's table."""
 
 from __future__ import annotations
 
@@ -8,34 +8,46 @@ import pandas as pd
 from analysis.runs.run_table import column
 from diagrams.running.stop_rules import SUCCESSFUL
 
-#: A body without an echo for so many ticks before the contact was out of sight: none
-#: at the last tick.
+#: A body was out of sight if the time from its last echo to the contact is at least
+#: this number of ticks. Then there was no echo at the last tick.
 OUT_OF_SIGHT_TICKS = 1.5
-#: A body first heard of so shortly before the contact was heard late, s: from top
-#: speed at 0.72 m/s, less than 0.72 m.
+#: A body was heard late if its first echo came less than this time before the contact,
+#: s. At the top speed of 0.72 m/s, the robot travels 0.72 m in this time.
 LATE_S = 1.0
 
 
 def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
-    """Mechanism of each failed run; missing where a run succeeded.
+    """Determines why each failed run failed, as the name of a mechanism.
 
-    Of collisions, by the echoes of the body that was hit (docs/results_laws.md):
+    The mechanism of a collision depends on the echoes of the body that the robot hit
+    (docs/results_laws.md):
 
-    - ``never heard``: there was none, the body came from where no cone looks;
-    - ``out of sight``: there was none any more at the last tick, the body had left
-      the cones for the side of the bar;
-    - ``heard late``: the first one was less than 1 s before the contact;
-    - ``pushed too little``: heard in time and to the end.
+    - ``never heard``: The body returned no echo. It came from a direction outside the
+      sensor cones.
+    - ``out of sight``: The body returned echoes, but none at the last tick before the
+      contact (tick = control period). The body had left the cones.
+    - ``heard late``: The first echo came less than 1 s before the contact.
+    - ``pushed too little``: The body returned echoes in time and up to the contact.
 
-    Of the others: ``jam`` (stuck, or out of time, without ever having come into the
-    goal), ``held off`` (stuck after it came: the push off the source itself keeps
-    it outside), ``swings`` (unsettled: it came, and did not come to rest there),
-    ``lost``, ``astray`` and ``diverged`` (the source), ``no way found`` (as the law
-    says), ``failed`` (an error).
+    The other failures have these mechanisms:
+
+    - ``jam``: The robot never reached the goal. It got stuck, or the time ran out.
+    - ``held off``: The robot reached the goal and got stuck later. The repulsion from
+      the source itself kept the robot outside.
+    - ``swings``: The robot reached the goal but did not come to rest there.
+    - ``lost``: The robot lost the source.
+    - ``astray``: The robot did not follow the moving source for long enough.
+    - ``diverged``: The robot drove too far from the source.
+    - ``no way found``: The control law reported that there is no path.
+    - ``failed``: The run raised an error.
 
     Args:
-        rows: Of ``analysis.sweeps.store.load_results``, with cones, and each run's
-            ``tick_s``.
+        rows: Results of runs with sensor cones, from
+            ``analysis.sweeps.store.load_results``, with an additional column ``tick_s``
+            (control period, s).
+
+    Returns:
+        Name of the mechanism for each row. The name is missing if the run succeeded.
     """
     cause = rows["cause"].astype("object")
     names = cause.where(~cause.isin(SUCCESSFUL))

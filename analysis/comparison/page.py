@@ -1,4 +1,4 @@
-"""A comparison as one page: rates, medians, pairs, runs to look at."""
+"""The HTML page of a comparison: rates, medians, pairs and example runs."""
 
 from __future__ import annotations
 
@@ -39,13 +39,15 @@ def comparison_page(
     pooled: Sequence[Pair],
     directory: Path,
 ) -> str:
-    """The whole page; it shows the pictures and replays that are in its directory.
+    """Makes the HTML page of a comparison.
+
+    The page shows the pictures and replays that exist in its directory.
 
     Args:
-        summary: From ``compare_summary``.
-        comparisons: Cells and pairs by scenario.
-        pooled: Pairs of laws over all scenarios together.
-        directory: Where the page will be.
+        summary: JSON document from ``compare_summary``.
+        comparisons: Results of each scenario, by the scenario's name.
+        pooled: Comparisons of each pair of control laws over all scenarios together.
+        directory: Directory that the page will be written to.
 
     Returns:
         HTML.
@@ -150,7 +152,7 @@ def _pairs(pairs: Sequence[Pair]) -> str:
 
 
 def _examples(cell: Mapping[str, Any], directory: Path) -> list[str]:
-    """Commands, and the replays that are there."""
+    """Commands that repeat a cell's example runs, and links to existing replays."""
     lines, replays = [], []
     label = ", ".join([cell["law"], *map(str, cell["fields"].values())])
     for example in cell["examples"]:

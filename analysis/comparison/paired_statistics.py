@@ -1,4 +1,4 @@
-"""Whether two methods differ, from runs of both on the same layouts."""
+"""Tests whether two methods differ, from runs of both methods on the same layouts."""
 
 from __future__ import annotations
 
@@ -11,55 +11,58 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class PairedRate:
-    """How often one method did what the other did not."""
+    """How often one method had an outcome that the other method did not have."""
 
     pairs: int
     only_first: int
-    """Pairs in which the first method did it and the second did not."""
+    """Pairs in which the first method had the outcome and the second had not."""
     only_second: int
     difference: float
-    """Rate of the first less that of the second."""
+    """Rate of the first method minus rate of the second method."""
     low: float
-    """Ends of the interval of the difference."""
+    """Lower end of the confidence interval of the difference."""
     high: float
     p_value: float
-    """Exact McNemar test, two-sided: that both rates are equal."""
+    """Two-sided p-value of the exact McNemar test that both rates are equal."""
 
 
 @dataclass(frozen=True)
 class PairedMedian:
-    """By how much a figure of one method exceeds that of the other."""
+    """Difference of a metric between two methods, with an interval and a test."""
 
     pairs: int
-    """Layouts on which both have the figure."""
+    """Number of layouts on which both methods have a value."""
     first: float | None
     """Median of the first method over the pairs."""
     second: float | None
-    """Median of the second."""
+    """Median of the second method over the pairs."""
     difference: float | None
-    """Median over the pairs of the first's figure less the second's."""
+    """Median over the pairs of the first value minus the second value."""
     low: float | None
-    """Ends of the interval of that median, from order statistics."""
+    """Lower end of the interval of ``difference``, from order statistics."""
     high: float | None
     p_value: float | None
-    """Wilcoxon signed-rank test, two-sided: differences lie evenly about zero."""
+    """Two-sided p-value of the Wilcoxon signed-rank test that the differences are
+    symmetric about zero."""
 
 
 def paired_rate(
     first: ArrayLike, second: ArrayLike, confidence: float = 0.95
 ) -> PairedRate:
-    """Compares how often two methods did something, run by run.
+    """Compares how often two methods have an outcome, for example a collision.
 
-    The interval is the adjusted Wald interval of Bonett and Price (2012), which
-    keeps its coverage for rare events and small samples.
+    Both methods run on the same n layouts. The confidence interval is the adjusted Wald
+    interval of Bonett and Price (2012). This interval keeps its coverage even for rare
+    outcomes and small samples.
 
     Args:
-        first: (n,) whether the first method did it, n >= 1.
-        second: (n,) the same of the second, on the same layouts.
-        confidence: Of the interval.
+        first: (n,) whether the first method had the outcome on each layout, n >= 1.
+        second: (n,) whether the second method had the outcome on each layout.
+        confidence: Confidence level of the interval, between 0 and 1.
 
     Returns:
-        Difference of the rates, -1 to 1, with its interval and McNemar's exact test.
+        Difference of the two rates, from -1 to 1, with its confidence interval. The
+        result also contains the p-value of the exact McNemar test.
     """
     from scipy.stats import binomtest, norm
 
@@ -85,15 +88,19 @@ def paired_rate(
 def paired_median(
     first: ArrayLike, second: ArrayLike, *, confidence: float = 0.95
 ) -> PairedMedian:
-    """Compares a figure of two methods, run by run.
+    """Compares the values of a metric between two methods.
+
+    Both methods run on the same n layouts.
 
     Args:
-        first: (n,) figure of the first method; NaN where it has none.
-        second: (n,) the same of the second, on the same layouts.
-        confidence: Of the interval.
+        first: (n,) values of the first method. NaN if a run has no value.
+        second: (n,) values of the second method. NaN if a run has no value.
+        confidence: Confidence level of the interval, between 0 and 1.
 
     Returns:
-        In the figure's unit; None where no layout has both figures.
+        Medians, and the interval of the median difference, in the unit of the metric.
+        The result also contains the p-value of the Wilcoxon signed-rank test. If no
+        layout has values of both methods, these numbers are None.
     """
     from scipy.stats import wilcoxon
 

@@ -1,4 +1,4 @@
-"""Plans of comparisons: which layouts, laws and further fields."""
+"""Plans of comparisons: the layouts, the laws and the other fields to compare."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from diagrams.scenario.settings import parse_setting
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, ROUTE_LAWS
 
-#: The papers' experiments.
+#: Names of the scenarios of the papers' experiments.
 EXPERIMENTS = (
     "obstacle_free",
     "two_static_obstacles",
@@ -26,12 +26,12 @@ EXPERIMENTS = (
 )
 VELOCITY_TERM = "collision_vector.velocity_term"
 _LIBRARY = Path(diagrams.__file__).parent / "layouts"
-#: Fields of a sweep that a comparison sets itself.
+#: Fields of a sweep file that a comparison sets. Files of layouts must not set them.
 _OURS = ("grid", "runs", "pair")
 
 
 def library_layouts() -> dict[str, Path]:
-    """Names and files of the layouts that come with the package."""
+    """Returns the files of the layouts that come with the package, by name."""
     return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
 
 
@@ -44,24 +44,30 @@ def comparison_plan(
     settings: dict[str, Any] | None = None,
     grid: Mapping[str, Sequence[Any]] | None = None,
 ) -> SweepPlan:
-    """The paired sweep that compares laws on one experiment's layouts.
+    """Plans the runs that compare control laws on the layouts of one scenario.
+
+    A layout is one variant of the positions and motions of all bodies. Every law meets
+    the same layouts with the same seeds.
 
     Args:
-        scenario: A library name, whose layouts are those of the library; a YAML
-            file of layouts (a sweep without grid, runs and pair); or a YAML file
-            of a scenario, whose runs differ in noise alone.
-        laws: What to compare, each as that of all robots; none: the papers' and no
-            avoidance, or those for routes.
-        runs: Layouts, each met by every law.
-        seed: Of all layouts and noise.
-        settings: Further fields of the scenario, by dotted path.
-        grid: Further fields to compare, with their values.
+        scenario: One of three things. A library name selects layouts of the library. A
+            YAML file of layouts is a sweep file without ``grid``, ``runs`` and
+            ``pair``. A YAML file of a scenario has a single layout, and its runs differ
+            only in their random numbers.
+        laws: Laws to compare. Each run uses one law for all robots. None means the laws
+            of the papers and driving without avoidance. For a scenario with routes,
+            None means the laws for routes.
+        runs: Number of layouts. Every law meets each layout.
+        seed: Seed of all layouts and all noise.
+        settings: Values of other fields of the scenario, by dotted path.
+        grid: Lists of values of other fields to compare, by dotted path.
 
     Returns:
-        The sweep: ``law`` is the first axis of its grid, and ``pair`` is set.
+        Plan of the parameter sweep. ``law`` is the first field of its grid, and
+        ``pair`` is true.
 
     Raises:
-        InputError: Something of that is unknown or no good; names the field.
+        InputError: An argument is unknown or not valid. The message names the field.
     """
     plan = _layouts(scenario)
     base = scenario_from_mapping(plan.base)
@@ -87,7 +93,7 @@ def comparison_plan(
 
 
 def _require_one_law(base: Scenario, written: Mapping[str, Any]) -> None:
-    """Refuses what a comparison could not set: all robots get its law."""
+    """Rejects scenarios whose robots cannot all get the same law."""
     for name, robot in base.robots.items():
         if robot.searches is not None:
             raise InputError(
@@ -114,22 +120,26 @@ def comparison_plans(
     settings: Iterable[str] = (),
     grid: Iterable[str] = (),
 ) -> dict[str, SweepPlan]:
-    """A plan for each scenario, by its name.
+    """Plans a comparison of control laws for each scenario of a command line.
 
     Args:
-        scenarios: See ``comparison_plan``; none: the papers' experiments.
-        laws: Names parted by commas; none: see ``comparison_plan``.
-        velocity_terms: ``printed``, ``closing``, or both parted by a comma.
-        runs: Layouts a scenario.
-        seed: A whole number.
-        settings: ``key=value``.
-        grid: ``key=[value, ...]``.
+        scenarios: Names or files of scenarios; see ``comparison_plan``. An empty list
+            means the experiments of the papers.
+        laws: Names of laws, separated by commas. None means the default of
+            ``comparison_plan``.
+        velocity_terms: ``printed``, ``closing``, or both separated by a comma.
+        runs: Number of layouts per scenario. Each layout is a variant of the positions
+            and motions of all bodies.
+        seed: Whole number as text. None means the default seed.
+        settings: Values of other fields, each in the form ``key=value``.
+        grid: Lists of values to compare, each in the form ``key=[value, ...]``.
 
     Returns:
-        In the order of ``scenarios``; names without folder and ending.
+        Plans in the order of ``scenarios``. The key of a plan is the scenario's name,
+        without folder and file ending.
 
     Raises:
-        InputError: A word is no good; names the option or the field.
+        InputError: An argument is not valid. The message names the option or the field.
     """
     fields = dict(parse_setting(text) for text in settings)
     varied = dict(_listed_values(text) for text in grid)
@@ -175,7 +185,7 @@ def _layouts(scenario: str) -> SweepPlan:
 
 
 def _listed_values(text: str) -> tuple[str, list[Any]]:
-    """Key and values of ``key=[value, ...]``."""
+    """Splits ``key=[value, ...]`` into the key and the list of values."""
     key, values = parse_setting(text)
     if not isinstance(values, list):
         raise InputError(key, f"{values!r} is not a list of values; write [a, b]")

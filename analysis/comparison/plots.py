@@ -1,4 +1,4 @@
-"""Pictures of a comparison: rates with their intervals, and runs to look at."""
+"""Pictures of a comparison: rates with their intervals, and example runs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from analysis.runs.trajectory_artists import (
 from diagrams import RunResult
 from systems.world.geometry import rectangle_corners
 
-#: Metrics with a panel each, with their axis' title.
+#: Metrics that have a panel, with the titles of their axes.
 _METRICS = {
     "minimum_obstacle_clearance_m": "least clearance from obstacles (m), all runs",
     "jerk_rms_m_s3": "rms jerk (m/s$^3$), successful runs",
@@ -32,9 +32,9 @@ _METRICS = {
 
 
 def plot_rates(comparisons: Sequence[Comparison]) -> Figure:
-    """Success, collision and two medians of every law, with 95 % intervals.
+    """Draws the success rate, the collision rate and two medians of every control law.
 
-    A row of panels an experiment.
+    All values have 95 % confidence intervals. Each scenario has one row of panels.
     """
     rows, columns = len(comparisons), 2 + len(_METRICS)
     tallest = max(len(comparison.cells) for comparison in comparisons)
@@ -89,7 +89,7 @@ def _label_laws(axes: Axes, cells: Sequence[LawCell]) -> None:
 
 
 def plot_examples(rows: Sequence[tuple[LawCell, Sequence[RunResult]]]) -> Figure:
-    """Worst, typical and best run of each cell, seen from above, in W, m."""
+    """Draws the worst, typical and best run of each cell from above, in W, m."""
     results = [result for _, runs in rows for result in runs]
     limits = np.array([bounds(result, margin=0.6) for result in results])
     x_low, y_low = limits[:, 0].min(), limits[:, 2].min()

@@ -1,4 +1,4 @@
-"""The JSON document, the tables and the files of a comparison."""
+"""The JSON document and the files of a comparison."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import RunResult, dump_scenario, simulate
 
-#: Of an example: the scenario's name, the number of the run, and its kind.
+#: Key of an example: name of the scenario, number of the run, and kind of the example.
 _Key = tuple[str, int, str]
 
 
@@ -33,15 +33,15 @@ def compare_summary(
     comparisons: dict[str, Comparison],
     pooled: Sequence[Pair],
 ) -> dict[str, Any]:
-    """The JSON document of a comparison.
+    """Makes the JSON document of a comparison.
 
     Args:
-        prepared: Plans and directory.
-        comparisons: Cells and pairs by scenario.
-        pooled: Pairs of laws over all scenarios together.
+        prepared: Plans and directory of the comparison.
+        comparisons: Results of each scenario, by the scenario's name.
+        pooled: Comparisons of each pair of control laws over all scenarios together.
 
     Returns:
-        Plain values, to be written as JSON.
+        Plain values that can be written as JSON.
     """
     plan = next(iter(prepared.sweeps.values())).plan
     cells, pairs = [], []
@@ -76,17 +76,22 @@ def write_comparison(
     pooled: Sequence[Pair],
     summary: dict[str, Any],
 ) -> None:
-    """Writes what belongs beside the runs into the comparison's directory.
+    """Writes the summary, pictures, page and examples of a comparison.
 
-    ``summary.json``, ``rates.png``, a picture of examples an experiment,
-    ``report.html``, which shows all of them, and under ``examples/`` a scenario for
-    each example that can be run again, and a replay of each law's typical run.
+    The function writes these files into the directory of the comparison:
+
+    - ``summary.json``: the JSON document.
+    - ``rates.png``: rates and medians of all control laws.
+    - One picture of example runs per scenario.
+    - ``report.html``: a page that shows the results and the pictures.
+    - ``examples/``: a scenario file for each example, so that users can repeat the run.
+      For the typical run of each law, the folder also contains a replay.
 
     Args:
-        prepared: Its directory exists.
-        comparisons: Cells and pairs by scenario.
-        pooled: Pairs of laws over all scenarios together.
-        summary: From ``compare_summary``.
+        prepared: Prepared comparison, whose directory exists.
+        comparisons: Results of each scenario, by the scenario's name.
+        pooled: Comparisons of each pair of laws over all scenarios together.
+        summary: JSON document from ``compare_summary``.
     """
     from analysis.comparison.page import comparison_page
     from analysis.comparison.plots import plot_examples, plot_rates
@@ -111,7 +116,7 @@ def write_comparison(
 def _run_examples(
     prepared: PreparedComparison, cell: LawCell, files: dict[_Key, str]
 ) -> Iterator[RunResult]:
-    """Runs a cell's examples again; keeps their scenarios, and the typical replay."""
+    """Repeats a cell's examples; writes their scenarios and the typical replay."""
     from analysis.runs.replay import write_replay
 
     sweep = prepared.sweeps[cell.scenario]
@@ -130,7 +135,7 @@ def _run_examples(
 
 
 def _example_files(comparisons: dict[str, Comparison]) -> dict[_Key, str]:
-    """The scenario file of each example, from the comparison's directory."""
+    """Scenario file of each example, relative to the comparison's directory."""
     labels = {
         _key(cell, example): re.sub(
             r"[^\w.]+", "-", f"{cell.scenario} {cell.label} {example.kind}"

@@ -1,4 +1,4 @@
-"""The tables of a comparison for a terminal, and how their figures are written."""
+"""Tables of a comparison for a terminal, and the formats of their numbers."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from analysis.reporting.intervals import with_interval
 
 
 class MedianColumn(NamedTuple):
-    """A median of the printed table."""
+    """A column of the printed table that shows a median."""
 
     heading: str
     metric: str
     factor: float
-    """From the metric's unit to that of the heading."""
+    """Factor from the unit of the metric to the unit of the heading."""
     form: str
-    """Of the number."""
+    """Format of the number."""
 
 
 _COLUMNS = (
@@ -38,15 +38,15 @@ PAIRED = ("minimum_obstacle_clearance_m", "jerk_rms_m_s3", "sparc")
 def compare_text(
     summary: dict[str, Any], comparisons: dict[str, Comparison], pooled: Sequence[Pair]
 ) -> str:
-    """Tables for a terminal.
+    """Makes the tables of a comparison for a terminal.
 
     Args:
-        summary: From ``compare_summary``.
-        comparisons: Cells and pairs by scenario.
-        pooled: Pairs of laws over all scenarios together.
+        summary: JSON document from ``compare_summary``.
+        comparisons: Results of each scenario, by the scenario's name.
+        pooled: Comparisons of each pair of control laws over all scenarios together.
 
     Returns:
-        Lines without an end of line after the last one.
+        Lines of text, without a newline after the last line.
     """
     lines = [
         f"{summary['layouts']} layouts per scenario, seed {summary['seed']}",
@@ -89,13 +89,14 @@ def _cell_lines(cells: list[LawCell]) -> Iterator[str]:
 
 
 def warning_texts(cells: Sequence[LawCell]) -> list[str]:
-    """The warnings of a scenario's runs.
+    """Lists the warnings of a scenario's runs.
 
     Args:
-        cells: Cells of all laws.
+        cells: Summary of the runs of each control law.
 
     Returns:
-        For each field one line: how many runs of which law, and the first message.
+        One line for each field with warnings. The line states the number of affected
+        runs of each law, and the text of the first warning.
     """
     counts, messages = dict[str, list[str]](), dict[str, str]()
     for cell in cells:
@@ -110,31 +111,31 @@ def warning_texts(cells: Sequence[LawCell]) -> list[str]:
 
 
 def median_columns(cells: Sequence[LawCell]) -> list[MedianColumn]:
-    """The columns that one of the laws has at least."""
+    """Columns of the medians that at least one law has."""
     return [
         column for column in _COLUMNS if any(column.metric in c.metrics for c in cells)
     ]
 
 
 def counts_text(counts: Mapping[str, int]) -> str:
-    """Names with how many there are of each."""
+    """Names, each with its count."""
     return ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
 def rate_text(rate: Mean) -> str:
-    """A rate in percent, with its interval."""
+    """A rate in percent, with its confidence interval."""
     return with_interval(rate.estimate, rate.low, rate.high, ".0f", factor=100.0)
 
 
 def median_text(cell: LawCell, column: MedianColumn) -> str:
-    """A median of a law with its interval; a dash where it has none.
+    """Writes a median of a control law with its confidence interval.
 
     Args:
-        cell: Of the law.
-        column: Says which median, and how it is written.
+        cell: Summary of the runs of the law.
+        column: Metric of the median, and format of the numbers.
 
     Returns:
-        A few words.
+        The text; a dash if the law has no such median.
     """
     median, factor = cell.metrics.get(column.metric), column.factor
     if median is None:
@@ -144,20 +145,20 @@ def median_text(cell: LawCell, column: MedianColumn) -> str:
 
 
 def points_text(rate: PairedRate) -> str:
-    """A difference of rates in points, with its interval."""
+    """A difference of rates in percentage points, with its confidence interval."""
     figures = rate.difference, rate.low, rate.high
     return with_interval(*figures, "+.0f", factor=100.0)
 
 
 def difference_text(median: PairedMedian | None) -> str:
-    """The median of paired differences with its interval; a dash where none is."""
+    """The median of paired differences with its interval; a dash if there is none."""
     if median is None or median.difference is None:
         return "-"
     return f"{median.difference:+z.3f} ({median.low:+z.3f}, {median.high:+z.3f})"
 
 
 def _pair_line(pair: Pair) -> Iterator[str]:
-    """First less second: rates in points, then medians of paired differences."""
+    """Differences, first minus second: of rates in points, then of paired metrics."""
     common = "".join(f", {value}" for value in pair.fields.values())
     text = f"{pair.first} less {pair.second}{common}:"
     for name, rate in (("success", pair.success), ("collision", pair.collision)):

@@ -1,1 +1,1 @@
-"""What reports share: HTML, tables, plain values, intervals, result directories."""
+"""Shared code of reports: HTML, tables, plain values, intervals, result directories."""

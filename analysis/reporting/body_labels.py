@@ -1,4 +1,4 @@
-"""Words beside bodies in a picture, put where they can be read."""
+"""Labels of bodies in a picture, placed where they can be read."""
 
 from __future__ import annotations
 
@@ -17,29 +17,35 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.reporting.palette import text_colour
 
 _POINTS_PER_INCH = 72.0
-#: From a body to its words, pt, and from which on a line leads to it.
+#: _GAPS_PT: possible gaps between a body and its label, pt.
+#: _LEAD_FROM_PT: least gap at which a line connects the two, pt.
 _GAPS_PT, _LEAD_FROM_PT = (2.0, 8.0, 15.0, 24.0, 34.0, 46.0), 8.0
-#: About a body, the first on the side that is preferred.
+#: Number of possible directions from a body to its label. The first direction is to
+#: the right of the body's x axis, which is the preferred side.
 _DIRECTIONS = 16
-#: Free about words, pt.
+#: Margin around a label, pt.
 _MARGIN_PT = 1.0
-#: What a place costs: words below words (none are put there if it can be helped), a
-#: point of a line below them, a point of distance, a step round the body, and another
-#: body, whose they would seem to be.
+#: Costs of a label's position. The position with the least cost is used.
+#: _WORDS: for each other label or large mark that the label covers.
+#: _INK: for each point of a line that the label covers.
+#: _FAR: for each pt of the gap.
+#: _ROUND: for each step away from the preferred direction.
+#: _IN_ANOTHER: if the label is inside another body, and would seem to name that body.
 _WORDS, _INK, _FAR, _ROUND, _IN_ANOTHER = 1e4, 1.0, 0.35, 0.6, 8.0
 _Box = tuple[float, float, float, float]
 
 
 class BodyLabel(Annotation):
-    """Words beside a rectangle, at its right until ``spread_labels`` has seen all."""
+    """Text label of a rectangular body; ``spread_labels`` finds its final position."""
 
     def __init__(self, text: str, rectangle: ArrayLike, colour: str) -> None:
-        """Begins on the right of the body.
+        """Places the label at the right side of the body.
 
         Args:
-            text: In one line.
-            rectangle: (5,) x, y, theta, length, width, m and rad.
-            colour: Of the words.
+            text: One line of text.
+            rectangle: (5,) body as (x, y, theta, length, width) in the world frame W, m
+                and rad.
+            colour: Color of the body. The text gets the same color, darkened if needed.
         """
         x, y, theta, length, width = map(float, np.asarray(rectangle))
         unit = math.sin(theta), -math.cos(theta)
@@ -59,20 +65,20 @@ class BodyLabel(Annotation):
         )
 
     def size_pt(self) -> tuple[float, float]:
-        """Width and height of the words, pt."""
+        """Width and height of the label with its margin, in points."""
         size = float(self.get_fontsize())
         box = TextPath((0.0, 0.0), self.get_text(), size=size).get_extents()
         return float(box.width) + 2.0 * _MARGIN_PT, size + 2.0 * _MARGIN_PT
 
 
 def spread_labels(axes: Axes) -> None:
-    """Puts all labels where none covers another, and little else, if it can be.
+    """Moves all labels to places where they cover as little of the picture as possible.
 
-    One that is away from its body is tied to it by a thin line. The limits of the axes
-    must be those of the picture.
+    A label covers another label only if there is no other place. If a label is 8 points
+    or more away from its body, a thin line connects the two.
 
     Args:
-        axes: With all that is drawn on them.
+        axes: Axes with the complete drawing. Their limits must be final.
     """
     figure = axes.get_figure(root=True)
     assert figure is not None
@@ -90,7 +96,7 @@ def spread_labels(axes: Axes) -> None:
         half = np.array(label.size_pt()) / 2.0
         best: tuple[float, Any] = (math.inf, None)
         for turn in range(_DIRECTIONS):
-            # To the right first, then a step to either side, and on to the left.
+            # The order is: right, then one step to each side, and so on to the left.
             step = (turn + 1) // 2 * (1 if turn % 2 else -1)
             angle = theta - math.pi / 2.0 + 2.0 * math.pi * step / _DIRECTIONS
             unit = np.array([math.cos(angle), math.sin(angle)])
@@ -132,7 +138,7 @@ def spread_labels(axes: Axes) -> None:
 
 
 def _to_edge(half: NDArray[np.float64], unit: NDArray[np.float64]) -> Any:
-    """From the middle of words to their edge."""
+    """Vector from the center of a label to its edge, along a unit vector."""
     return unit * np.min(half / np.maximum(np.abs(unit), 1e-9))
 
 
@@ -161,14 +167,14 @@ def _overlap(a: _Box, b: _Box) -> float:
 
 
 def _within(points: NDArray[np.float64], box: _Box) -> int:
-    """How many points lie below words."""
+    """Number of points that a label covers."""
     x, y = points.T
     inside = (x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])
     return int(np.count_nonzero(inside))
 
 
 def _ink(axes: Axes, scale: float) -> NDArray[np.float64]:
-    """(n, 2) points of lines and edges of bodies, one a point of length, pt."""
+    """(n, 2) points every 1 pt along the lines and the edges of bodies, pt."""
     found = [np.zeros((0, 2))]
     for line in axes.get_lines():
         data = line.get_transform().contains_branch_seperately(axes.transData)
@@ -184,7 +190,7 @@ def _ink(axes: Axes, scale: float) -> NDArray[np.float64]:
 
 
 def _dots(points: NDArray[np.float64], *, drawn: bool) -> NDArray[np.float64]:
-    """Points along a line, one a point of length; of marks alone themselves."""
+    """Points every 1 pt along a line; without a line, the given points."""
     points = points[np.isfinite(points).all(axis=1)]
     if not drawn or len(points) < 2:
         return points
@@ -194,7 +200,7 @@ def _dots(points: NDArray[np.float64], *, drawn: bool) -> NDArray[np.float64]:
 
 
 def _marks(axes: Axes, scale: float) -> list[_Box]:
-    """Large marks, as of a collision: words under them cannot be read."""
+    """Boxes of large marks, for example of a collision, which labels must not cover."""
     found = []
     for line in axes.get_lines():
         size = float(line.get_markersize())

@@ -1,4 +1,4 @@
-"""Tables of named numbers: what a data object says of itself, for readers."""
+"""HTML tables of named values."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from analysis.reporting.html_page import Cell, number, table
 
-#: Endings of names, longest first, and what they stand for.
+#: Endings of names, and the units that they mean; longest endings first.
 _UNITS = {
     "_n_s_m": "N s/m",
     "_rad_s3": "rad/s\u00b3",
@@ -27,12 +27,12 @@ _UNITS = {
     "_m": "m",
     "_s": "s",
 }
-#: Longer lists than this are left to the JSON document.
+#: Greatest length of a list in a table. Longer lists are in the JSON document only.
 _LONGEST = 8
 
 
 def readable_name(name: str) -> str:
-    """`top_kinetic_energy_j` as 'top kinetic energy (J)'."""
+    """Makes a name readable: `top_energy_j` becomes 'top energy (J)'."""
     for ending, unit in _UNITS.items():
         if name.endswith(ending):
             return f"{_words(name.removesuffix(ending))} ({unit})"
@@ -46,13 +46,16 @@ def _words(name: str) -> str:
 def fact_table(
     facts: Mapping[str, Any], *, skip: Sequence[str] = (), caption: str = ""
 ) -> str:
-    """Two columns, what and how much; groups in groups.
+    """Makes a table with two columns: the name and the value of each fact.
+
+    If a value is a mapping, its entries get a row each. Their names start with the name
+    of the mapping.
 
     Args:
-        facts: Plain values (see ``analysis.reporting.plain_values``). Long lists and
-            lists of mappings are left out.
-        skip: Keys, or dotted paths, to leave out.
-        caption: Stands above.
+        facts: Plain values by name (see ``analysis.reporting.plain_values``). The table
+            omits lists of mappings and lists of more than 8 values.
+        skip: Keys or dotted paths of values to omit.
+        caption: Text above the table.
 
     Returns:
         HTML.
@@ -93,14 +96,15 @@ def _cell(value: Any) -> Any:
 
 
 def row_table(rows: Sequence[Mapping[str, Any]], *, caption: str = "") -> str:
-    """A table with a row for each mapping; columns are the first one's keys.
+    """Makes a table with one row for each mapping.
 
     Args:
-        rows: Plain values by name; values that a cell cannot hold are left out.
-        caption: Stands above.
+        rows: Plain values by name. The names of the first row are the headings of the
+            columns. The table omits values that do not fit into a cell.
+        caption: Text above the table.
 
     Returns:
-        HTML; empty where there are no rows.
+        HTML; an empty text if there are no rows.
     """
     if not rows:
         return ""

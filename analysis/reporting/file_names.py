@@ -1,4 +1,4 @@
-"""Names of files and folders that are made of a user's own names."""
+"""Names of files and folders, made from names that a user chose."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import re
 import unicodedata
 from collections.abc import Iterable, Sequence
 
-#: What some file systems do not take in a name.
+#: Characters that some file systems do not allow in a name.
 _RESERVED = re.compile(r'[<>:"/\\|?*\x00-\x1f\x7f]')
-#: Most systems take 255; what is added to a name needs the rest.
+#: Greatest length of a name, bytes. Most systems allow 255. The rest is for the number
+#: and the ending.
 _MOST_BYTES = 200
 
 
@@ -19,20 +20,22 @@ def distinct_names(
     endings: Sequence[str] = ("",),
     joint: str = "-",
 ) -> list[str]:
-    """Names for files of one folder, each as it is wanted where that is possible.
+    """Makes a different file name for each text, as close to the text as possible.
 
-    Names count as one also where they differ in case alone, as they do for the file
-    systems of macOS and Windows.
+    Two names that differ only in upper and lower case count as equal. The file systems
+    of macOS and Windows also treat them as equal.
 
     Args:
-        wanted: Any text; a user's names.
-        taken: Names of other files in that folder.
-        endings: Each name stands for files with these endings.
-        joint: Stands before the number of a name that is taken, as in ``summary-2``.
+        wanted: Any texts, chosen by a user.
+        taken: Names of other files in the same folder.
+        endings: Endings of the files that belong to each name.
+        joint: Text between a name and its number. If a name is taken, the new name is,
+            for example, ``summary-2``.
 
     Returns:
-        A name for each text, in order. Reserved characters become hyphens, dots at
-        its ends are left out, and it has at most 200 bytes before its number.
+        One name for each text, in the same order. Hyphens replace characters that some
+        file systems reserve. Dots and spaces at both ends are removed. A name has at
+        most 200 bytes, not counting its number.
     """
     used = {_folded(name) for name in taken}
     names = []
@@ -49,7 +52,7 @@ def distinct_names(
 
 def _plain(text: str) -> str:
     encoded = text.encode("utf-8", "backslashreplace")[:_MOST_BYTES]
-    # Names of one or two dots are folders that exist; one more dot hides a file.
+    # The names "." and ".." are folders. A dot at the beginning hides a file.
     plain = _RESERVED.sub("-", encoded.decode("utf-8", "ignore")).strip(". ")
     return plain or "unnamed"
 

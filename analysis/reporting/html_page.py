@@ -1,8 +1,9 @@
-"""A page of text, tables and figures in one file, for the screen and for paper.
+"""Makes a page of text, tables and figures in one HTML file, for screen and paper.
 
-Plain functions from text to HTML: each takes plain text, which it escapes, and
-returns a string of HTML; whatever takes HTML says so. Nothing on a page needs a
-network or a font of its own; its only script lets keyboards scroll what is too wide.
+The functions of this module turn plain text into HTML and escape the text. If a
+function takes HTML, its docstring says so. A page needs no network connection and no
+fonts of its own. Its only script allows scrolling with the keyboard through wide tables
+and figures.
 """
 
 from __future__ import annotations
@@ -22,11 +23,12 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.mathtext import math_to_image
 
 _HERE = Path(__file__).parent
-#: Variables with the colours of pages, by day and by night.
+#: CSS variables with the colors of pages, in light mode and in dark mode.
 COLOURS_CSS = (_HERE / "page_colours.css").read_text("utf-8")
 _CSS = COLOURS_CSS + (_HERE / "html_page.css").read_text("utf-8")
 
-#: What scrolls by itself is reached by the Tab key, and nothing else is.
+#: With this script, the Tab key reaches the elements that can be scrolled, and no
+#: others.
 _SCRIPT = """
 const reach = () => document.querySelectorAll(".wide, .drawing, .equation").forEach(
   (box) => box.scrollWidth > box.clientWidth
@@ -37,19 +39,19 @@ reach();
 
 
 class Judged(NamedTuple):
-    """A number, or a word, above the verdict on it, in one cell."""
+    """A value and the verdict on this value below it, in one cell of a table."""
 
     value: complex | str | None
     verdict: str
 
 
-#: Text, or a number; none is a dash.
+#: Content of a table cell: a text or a number. None is shown as a dash.
 Cell = str | complex | Judged | None
 
-#: Stands for a zero among numbers, so that the others are seen.
+#: Sign for a zero in a matrix, so that the other numbers stand out.
 ZERO = "\u00b7"
 
-#: Cells that are coloured, by their text.
+#: Style classes of cells that have a color, by the text of the cell.
 _VERDICT_CLASSES = {
     "pass": "pass",
     "fail": "fail",
@@ -59,12 +61,12 @@ _VERDICT_CLASSES = {
 
 
 def heading(level: int, text: str, anchor: str = "") -> str:
-    """A heading of level 1 to 4.
+    """Makes a heading of a page.
 
     Args:
-        level: 1 to 4.
+        level: Level from 1 to 4.
         text: Plain text.
-        anchor: What links lead to; empty: none do.
+        anchor: Identifier of the heading, for links. Empty if there are no such links.
 
     Returns:
         HTML.
@@ -74,12 +76,12 @@ def heading(level: int, text: str, anchor: str = "") -> str:
 
 
 def paragraph(text: str) -> str:
-    """A paragraph; `words` between backquotes are set as code."""
+    """Makes a paragraph; text between backquotes is set as code."""
     return f"<p>{_inline(text)}</p>"
 
 
 def links(targets: Iterable[tuple[str, str]]) -> str:
-    """A line of links to sections, given as anchor and text."""
+    """Makes a line of links to sections, given as pairs of anchor and text."""
     inner = " \u00b7 ".join(
         f'<a href="#{html.escape(anchor)}">{html.escape(text)}</a>'
         for anchor, text in targets
@@ -88,17 +90,17 @@ def links(targets: Iterable[tuple[str, str]]) -> str:
 
 
 def note(text: str) -> str:
-    """A paragraph that stands out: what a reader must know before the numbers."""
+    """Makes a highlighted paragraph to read before the numbers."""
     return f'<p class="note">{_inline(text)}</p>'
 
 
 def bullets(texts: Iterable[str]) -> str:
-    """A list with a dot before each text."""
+    """Makes a list with one bullet for each text."""
     return "<ul>" + "".join(f"<li>{_inline(text)}</li>" for text in texts) + "</ul>"
 
 
 def definitions(rows: Iterable[tuple[str, str]]) -> str:
-    """Pairs of term and text, a line each."""
+    """Makes a list of pairs of term and text, one pair per line."""
     lines = "".join(
         f"<dt>{_inline(term)}</dt><dd>{_inline(text)}</dd>" for term, text in rows
     )
@@ -112,17 +114,20 @@ def table(
     caption: str = "",
     dense: bool = False,
 ) -> str:
-    """A table whose columns are as wide as they need to be.
+    """Makes a table whose columns are as wide as their contents.
+
+    Numbers are aligned to the right. Verdicts, for example "pass", have colors.
 
     Args:
-        headings: One for each column; all empty: no row of headings.
-        rows: Cells; numbers are set to the right, verdicts in their colours. A row
-            of a single cell spans the table and heads the rows that follow.
-        caption: Stands above.
-        dense: In small type, for matrices.
+        headings: One heading for each column. If all are empty, the table has no row of
+            headings.
+        rows: Cells of each row. A row with a single cell spans the table and is a
+            heading for the rows below.
+        caption: Text above the table.
+        dense: Whether to use small type, for matrices.
 
     Returns:
-        HTML; a wide table scrolls by itself.
+        HTML. If the table is wider than the page, the reader can scroll the table.
     """
     kind = ' class="dense"' if dense else ""
     top = f"<caption>{_inline(caption)}</caption>" if caption else ""
@@ -158,13 +163,14 @@ def _cell(value: Cell) -> str:
 
 
 def number(value: complex | None, digits: int = 4) -> str:
-    """A number for readers: so many significant digits, a true minus sign.
+    """Writes a number with a fixed number of significant digits and a true minus sign.
 
-    Nothing is a dash, a complex number is written as a sum with j.
+    A complex number is written as a sum with j. A missing number is written as a dash.
 
     Args:
-        value: Any; None and NaN are nothing.
-        digits: Significant digits of a float; whole numbers keep all of theirs.
+        value: The number; None and NaN mean that it is missing.
+        digits: Number of significant digits of a float. Whole numbers keep all their
+            digits.
 
     Returns:
         Plain text.
@@ -186,16 +192,18 @@ def _inline(text: str) -> str:
 
 
 def figure_html(figure: Figure, name: str, caption: str, *, scale: bool = False) -> str:
-    """A figure as inline SVG.
+    """Makes a matplotlib figure part of an HTML page, as inline SVG.
 
     Args:
-        figure: Drawn with matplotlib.
-        name: Unlike that of any other figure on the page; letters, digits, _.
-        caption: Stands below.
-        scale: Whether lightness tells how much, so that it stays by night.
+        figure: The figure.
+        name: Beginning of all identifiers in the SVG: letters, digits and underscores.
+            Each figure of a page needs a different name.
+        caption: Text below the figure.
+        scale: Whether the lightness of a color represents a value in this figure. If
+            true, the page does not change the colors in dark mode.
 
     Returns:
-        HTML, the same at every run.
+        HTML. The same figure always gives the same HTML.
     """
     stream = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
@@ -209,14 +217,14 @@ def figure_html(figure: Figure, name: str, caption: str, *, scale: bool = False)
 
 
 def picture(file: str, caption: str) -> str:
-    """A picture that lies beside the page, as wide as the page.
+    """Shows a picture file, as wide as the page.
 
     Args:
-        file: Its name, in the page's directory.
-        caption: Stands below.
+        file: Name of the picture in the directory of the page.
+        caption: Text below the picture.
 
     Returns:
-        HTML; the picture leads to its file.
+        HTML. A click on the picture opens the file.
     """
     label, source = html.escape(caption.replace("`", "")), html.escape(file)
     image = f'<a href="{source}"><img src="{source}" alt="{label}"></a>'
@@ -224,7 +232,7 @@ def picture(file: str, caption: str) -> str:
 
 
 def _figure(drawing: str, caption: str, kind: str = "") -> str:
-    """A wide drawing scrolls by itself."""
+    """Makes a figure with a caption; a wide drawing can be scrolled."""
     opening = f'<figure class="{kind}">' if kind else "<figure>"
     return (
         f'{opening}<div class="drawing">{drawing}</div>'
@@ -233,7 +241,7 @@ def _figure(drawing: str, caption: str, kind: str = "") -> str:
 
 
 def file_links(files: Iterable[tuple[str, str]]) -> str:
-    """A list of files that lie beside the page, given as name and what is in it."""
+    """Makes a list of files beside the page, given as pairs of name and description."""
     lines = [
         f'<li><a href="{html.escape(name)}">{html.escape(name)}</a>: {_inline(text)}'
         for name, text in files
@@ -242,12 +250,13 @@ def file_links(files: Iterable[tuple[str, str]]) -> str:
 
 
 def equation(tex: str, name: str, text: str) -> str:
-    """A formula in matplotlib's subset of TeX, set off from the text.
+    """Shows a formula on a line of its own.
 
     Args:
-        tex: Without the dollar signs.
-        name: As for ``figure_html``.
-        text: The formula in words or plain signs, for those who hear the page.
+        tex: Formula in matplotlib's subset of TeX, without dollar signs.
+        name: Beginning of all identifiers in the SVG: letters, digits and underscores.
+            Each figure of a page needs a different name.
+        text: Formula in words or plain characters, for screen readers.
 
     Returns:
         HTML.
@@ -262,10 +271,11 @@ def equation(tex: str, name: str, text: str) -> str:
 
 
 def _embed(svg: str, name: str, label: str) -> str:
-    """An SVG file as an element that shares its page with others.
+    """Turns the text of an SVG file into an element of an HTML page.
 
-    Identifiers must differ on a page: those that are referred to get the figure's
-    name in front, others are dropped.
+    Identifiers must be unique on the page. If another part of the SVG refers to an
+    identifier, the function puts the figure's name in front of the identifier. The
+    function removes all other identifiers.
     """
     svg = svg[svg.index("<svg") :].strip()
     svg = re.sub(r"(?s)<metadata>.*?</metadata>", "", svg)
@@ -290,14 +300,14 @@ def section(
     level: int = 2,
     fresh: bool = False,
 ) -> str:
-    """Parts in HTML under a heading.
+    """Makes a section of a page: a heading and the parts below the heading.
 
     Args:
-        anchor: Where the contents lead.
-        title: Text of the heading.
-        parts: HTML.
-        level: Of the heading.
-        fresh: Whether it begins a sheet of paper.
+        anchor: Identifier of the section, for links.
+        title: Plain text of the heading.
+        parts: Parts in HTML.
+        level: Level of the heading, from 1 to 4.
+        fresh: Whether the section begins on a new sheet when the page is printed.
 
     Returns:
         HTML.
@@ -308,15 +318,16 @@ def section(
 
 
 def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) -> str:
-    """The whole document.
+    """Makes the whole HTML document.
 
     Args:
-        title: Of the window and at the top.
-        contents: Anchor and title of each section.
-        parts: HTML.
+        title: Title of the browser window, and heading of the page.
+        contents: Pairs of anchor and title, one pair for each section.
+        parts: Parts of the page in HTML.
 
     Returns:
-        HTML with its style sheet inside; nothing is loaded from elsewhere.
+        HTML with an embedded style sheet. The page loads no other files, apart from its
+        pictures.
     """
     links = "".join(
         f'<li><a href="#{html.escape(anchor)}">{html.escape(text)}</a></li>'

@@ -1,4 +1,4 @@
-"""Confidence intervals of rates and of statistics of samples."""
+"""Confidence intervals of rates and of sample statistics."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 
 class Interval(NamedTuple):
-    """Where a figure lies, in all likelihood."""
+    """A confidence interval."""
 
     low: float
     high: float
 
 
 class Estimate(NamedTuple):
-    """A figure with its 95 % interval; NaN where nothing has one."""
+    """An estimated value with its 95 % confidence interval; NaN without data."""
 
     value: float
     low: float
@@ -33,18 +33,19 @@ def with_interval(
     unit: str = "",
     factor: float = 1.0,
 ) -> str:
-    """A figure and its interval for readers.
+    """Writes a value and its confidence interval for readers.
 
     Args:
-        value: The figure.
-        low: Lower end of its interval.
-        high: Upper end.
-        form: Sign and decimals, as ``format`` takes them. A zero gets no minus.
-        unit: Stands behind the figure, with a space in front.
-        factor: What all are multiplied by.
+        value: Estimated value.
+        low: Lower end of the interval.
+        high: Upper end of the interval.
+        form: Format of all three numbers, for Python's function ``format``. Zeros never
+            have a minus sign.
+        unit: Unit after the value, with a leading space.
+        factor: Factor that multiplies all three numbers before they are written.
 
     Returns:
-        Text as '12.5 % (3.1, 22.0)'.
+        Text in the form '12.5 % (3.1, 22.0)'.
     """
     value, low, high = (factor * each for each in (value, low, high))
     form = form.replace(".", "z.")
@@ -52,15 +53,17 @@ def with_interval(
 
 
 def wilson_interval(successes: int, runs: int, *, confidence: float = 0.95) -> Interval:
-    """Wilson's score interval of a probability (Wilson 1927), without correction.
+    """Computes Wilson's score interval of a probability, without continuity correction.
+
+    Reference: Wilson (1927).
 
     Args:
-        successes: Runs in which it happened.
-        runs: All runs, at least one.
-        confidence: Share of such intervals that hold the true value.
+        successes: Number of successful runs.
+        runs: Number of all runs, at least one.
+        confidence: Probability that an interval of this kind contains the true value.
 
     Returns:
-        Both ends, 0 to 1.
+        Both ends of the interval, from 0 to 1.
     """
     from scipy.stats import binomtest
 
@@ -76,21 +79,24 @@ def bootstrap_interval(
     confidence: float = 0.95,
     resamples: int = 2000,
 ) -> Interval:
-    """Percentile bootstrap of a statistic (Efron 1979).
+    """Computes the percentile bootstrap interval of a statistic.
+
+    Reference: Efron (1979).
 
     Args:
-        values: (n,) independent samples, at least one.
-        statistic: Takes an ``axis``, as ``np.median``.
+        values: (n,) independent samples, n >= 1.
+        statistic: Function of samples with an argument ``axis``, for example
+            ``np.median``.
         seed: Seed of the resampling.
-        confidence: As of ``wilson_interval``.
+        confidence: Probability that an interval of this kind contains the true value.
         resamples: Number of resampled sets.
 
     Returns:
-        Both ends, in the unit of the statistic.
+        Both ends of the interval, in the unit of the statistic.
     """
     from scipy.stats import bootstrap
 
-    # scipy refuses a single sample: twice the same has the same interval.
+    # scipy rejects a single sample. Two equal samples have the same interval.
     samples = np.resize(np.asarray(values, dtype=float), max(np.size(values), 2))
     found = bootstrap(
         (samples,),
@@ -104,20 +110,23 @@ def bootstrap_interval(
 
 
 def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
-    """Interval of a median from order statistics: for any distribution.
+    """Computes a confidence interval of a median from order statistics.
 
-    The number of samples below the true median is binomial, which gives the
-    ranks. With fewer than six samples (at 95 %) no two of them are enough:
-    the interval is then their range.
+    The interval is valid for any distribution of the samples. The number of samples
+    below the true median has a binomial distribution. This distribution determines
+    which two of the sorted samples bound the interval. At 95 % confidence, this needs
+    at least six samples. With fewer samples, the interval extends from the least to the
+    greatest sample.
 
     Args:
-        values: (n,) independent samples, at least one.
-        confidence: As of ``wilson_interval``, at least.
+        values: (n,) independent samples, n >= 1.
+        confidence: Least probability that an interval of this kind contains the true
+            median.
 
     Returns:
-        Two of the samples.
+        Both ends of the interval. Each end is one of the samples.
     """
-    # The same as quantile_test's, which takes 15 times as long.
+    # scipy's quantile_test gives the same interval, but takes 15 times as long.
     from scipy.stats import binom
 
     ordered = np.sort(np.asarray(values, dtype=float))

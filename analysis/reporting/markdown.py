@@ -1,4 +1,4 @@
-"""Tables in Markdown, as the pages under docs/ hold them."""
+"""Markdown tables for the pages under docs/."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from collections.abc import Iterable, Sequence
 
 
 def markdown_row(cells: Iterable[object]) -> str:
-    """One line of a table."""
+    """Makes one row of a table."""
     return f"| {' | '.join(str(cell) for cell in cells)} |"
 
 
 def markdown_head(headings: Sequence[str]) -> str:
-    """The row of headings, and the rule below it."""
+    """Makes the row of headings and the line below it."""
     return f"{markdown_row(headings)}\n{'|---' * len(headings)}|"
 
 
 def markdown_table(headings: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    """A whole table.
+    """Makes a table in Markdown.
 
     Args:
-        headings: One for each column.
-        rows: Cells from left to right; each is written as ``str`` writes it.
+        headings: One heading for each column.
+        rows: Cells of each row from left to right, written with ``str``.
 
     Returns:
-        Lines without an end of line after the last one.
+        Lines of text, without a newline after the last line.
     """
     return "\n".join([markdown_head(headings), *map(markdown_row, rows)])

@@ -1,4 +1,4 @@
-"""A figure that a notebook shows by itself."""
+"""A figure that a notebook displays without further commands."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from io import BytesIO
 
 from matplotlib.figure import Figure
 
-#: As wide as a page is read.
+#: Resolution in a notebook, dots per inch.
 _DPI = 100
 
 
 class NotebookFigure(Figure):
-    """As matplotlib's, and a picture where it is the last value of a cell.
+    """A matplotlib figure that a notebook shows as the last value of a cell.
 
-    Notebooks show figures of pyplot, which keeps every one of them and chooses a
-    window; ours belong to whoever asked for them.
+    Notebooks show figures of pyplot in the same way. But pyplot keeps all figures in
+    memory and chooses a window system. A figure of this class can be deleted like any
+    other object.
     """
 
     def _repr_png_(self) -> bytes:

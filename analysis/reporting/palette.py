@@ -1,4 +1,4 @@
-"""The colours of things, and the grid behind them: the same in every picture."""
+"""Colors that have the same meaning in every picture, and the grid of pictures."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Okabe and Ito's palette, told apart with any colour vision; its light ones darker, so
-#: that lines stand out from white by 3 to 1 (WCAG 2.2, 1.4.11). Their orange is brown:
-#: one between would be their vermilion to who sees no green. Sound is laid below.
+#: Color of each kind of thing, after the palette of Okabe and Ito. People with any kind
+#: of color vision can distinguish these colors. Light colors of the palette are
+#: darkened, so that lines have a contrast of 3 to 1 on white (WCAG 2.2, 1.4.11).
+#: Orange became brown, because people who see no green would confuse a darker orange
+#: with vermilion. "sound" is light, because it is drawn below other things.
 COLOURS = {
     "robot": "#0072B2",
     "source": "#D55E00",
@@ -34,7 +36,7 @@ COLOURS = {
     "passed": "#6B6B6B",
     "lessened": "#A86B00",
 }
-#: Of several robots, in turn.
+#: Colors of several robots, in order.
 ROBOT_COLOURS = (
     "#0072B2",
     "#009E73",
@@ -46,7 +48,8 @@ ROBOT_COLOURS = (
     "#444444",
 )
 
-#: For curves that are no such thing, as of laws: in order, after the grey of none.
+#: Colors of curves that belong to none of these things, for example to laws, in order.
+#: The first one is gray, for driving without a law of avoidance.
 SERIES_COLOURS = (
     COLOURS["empty"],
     "#D55E00",
@@ -61,12 +64,15 @@ SERIES_COLOURS = (
 
 
 def luminance(colour: Any) -> float:
-    """How light a colour is, 0 to 1, after WCAG 2.2.
+    """Computes the relative luminance of a color, as defined by WCAG 2.2.
 
-    Below 0.18 white letters stand out more than black ones.
+    If the luminance is below 0.18, white text has more contrast than black text.
 
     Args:
-        colour: As matplotlib takes it; how transparent it is does not count.
+        colour: Color in any form of matplotlib. Its transparency is ignored.
+
+    Returns:
+        Luminance from 0 for black to 1 for white.
     """
     from matplotlib.colors import to_rgb
 
@@ -80,27 +86,33 @@ def luminance(colour: Any) -> float:
 
 
 def contrast(first: Any, second: Any) -> float:
-    """How much two colours stand out from each other, 1 to 21, after WCAG 2.2.
+    """Computes the contrast ratio of two colors, as defined by WCAG 2.2.
+
+    The ratio is (L1 + 0.05) / (L2 + 0.05), where L1 and L2 are the luminances of the
+    lighter and the darker color. The number 0.05 represents stray light.
 
     Args:
-        first: As matplotlib takes it.
-        second: The same.
+        first: Color in any form of matplotlib.
+        second: Color in any form of matplotlib.
 
     Returns:
-        The ratio of their luminances, each with 0.05 of stray light.
+        Ratio from 1 to 21.
     """
     less, more = sorted((luminance(first), luminance(second)))
     return (more + 0.05) / (less + 0.05)
 
 
 def text_colour(colour: Any) -> str:
-    """A colour as dark as words on white need it, 4.5 to 1.
+    """Darkens a color until text in this color is readable on white.
+
+    The required contrast ratio is 4.5 to 1.
 
     Args:
-        colour: As matplotlib takes it.
+        colour: Color in any form of matplotlib.
 
     Returns:
-        The same one if it is dark enough.
+        The darkened color. If the color is dark enough, the function returns the color
+        itself.
     """
     from matplotlib.colors import to_hex, to_rgb
 
@@ -114,13 +126,15 @@ def text_colour(colour: Any) -> str:
 
 
 def faintest(colour: Any) -> float:
-    """How opaque a mark on white must be at least, to stand out by 3 to 1.
+    """Computes the least opacity at which a mark stands out from white.
+
+    The required contrast ratio is 3 to 1.
 
     Args:
-        colour: As matplotlib takes it.
+        colour: Color of the mark in any form of matplotlib.
 
     Returns:
-        0 to 1; 1 for a colour that does not itself.
+        Opacity from 0 to 1. The result is 1 if even the opaque color is too light.
     """
     from matplotlib.colors import to_rgb
 
@@ -133,11 +147,11 @@ def faintest(colour: Any) -> float:
 
 
 def draw_grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
-    """A faint grid behind all else.
+    """Draws a faint grid behind all other parts of a picture.
 
     Args:
-        axes: Where to draw.
-        axis: Whose ticks have lines.
+        axes: Axes to draw into.
+        axis: Axis whose tick marks get grid lines.
     """
     axes.grid(axis=axis, color="#E5E5E5", linewidth=0.6)
     axes.set_axisbelow(True)

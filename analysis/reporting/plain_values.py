@@ -1,4 +1,4 @@
-"""Data objects as values that JSON can hold, and JSON as files."""
+"""Conversion of data objects to values that JSON can represent, and JSON files."""
 
 from __future__ import annotations
 
@@ -15,15 +15,27 @@ from pydantic import BaseModel
 
 
 def plain(value: Any) -> Any:
-    """Mappings, lists, strings, numbers, truth values and null only.
+    """Converts a value to mappings, lists, texts, numbers, truth values and None.
 
-    An object with ``to_dict`` becomes what that says, another dataclass a mapping
-    of its fields, those that begin with an underscore left out. A complex number
-    becomes [re, im]; what is not finite becomes null, since JSON has no word for
-    it.
+    These types need a conversion:
+
+    - An object with a method ``to_dict`` is replaced by the result of this method.
+    - Any other dataclass becomes a mapping of its fields. Fields whose names begin with
+      an underscore are omitted.
+    - A NumPy array becomes a list.
+    - A complex number becomes [re, im].
+    - An infinite number or NaN becomes None, because JSON has no such numbers.
+    - A model of pydantic becomes a mapping.
+    - A path or an enumeration value becomes a text.
+
+    Args:
+        value: Value to convert.
+
+    Returns:
+        The converted value.
 
     Raises:
-        TypeError: There is no plain form of it.
+        TypeError: The value has another type.
     """
     if hasattr(value, "to_dict"):
         value = value.to_dict()
@@ -56,14 +68,14 @@ def _leaf(value: Any) -> Any:
 
 
 def write_json(document: Any, path: Path) -> None:
-    """Writes a document for people and programs to read.
+    """Writes a document as indented JSON.
 
     Args:
         document: Plain values.
-        path: The file.
+        path: File to write.
 
     Raises:
-        ValueError: A number is not finite.
+        ValueError: A number is infinite or NaN.
     """
     text = json.dumps(document, indent=2, allow_nan=False)
     path.write_text(f"{text}\n", "utf-8")

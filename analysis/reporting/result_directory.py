@@ -1,4 +1,4 @@
-"""Result directories that appear whole or not at all, and belong to one process."""
+"""Result directories that appear complete or not at all, and belong to one process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from systems.framework.input_error import InputError, shortened
 
-#: Parent of numbered directories.
+#: Parent directory of the numbered result directories.
 _BASE = "results"
 
 
@@ -20,14 +20,16 @@ class ResultDirectory:
     """An empty directory that no other process can take; see ``take_directory``."""
 
     def __init__(self, path: Path, made: list[Path]) -> None:
-        """Locks a directory that exists.
+        """Locks an existing directory.
 
         Args:
             path: The directory.
-            made: Directories that were made for it, innermost first.
+            made: New directories among ``path`` and its parents, innermost first.
+                ``undo`` removes them.
 
         Raises:
-            InputError: Another process has it, or it is not empty any more.
+            InputError: Another process has locked the directory, or the directory is no
+                longer empty.
         """
         self.path = path
         self._made = made
@@ -46,16 +48,20 @@ class ResultDirectory:
             raise _refused(f"another process writes to {path}")
 
     def close(self) -> None:
-        """Lets other processes have it."""
+        """Unlocks the directory, so that other processes can take it."""
         if self._lock >= 0:
             os.close(self._lock)
             self._lock = -1
 
     def undo(self, *, contents: bool = False) -> None:
-        """Removes what was made for it, its parents too, where nothing else is in.
+        """Unlocks the directory, and removes it if this process created it.
+
+        Parent directories that this process created are removed, too. Directories that
+        are not empty are kept, unless ``contents`` is true.
 
         Args:
-            contents: Whether it goes with all that it holds, if it was made.
+            contents: Whether to remove the result directory together with its contents,
+                if this process created the directory.
         """
         if contents and self.path in self._made:
             shutil.rmtree(self.path, ignore_errors=True)
@@ -66,17 +72,16 @@ class ResultDirectory:
 
 
 def take_directory(out: str | Path | None) -> ResultDirectory:
-    """Takes the directory that results go to, before anything runs.
+    """Creates and locks the result directory before any computation starts.
 
     Args:
-        out: A directory that does not exist yet, or is empty; none: the next
-            number under ``results``.
+        out: New or empty directory. None means the next number under ``results``.
 
     Returns:
-        The directory, which exists, is empty, and belongs to this process.
+        The directory. It exists, is empty, and belongs to this process.
 
     Raises:
-        InputError: It is in use, or cannot be made or written.
+        InputError: The directory is in use, or cannot be created or written.
     """
     if out is not None:
         path = check_directory(out)
@@ -86,20 +91,22 @@ def take_directory(out: str | Path | None) -> ResultDirectory:
 
 @contextmanager
 def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
-    """The directory of ``take_directory``, with a hidden one to write to.
+    """Gives a hidden directory to write to, and renames this directory at the end.
 
-    The hidden one takes the other's place at the end. If the block raises,
-    KeyboardInterrupt included, nothing stays behind: not even parents that were
-    made for it.
+    At the end of the ``with`` block, the hidden directory replaces the result
+    directory. If the block raises an exception, including KeyboardInterrupt, all new
+    directories are removed. This also applies to parent directories that were created.
 
     Args:
-        out: As of ``take_directory``.
+        out: New or empty result directory. None means the next number under
+            ``results``.
 
     Yields:
-        The directory as it will be called, and the hidden one.
+        A pair of paths. The first is the result directory as the user knows it. The
+        second is the hidden directory.
 
     Raises:
-        InputError: As ``take_directory``.
+        InputError: The directory is in use, or cannot be created or written.
     """
     taken = take_directory(out)
     path, partial = taken.path, None
@@ -121,17 +128,18 @@ def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
 
 
 def check_directory(out: str | Path, *, parent: bool = False) -> Path:
-    """The whole path, with all links followed, if a new directory may be there.
+    """Checks whether a new directory can be created, and resolves its path.
 
     Args:
-        out: What the user named.
-        parent: Whether it may hold something: the directory goes below it.
+        out: Directory that the user named.
+        parent: Whether ``out`` is only the parent of the new directory. If true,
+            ``out`` may contain files.
 
     Returns:
-        An absolute path.
+        Absolute path without symbolic links.
 
     Raises:
-        InputError: It is in use, or cannot be made or written.
+        InputError: The directory is in use, or cannot be created or written.
     """
     shown = shortened(str(out), 80)
     try:
@@ -143,7 +151,7 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
     except UnicodeEncodeError:
         raise _refused(f"{shown} is not UTF-8") from None
     except (OSError, RuntimeError, ValueError) as error:
-        # Names too long, home directories of nobody, and zero bytes.
+        # The name is too long or has zero bytes, or "~user" names no user.
         reason = getattr(error, "strerror", None) or error
         raise _refused(f"{shown} is not a usable path ({reason})") from None
     if is_file:
@@ -166,7 +174,7 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
 
 
 def _make(path: Path) -> list[Path]:
-    """What had to be made, innermost first."""
+    """Creates a directory; returns all directories that it created, innermost first."""
     missing = [p for p in (path, *path.parents) if not p.exists()]
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -176,7 +184,7 @@ def _make(path: Path) -> list[Path]:
 
 
 def _make_number(base: Path) -> tuple[Path, list[Path]]:
-    """The next number that nobody else has taken meanwhile."""
+    """Creates the directory of the next number that no other process has taken."""
     made = _make(base)
     numbers = [int(p.name) for p in base.glob("[0-9]*") if p.name.isdecimal()]
     number = max(numbers, default=0)

@@ -1,1 +1,1 @@
-"""Many scenarios, in many processes, into one table."""
+"""Sweeps: many runs of variants of a scenario, in many processes, into one table."""

@@ -1,4 +1,4 @@
-"""What a sweep asks of a layout beside that it is a valid scenario."""
+"""Conditions of a sweep on its layouts, in addition to those of a valid scenario."""
 
 from __future__ import annotations
 
@@ -14,29 +14,34 @@ from systems.framework.input_error import InputError
 from systems.framework.parameters import Length, NonNegativeLength, Parameters
 from systems.world.plane import beyond_rectangle
 
-#: Distances of what moves are looked at so often, s.
+#: Time between two checks of the distances of moving bodies, s.
 STEP_S = 0.1
 
 
 class Conditions(Parameters):
-    """Distances that a layout keeps, and a way that it leaves open."""
+    """Distances that a layout must keep, and a path that it must leave free."""
 
     start_distance_m: NonNegativeLength = 0.0
-    """No body is nearer to a robot's origin of B at time zero, m."""
+    """Least distance between each robot and any body at time zero, m. The distance
+    starts at the midpoint of the robot's wheel axle, the origin of B."""
     source_distance_m: NonNegativeLength = 0.0
-    """No obstacle is ever nearer to a source, outline to outline, m."""
+    """Least distance between the outlines of a source and an obstacle during the whole
+    run, m."""
     way_radius_m: Length | None = None
-    """A disc of this radius about the origin of B gets past what rests from each
-    robot's start to where P is at the follow distance, m."""
+    """Radius of a disc, m. A path between the obstacles at rest must be free for this
+    disc. The path begins at each robot's start. The path ends where the control point
+    P can be at the follow distance from the source. The center of the disc is the
+    origin of B."""
 
     def check(self, scenario: Scenario) -> None:
-        """Looks whether a layout has what is asked.
+        """Checks whether a layout fulfills the conditions.
 
         Args:
-            scenario: The layout.
+            scenario: Scenario with the layout.
 
         Raises:
-            InputError: It has not; names the condition.
+            InputError: The layout violates a condition. The message names the
+                condition.
         """
         if self == Conditions():
             return
@@ -68,7 +73,8 @@ class Conditions(Parameters):
         from analysis.runs.proximity import least_clearances  # compiled code
 
         for name, source in scenario.sources.items():
-            # Where it is to be: it drives there within centimetres.
+            # Planned positions of the source. The source drives within centimeters of
+            # them.
             plan = Body(source.plan(), (source.length_m, source.width_m))
             moves = any(body.path.moves for body in (plan, *obstacles))
             times = np.arange(0.0, scenario.duration_s if moves else STEP_S, STEP_S)
@@ -109,7 +115,7 @@ def _resting(bodies: Mapping[str, Body]) -> Iterator[tuple[str, Body]]:
     return ((name, body) for name, body in bodies.items() if not body.path.moves)
 
 
-# Cells of a grid that share their draws ask the same again.
+# Cells of a grid that share their draws repeat the same question.
 @lru_cache(maxsize=16)
 def _has_way(
     start: tuple[float, float],
@@ -121,7 +127,8 @@ def _has_way(
     from analysis.runs.shortest_path import shortest_path_length  # so is this
 
     rectangles = np.array(boxes).reshape(-1, 5)
-    # The shortest way begins with less room where the start has no more.
+    # The search for the shortest path accepts a start that is nearer than the radius
+    # to an obstacle. This check does not.
     away = (math.hypot(*beyond_rectangle(start, box)) for box in rectangles)
     return min(away, default=math.inf) >= radius and math.isfinite(
         shortest_path_length(start, goal, reach, rectangles, radius)

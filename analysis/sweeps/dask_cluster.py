@@ -1,7 +1,8 @@
-"""A Dask cluster that runs the points of a sweep.
+"""Runs of a parameter sweep on a Dask cluster.
 
-Each thread of a Dask worker keeps a ``WorkerProcess``, as a local sweep does:
-blocks written in Python are never freed, and a Dask worker lives long.
+Each thread of a Dask worker runs the scenarios in a ``WorkerProcess``, as a local sweep
+does. This limits the use of memory: Drake never frees blocks that are written in
+Python, and a Dask worker lives for a long time.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from analysis.sweeps.one_run import Outcome, Task, lost_outcome
 from analysis.sweeps.processes import ATTEMPTS, PULSE_S, WorkerError, WorkerProcess
 from systems.framework.input_error import InputError
 
-#: Tasks that the cluster holds for each of its threads: one runs, one waits.
+#: Number of tasks per thread of the cluster: one task runs, and one waits.
 TASKS_A_THREAD = 2
-#: While a cluster has no workers, a warning comes after so long, s.
+#: Time without any workers after which a warning appears, s.
 WARN_S = 5.0
-#: A sweep on a cluster that has had no workers for so long ends, s.
+#: Time without any workers after which the sweep ends, s.
 PATIENCE_S = 600.0
 _CONNECT_S = 10.0
 
@@ -37,14 +38,17 @@ _idle: SimpleQueue[WorkerProcess] = SimpleQueue()
 
 
 def connect(scheduler: str) -> Any:
-    """A Dask client of a cluster that can run sweeps.
+    """Connects to a Dask cluster and checks that its workers can run sweeps.
 
     Args:
-        scheduler: Address of the scheduler, as tcp://host:8786.
+        scheduler: Address of the Dask scheduler, for example tcp://host:8786.
+
+    Returns:
+        The Dask client.
 
     Raises:
-        InputError: It cannot be reached, or has no workers, or they have other
-            packages than this process; ``scheduler: ...``.
+        InputError: The cluster cannot be reached or has no workers, or its workers have
+            other versions of the packages. The error is about the field ``scheduler``.
     """
     try:
         import distributed
@@ -54,7 +58,7 @@ def connect(scheduler: str) -> Any:
         ) from None
     try:
         address = urlsplit(scheduler)
-        # Dask's own client is noisy about an address at which nobody listens.
+        # Dask's own client prints many messages if no scheduler has this address.
         with socket.create_connection((address.hostname, address.port), _CONNECT_S):
             client = distributed.Client(scheduler, timeout=_CONNECT_S)
         trouble = _trouble(client)
@@ -71,7 +75,7 @@ def connect(scheduler: str) -> Any:
 
 
 def _trouble(client: Any) -> str:
-    """Why the cluster's workers cannot run a sweep; empty if they can."""
+    """Returns the reason why the workers cannot run a sweep; empty if they can."""
     found = client.run(versions, on_error="return")
     if not found:
         return "has no workers; start some with `dask worker` and that address"
@@ -90,16 +94,19 @@ def _trouble(client: Any) -> str:
 def run_on_cluster(
     tasks: Iterator[Task], pulse: Callable[[], None], *, client: Any
 ) -> Generator[Outcome]:
-    """Runs tasks on a cluster.
+    """Runs the tasks of a parameter sweep on a cluster.
+
+    If a Dask worker is lost, other workers repeat its runs. If several workers are lost
+    during the same run, this run counts as failed.
 
     Args:
-        tasks: What to run.
-        pulse: Called a few times a second; what it raises ends the work.
-        client: See ``connect``; closed at the end.
+        tasks: Tasks to run.
+        pulse: Function that is called a few times per second. If it raises an
+            exception, the work ends.
+        client: Dask client from ``connect``. It is closed at the end.
 
     Yields:
-        Outcomes as they come. The runs of a Dask worker that is lost go to the
-        others; one that takes several workers with it is given up.
+        Results of the runs, in the order in which the runs end.
 
     Raises:
         WorkerError: The cluster is gone, or has had no workers for ``PATIENCE_S``.
@@ -110,7 +117,7 @@ def run_on_cluster(
 
 @contextmanager
 def _silent_dask() -> Iterator[None]:
-    """Within it Dask logs nothing: we say in a line what is wrong with a cluster."""
+    """Disables the log messages of Dask; our own message describes each fault."""
     names = [*logging.root.manager.loggerDict, "asyncio"]
     loggers = [
         logging.getLogger(name)
@@ -128,16 +135,20 @@ def _silent_dask() -> Iterator[None]:
 
 
 class _Patience:
-    """Watches whether a cluster has workers."""
+    """Measures for how long a cluster has had no workers."""
 
     def __init__(self) -> None:
         self._seen, self._warned = monotonic(), False
 
     def watch(self, threads: int) -> None:
-        """Says so if there have been no threads for a while.
+        """Warns after 5 s without workers, and raises an error after 600 s.
+
+        Args:
+            threads: Number of threads that all workers of the cluster have at this
+                time.
 
         Raises:
-            WorkerError: There have been none for ``PATIENCE_S``.
+            WorkerError: There have been no workers for ``PATIENCE_S``, 600 s.
         """
         if threads:
             self._seen, self._warned = monotonic(), False
@@ -205,7 +216,7 @@ def _outcome(future: Any, task: Task) -> Outcome:
 
 
 def _run_remotely(task: Task) -> Outcome:
-    """In a thread of a Dask worker."""
+    """Runs a task, in a thread of a Dask worker."""
     for _ in range(ATTEMPTS):
         try:
             worker = _idle.get_nowait()
@@ -225,7 +236,7 @@ def _run_remotely(task: Task) -> Outcome:
 
 
 def _dismiss_idle() -> None:
-    """In a Dask worker: ends the processes that wait for more."""
+    """Ends the idle worker processes of a Dask worker; runs in this worker."""
     while True:
         try:
             _idle.get_nowait().close()

@@ -1,4 +1,4 @@
-"""What a sweep draws the value of a field from."""
+"""Distributions from which a sweep draws the values of fields."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from systems.framework.parameters import (
     Point,
 )
 
-#: Differences of such numbers are finite, and such integers are exact as floats.
+#: Limits of the numbers. The difference of two floats within the limits is finite.
+#: Integers within the limits are exact as floats.
 Number = Annotated[float, Field(ge=-1e300, le=1e300)]
 Integer = Annotated[int, Field(ge=-(2**53), le=2**53)]
 Numbers = Annotated[tuple[Number, Number], Strict(False)]
 Integers = Annotated[tuple[Integer, Integer], Strict(False)]
 Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 Pairs = Annotated[tuple[Numbers, ...], Strict(False), Field(min_length=1)]
-#: As many as a scenario may have.
+#: Number of boxes. A scenario has at most 100 obstacles.
 BoxCount = Annotated[int, Field(ge=0, le=100)]
 BoxCounts = Annotated[tuple[BoxCount, BoxCount], Strict(False)]
 Span = Annotated[tuple[Coordinate, Coordinate], Strict(False)]
@@ -32,16 +33,17 @@ Sides = Annotated[tuple[Length, Length], Strict(False)]
 
 
 class Boxes(Parameters):
-    """Resting boxes of any heading, evenly scattered over a rectangle."""
+    """Boxes at rest with random headings, spread evenly over a rectangle."""
 
     count: BoxCounts
-    """[low, high]: how many, both ends included, each as likely."""
+    """[low, high]: number of boxes, including both ends. All numbers are equally
+    likely."""
     x_m: Span
-    """[low, high]: where their centres lie along x of W, m."""
+    """[low, high]: x of the boxes' centers in W, m."""
     y_m: Span
-    """[low, high]: where their centres lie along y of W, m."""
+    """[low, high]: y of the boxes' centers in W, m."""
     side_m: Sides
-    """[low, high]: both extents of each, m."""
+    """[low, high]: length and width of each box, drawn separately, m."""
 
     @model_validator(mode="after")
     def _check(self) -> Boxes:
@@ -53,13 +55,13 @@ class Boxes(Parameters):
         return self
 
     def draw(self, generator: np.random.Generator) -> list[dict[str, Any]]:
-        """A value for ``obstacles`` of a scenario; boxes may overlap.
+        """Draws boxes for the field ``obstacles`` of a scenario; the boxes may overlap.
 
         Args:
-            generator: Where the numbers come from.
+            generator: Generator of random numbers.
 
         Returns:
-            Fields of ``ObstacleParameters`` of each, with names of their own.
+            Fields of ``ObstacleParameters`` for each box. Each box has its own name.
         """
         count = int(generator.integers(*self.count, endpoint=True))
         ranges = (self.x_m, self.y_m, (-180.0, 180.0), self.side_m, self.side_m)
@@ -77,14 +79,15 @@ class Boxes(Parameters):
 
 
 class Sector(Parameters):
-    """Points evenly spread over the area of a sector of a ring."""
+    """Positions spread evenly over the area of a sector of a ring."""
 
     about_m: Point
-    """Middle of the ring in W, m."""
+    """(x, y) of the ring's center in W, m."""
     range_m: Sides
-    """[low, high]: distance from it, m."""
+    """[low, high]: distance from the ring's center, m."""
     bearing_deg: Annotated[tuple[Angle, Angle], Strict(False)] = (-180.0, 180.0)
-    """[low, high]: CCW from the x axis of W, deg."""
+    """[low, high]: direction from the ring's center, counterclockwise from the x axis
+    of W, deg."""
 
     @model_validator(mode="after")
     def _check(self) -> Sector:
@@ -97,13 +100,13 @@ class Sector(Parameters):
         return self
 
     def draw(self, generator: np.random.Generator) -> list[float]:
-        """A place.
+        """Draws a position.
 
         Args:
-            generator: Where the numbers come from.
+            generator: Generator of random numbers.
 
         Returns:
-            x and y in W, m.
+            [x, y] of the position in the world frame W, m.
         """
         low, high = self.range_m
         distance = math.sqrt(generator.uniform(low**2, high**2))
@@ -112,32 +115,34 @@ class Sector(Parameters):
         return [x + distance * math.cos(bearing), y + distance * math.sin(bearing)]
 
 
-#: Fields of a distribution that are none themselves.
+#: Fields of ``Distribution`` that change a value but are not distributions.
 _CHANGES = ("each", "either_sign")
 
 
 class Distribution(Parameters):
-    """One distribution; ``each`` and ``either_sign`` change what it draws."""
+    """Exactly one distribution; ``each`` and ``either_sign`` change the drawn value."""
 
     uniform: Numbers | None = None
-    """[low, high]: even between them."""
+    """[low, high]: uniform distribution between low and high."""
     log_uniform: Numbers | None = None
-    """[low, high], both positive: the logarithm is even between theirs."""
+    """[low, high], both positive: the logarithm of the number has a uniform
+    distribution between log(low) and log(high)."""
     normal: Numbers | None = None
-    """[mean, standard deviation]."""
+    """[mean, standard deviation] of a normal distribution."""
     integers: Integers | None = None
-    """[low, high]: whole numbers, both ends included, each as likely."""
+    """[low, high]: whole numbers from low to high, including both. All are equally
+    likely."""
     choice: Values | None = None
-    """Values of any kind, each as likely."""
+    """List of values of any type. All values are equally likely."""
     boxes: Boxes | None = None
-    """A list of resting boxes, for ``obstacles``."""
+    """Random boxes at rest, for the field ``obstacles``."""
     sector: Sector | None = None
-    """A place, for ``position_m`` and its like."""
+    """Random position, for fields like ``position_m``."""
     each: Pairs | None = None
-    """[a, b] for each path of the key, in its order: it gets a times the number that
-    was drawn, plus b."""
+    """One pair [a, b] for each path of the key, in the order of the paths. The field at
+    the path gets a times the drawn number, plus b."""
     either_sign: Literal[True] | None = None
-    """The number or its negative, each as likely."""
+    """If true, the sign of the drawn number changes with probability 1/2."""
 
     @model_validator(mode="after")
     def _check(self) -> Distribution:
@@ -177,23 +182,24 @@ class Distribution(Parameters):
 
     @property
     def _given(self) -> tuple[str, Any]:
-        """The one distribution that is set, and its values."""
+        """Name and parameters of the distribution that is set."""
         return next((name, values) for name, values in self if values is not None)
 
     @property
     def numeric(self) -> bool:
-        """Whether what is drawn has an order, as numbers have."""
+        """Whether the drawn values are numbers, which can be ordered."""
         return self.choice is None and self.boxes is None and self.sector is None
 
     def draw(self, generator: np.random.Generator, count: int = 1) -> list[Any]:
-        """Draws once.
+        """Draws one value, and derives from it the values of one or several fields.
 
         Args:
-            generator: Where the numbers come from.
-            count: Of paths that get a value; as many as ``each`` has entries.
+            generator: Generator of random numbers.
+            count: Number of fields. If ``each`` is set, it has one entry for each
+                field.
 
         Returns:
-            What each path gets, of plain types.
+            Value for each field, as plain Python types.
         """
         if self.boxes is not None:
             return [self.boxes.draw(generator)] * count

@@ -1,4 +1,4 @@
-"""What the runs of a sweep say, with intervals: by cell, and by drawn field."""
+"""Estimates with confidence intervals from the runs of a sweep."""
 
 from __future__ import annotations
 
@@ -16,30 +16,32 @@ from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan
 from diagrams.running.stop_rules import SUCCESSFUL
 
-#: A drawn number is cut into at most so many bins, of so many runs or more.
+#: MOST_BINS: greatest number of bins of a drawn number.
+#: LEAST_RUNS: least number of runs per bin, if there is more than one bin.
 MOST_BINS, LEAST_RUNS = 8, 20
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something to estimate from runs."""
+    """A rate or a median that is estimated from runs."""
 
     name: str
-    """Key in documents."""
+    """Key in JSON documents."""
     title: str
-    """Words for pictures, with the unit."""
+    """Title in pictures, with the unit."""
     causes: tuple[str, ...] = ()
-    """The share of runs that end so; none: the median of a metric."""
+    """Causes of the end of a run. The quantity is the fraction of runs that end by one
+    of them. If empty, the quantity is the median of a metric."""
     metric: str = ""
-    """Column of the results."""
+    """Column of the metric in the results."""
 
     @property
     def rate(self) -> bool:
-        """Whether it is a share, between 0 and 1."""
+        """Whether the quantity is a rate, between 0 and 1, instead of a median."""
         return bool(self.causes)
 
     def estimate(self, runs: pd.DataFrame) -> Estimate:
-        """The figure for runs that ended; see ``ended``."""
+        """Estimates the quantity from runs that came to an end; see ``ended``."""
         nothing = Estimate(np.nan, np.nan, np.nan)
         if self.rate:
             count = int(runs["cause"].isin(self.causes).sum())
@@ -54,7 +56,7 @@ class Quantity:
         return Estimate(float(np.median(values)), *median_interval(values))
 
 
-#: What pages and pictures show of one robot; see ``quantities``.
+#: Quantities that pages and pictures show for one robot; see ``quantities``.
 QUANTITIES = (
     Quantity("success", "runs that end well", causes=SUCCESSFUL),
     Quantity("collision", "runs that end in a collision", causes=("collision",)),
@@ -72,7 +74,7 @@ QUANTITIES = (
 
 
 def quantities(results: pd.DataFrame) -> tuple[Quantity, ...]:
-    """What pages and pictures show: of several robots, each one's own figures."""
+    """Returns the quantities to show; medians are shown for each robot separately."""
     shown_: list[Quantity] = []
     for quantity in QUANTITIES:
         ending = f".{quantity.metric}"
@@ -93,21 +95,25 @@ def quantities(results: pd.DataFrame) -> tuple[Quantity, ...]:
 
 
 def ended(results: pd.DataFrame) -> pd.DataFrame:
-    """The runs that came to an end, whichever: not those that raised an error."""
+    """Returns the runs that came to an end, without those that raised an error."""
     return results[results["cause"] != FAILED]
 
 
 def figure_table(
     plan: SweepPlan, results: pd.DataFrame
 ) -> tuple[list[str], list[list[str]]]:
-    """What pages show of each cell, with intervals.
+    """Makes a table of the estimates of a parameter sweep, with confidence intervals.
+
+    The table has one row for each cell of the grid. A cell is one combination of the
+    values in the grid.
 
     Args:
-        plan: What was run.
-        results: See ``load_results``.
+        plan: Plan of the sweep.
+        results: Results of the sweep, from ``load_results``.
 
     Returns:
-        Titles of the quantities, and for each cell its name and figures.
+        A pair of lists. The first contains the titles of the quantities. The second
+        contains one row for each cell: its name and its estimates as text.
     """
     figured = quantities(results)
     rows = [
@@ -118,44 +124,51 @@ def figure_table(
 
 
 def by_cell(plan: SweepPlan, results: pd.DataFrame) -> list[pd.DataFrame]:
-    """The runs of each cell of the grid.
+    """Splits the runs of a parameter sweep by the cells of its grid.
+
+    A cell is one combination of the values in the grid.
 
     Args:
-        plan: What was run.
-        results: See ``load_results``.
+        plan: Plan of the sweep.
+        results: Results of the sweep, from ``load_results``.
 
     Returns:
-        A table for each of ``plan.cells()``.
+        Table of the runs of each cell, in the order of ``plan.cells()``.
     """
     return [results[results["cell"] == k] for k in range(len(plan.cells()))]
 
 
 @dataclass(frozen=True)
 class Marginal:
-    """A quantity against one drawn field, whatever the others were."""
+    """Estimates of a quantity as a function of one drawn field."""
 
     path: str
     places: NDArray[np.float64]
-    """Median of the field in each bin, or the number of each choice."""
+    """Median of the field in each bin; for choices, their indices from 0."""
     labels: tuple[str, ...]
-    """Names of the choices; none for numbers."""
+    """Names of the choices; empty if the field is a number."""
     estimates: tuple[Estimate, ...]
-    """One a bin."""
+    """Estimate of the quantity in each bin, with its confidence interval."""
 
 
 def marginal(
     plan: SweepPlan, key: str, runs: pd.DataFrame, quantity: Quantity
 ) -> Marginal:
-    """Estimates for bins of a drawn field.
+    """Estimates a quantity as a function of one randomly drawn field.
+
+    The runs are sorted into bins by the value of the field. If the field is a number,
+    the bins have about the same number of runs. Otherwise, each possible value has a
+    bin.
 
     Args:
-        plan: The sweep.
-        key: Of ``plan.draw``; of several paths the first one stands for all.
-        runs: That ended.
-        quantity: What is estimated.
+        plan: Plan of the parameter sweep.
+        key: Key of ``plan.draw``. If the key lists several paths, the first path
+            represents all of them.
+        runs: Runs that came to an end; see ``ended``.
+        quantity: Quantity to estimate.
 
     Returns:
-        Bins hold about the same number of runs each, or one choice each.
+        One estimate for each bin.
     """
     path = key.partition(",")[0].strip()
     values = runs[path]
@@ -179,14 +192,15 @@ def marginal(
 
 
 def shown(quantity: Quantity, estimate: Estimate) -> str:
-    """An estimate with its interval, for readers; a dash where there is none.
+    """Writes an estimate with its confidence interval for readers.
 
     Args:
-        quantity: Says whether it is a rate.
-        estimate: Value and both ends of its interval, in the quantity's unit.
+        quantity: Quantity that was estimated: a rate or a median.
+        estimate: Value and both ends of its interval, in the unit of the quantity.
 
     Returns:
-        Rates in %, others with three significant digits.
+        Text. Rates are in percent. Other values have three decimals. A missing value is
+        a dash.
     """
     if math.isnan(estimate.value):
         return "-"
@@ -197,27 +211,27 @@ def shown(quantity: Quantity, estimate: Estimate) -> str:
 
 
 def cell_label(fields: dict[str, Any]) -> str:
-    """Fields of a cell in words: last part of each path, and value.
+    """Describes a cell of a grid, which is one combination of values, in a short text.
 
     Args:
-        fields: Values of the grid by path.
+        fields: Values of the grid's fields in this cell, by dotted path.
 
     Returns:
-        ``all runs`` where there is nothing to show.
+        Last part of each path with its value, or ``all runs`` if there are no fields.
     """
     pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
     return ", ".join(pairs) or "all runs"
 
 
 def short(value: Any, most: int = 24) -> str:
-    """A value in few letters.
+    """Writes a value as short text.
 
     Args:
-        value: Plain value; what is not text is written as JSON.
-        most: Letters, at least 4.
+        value: Plain value. Values other than texts are written as JSON.
+        most: Greatest length of the result, at least 4 characters.
 
     Returns:
-        At most so many letters; of longer ones the end is left out.
+        The text. If the text is too long, three dots replace its end.
     """
     text = value if isinstance(value, str) else json.dumps(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."

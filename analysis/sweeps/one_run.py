@@ -1,4 +1,4 @@
-"""One run of a sweep, the row that it leaves, and all rows as one table."""
+"""One run of a sweep, its row of results, and the table of all rows."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import shortened
 
-#: Cause in the row of a run that raised an error.
+#: Cause of the end of a run that raised an error.
 FAILED = "failed"
 _FIRST = ("index", "cell", "run", "seed", "redraws")
 _TEXTS = ("cause", "collision_object", "collision_fault")
-#: Kinds of the values of a row as they come back from JSON.
+#: Types of the values of a row that was read from JSON.
 _NUMBER, _TEXT = (float, int, type(None)), (str, type(None))
 _KINDS: dict[str, Any] = {
     **dict.fromkeys(_FIRST, int),
@@ -39,34 +39,38 @@ _KINDS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker is given."""
+    """A run that a worker has to do."""
 
     point: SweepPoint
     scenario: Scenario
     engine: Engine
-    """What runs it."""
+    """Engine for the run: ``drake`` or ``compiled``."""
     trajectory: bool
-    """Whether the trajectory is wanted."""
+    """Whether to return the trajectory."""
     files: Mapping[str, str] = field(default_factory=dict)
-    """SHA-256 of the files that the sweep began with, by their absolute paths."""
+    """SHA-256 of the sweep's input files at its start, by absolute path."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a worker gives back."""
+    """Results of a run that a worker has done."""
 
     row: dict[str, Any]
-    """Plain values: the point's own (``fields`` a mapping), ``cause``,
-    ``collision_object``, ``collision_fault``, ``collision_time_s``, ``robots`` (the
-    same of each of several, ``<name>.cause`` ...), ``metrics``
-    (a mapping), ``simulated_s``, ``wall_s``, ``engine``, ``error`` and ``warnings`` (a
-    list of mappings with ``field`` and ``message``)."""
+    """Plain values by name:
+
+    - The fields of ``SweepPoint``. ``fields`` is a mapping.
+    - ``cause``, ``collision_object``, ``collision_fault``, ``collision_time_s``.
+    - ``robots``: mapping with the ending of each of several robots. Its keys are
+      ``<name>.cause``, ``<name>.collision_object`` and ``<name>.collision_fault``.
+    - ``metrics``: mapping from the name of each metric to its value.
+    - ``simulated_s``, ``wall_s``, ``engine``, ``error``.
+    - ``warnings``: list of mappings with ``field`` and ``message``."""
     trajectory: bytes | None = None
-    """A Parquet file."""
+    """Contents of a Parquet file."""
 
 
 def run_task(task: Task) -> Outcome:
-    """Runs a point. Whatever the run raises becomes its row."""
+    """Runs a scenario; if the run raises an error, the row states the error."""
     start = perf_counter()
     try:
         with code_of_sweep(task.scenario, task.files):
@@ -82,14 +86,14 @@ def run_task(task: Task) -> Outcome:
 
 
 def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
-    """Refuses results that hold no run but failed ones.
+    """Rejects results in which every run failed.
 
     Args:
-        tables: Results, one a sweep; see ``load_results``.
-        out: The directory, for the message.
+        tables: Results of each parameter sweep, from ``load_results``.
+        out: Directory of the results, for the message.
 
     Raises:
-        RunError: All failed; says how the first one did.
+        RunError: Every run failed. The message states the error of the first run.
     """
     causes = [cause for table in tables for cause in table["cause"]]
     if causes and all(cause == FAILED for cause in causes):
@@ -100,14 +104,14 @@ def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
 
 
 def lost_outcome(task: Task, reason: str) -> Outcome:
-    """The outcome of a run whose worker ended each time.
+    """Makes the result of a run whose worker ended at every attempt.
 
     Args:
-        task: What was to be run.
-        reason: What became of the worker.
+        task: Task that the worker did not complete.
+        reason: Reason why the worker ended.
 
     Returns:
-        A failed run, with the reason as its error.
+        Result of a failed run with ``reason`` as its error.
     """
     return Outcome(_row(task, FAILED, perf_counter(), error=reason))
 
@@ -151,7 +155,7 @@ def _ending(cause: str, hit: Collision | None) -> dict[str, Any]:
 
 
 def is_row(value: Any) -> bool:
-    """Whether a value from a JSON file can be a row of ``Outcome``."""
+    """Whether a value from a JSON file has the form of ``Outcome.row``."""
     return (
         isinstance(value, dict)
         and all(isinstance(value.get(name, ...), kind) for name, kind in _KINDS.items())
@@ -161,13 +165,27 @@ def is_row(value: Any) -> bool:
 
 
 def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
-    """The rows of ``Outcome`` by index, the same in whatever order they came.
+    """Makes a table of the rows of all runs, sorted by the number of the run.
+
+    The table has these columns:
+
+    - Each value of the row that is not a mapping.
+    - Each field of the parameter sweep, by its dotted path.
+    - The ending of each robot, for example ``<name>.cause``, if there are several.
+    - Each metric.
+
+    The types are as follows:
+
+    - ``index``, ``cell``, ``run``, ``seed`` and ``redraws`` are integers.
+    - Metrics and times are float64. A missing number is NaN.
+    - Warnings are JSON text.
+    - A field is JSON text if its values are lists or mappings, or have different types.
+
+    Args:
+        rows: Rows of ``Outcome``, in any order.
 
     Returns:
-        A column for each of the row's own values, for each field by its dotted
-        path, and for each metric; numbers are float64 but for indices and
-        seeds, missing ones NaN. Warnings, and fields that are lists or mappings, or of
-        several kinds, are JSON text.
+        One row for each run.
     """
     ordered = sorted(rows, key=lambda row: int(row["index"]))
     columns: dict[str, Any] = {
@@ -193,14 +211,14 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 
 
 def parquet_bytes(table: pd.DataFrame) -> bytes:
-    """The table as a Parquet file."""
+    """Returns the contents of a Parquet file with the table."""
     buffer = io.BytesIO()
     table.to_parquet(buffer, index=False)
     return buffer.getvalue()
 
 
 def _keys(rows: Sequence[dict[str, Any]], group: str) -> list[str]:
-    """Keys of a mapping in the rows, in order; rows that failed lack some."""
+    """Keys of a mapping over all rows, in order; rows of failed runs lack some keys."""
     return list(dict.fromkeys(key for row in rows for key in row[group]))
 
 

@@ -1,4 +1,4 @@
-"""Where a sweep's results go, and who does the runs."""
+"""Options of a sweep: where its results go, and which processes do the runs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from analysis.reporting.result_directory import check_directory
 from systems.framework.input_error import InputError
 
-#: Processes, each of some 300 MB.
+#: Greatest number of processes. Each process needs about 300 MB of memory.
 MOST_WORKERS = 256
 
 
@@ -18,16 +18,16 @@ def check_options(
     scheduler: str | None = None,
     resume: bool = False,
 ) -> None:
-    """Refuses what no sweep can be run with.
+    """Checks the options of a parameter sweep before anything is computed.
 
     Args:
-        out: As of ``prepare_sweep``.
-        workers: The same.
-        scheduler: The same.
-        resume: The same.
+        out: Directory of the results. None means the next number under results/.
+        workers: Number of local processes. None means one process per processor core.
+        scheduler: Address of a Dask scheduler. None means local processes.
+        resume: Whether ``out`` may contain runs of the same plan.
 
     Raises:
-        InputError: One of them is no good, or two are not together.
+        InputError: An option is not valid, or two options exclude each other.
     """
     if workers is not None and not 1 <= workers <= MOST_WORKERS:
         raise InputError("workers", f"{workers} must lie between 1 and {MOST_WORKERS}")

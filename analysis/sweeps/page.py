@@ -1,4 +1,4 @@
-"""A sweep as one page: how the runs ended, heat maps, marginals, failures."""
+"""The HTML page of a sweep: endings of the runs, heat maps, marginals and failures."""
 
 from __future__ import annotations
 
@@ -29,9 +29,12 @@ from analysis.sweeps.plots import grid_axes, plot_heat_maps, plot_line, plot_mar
 from analysis.sweeps.sweep import reproducing_command
 from diagrams.running.stop_rules import SUCCESSFUL
 
-#: Pages stay readable: so many maps, and so many commands for errors and others.
+#: Limits that keep a page readable.
+#: MOST_MAPS: number of heat maps.
+#: MOST_ERRORS: number of commands for runs that raised an error.
+#: MOST_OTHERS: number of commands for runs with any other cause of failure.
 MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
-#: With more cells their tables come last.
+#: If there are more cells than this, the tables of cells are at the end of the page.
 MOST_CELLS = 24
 
 
@@ -41,13 +44,16 @@ def write_sweep(
     results: pd.DataFrame,
     summary: dict[str, Any],
 ) -> None:
-    """Writes ``summary.json`` and ``report.html`` into the sweep's directory.
+    """Writes the summary and the HTML page of a parameter sweep into its directory.
+
+    The files are ``summary.json`` and ``report.html``.
 
     Args:
-        plan: What was run.
-        points: All its runs.
-        results: See ``load_results``.
-        summary: From ``sweep_summary``; names the directory, which exists.
+        plan: Plan of the sweep.
+        points: All runs of the plan.
+        results: Results of the sweep, from ``load_results``.
+        summary: JSON document from ``sweep_summary``. It names the directory, which
+            must exist.
     """
     out = Path(summary["out"])
     write_json(summary, out / "summary.json")
@@ -62,13 +68,13 @@ def sweep_page(
     results: pd.DataFrame,
     summary: dict[str, Any],
 ) -> str:
-    """The whole page.
+    """Makes the HTML page of a parameter sweep.
 
     Args:
-        plan: What was run.
-        points: All its runs.
-        results: See ``load_results``.
-        summary: From ``sweep_summary``.
+        plan: Plan of the sweep.
+        points: All runs of the plan.
+        results: Results of the sweep, from ``load_results``.
+        summary: JSON document from ``sweep_summary``.
 
     Returns:
         HTML.
@@ -185,7 +191,7 @@ def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
 
 
 def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
-    """The two fields with most values span the maps; the others have a map each."""
+    """Axes of the maps, the two fields with most values; and the other fields."""
     by_size = sorted(plan.grid, key=lambda path: -len(plan.grid[path]))
     chosen = [path for path in plan.grid if path in by_size[:2]]
     return chosen, [path for path in plan.grid if path not in chosen]
@@ -199,13 +205,13 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
             f"Every metric over `{key}`, in bins with equal numbers of runs.",
         )
         for k, (key, drawn) in enumerate(plan.draw.items())
-        # No two lists of boxes are the same: there is nothing to plot over.
+        # A list of boxes is no number and is never drawn twice. It has no marginal.
         if drawn.boxes is None and not ended(results).empty
     ]
 
 
 def _commands(points: list[SweepPoint], results: pd.DataFrame, out: Path) -> list[str]:
-    """The first runs of each cause that is no success, with their commands."""
+    """Commands that repeat the first failed runs of each cause, errors first."""
     parts = [paragraph("Each command repeats one run and makes its replay.")]
     causes = [c for c in results["cause"].value_counts().index if c not in SUCCESSFUL]
     for cause in sorted(causes, key=lambda cause: cause != FAILED):

@@ -1,4 +1,4 @@
-"""The plan of a sweep: which scenarios it runs, each with its draws and its seed."""
+"""The plan of a sweep: its scenarios, their random draws, and their seeds."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
 
 GridValues = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
-#: All are drawn and checked before the first one runs, a millisecond each.
+#: Greatest number of runs. All runs are drawn and checked before the first one starts,
+#: which takes about 1 ms per run.
 MOST_RUNS = 1_000_000
-#: So many cells are looked at before all runs are drawn.
+#: Number of cells that ``SweepPlan.check`` checks before all runs are drawn.
 _FIRST_CELLS = 64
 Count = Annotated[int, Field(ge=1, le=MOST_RUNS)]
 
@@ -43,51 +44,54 @@ class SweepPoint:
     """One run of a sweep."""
 
     index: int
-    """Its number: ``run`` times the number of cells, plus ``cell``."""
+    """Number of the run in the sweep: ``run`` times number of cells, plus ``cell``."""
     cell: int
-    """Which cell of the grid."""
+    """Number of the cell of the grid, from 0."""
     run: int
-    """Which draw within the cell."""
+    """Number of the draw within the cell, from 0."""
     seed: int
     """Seed of the scenario."""
     fields: dict[str, Any]
-    """Dotted path and value of every field of grid and draw."""
+    """Value of every field of grid and draw, by dotted path."""
     redraws: int
-    """How often its draws made no valid scenario and were drawn again."""
+    """Number of draws that made no valid scenario and were replaced."""
 
 
 class SweepPlan(Parameters):
-    """What a sweep runs; see docs/compare.md.
+    """Plan of a parameter sweep: the variants of a scenario to run.
 
-    Paths are those of ``--set``. A key of ``draw`` may list several paths,
-    parted by commas, which all get the one value that is drawn.
+    The format is described in docs/compare.md. A field has a dotted path, for example
+    ``source.speed_m_s``. A key of ``draw`` may list several paths, separated by commas.
+    All these fields then get the same drawn value.
     """
 
     name: str = Field(default="sweep", min_length=1, pattern=r"^[^\n]*$")
     """Title of the result page."""
     scenario: str = Field(default="default", min_length=1)
-    """Library name, or path of a YAML file from ``folder``."""
+    """Name of a scenario in the library, or path of a YAML file relative to
+    ``folder``."""
     set: dict[str, Any] = Field(default_factory=dict)
-    """Fields with one value."""
+    """Fields with the same value in all runs."""
     grid: dict[str, GridValues] = Field(default_factory=dict)
-    """Fields with several values, crossed: each combination is a cell."""
+    """Fields with several values. Each combination of values is a cell."""
     draw: dict[str, Distribution] = Field(default_factory=dict)
-    """Fields that are drawn for every run, after set and grid, in this order."""
+    """Fields that are drawn for every run. They are set after ``set`` and ``grid``, in
+    this order."""
     require: Conditions = Conditions()
-    """What every layout must have; draws that lack it count as not valid."""
+    """Conditions on every layout. If a draw violates them, the draw is not valid."""
     runs: Count = 1
-    """Runs in each cell."""
+    """Number of runs in each cell."""
     seed: int = Field(default=1, ge=0, lt=2**63)
-    """All draws, and the seeds of all scenarios, come from it."""
+    """Seed of all draws. It also determines the seeds of all scenarios."""
     pair: bool = True
-    """Run k has the same draws and the same scenario seed in every cell."""
+    """If true, run k has the same draws and the same scenario seed in every cell."""
     redraws: int = Field(default=0, ge=0, le=10_000)
-    """How often a run is drawn again whose draws make no valid scenario; with
-    ``pair``, in any cell."""
+    """How often a run is drawn again if its draws make no valid scenario. With
+    ``pair``, the scenario must be valid in all cells."""
     trajectories: bool = False
     """Whether to keep the trajectory of every run."""
     folder: str = Field(default=".", min_length=1, exclude=True)
-    """Where relative paths begin: the folder of the sweep's file."""
+    """Folder in which relative paths start: the folder of the sweep's file."""
 
     @model_validator(mode="after")
     def _check_fields(self) -> SweepPlan:
@@ -127,9 +131,11 @@ class SweepPlan(Parameters):
 
     @cached_property
     def base(self) -> dict[str, Any]:
-        """Fields of the scenario's file, with ``set`` applied; not to be changed.
+        """Fields of the scenario file after ``set`` is applied.
 
-        A list is stated if another field of the sweep sets one of its elements.
+        The caller must not change this mapping. Another field of the parameter sweep
+        may set an element of a list. The mapping then contains the whole list, even if
+        the scenario file omits the list.
         """
         data = written_fields(self.source)
         _state_lists(data, scenario_from_mapping(data), self.set)
@@ -140,12 +146,12 @@ class SweepPlan(Parameters):
 
     @cached_property
     def _base_copy(self) -> bytes:
-        """To copy ``base`` from, a fifth of ``deepcopy``'s time."""
+        """Pickle of ``base``; loading it takes a fifth of the time of ``deepcopy``."""
         return pickle.dumps(self.base)
 
     @property
     def source(self) -> str:
-        """Library name, or whole path of the scenario's file."""
+        """Name of the scenario in the library, or full path of the scenario's file."""
         if Path(self.scenario).suffix in (".yaml", ".yml"):
             return str(Path(self.folder).absolute() / self.scenario)
         return self.scenario
@@ -157,25 +163,26 @@ class SweepPlan(Parameters):
 
     @property
     def cell_count(self) -> int:
-        """Number of the grid's cells."""
+        """Number of cells of the grid."""
         return math.prod(len(values) for values in self.grid.values())
 
     def cells(self) -> list[dict[str, Any]]:
-        """The grid's fields in each cell; one cell without fields where it is empty."""
+        """Returns the grid's fields in each cell; an empty grid has one cell."""
         return [
             dict(zip(self.grid, values, strict=True))
             for values in product(*self.grid.values())
         ]
 
     def points(self) -> list[SweepPoint]:
-        """Draws all runs, and validates the scenario of each.
+        """Draws all runs, and checks the scenario of each run.
 
         Returns:
-            Points by index. A point does not depend on ``runs``.
+            Runs, sorted by their number. The draws of a run do not depend on the total
+            number of runs.
 
         Raises:
-            InputError: A field is unknown, or a value or a layout is not
-                valid; names the field by its whole path.
+            InputError: A field is unknown, or a value or a layout is not valid. The
+                message names the field by its dotted path.
         """
         cells = self.cells()
         points: list[SweepPoint] = []
@@ -189,12 +196,15 @@ class SweepPlan(Parameters):
         return points
 
     def check(self) -> None:
-        """Refuses values that are valid neither by themselves nor with the first draws.
+        """Checks the first 64 cells of the grid, before all runs are drawn.
 
-        It takes a moment; ``points`` finds all that can be wrong.
+        A cell is one combination of the values in the grid. Each cell is checked
+        without random draws, and with the first draws. A cell is rejected only if both
+        scenarios are not valid. This check is quick. ``points`` is slower, but finds
+        all faults.
 
         Raises:
-            InputError: One of the first cells of the grid has such values.
+            InputError: One of these cells is not valid.
         """
         drawn = dict(self._draws([self.seed, 0, 0]))
         for cell, fields in enumerate(self.cells()[:_FIRST_CELLS]):
@@ -215,7 +225,7 @@ class SweepPlan(Parameters):
         return None
 
     def scenario_of(self, point: SweepPoint) -> Scenario:
-        """The scenario of a run."""
+        """Makes the scenario of a run."""
         data = pickle.loads(self._base_copy)
         apply_settings(data, copy.deepcopy(point.fields))
         data["seed"] = point.seed
@@ -224,7 +234,7 @@ class SweepPlan(Parameters):
 
     @property
     def digest(self) -> str:
-        """Hash of everything that the draws and the runs depend on."""
+        """Hash of everything that influences the draws and the runs."""
         base = scenario_from_mapping(self.base).model_dump(mode="json")
         document = {**self.model_dump(mode="json"), "base": base}
         if self.file_digests:
@@ -233,7 +243,7 @@ class SweepPlan(Parameters):
 
     @cached_property
     def file_digests(self) -> dict[str, str]:
-        """SHA-256 of each file on which runs depend: sounds, and users' modules."""
+        """SHA-256 of each file that influences the runs: sounds, and users' modules."""
         values = {**self.base, **self.grid, **self.model_dump(include={"draw"})["draw"]}
         files: set[Path] = set()
         for field, text in _texts("", values):
@@ -250,7 +260,7 @@ class SweepPlan(Parameters):
     def _draw_run(
         self, run: int, cells: list[tuple[int, dict[str, Any]]], stream: list[int]
     ) -> list[SweepPoint]:
-        """One run in the cells that share its draws."""
+        """Draws one run in all cells that share its draws."""
         entropy = [self.seed, run, *stream]
         seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0] >> 1)
         for attempt in range(self.redraws + 1):
@@ -273,7 +283,7 @@ class SweepPlan(Parameters):
         raise complaint
 
     def _complaint(self, points: list[SweepPoint]) -> InputError | None:
-        """What is wrong with the first point that makes no valid scenario."""
+        """Describes the fault of the first point whose scenario is not valid."""
         for point in points:
             try:
                 self.require.check(self.scenario_of(point))
@@ -292,7 +302,7 @@ class SweepPlan(Parameters):
         return bool(self.draw) and self._fault(undrawn) is None
 
     def _draws(self, entropy: list[int]) -> Iterator[tuple[str, Any]]:
-        """Each key has a stream of its own: it does not depend on the others."""
+        """Draws the fields; each key has its own independent random stream."""
         for key, distribution in self.draw.items():
             words = [*entropy, crc32(key.encode())]
             generator = np.random.Generator(np.random.Philox(seed=words))
@@ -301,14 +311,17 @@ class SweepPlan(Parameters):
 
 
 def load_sweep(path: str | Path) -> SweepPlan:
-    """Loads the plan of a sweep.
+    """Loads the plan of a parameter sweep from a file.
 
     Args:
-        path: A YAML file with the fields of ``SweepPlan``. Relative paths in
-            it begin in its folder.
+        path: YAML file with the fields of ``SweepPlan``. Relative paths in the file
+            start in its folder.
+
+    Returns:
+        The plan.
 
     Raises:
-        InputError: The file cannot be read, or a field is unknown or wrong.
+        InputError: The file cannot be read, or a field is unknown or not valid.
     """
     data = read_sweep(path)
     try:
@@ -318,7 +331,7 @@ def load_sweep(path: str | Path) -> SweepPlan:
 
 
 def dump_plan(plan: SweepPlan) -> str:
-    """The plan as YAML, loadable by ``load_sweep``."""
+    """Writes the plan as YAML, which ``load_sweep`` can load."""
     document = plan.model_dump(mode="json", exclude_none=True)
     return dump_yaml({**document, "scenario": plan.source})
 
@@ -328,12 +341,12 @@ def _paths(key: str) -> list[str]:
 
 
 def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
-    """Every text within a value, with the last part of the key that it stands at."""
+    """Every text within a value, each with the name of the field that contains it."""
     if isinstance(value, dict):
         for inner, item in value.items():
             for path in _paths(str(inner)):
                 known = path.split(".")[-1]
-                # A distribution's own fields stand for the field that is drawn.
+                # The values of ``choice`` belong to the field that is drawn.
                 yield from _texts(key if known == "choice" else known, item)
     elif isinstance(value, list | tuple):
         for item in value:
@@ -345,12 +358,15 @@ def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
 def _state_lists(
     data: dict[str, Any], scenario: Scenario, paths: Iterable[str]
 ) -> None:
-    """States the lists that paths lead into, where the data leave them out.
+    """Adds lists to the fields of a scenario, so that their elements can be set later.
+
+    A list is added if a path leads into the list and the fields do not contain it yet.
+    The added list has its value from ``scenario``.
 
     Args:
         data: Fields of a scenario, changed in place.
-        scenario: The scenario that they make.
-        paths: Dotted paths.
+        scenario: Scenario with these fields.
+        paths: Dotted paths of the fields to set later.
     """
     whole = scenario.model_dump(mode="json")
     for group in ("robots", "sources"):
@@ -387,7 +403,7 @@ def _check_path(field: str, path: str, earlier: list[str]) -> None:
 
 
 def _check_presets(part: str, keys: Iterable[str], fixed: list[str]) -> None:
-    """Refuses a preset that would make the scenario forget what ``set`` says."""
+    """Rejects a preset that would discard values of the scenario from ``set``."""
     for path in (path for key in keys for path in _paths(key)):
         group, _, last = path.rpartition(".")
         for other in fixed if last == "preset" else ():

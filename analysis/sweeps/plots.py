@@ -1,4 +1,4 @@
-"""Pictures of a sweep: the grid as heat maps, the draws as marginals."""
+"""Pictures of a sweep: heat maps over the grid, and marginals over drawn fields."""
 
 from __future__ import annotations
 
@@ -26,32 +26,33 @@ from analysis.sweeps.estimates import (
 from analysis.sweeps.plan import SweepPlan
 
 WIDTH_IN = 9.0
-#: Cells beside one another that have room for their numbers, and values for names.
+#: MOST_NUMBERS: greatest number of columns for which cells show their numbers.
+#: MOST_TICKS: greatest number of values that an axis shows.
 MOST_NUMBERS, MOST_TICKS = 8, 20
-#: Okabe and Ito's colours, which the colour-blind can tell apart.
+#: Colors of curves, after Okabe and Ito. Color-blind people can distinguish them.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#A8498A")
 
 
 def grid_axes(plan: SweepPlan) -> list[str]:
-    """Fields of the grid that have more than one value."""
+    """Returns the fields of the grid that have more than one value."""
     return [path for path, values in plan.grid.items() if len(values) > 1]
 
 
 def plot_heat_maps(
     plan: SweepPlan, results: pd.DataFrame, x: str, y: str, rest: dict[str, Any]
 ) -> Figure:
-    """Every quantity over two fields of the grid.
+    """Draws a heat map of each quantity over two fields of the grid.
 
     Args:
-        plan: The sweep.
-        results: See ``load_results``.
-        x: Path of the field along the first axis.
-        y: Path of the field along the second one.
-        rest: Values of the grid's other fields.
+        plan: Plan of the parameter sweep.
+        results: Results of the sweep, from ``load_results``.
+        x: Dotted path of the field along the horizontal axis.
+        y: Dotted path of the field along the vertical axis.
+        rest: Values of the grid's other fields, by dotted path.
 
     Returns:
-        The picture, a panel for each quantity: lighter is more, and what nobody knows
-        is hatched.
+        Picture with one panel for each quantity. Lighter cells have larger values.
+        Cells without an estimate are hatched.
     """
     runs, cells = by_cell(plan, ended(results)), plan.cells()
     chosen = [
@@ -65,7 +66,8 @@ def plot_heat_maps(
     figure, panels = _panels(results, min(max(3.5, 1.4 + 0.26 * rows), 12.0))
     for axes, quantity in panels:
         values = [[quantity.estimate(each).value for each in row] for row in chosen]
-        # Of all cells, so that a colour means the same on every map of a sweep.
+        # The limits are those of all cells, so that a color has the same meaning on
+        # every map of a sweep.
         _heat_map(axes, quantity, np.array(values), _limits(quantity, runs))
         _ticks(axes, "x", x, plan.grid[x])
         _ticks(axes, "y", y, plan.grid[y])
@@ -73,7 +75,7 @@ def plot_heat_maps(
 
 
 def _limits(quantity: Quantity, runs: Sequence[pd.DataFrame]) -> tuple[float, float]:
-    """Least and greatest value that a map has a colour for."""
+    """Least and greatest value of the color scale."""
     if quantity.rate:
         return 0.0, 1.0
     values = np.array([quantity.estimate(each).value for each in runs])
@@ -88,7 +90,7 @@ def _limits(quantity: Quantity, runs: Sequence[pd.DataFrame]) -> tuple[float, fl
 def _panels(
     results: pd.DataFrame, height_in: float
 ) -> tuple[Figure, list[tuple[Axes, Quantity]]]:
-    """Two panels a row, each of so many inch, for all that is shown."""
+    """Makes a panel for each quantity, two per row; each row has the given height."""
     shown = quantities(results)
     rows = math.ceil(len(shown) / 2)
     figure = Figure(figsize=(WIDTH_IN, height_in * rows), layout="constrained")
@@ -147,15 +149,15 @@ def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
 
 
 def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
-    """Every quantity over the one field of the grid, with 95 % intervals.
+    """Draws each quantity over the only field of the grid, with 95 % intervals.
 
     Args:
-        plan: The sweep; its grid has one field.
-        results: See ``load_results``.
-        x: Path of that field.
+        plan: Plan of the parameter sweep, whose grid has one field.
+        results: Results of the sweep, from ``load_results``.
+        x: Dotted path of this field.
 
     Returns:
-        The picture, a panel for each quantity.
+        Picture with one panel for each quantity, for example the success rate.
     """
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
@@ -168,18 +170,19 @@ def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
 
 
 def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
-    """Every quantity over one drawn field, a curve for each value of an axis.
+    """Draws each quantity as a function of one randomly drawn field.
 
-    The first axis of the grid with few enough values has the curves; over the
-    others, as over all other draws, the runs are taken together.
+    If a field of the grid has few enough values, the picture has one curve for each of
+    these values. If several fields have, the first field is used. Each curve combines
+    the runs over all other fields.
 
     Args:
-        plan: The sweep.
-        results: See ``load_results``.
-        key: Of ``plan.draw``.
+        plan: Plan of the parameter sweep.
+        results: Results of the sweep, from ``load_results``.
+        key: Key of the drawn field in ``plan.draw``.
 
     Returns:
-        The picture, a panel for each quantity.
+        Picture with one panel for each quantity.
     """
     runs = ended(results)
     split = next(

@@ -1,4 +1,4 @@
-"""Local processes that run the points of a sweep."""
+"""Local processes that do the runs of a sweep."""
 
 from __future__ import annotations
 
@@ -16,31 +16,32 @@ from analysis.run_error import RunError
 from analysis.sweeps.one_run import Outcome, Task, lost_outcome
 from analysis.sweeps.worker import READY
 
-#: How often a run is tried whose worker ends before it answers.
+#: Greatest number of attempts at a run. If the worker ends before it returns a result,
+#: the next attempt follows.
 ATTEMPTS = 2
-#: Tasks that a worker has at once, so that it never waits for the next one.
+#: Number of tasks that a worker has at a time, so that it never waits for a task.
 AHEAD = 2
-#: The caller is heard at least so often, s.
+#: Longest time between two calls of ``pulse``, s.
 PULSE_S = 0.25
 _MAIN = "import sys; from analysis.sweeps.worker import main; main(int(sys.argv[1]))"
 
 
 class WorkerError(RunError):
-    """Workers that cannot be started, or reached any more."""
+    """A worker process cannot be started, or can no longer be reached."""
 
 
 class WorkerProcess:
-    """A worker in a process of its own; see ``analysis/sweeps/worker.py``."""
+    """A worker in a separate process; see ``analysis/sweeps/worker.py``."""
 
     def __init__(self, task: Task) -> None:
-        """Starts the process, which warms up with a task; it is not yet given that."""
+        """Starts the process, which loads the code for the task but does not run it."""
         ours, theirs = socket.socketpair()
         self.connection = Connection(ours.detach())
         self.tasks: deque[Task] = deque()
         self.ready = False
-        # With several threads a worker would be slower, and its sums different.
+        # Several threads would make a worker slower, and would change rounding errors.
         threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        # Drake cannot be loaded where the locale's encoding is ASCII.
+        # Drake cannot be loaded if the encoding of the locale is ASCII.
         encoding = {"PYTHONUTF8": "1"}
         paths = os.pathsep.join(path or os.getcwd() for path in sys.path)  # noqa: PTH109
         with theirs:
@@ -55,21 +56,24 @@ class WorkerProcess:
         self._send(task)
 
     def _send(self, message: Task) -> None:
-        # A process that has just ended is noticed by receive.
+        # If the process has just ended, ``receive`` detects that.
         with contextlib.suppress(OSError):
             self.connection.send(message)
 
     def give(self, task: Task) -> None:
-        """Hands over a task; ``receive`` gets its outcome, in the order of tasks."""
+        """Sends a task; ``receive`` returns the results in the order of the tasks."""
         self.tasks.append(task)
         self._send(task)
 
     def receive(self) -> Outcome | None:
-        """Waits for the next message; none: that it is ready.
+        """Waits for the next message of the worker process.
+
+        Returns:
+            Result of a task. None if the message says that the process is ready.
 
         Raises:
-            EOFError: The process has ended.
-            WorkerError: It has ended before it was ready.
+            EOFError: The process ended after it was ready.
+            WorkerError: The process ended before it was ready.
         """
         try:
             message = self.connection.recv()
@@ -87,7 +91,7 @@ class WorkerProcess:
         return outcome
 
     def run(self, task: Task) -> Outcome:
-        """Runs a task to its end; errors as of ``receive``."""
+        """Runs one task to its end; raises the same errors as ``receive``."""
         if not self.ready:
             self.receive()
         self.give(task)
@@ -96,7 +100,7 @@ class WorkerProcess:
         return outcome
 
     def close(self) -> None:
-        """Ends the process at once, with its child."""
+        """Ends the process and its child at once."""
         self.connection.close()
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
@@ -106,19 +110,22 @@ class WorkerProcess:
 def run_locally(
     tasks: Iterator[Task], pulse: Callable[[], None], *, workers: int
 ) -> Generator[Outcome]:
-    """Runs tasks in local processes.
+    """Runs the tasks of a parameter sweep in local processes.
+
+    A worker process may end during a run, for example if the system is out of memory.
+    The run is then tried once more.
 
     Args:
-        tasks: What to run.
-        pulse: Called a few times a second; what it raises ends the work.
+        tasks: Tasks to run.
+        pulse: Function that is called a few times per second. If it raises an
+            exception, the work ends.
         workers: Number of processes.
 
     Yields:
-        Outcomes as they come. A run whose worker ends, as when the system is
-        out of memory, is tried once more.
+        Results of the runs, in the order in which the runs end.
 
     Raises:
-        WorkerError: A worker cannot be started.
+        WorkerError: A worker process cannot be started.
     """
     pool = _Pool(tasks)
     try:
@@ -142,7 +149,7 @@ class _Pool:
         return self._first.popleft() if self._first else next(self._tasks, None)
 
     def start(self) -> None:
-        """A worker for the next task, if there is one."""
+        """Starts a worker for the next task, if there is one."""
         task = self._next()
         if task is not None:
             self._first.appendleft(task)
@@ -165,9 +172,11 @@ class _Pool:
                 yield outcome
 
     def _replace(self, worker: WorkerProcess) -> Iterator[Outcome]:
-        """The runs of a worker that has ended go to a new one.
+        """Starts a new worker in place of a worker that has ended.
 
-        It was at the first; the others waited.
+        The worker was running the first of its tasks. This task is tried again, at most
+        ``ATTEMPTS`` times in all. The other tasks had not started and go to the next
+        worker.
         """
         task, *others = worker.tasks
         self._dismiss(worker)

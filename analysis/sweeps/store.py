@@ -1,7 +1,7 @@
-"""The directory of a sweep: every run that is done is kept at once.
+"""The directory of a parameter sweep, which saves each run as soon as the run ends.
 
-While a sweep runs, ``runs.jsonl`` gets a line a run. When all are there,
-``runs.parquet`` takes its place.
+While a sweep is running, each finished run adds a line to ``runs.jsonl``. When all runs
+are finished, ``runs.parquet`` replaces this file.
 """
 
 from __future__ import annotations
@@ -35,25 +35,26 @@ MANIFEST, PLAN = "sweep.json", "sweep.yaml"
 
 
 class StoreError(RunError):
-    """Results that cannot be written; what was written before is kept."""
+    """Results cannot be written; results that were written before are kept."""
 
 
 class SweepStore:
-    """An open directory of a sweep, which no other process can open."""
+    """Open directory of a sweep, which no other process can open."""
 
     def __init__(
         self, out: Path | None, plan: SweepPlan, points: Sequence[SweepPoint]
     ) -> None:
-        """Opens the directory of this plan, or makes it where there is none.
+        """Opens the directory of a plan's sweep, or creates the directory.
 
         Args:
-            out: The directory; none: the next number under results/.
-            plan: What to run.
-            points: All runs of the plan, by index.
+            out: Directory of the parameter sweep. None means the next number under
+                results/.
+            plan: Plan of the sweep.
+            points: All runs of the plan, sorted by their number.
 
         Raises:
-            InputError: It holds something else, cannot be written, or is in
-                use; ``out: ...``.
+            InputError: The directory contains something else, cannot be written, or is
+                in use. The error is about the field ``out``.
             StoreError: The disk is full.
         """
         self._journal = -1
@@ -81,7 +82,7 @@ class SweepStore:
             raise _unwritable(self.out, error) from None
 
     def _open(self, points: Sequence[SweepPoint]) -> None:
-        """Finds what is done, and drops lines that are no runs of the plan."""
+        """Finds the finished runs, and drops lines that are not runs of the plan."""
         path = self.out / JOURNAL
         if (self.out / TABLE).exists() and not path.exists():
             _check_table(self.out, points)
@@ -103,10 +104,13 @@ class SweepStore:
         self._journal = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
 
     def add(self, outcome: Outcome) -> None:
-        """Keeps a run.
+        """Writes the results of a run to the disk.
+
+        Args:
+            outcome: Results of the run.
 
         Raises:
-            StoreError: The disk is full, or broken.
+            StoreError: The disk is full or faulty.
         """
         index = outcome.row["index"]
         line = memoryview((json.dumps(outcome.row, allow_nan=False) + "\n").encode())
@@ -122,13 +126,13 @@ class SweepStore:
         self.done.add(index)
 
     def write_table(self, *, complete: bool) -> None:
-        """Writes the table of the runs so far.
+        """Writes the table of all finished runs.
 
         Args:
-            complete: Whether these are all, so that the journal can go.
+            complete: Whether all runs are finished. If so, ``runs.jsonl`` is removed.
 
         Raises:
-            StoreError: The disk is full, or broken.
+            StoreError: The disk is full or faulty.
         """
         if self._journal < 0:
             return
@@ -147,20 +151,24 @@ class SweepStore:
         )
 
     def close(self) -> None:
-        """Lets other processes work in the directory."""
+        """Unlocks the directory for other processes."""
         if self._journal >= 0:
             os.close(self._journal)
         os.close(self._lock)
 
 
 def load_results(out: str | Path) -> pd.DataFrame:
-    """The runs of a sweep's directory by index, also while it runs.
+    """Loads the finished runs of a parameter sweep, even while the sweep is running.
+
+    Args:
+        out: Directory of the sweep.
 
     Returns:
-        See ``results_table``.
+        Table with one row per run, sorted by the run's number. ``results_table``
+        describes the columns.
 
     Raises:
-        InputError: The directory holds no sweep.
+        InputError: The directory contains no sweep.
     """
     journal, table = Path(out) / JOURNAL, Path(out) / TABLE
     if journal.exists():
@@ -175,14 +183,14 @@ def load_results(out: str | Path) -> pd.DataFrame:
 
 
 def trajectory_path(out: Path, index: int) -> Path:
-    """The file of a run's trajectory.
+    """Returns the file of a run's trajectory.
 
     Args:
-        out: Directory of the sweep.
+        out: Directory of the parameter sweep.
         index: Number of the run, from 0.
 
     Returns:
-        A Parquet file below ``trajectories/``.
+        Path of a Parquet file in the folder ``trajectories``.
     """
     return out / "trajectories" / f"{index:06d}.parquet"
 
@@ -221,7 +229,7 @@ def _locked(path: Path) -> int:
 
 
 def _check_same(out: Path, plan: SweepPlan) -> None:
-    """Whether the directory's runs are some of the plan's."""
+    """Checks that the directory belongs to a sweep with the same plan and versions."""
     try:
         manifest = json.loads((out / MANIFEST).read_text("utf-8"))
         stored = YAML(typ="safe").load(out / PLAN)
@@ -258,10 +266,14 @@ def _check_same(out: Path, plan: SweepPlan) -> None:
 def _runs_of(
     points: Sequence[SweepPoint], lines: Sequence[bytes]
 ) -> tuple[dict[int, bytes], list[int]]:
-    """The lines of runs of a plan by index, and the numbers of other lines, from 1.
+    """Sorts the lines of a file into runs of a plan and other lines.
 
-    Of an index with different lines nobody knows which is right: none is taken. A last
-    line that a crash left unfinished is among neither.
+    If two different lines claim to be the same run, neither is accepted. An unfinished
+    last line, left by a crash, is ignored.
+
+    Returns:
+        A pair. The first is a mapping from the number of each run to its line. The
+        second is a list of the line numbers of all other lines, starting from 1.
     """
     found: dict[int, dict[bytes, int]] = {}
     others = []
@@ -277,7 +289,7 @@ def _runs_of(
 
 
 def _is_run_of(points: Sequence[SweepPoint], row: dict[str, Any]) -> bool:
-    """Whether a row has the index, seed and fields of one of the points."""
+    """Whether a row has the index, the seed and the fields of one of the points."""
     if not 0 <= row["index"] < len(points):
         return False
     point = vars(points[row["index"]])
@@ -285,7 +297,7 @@ def _is_run_of(points: Sequence[SweepPoint], row: dict[str, Any]) -> bool:
 
 
 def _check_table(out: Path, points: Sequence[SweepPoint]) -> None:
-    """Refuses a table of all runs that are not those of the plan."""
+    """Rejects a table whose runs are not exactly the runs of the plan."""
     table = load_results(out)
     own = [(point.index, point.seed) for point in points]
     if not {"index", "seed"} <= {*table} or own != [
@@ -299,7 +311,7 @@ def _check_table(out: Path, points: Sequence[SweepPoint]) -> None:
 
 
 def _parse(line: bytes) -> dict[str, Any] | None:
-    """A row; none where a crash left half a line, or where there is something else."""
+    """Reads a row from a line; None if the line is incomplete or is not a row."""
     if not line.endswith(b"\n"):
         return None
     with suppress(ValueError, RecursionError):
@@ -310,7 +322,7 @@ def _parse(line: bytes) -> dict[str, Any] | None:
 
 
 def _write_whole(path: Path, content: bytes) -> None:
-    """Writes a file that appears whole or not at all."""
+    """Writes a file that appears complete or not at all."""
     partial = path.with_name(f".{path.name}.part")
     try:
         with partial.open("wb") as file:

@@ -1,4 +1,4 @@
-"""A sweep in one JSON document, and on one screen."""
+"""Results of a sweep as a JSON document, and as text for a terminal."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.sweep import reproducing_command
 
-#: Columns that are no metrics.
+#: Columns with numbers that are not metrics.
 _NO_METRICS = ("index", "cell", "run", "seed", "redraws", "wall_s")
 
 
 def sweep_summary(
     plan: SweepPlan, points: list[SweepPoint], results: pd.DataFrame, out: Path
 ) -> dict[str, Any]:
-    """The JSON document of a sweep.
+    """Makes the JSON document of a parameter sweep.
 
     Args:
-        plan: What was run.
-        points: All its runs.
-        results: See ``load_results``.
-        out: The directory, for commands.
+        plan: Plan of the sweep.
+        points: All runs of the plan.
+        results: Results of the sweep, from ``load_results``.
+        out: Directory of the sweep, for the commands that repeat runs.
 
     Returns:
-        Plain values, to be written as JSON.
+        Plain values that can be written as JSON.
     """
     failed = results[results["cause"] == FAILED]
     return {
@@ -92,14 +92,18 @@ def _plain(estimate: Estimate, name: str) -> dict[str, float | None]:
 
 
 def sweep_text(plan: SweepPlan, results: pd.DataFrame) -> str:
-    """A line a cell, with 95 % intervals, and a line for each field with warnings.
+    """Makes a text of the results of a parameter sweep.
+
+    Each cell of the grid has one line with its estimates and their 95 % confidence
+    intervals. A cell is one combination of the values in the grid. Each field with
+    warnings has one line.
 
     Args:
-        plan: What was run.
-        results: See ``load_results``.
+        plan: Plan of the sweep.
+        results: Results of the sweep, from ``load_results``.
 
     Returns:
-        Lines without an end of line after the last one.
+        Lines of text, without a newline after the last line.
     """
     titles, cells = figure_table(plan, results)
     rows = [["cell", "runs", *titles]]

@@ -1,4 +1,4 @@
-"""Runs a sweep: many scenarios, in many processes, into one table."""
+"""Runs a sweep: many variants of a scenario, in many processes, into one table."""
 
 from __future__ import annotations
 
@@ -25,36 +25,36 @@ from systems.framework.input_error import InputError
 
 _LOGGER = logging.getLogger("phonotaxis")
 
-#: Runs tasks, and calls its second argument a few times a second.
+#: Function that runs tasks. It calls its second argument a few times per second.
 Runner = Callable[[Iterator[Task], Callable[[], None]], Generator[Outcome]]
 
 
 @dataclass(frozen=True)
 class PreparedSweep:
-    """A sweep that has only to be run; see ``prepare_sweep``."""
+    """A sweep that is ready to run; see ``prepare_sweep``."""
 
     plan: SweepPlan
     points: list[SweepPoint]
-    """All runs, those that are done included."""
+    """All runs, including the finished ones."""
     store: SweepStore
-    """The open directory of the results; ``run`` closes it."""
+    """Open directory of the results, which ``run`` closes."""
     runner: Runner
     compiled: bool
-    """Whether runs are compiled where the scenario leaves it open."""
+    """Whether to use the compiled engine for scenarios that do not choose an engine."""
 
     def run(self, progress: Callable[[int], None] | None = None) -> pd.DataFrame:
-        """Does all runs that the directory does not hold yet.
+        """Does all runs of a parameter sweep that are not in its directory yet.
 
         Args:
-            progress: Called a few times a second with the number of runs that
-                are done. What it raises ends the sweep.
+            progress: Function that is called a few times per second with the number of
+                finished runs. If it raises an exception, the sweep ends.
 
         Returns:
-            See ``load_results``.
+            Table with one row per run, as from ``load_results``.
 
         Raises:
-            StoreError: The disk is full, or broken.
-            WorkerError: Workers cannot be started, or are gone.
+            StoreError: The disk is full or faulty.
+            WorkerError: Worker processes cannot be started or reached.
         """
 
         def pulse() -> None:
@@ -88,7 +88,7 @@ class PreparedSweep:
                 yield Task(point, scenario, engine, self.plan.trajectories, files)
 
     def engine(self, scenario: Scenario) -> Engine:
-        """What runs a scenario of the sweep."""
+        """Chooses the engine for a scenario of the sweep."""
         if scenario.engine != "auto":
             return scenario.engine
         return "compiled" if self.compiled else "drake"
@@ -102,20 +102,21 @@ def prepare_sweep(
     scheduler: str | None = None,
     resume: bool = False,
 ) -> PreparedSweep:
-    """Draws and checks all runs, then opens the directory of the results.
+    """Draws and checks all runs of a parameter sweep, then opens its directory.
 
     Args:
-        plan: What to run.
-        out: The directory; none: the next number under results/.
-        workers: Number of local processes; none: one a core.
-        scheduler: Address of a Dask scheduler to use instead.
-        resume: Whether ``out`` may hold runs of the same plan, which are kept.
+        plan: Plan of the sweep.
+        out: Directory of the results. None means the next number under results/.
+        workers: Number of local processes. None means one process per processor core.
+        scheduler: Address of a Dask scheduler, which then replaces the local processes.
+        resume: Whether ``out`` may contain runs of the same plan. These runs are kept.
 
     Returns:
-        The sweep, to be run once; its directory is locked until then.
+        The sweep, which can be run once. Its directory is locked until then.
 
     Raises:
-        InputError: Something of that is no good; says what, and the remedy.
+        InputError: An argument or the plan is not valid. The message states the fault
+            and the remedy.
     """
     check_options(out, workers=workers, scheduler=scheduler, resume=resume)
     directory = Path(out).expanduser() if out is not None else None
@@ -141,21 +142,22 @@ def run_sweep(
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> pd.DataFrame:
-    """Prepares and runs a sweep; see ``prepare_sweep`` and ``PreparedSweep.run``.
+    """Prepares a parameter sweep and does all its runs.
 
     Args:
-        plan: What to run.
-        out: The directory.
-        workers: Number of local processes; None: one a core.
-        scheduler: Address of a Dask scheduler to use instead.
-        resume: Whether ``out`` may hold runs of the same plan, which are kept.
-        progress: Called with the number of runs done.
+        plan: Plan of the sweep.
+        out: Directory of the results.
+        workers: Number of local processes. None means one process per processor core.
+        scheduler: Address of a Dask scheduler, which then replaces the local processes.
+        resume: Whether ``out`` may contain runs of the same plan. These runs are kept.
+        progress: Function that is called with the number of finished runs.
 
     Returns:
-        A row a run; see ``load_results``.
+        Table with one row per run, as from ``load_results``.
 
     Raises:
-        InputError: As ``prepare_sweep``.
+        InputError: An argument or the plan is not valid. The message states the fault
+            and the remedy.
     """
     prepared = prepare_sweep(
         plan, out, workers=workers, scheduler=scheduler, resume=resume
@@ -164,15 +166,15 @@ def run_sweep(
 
 
 def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
-    """The shell command that does one run of a sweep again.
+    """Returns the shell command that repeats one run of a parameter sweep.
 
     Args:
-        out: Directory of the sweep; has the scenario's file.
-        point: The run.
-        engine: What ran it.
+        out: Directory of the sweep, which contains the scenario file.
+        point: Run to repeat.
+        engine: Engine that did the run: ``drake`` or ``compiled``.
 
     Returns:
-        One line, quoted for a shell.
+        Command in one line, with quotes for the shell.
     """
     words = ["phonotaxis", "simulate", str(out / "scenario.yaml")]
     for path, value in point.fields.items():
@@ -183,11 +185,15 @@ def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
 
 
 def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
-    """What only a build finds, as an unknown law: once for each text or group.
+    """Builds the block diagrams of some runs, to find faults before all runs start.
+
+    Some faults appear only when a diagram is built, for example an unknown control law.
+    The function builds the diagram of the first run. It also builds the diagram of
+    every run in which a field has a new text or mapping as its value.
 
     Returns:
-        Whether compiled loops shall run where a scenario leaves it open: for many runs,
-        unless numba cannot compile a user's own code.
+        Whether to use the compiled engine for scenarios that do not choose an engine.
+        That is the case for many runs, unless numba cannot compile code of the user.
     """
     compiled = len(points) >= MANY_RUNS
     seen: set[str] = set()

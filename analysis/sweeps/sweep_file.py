@@ -1,4 +1,4 @@
-"""The file of a sweep."""
+"""The YAML file of a sweep."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ SWEEP_SCHEMA_FILE = Path(__file__).with_name("sweep.schema.json")
 
 
 def read_sweep(path: str | Path) -> dict[str, Any]:
-    """The fields of a sweep, not yet checked.
+    """Reads the fields of a parameter sweep without checking them.
 
     Args:
-        path: A YAML file with the fields of ``SweepPlan``. Relative paths in
-            it begin in its folder.
+        path: YAML file with the fields of ``SweepPlan``. Relative paths in the file
+            start in its folder.
 
     Returns:
-        Plain values, with the file's folder.
+        Plain values of the fields, and the folder of the file as ``folder``.
 
     Raises:
         InputError: The file cannot be read.

@@ -1,9 +1,9 @@
-"""A process that runs the points of a sweep for another one.
+"""A worker process that does runs of a parameter sweep for another process.
 
-It loads all that a run needs once. Then it forks a child that does the runs,
-and a new child every ``RUNS_PER_CHILD`` runs: Drake never frees blocks written
-in Python, so that a process grows by about a megabyte a run. Compiled runs share
-blocks.
+The worker loads all code that a run needs once. Then the worker forks a child process,
+which does the runs. Drake never frees blocks that are written in Python, so that the
+child grows by about 1 MB per run. The worker therefore replaces the child after 50 runs
+of Drake. Compiled runs share their blocks, so that a child does 1000 of them.
 """
 
 from __future__ import annotations
@@ -23,18 +23,22 @@ RUNS_PER_CHILD = {"drake": 50, "compiled": 1000}
 
 
 def main(file_descriptor: int) -> None:
-    """Serves tasks until the other end of the socket is closed.
+    """Runs tasks until the other process closes the socket.
+
+    The other process first sends a ``Task``. The worker loads the code for this task
+    without running it, and answers ``READY``. Each further ``Task`` is run and is
+    answered with an ``Outcome``.
 
     Args:
-        file_descriptor: A socket. A ``Task`` comes first, to warm up with;
-            the answer is READY. Then an ``Outcome`` answers each ``Task``.
+        file_descriptor: File descriptor of the socket.
     """
-    # Keyboards speak to the process that we work for.
+    # Ctrl-C is for the process that sends the tasks.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with Connection(file_descriptor) as connection:
         try:
             task = connection.recv()
-            # A run may end its process: that must happen when it is its turn.
+            # Code of the task may end its process. That must not happen here, so a
+            # child process tries the code first.
             if _survives(lambda: _warm(task)):
                 _warm(task)
             connection.send(READY)
@@ -46,7 +50,7 @@ def main(file_descriptor: int) -> None:
 
 
 def _survives(work: Callable[[], None]) -> bool:
-    """Works in a forked child, and tells whether it got to the end."""
+    """Runs a function in a forked child; returns whether the child ended normally."""
     child = os.fork()
     if child == 0:
         status = 1
@@ -59,7 +63,7 @@ def _survives(work: Callable[[], None]) -> bool:
 
 
 def _warm(task: Task) -> None:
-    """Loads compiled functions. An error here comes again with the run itself."""
+    """Loads compiled functions; ignores errors, because the run repeats them."""
     with contextlib.suppress(BaseException):
         if task.engine == "compiled":
             prepared_loop(task.scenario)
@@ -68,7 +72,7 @@ def _warm(task: Task) -> None:
 
 
 def _serve(connection: Connection) -> None:
-    """Some runs. At the end of all, EOFError."""
+    """Runs tasks until the child is worn out; raises EOFError if the socket closes."""
     worn = 0.0
     while worn < 1.0:
         task: Task = connection.recv()

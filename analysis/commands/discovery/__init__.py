@@ -1,1 +1,1 @@
-"""Commands that tell what there is: scenarios, laws, fields, and the installation."""
+"""Commands that list scenarios, laws and fields, and that check the installation."""

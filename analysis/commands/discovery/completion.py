@@ -1,4 +1,4 @@
-"""``phonotaxis completion``: what the tab key does in a shell."""
+"""``phonotaxis completion``: a script for completion with the tab key in a shell."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from analysis.commands.arguments import (
 )
 from analysis.commands.command import Command, Job, Take
 
-#: A function of a shell that gives some words, and files.
+#: Text of a shell function, by shell. The function offers some words and all files.
 _FUNCTIONS = {
     "bash": '{name}() {{ compgen -W "{words}" -- "$1"; compgen -f -- "$1"; }}',
     "zsh": "{name}() {{ _alternative 'words:name:({words})' 'files:file:_files' }}",
@@ -44,7 +44,8 @@ def _prepare(options: Namespace, take: Take) -> Job[str]:
         text: str = shtab.complete(
             options.parser, shell=options.shell, preamble="\n".join(functions)
         )
-        # shtab registers the function under eval alone; people source scripts as well.
+        # shtab registers the function only if the script runs under eval. Users also
+        # source such scripts.
         return text.replace("[-1] == eval ]]", "[-1] == (eval|file) ]]")
 
     return Job(
@@ -55,7 +56,7 @@ def _prepare(options: Namespace, take: Take) -> Job[str]:
 
 
 def _complete_paths(parser: ArgumentParser) -> None:
-    """Files and directories for arguments that say by their names that they are."""
+    """Completes file and directory arguments, which are recognized by their names."""
     for command in parser.below.values():  # type: ignore[attr-defined]
         for argument in command._actions:
             name = str(argument.metavar)

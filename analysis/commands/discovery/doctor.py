@@ -1,4 +1,4 @@
-"""``phonotaxis doctor``: whether all that a run needs is there."""
+"""``phonotaxis doctor``: checks whether everything that a run needs is installed."""
 
 from __future__ import annotations
 

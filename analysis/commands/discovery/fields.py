@@ -65,7 +65,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[Field]]:
 
 
 def _paragraph(field: Field) -> str:
-    """What ``--set`` takes on the first line, what it means below."""
+    """Describes a field: a line with the values for ``--set``, then the meaning."""
     unit = f" {field.unit}" if field.unit else ""
     default = "" if _has_no_default(field) else f" = {json.dumps(field.default)}{unit}"
     legal = f", {field.range}" if field.range else ""

@@ -1,4 +1,4 @@
-"""A list of names, each with a line about it."""
+"""A command that prints a list of names, each with one line of text."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from analysis.commands.command import Job
 def listing(
     plural: str, about: str, rows: Callable[[], dict[str, str]]
 ) -> Job[dict[str, str]]:
-    """The job of a command that prints a list.
+    """Makes the job of a command that prints a list of names.
 
     Args:
-        plural: What is listed, as the JSON document has it.
-        about: What the line is, as the JSON document has it.
-        rows: Gives names and lines.
+        plural: Key of the list in the JSON document.
+        about: Key of each entry's text in the JSON document.
+        rows: Function that returns a mapping from each name to one line of text.
 
     Returns:
-        A job without a result directory.
+        The job, which writes no files.
     """
 
     def summary(found: dict[str, str]) -> dict[str, Any]:

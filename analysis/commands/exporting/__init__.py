@@ -1,1 +1,1 @@
-"""Runs for other programs: MCAP, CSV, and what the columns mean."""
+"""Export of runs to MCAP and CSV files, and the meanings of the table's columns."""

@@ -1,4 +1,4 @@
-"""``phonotaxis export``: a run that is done, for other programs."""
+"""``phonotaxis export``: exports a finished run for other programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``--mcap`` and ``--csv``: a run's files for other programs."""
+"""``--mcap`` and ``--csv``: files of a run for other programs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MCAP_FILE, CSV_FILE = "run.mcap", "trajectory.csv"
 
 
 def take_exports(parser: ArgumentParser) -> None:
-    """``--mcap`` and ``--csv``."""
+    """Adds the options ``--mcap`` and ``--csv``."""
     parser.add_argument(
         "--mcap",
         action="store_true",
@@ -25,17 +25,23 @@ def take_exports(parser: ArgumentParser) -> None:
 
 
 class Exports(NamedTuple):
-    """Which files are asked for."""
+    """The files that the options request."""
 
     mcap: bool
     csv: bool
 
     @classmethod
     def chosen(cls, options: Namespace) -> Exports:
-        """Those of the options.
+        """Reads from the options which files are requested.
+
+        Args:
+            options: Parsed options ``--mcap`` and ``--csv``.
+
+        Returns:
+            The choice of files.
 
         Raises:
-            InputError: A package for them is not installed.
+            InputError: A package that writes MCAP files is not installed.
         """
         if options.mcap:
             from analysis.exports.mcap_file import require_mcap
@@ -45,16 +51,16 @@ class Exports(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Of the files."""
+        """Names of the requested files."""
         every = zip((MCAP_FILE, CSV_FILE), self, strict=True)
         return [name for name, chosen in every if chosen]
 
     def write(self, run: RecordedRun, directory: Path) -> None:
-        """Writes them.
+        """Writes the requested files.
 
         Args:
-            run: What happened.
-            directory: Exists.
+            run: Run to export.
+            directory: Existing directory for the files.
         """
         if self.mcap:
             from analysis.exports.mcap_file import write_mcap
