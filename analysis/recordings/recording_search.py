@@ -152,10 +152,12 @@ class RecordingSearch:
         return self._responses(cross.astype(np.complex64))
 
     def mean_response(self) -> float:
-        """Averages the greatest response of each stretch, which measures the fit of all pairs.
+        """Averages the greatest response of each stretch.
+
+        The mean measures how well all pairs of channels agree on a source position.
 
         Returns:
-            Mean over the stretches, with their weights.
+            Mean over the stretches, weighted by the weights of the stretches.
         """
         weights = [float(self.recording.weights[s].mean()) for s in self.stretches]
         best = [
@@ -203,8 +205,7 @@ class RecordingSearch:
         return self._responses(cross / self.recording.weights[stretch].sum())
 
     def _cross(self, stretch: slice) -> NDArray[np.complex64]:
-        """Returns (p, f) weighted cross-spectra of the pairs, with all magnitudes
-        whitened."""
+        """Returns (p, f) whitened and weighted cross-spectra of the pairs."""
         weights = self.recording.weights[stretch]
         spectra = self.recording.spectra(stretch)
         power = np.mean(np.abs(spectra) ** 2, axis=0)
@@ -239,7 +240,7 @@ class RecordingSearch:
         return Sighting(**vars(fit), t_s=ends / (2.0 * recording.sample_rate_hz))
 
     def _consistent(self, place: int, stretch: slice) -> AlignedDelays | None:
-        """Returns the delays on which all channels agree best and that fit a source position.
+        """Returns the delays with the best agreement that also fit a source position.
 
         Several sets of delays are compared, because the grid position with the greatest
         response can be wrong for two reasons:

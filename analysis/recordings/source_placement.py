@@ -93,7 +93,9 @@ def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | Non
 
 
 def has_place(delays: AlignedDelays, array: KnownArray) -> bool:
-    """Returns whether some source position fits the delays, however uncertain its bearing.
+    """Returns whether some source position fits the delays.
+
+    The bearing of the position may be arbitrarily uncertain.
 
     Args:
         delays: Delays of the channels, and their errors.
@@ -149,8 +151,7 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
 def _direction(
     tau: NDArray[np.float64], own: NDArray[np.float64], array: KnownArray
 ) -> NDArray[np.float64]:
-    """Returns the (d,) unit vector to the source under the assumption that it is far
-    away."""
+    """Returns the (d,) unit vector to the source, as if the source were far away."""
     shape = array.shape
     allowed = (array.budget.position_std / array.c) ** 2 * (
         np.eye(shape.count - 1) + 1.0
@@ -298,8 +299,7 @@ def _limit(freedom: int) -> float:
 
 
 def _level(fix: SourceFix) -> SourceFix:
-    """Returns the azimuth of a source without its elevation, as for a source in the
-    plane."""
+    """Returns the azimuth of a source without its elevation."""
     u = np.array([math.cos(fix.bearing), math.sin(fix.bearing)])
     across = np.array([-u[1], u[0]])
     covariance = fix.bearing_std**2 * np.outer(across, across)

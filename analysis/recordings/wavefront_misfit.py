@@ -54,8 +54,7 @@ _ALIKE = 0.8
 
 @dataclass(frozen=True)
 class Lateness:
-    """Lateness of each channel that would give the best fit, if only this channel is
-    late."""
+    """Lateness of each channel that gives the best fit if only this channel is late."""
 
     late_s: NDArray[np.float64]
     """(n,) lateness of each channel, median over the stretches, s."""
@@ -133,7 +132,9 @@ def late_channel(
 def _of_stretch(
     sighting: Sighting, shape: ArrayShape, array: KnownArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
-    """Estimates the lateness of each channel in one stretch, if only this channel is late.
+    """Estimates the lateness of each channel in one stretch.
+
+    Each estimate assumes that only this channel is late.
 
     Returns:
         late: (n,) lateness of each channel, s. information: (n,) inverse variance of
@@ -217,7 +218,7 @@ def _fit(
 def _wave_front(
     u: NDArray[np.float64], w: float, p: NDArray[np.float64], c: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Computes the delays of a wave front from the position u / w, and their derivatives.
+    """Computes the delays of a wave front from the position u / w.
 
     A microphone at p is nearer to the source than the origin by (2 p.u - w p^2) / (1 +
     s). Here s is the distance of the microphone from the source times w.
@@ -225,7 +226,7 @@ def _wave_front(
     Returns:
         delays: (n - 1,) delays of channels 1 ... n - 1 after channel 0, s. along_u: (n
         - 1, d) derivatives of the delays with respect to u, s. along_w: (n - 1,)
-        derivatives of the delays with respect to w, s m.
+        derivatives of the delays with respect to w, m s.
     """
     square = np.sum(p**2, axis=1)
     s = np.sqrt(np.maximum(1.0 - 2.0 * w * (p @ u) + w * w * square, 1e-12))
