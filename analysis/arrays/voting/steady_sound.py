@@ -74,7 +74,6 @@ def steered_only(votes: DirectionVotes) -> DirectionVotes:
 
 
 def _sounds(levels_db: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Returns for each of g groups whether it is nearly as loud as the loudest groups.
-    """
+    """Returns for each of g groups whether it is nearly as loud as the loudest."""
     whole = 10.0 * np.log10(np.sum(10.0 ** (0.1 * levels_db), axis=1))
     return np.asarray(whole >= np.quantile(whole, _LOUD_SHARE) - _SOUNDS_DB)

@@ -119,8 +119,7 @@ class SteeredSearch:
         return steered_response(gated, self.grid).astype(np.float64)
 
     def _peaks(self, response: NDArray[np.float64], least: float) -> NDArray[np.int64]:
-        """Returns the positions with the greatest responses whose bearings differ
-        enough."""
+        """Returns the positions of the highest peaks whose bearings differ enough."""
         left = response.copy()
         least = max(least, _LEAST_SHARE * float(response.max(initial=0.0)))
         found: list[int] = []

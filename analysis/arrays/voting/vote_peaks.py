@@ -27,8 +27,8 @@ _KERNEL_RAD = math.radians(4.5)
 #   valleys, as a share of the height of the peak.
 _LEAST_HEIGHT, _LEAST_PROMINENCE = 0.18, 0.12
 
-# Least number of votes of a source, as a share of the largest number. A strong echo has
-# few votes, but they agree, so its peak is narrow and high.
+# Least share of a source in the votes, as a fraction of the largest share. A strong
+# echo has few votes, but they agree, so its peak is narrow and high.
 _LEAST_SHARE = 0.17
 
 # _OF_BINS: exponent of the density of single bins in the geometric mean.
@@ -158,7 +158,7 @@ def _source(
     bearing: float,
     nearest: NDArray[np.bool_],
 ) -> VotedSource | None:
-    """Makes the source at a peak from the votes that are nearer to it than to other peaks.
+    """Makes the source at a peak from the votes that are nearest to this peak.
 
     Args:
         azimuth: (k,) azimuths of the votes, rad.
