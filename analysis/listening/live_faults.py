@@ -79,13 +79,14 @@ class LiveFaults:
         self._worker.shutdown(cancel_futures=True)
 
     def look(self, channels: NDArray[np.float32]) -> Iterator[ChannelFault]:
-        """Examines another block of samples. Faults count the channels of the array from 0.
+        """Examines another block of samples.
 
         Args:
             channels: (n, k) samples of the array's channels.
 
         Yields:
-            Faults. A lasting fault is reported again and again.
+            Faults, with channel numbers from 0. A lasting fault is reported again and
+            again.
         """
         self._held.append(channels)
         while sum(part.shape[1] for part in self._held) >= self._size:
@@ -124,8 +125,7 @@ class LiveFaults:
         self._pending = self._begin_look()
 
     def _hears(self) -> bool:
-        """Returns whether the stretches to examine contain sound. Silence shows no
-        faults."""
+        """Returns whether the stretches contain sound. Silence shows no faults."""
         return max(_heard_db(stretch) for stretch in self._stretches) > _LEAST_DB
 
     def _begin_look(self) -> Future[list[ChannelFault]]:

@@ -163,6 +163,9 @@ class _Source:
     def some(self, size: int) -> bytes | None:
         """Reads up to ``size`` bytes.
 
+        Args:
+            size: Largest number of bytes.
+
         Returns:
             The bytes. Empty at the end of the input. None if nothing has arrived for 1
             s.

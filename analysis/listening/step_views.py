@@ -1,5 +1,4 @@
-"""Displays the steps of ``phonotaxis listen`` as JSON lines, as text, or on a screen.
-"""
+"""Displays the steps of ``phonotaxis listen``: as JSON, as text, or on a screen."""
 
 from __future__ import annotations
 
