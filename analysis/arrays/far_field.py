@@ -104,8 +104,8 @@ def _on_sphere(
     """Finds the unit vector that best fits whitened delays.
 
     Returns:
-        u: (d,) unit vector to the source. basis: (d, d - 1) orthonormal vectors
-        perpendicular to u.
+        u: (d,) unit vector to the source.
+        basis: (d, d - 1) orthonormal vectors perpendicular to u.
     """
     u = _least_squares(slopes, tau)
     u /= max(float(np.linalg.norm(u)), 1e-12)
@@ -125,8 +125,8 @@ def _off_array(
     The component perpendicular to the row or plane follows from the unit length.
 
     Returns:
-        u: (d,) unit vector to the source. basis: (d, r) derivatives of u with respect
-        to its r components along the array.
+        u: (d,) unit vector to the source.
+        basis: (d, r) derivatives of u with respect to its r components along the array.
     """
     assert shape.ahead is not None
     span = shape.span

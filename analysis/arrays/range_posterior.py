@@ -142,9 +142,9 @@ def _delays(
     """Computes the delays of a source at the position u r.
 
     Returns:
-        tau: (n - 1,) delays, s. slopes: (n - 1, d) derivatives of the delays with
-        respect to the position, s/m. whole: (n - 1, n - 1) covariance of all delay
-        errors, s^2.
+        tau: (n - 1,) delays, s.
+        slopes: (n - 1, d) derivatives of the delays with respect to the position, s/m.
+        whole: (n - 1, n - 1) covariance of all delay errors, s^2.
     """
     n, d = kernel.p.shape
     rays = np.empty((n, d))
@@ -239,8 +239,8 @@ def _place(
     """Finds the best direction at a range, and the error of the source position.
 
     Returns:
-        a: (q,) unit vector to the source, along the axes ``kernel.frame``. covariance:
-        (d, d) covariance of the position, m^2.
+        a: (q,) unit vector to the source, along the axes ``kernel.frame``.
+        covariance: (d, d) covariance of the position, m^2.
     """
     a, _ = _turned(kernel, a, r)
     _, slopes, whole = _delays(kernel, kernel.frame @ a, r)

@@ -128,8 +128,8 @@ def _begin(source: _Source, raw: _Format | None) -> tuple[_Format, int | None]:
     """Reads the beginning of the input up to the samples.
 
     Returns:
-        form: Format of the samples; ``raw`` if there is no header. length: Number of
-        bytes of the samples. None if it is unknown.
+        form: Format of the samples; ``raw`` if there is no header.
+        length: Number of bytes of the samples. None if it is unknown.
     """
     start = source.read(4)
     if not start:
@@ -167,8 +167,8 @@ class _Source:
             size: Largest number of bytes.
 
         Returns:
-            The bytes. Empty at the end of the input. None if nothing has arrived for 1
-            s.
+            The bytes. Empty at the end of the input. None if nothing has arrived for
+            1 s.
         """
         if self._unread:
             data, self._unread = self._unread[:size], self._unread[size:]
@@ -243,8 +243,8 @@ def _wav_header(source: _Source) -> tuple[_Format, int | None]:
     """Reads a WAV header after the bytes RIFF, up to the samples.
 
     Returns:
-        form: Format of the samples. length: Number of bytes of the samples. None if the
-        header does not state it.
+        form: Format of the samples.
+        length: Number of bytes of the samples. None if the header does not state it.
     """
     _exactly(source, 4)
     if _exactly(source, 4) != b"WAVE":

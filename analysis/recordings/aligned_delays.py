@@ -180,8 +180,7 @@ def _sums(  # pragma: no cover  (compiled)
 
     Returns:
         slope: (b, n - 1) derivative of the agreement of each of b bands with respect to
-        the
-            delays.
+            the delays.
         curve: (n - 1, n - 1) negative second derivative of the total agreement.
         agreement: Total agreement over all pairs and frequencies.
     """

@@ -36,8 +36,8 @@ def recorded_samples(
     """Reads a recording and checks that the array can have made it.
 
     Args:
-        recording: WAV or FLAC file with one channel per microphone, or (channels,
-            samples) recorded samples.
+        recording: WAV or FLAC file with one channel per microphone, or
+            (channels, samples) recorded samples.
         geometry: Geometry of the array.
         sample_rate_hz: Rate of recorded samples, Hz. None for a file, which states its
             own rate.

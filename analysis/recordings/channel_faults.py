@@ -93,8 +93,8 @@ def find_channel_faults(
         samples: (n, samples) recorded samples, one row per microphone.
         array: The n microphones and the errors of their description.
         sample_rate_hz: Sample rate, Hz.
-        band_hz: Lowest and highest frequency of the sound, Hz. None: 300 Hz up to 8000
-            Hz or 0.45 times the sample rate, whichever is lower.
+        band_hz: Lowest and highest frequency of the sound, Hz. None: 300 Hz up to
+            8000 Hz or 0.45 times the sample rate, whichever is lower.
 
     Returns:
         The faults that were found. An empty list does not prove that all channels are

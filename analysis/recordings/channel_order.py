@@ -89,8 +89,7 @@ class FrameDelays:
 
         Returns:
             differences: (k, n - 1) distance of the source from microphones 1 ... n - 1
-            minus
-                its distance from microphone 0, m, in k of the f frames.
+                minus its distance from microphone 0, m, in k of the f frames.
             levels: (k, n) levels of the channels in these frames.
         """
         i, j = self.shape.pairs.T
@@ -182,8 +181,9 @@ def _fitting(
     """Computes how many frames fit a source position outside the array, and how well.
 
     Returns:
-        share: Share of the frames that fit, 0 to 1. error: Root-mean-square error of
-        the frames that fit, m. Infinite if no frame fits.
+        share: Share of the frames that fit, 0 to 1.
+        error: Root-mean-square error of the frames that fit, m. Infinite if no frame
+            fits.
     """
     shape, tolerance = delays.shape, delays.tolerance_m
     gain_std_db = delays.gain_std_db

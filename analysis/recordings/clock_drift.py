@@ -161,8 +161,8 @@ def _slope(
     """Fits a line through delays, and returns whether the line shows a clock drift.
 
     Returns:
-        slope: Slope of the line, s/s. drifts: Whether the delays grow steadily and
-        leave the allowed range.
+        slope: Slope of the line, s/s.
+        drifts: Whether the delays grow steadily and leave the allowed range.
     """
     heard = np.isfinite(lag)
     if np.count_nonzero(heard) < _LEAST:

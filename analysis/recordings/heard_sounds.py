@@ -83,8 +83,8 @@ def sightings_of(
             shorter than the possible delay errors from wrong microphone positions.
 
     Returns:
-        sightings: The stretches with a source, in the order of time. remarks: Messages
-        about faulty channels.
+        sightings: The stretches with a source, in the order of time.
+        remarks: Messages about faulty channels.
 
     Raises:
         InputError: The recording cannot be used.
@@ -179,7 +179,8 @@ def _channels(
     """Reads the channels of the array between two times of a recording.
 
     Returns:
-        samples: (n, samples) samples of the array's channels. rate: Sample rate, Hz.
+        samples: (n, samples) samples of the array's channels.
+        rate: Sample rate, Hz.
     """
     samples, rate = read_sound(path, "recording")
     where = repr(str(path))

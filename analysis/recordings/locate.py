@@ -199,8 +199,8 @@ def _recording(
     """Prepares the chosen channels, and corrects the faults that can be corrected.
 
     Returns:
-        recording: Short spectra of the corrected channels. faults: The faults that
-        remain worth reporting.
+        recording: Short spectra of the corrected channels.
+        faults: The faults that remain worth reporting.
     """
     low, high = band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
     shape = array.shape

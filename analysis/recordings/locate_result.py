@@ -265,8 +265,8 @@ def _median(
             ignored.
 
     Returns:
-        median: The weighted median. None if there are no values. error: Scatter of the
-        values around the median, or the median of their standard
+        median: The weighted median. None if there are no values.
+        error: Scatter of the values around the median, or the median of their standard
             deviations, whichever is larger. None if there are no values.
     """
     rows = [row for row in estimates if row[0] is not None and row[1] is not None]

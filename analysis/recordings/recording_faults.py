@@ -38,7 +38,8 @@ def channels_without_faults(
         where: Name of the recording, which begins a message.
 
     Returns:
-        samples: The corrected channels. faults: The faults that remain worth reporting.
+        samples: The corrected channels.
+        faults: The faults that remain worth reporting.
 
     Raises:
         InputError: Channels are dead, not finite, copied, exchanged, or drift apart. Or

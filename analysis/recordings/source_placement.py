@@ -171,9 +171,9 @@ def _near(
     """Estimates a source position at a finite range.
 
     Returns:
-        fix: The source position. allowed: (n - 1, n - 1) covariance of the delays from
-        the errors of the array, for
-            this position, s^2.
+        fix: The source position.
+        allowed: (n - 1, n - 1) covariance of the delays from the errors of the array,
+            for this position, s^2.
     """
     allowed = _budget(u, 0.0, array)
     for _ in range(_ROUNDS):

@@ -137,10 +137,11 @@ def _of_stretch(
     Each estimate assumes that only this channel is late.
 
     Returns:
-        late: (n,) lateness of each channel, s. information: (n,) inverse variance of
-        each lateness, 1/s^2. alike: (n,) part of each variance from errors that are the
-        same in all stretches, s^2. misfit: Total misfit of the stretch, a sum of
-        squared whitened residuals.
+        late: (n,) lateness of each channel, s.
+        information: (n,) inverse variance of each lateness, 1/s^2.
+        alike: (n,) part of each variance from errors that are the same in all
+            stretches, s^2.
+        misfit: Total misfit of the stretch, a sum of squared whitened residuals.
     """
     c = array.c
     allowed = tolerance(sighting, array)
@@ -189,11 +190,9 @@ def _fit(
 
     Returns:
         residual: (n,) whitened residual of the best position. The last value is that of
-        the
-            prior of the range.
+            the prior of the range.
         slopes: (n, 3) derivatives of the modeled values with respect to two coordinates
-        of
-            the direction and the inverse range.
+            of the direction and the inverse range.
     """
     for k in range(_STEPS + 1):
         delays, along_u, along_w = _wave_front(u, w, shape.p_AM, c)
@@ -220,13 +219,13 @@ def _wave_front(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Computes the delays of a wave front from the position u / w.
 
-    A microphone at p is nearer to the source than the origin by (2 p.u - w p^2) / (1 +
-    s). Here s is the distance of the microphone from the source times w.
+    A microphone at p is nearer to the source than the origin by (2 p.u - w p^2) /
+    (1 + s). Here s is the distance of the microphone from the source times w.
 
     Returns:
-        delays: (n - 1,) delays of channels 1 ... n - 1 after channel 0, s. along_u: (n
-        - 1, d) derivatives of the delays with respect to u, s. along_w: (n - 1,)
-        derivatives of the delays with respect to w, m s.
+        delays: (n - 1,) delays of channels 1 ... n - 1 after channel 0, s.
+        along_u: (n - 1, d) derivatives of the delays with respect to u, s.
+        along_w: (n - 1,) derivatives of the delays with respect to w, m s.
     """
     square = np.sum(p**2, axis=1)
     s = np.sqrt(np.maximum(1.0 - 2.0 * w * (p @ u) + w * w * square, 1e-12))

@@ -206,7 +206,8 @@ def cast_votes(
         block: (n, k) samples of n channels, in any unit, of any length k.
 
     Returns:
-        votes: The new votes. memory: The memory after this block.
+        votes: The new votes.
+        memory: The memory after this block.
 
     Raises:
         InputError: The block does not have one channel per microphone, or a sample is
@@ -336,8 +337,8 @@ def _louder(
     below it.
 
     Returns:
-        loud: (g, b) whether each bin is above the limit. level: Power limit after the
-        last group.
+        loud: (g, b) whether each bin is above the limit.
+        level: Power limit after the last group.
     """
     loud = np.zeros(powers.shape, dtype=bool)
     for row, kept in zip(powers, loud, strict=True):
@@ -355,8 +356,8 @@ def _risen(
     """Finds the bins that are louder than the echo of earlier sound.
 
     Returns:
-        fresh: (g, b) whether each bin is louder than the echo. echo: (b,) largest
-        possible echo after the last group, as power.
+        fresh: (g, b) whether each bin is louder than the echo.
+        echo: (b,) largest possible echo after the last group, as power.
     """
     decay = np.float32(10.0 ** (-0.1 * _DECAY_DB_S * hop_s))
     fresh = np.empty(powers.shape, dtype=bool)

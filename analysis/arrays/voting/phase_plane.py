@@ -172,8 +172,8 @@ class PhasePlane:
         """Finds the guessed direction that fits the phases of all pairs best.
 
         Returns:
-            slowness: (k, r) best guess for each pattern. clear: (k,) True if no clearly
-            different guess fits nearly as well.
+            slowness: (k, r) best guess for each pattern.
+            clear: (k,) True if no clearly different guess fits nearly as well.
         """
         slowness = np.empty((len(phase), self.guesses.shape[1]))
         clear = np.empty(len(phase), dtype=bool)
@@ -198,8 +198,7 @@ class PhasePlane:
 
         Returns:
             u: (k, d) directions. They are unit vectors if the component perpendicular
-            to the
-                array can be computed.
+                to the array can be computed.
             length: (k,) lengths of the measured slownesses.
         """
         length = np.linalg.norm(slowness, axis=1)

@@ -62,8 +62,9 @@ def find_rank_one(
         least_ratio: Least ratio of the two largest eigenvalues of the covariance.
 
     Returns:
-        group: (k,) numbers of the groups. bins: (k,) numbers of the bins. pattern: (k,
-        n) dominant eigenvector of each, with any length and phase.
+        group: (k,) numbers of the groups.
+        bins: (k,) numbers of the bins.
+        pattern: (k, n) dominant eigenvector of each, with any length and phase.
     """
     products = _products(spectra)
     power = _running(products[0].real, GROUP_FRAMES)

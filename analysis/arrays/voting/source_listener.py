@@ -114,8 +114,8 @@ def hear_sources(
         parameters: How votes become tracks.
 
     Returns:
-        found: Sources at the end of each completed step. memory: State after this
-        block.
+        found: Sources at the end of each completed step.
+        memory: State after this block.
 
     Raises:
         InputError: The block does not have one channel per microphone, or a sample is

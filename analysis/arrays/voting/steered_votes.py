@@ -93,9 +93,10 @@ class SteeredSearch:
             spectra: (f, n, b) spectra of f frames, n channels and all b bins from 0.
 
         Returns:
-            azimuth: (k,) azimuths of the peaks, rad. elevation: (k,) elevations of the
-            peaks, rad. response: (k,) responses of the peaks. All three are empty if no
-            peak stands out.
+            azimuth: (k,) azimuths of the peaks, rad.
+            elevation: (k,) elevations of the peaks, rad.
+            response: (k,) responses of the peaks. All three are empty if no peak stands
+                out.
         """
         i, j = self.shape.pairs.T
         chosen = spectra[:, :, self.bins]

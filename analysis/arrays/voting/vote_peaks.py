@@ -126,8 +126,8 @@ def _density(
     """Computes the smoothed density of the votes around the circle.
 
     Returns:
-        density: (c,) density in each of c cells of the circle. bearings: (c,) bearings
-        of the middles of the cells, rad.
+        density: (c,) density in each of c cells of the circle.
+        bearings: (c,) bearings of the middles of the cells, rad.
     """
     cells = np.floor((azimuth + math.pi) / (2.0 * math.pi) * _CELLS).astype(int)
     histogram = np.bincount(cells % _CELLS, weight, _CELLS)
