@@ -34,7 +34,7 @@ class ArrayBudget:
         speed_std: float = 0.0,
         delay_std: float = 0.0,
     ) -> ArrayBudget:
-        """Makes a budget with equal position errors for all coordinates.
+        """Makes an error budget with equal position errors for all coordinates.
 
         Args:
             shape: The microphones.
@@ -89,7 +89,7 @@ class ArrayBudget:
 def _arrivals(
     u: NDArray[np.float64], w: float, shape: ArrayShape
 ) -> NDArray[np.float64]:
-    """Returns by how much each microphone is farther from the source than the centroid.
+    """Computes how much farther from the source each microphone is than the centroid.
 
     Returns:
         (n,) differences of distance, m.

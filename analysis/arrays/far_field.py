@@ -36,12 +36,13 @@ def locate_far_source(
         covariance: (n - 1, n - 1) covariance of the delays, s^2.
         shape: The n microphones.
         c: Speed of sound, m/s.
-        tolerance: (n - 1, n - 1) covariance of further errors, s^2. They affect the
-            weights of the delays and chi-square, but not the standard deviations of the
-            result.
+        tolerance: (n - 1, n - 1) covariance of further errors of the delays, s^2. The
+            further errors affect the weights of the delays and chi-square. They do not
+            affect the standard deviations of the result. None: no further errors.
         inverse_range_std: Prior standard deviation of the inverse range, 1/m. It states
-            how uncertain it is that the waves are plane. It increases the errors as far
-            as the delays do not determine the curvature.
+            how uncertain it is that the waves are plane. If it is positive and the
+            delays do not determine the curvature, the standard deviations of the result
+            increase.
 
     Returns:
         The source without a range, on the side of ``shape.ahead``.

@@ -43,9 +43,10 @@ class LiveFaults:
     """Examines each half second of a stream, and occasionally the last three seconds.
 
     The examination of three seconds takes a quarter of a second, or more with many
-    channels. It therefore runs in a separate thread. Its faults are reported after two
-    more seconds of sound, or when it has finished if that is later. At the end of the
-    stream, they are reported at once.
+    channels. It therefore runs in a separate thread. Its faults are reported two
+    seconds of sound after its start. If the examination takes longer, they are reported
+    when it has finished. At the end of the stream, the remaining faults are reported at
+    once.
     """
 
     geometry: ArrayGeometry
@@ -60,7 +61,7 @@ class LiveFaults:
         self.begin(range(len(self.geometry.microphones)))
 
     def begin(self, alive: Sequence[int] | None = None) -> None:
-        """Restarts the examination, for example after a gap or without some channels.
+        """Restarts the examination, for example after a gap in the stream.
 
         Args:
             alive: Numbers of the channels to use from now on. None: the same channels
@@ -140,10 +141,10 @@ class LiveFaults:
         )
 
     def _is_done(self, pending: Future[list[ChannelFault]]) -> bool:
-        """Returns whether a look has finished, after waiting for it if necessary.
+        """Returns whether an examination has finished, after a wait of limited length.
 
-        The wait ends when live sound of two seconds would have passed since the start
-        of the look.
+        The wait ends 2 s after the start of the examination. Live sound would arrive no
+        faster.
         """
         spare = self._begun + _TOLD * STRETCH_S - time.monotonic()
         return bool(wait([pending], max(0.0, spare)).done)

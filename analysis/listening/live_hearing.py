@@ -40,7 +40,7 @@ _WILD = 1e3
 
 @dataclass
 class HeardStream:
-    """Summary of a stream."""
+    """Summary of what was heard in a stream."""
 
     seconds: float = 0.0
     identities: set[int] = field(default_factory=set)

@@ -95,7 +95,7 @@ class JsonLines(TextLines):
     """Writes one JSON line per source and step, and one per fault."""
 
     def tell(self, step: HeardStep) -> None:
-        """Writes the sources of a step at once."""
+        """Writes the sources of a step immediately, one line per source."""
         for line in track_document(step):
             self._out.write(f"{json.dumps(line, allow_nan=False)}\n")
         self._out.flush()

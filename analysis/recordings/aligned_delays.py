@@ -1,12 +1,12 @@
 """Estimates the delays of nearly aligned channels from many short spectra together.
 
 The estimated delays are those at which the phases of the channels agree best. The
-agreement is summed over all pairs of channels, all snapshots and all frequencies. A
-snapshot is a short window of the recording. A frequency counts more if the channels are
-more coherent there.
+agreement is summed over all pairs of channels, all frequencies and all snapshots, which
+are short windows of the recording. If the channels are more coherent at a frequency,
+this frequency has a larger weight.
 
-The errors follow from how much frequency bands disagree about the delays. They contain
-the errors from noise. They contain the errors from reflections only as far as the
+The errors follow from how much frequency bands disagree about the delays. They include
+the errors from noise. They include errors from reflections only as far as the
 reflections shift the bands differently.
 """
 
@@ -60,11 +60,12 @@ def fit_aligned_delays(
     angular_frequency: NDArray[np.float64],
     coarseness: float = 1.0,
 ) -> AlignedDelays | None:
-    """Estimates the remaining delays of aligned channels.
+    """Estimates the delays that remain between channels after a rough alignment.
 
     Args:
-        spectra: (n, k, f) spectra of n channels in k snapshots, which are short
-            windows, at f frequencies. All channels have about the same power.
+        spectra: (n, k, f) spectra of n channels at f frequencies in k snapshots. A
+            snapshot is a short window of the recording. All channels have about the
+            same power.
         weights: (k, f) weights of the frequencies of each snapshot, 0 to 1.
         angular_frequency: (f,) increasing angular frequencies, rad/s.
         coarseness: Possible error of the alignment, in tenths of the shortest period.

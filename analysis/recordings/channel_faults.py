@@ -1,9 +1,10 @@
 """Finds faulty channels of a recording, which would otherwise cause wrong positions.
 
-The checks run in this order:
+There are these checks:
 
 - Each channel alone: whether it has NaN values, is constant, or is clipped.
-- Pairs of channels: whether one is a copy of the other (``systems.delays``).
+- Pairs of channels: whether one is a copy of the other
+  (``systems.delays.copied_channels``).
 - Each channel compared with the others: its level, and the height and the sign of its
   correlation with them.
 - The delays of all channels: whether they match the size of the array
@@ -180,9 +181,9 @@ def _copied(
 
 
 def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
-    """Finds whether the samples of a channel pile up at their lowest or highest value.
+    """Returns a fault if many samples of a channel have its lowest or highest value.
 
-    A value counts as a pile if it occurs far more often than the next three values.
+    The value must occur far more often than each of the next three values.
     """
     _, counts = np.unique(channel, return_counts=True)
     most = 0
@@ -329,7 +330,7 @@ def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
 
 
 def _order(delays: FrameDelays) -> list[ChannelFault]:
-    """Finds exchanged channels, or a geometry that fits with no exchange."""
+    """Finds exchanged channels, or a geometry that the delays do not fit."""
     exchanges = exchanged_channels(delays)
     if exchanges:
         names = " or ".join(f"{a + 1} and {b + 1}" for a, b in exchanges)

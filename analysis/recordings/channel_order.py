@@ -110,7 +110,8 @@ def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
 
     Returns:
         Pairs of channel numbers, from 0. If there are several pairs, one of them is the
-        exchange. Empty if the delays fit as they are, or if no exchange helps.
+        exchange. Empty if the delays fit as they are, if no exchange helps, or if the
+        pairs agree in too few frames.
     """
     (d, levels), shape = delays.agreeing(), delays.shape
     if len(d) < _LEAST_FRAMES or _fitting(d, levels, delays)[0] > _WRONG:
@@ -211,9 +212,9 @@ def levels_contradict(
 ) -> bool:
     """Returns whether the measured levels contradict a near source position.
 
-    The level of a near source falls as 1/R with the distance R. This check finds false
-    near sources. For example, two exchanged neighbors in a row can produce the delays
-    of a source that is very near to the array.
+    The level of sound from a near source falls as 1/R with the distance R. The check
+    rejects wrong near positions. For example, if two neighbors in a row are exchanged,
+    the delays can be those of a source very near to the array.
 
     Args:
         levels: (n,) root-mean-square levels of the channels, in any unit.

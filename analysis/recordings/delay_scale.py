@@ -1,9 +1,9 @@
 """Checks whether delays match the size of an array, or a much larger or smaller array.
 
 Sound takes at most the straight travel time from one microphone to another. The delays
-of all pairs can be much shorter in only one case: the source is straight ahead of a
-row, or straight above a plane. The source is then also far away, because the wave
-fronts must be nearly flat.
+of all pairs can be much shorter in only one case. In this case, the source is straight
+ahead of a row, or straight above a plane. It is also far away, because the wave fronts
+must be nearly flat.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from analysis.recordings.channel_order import FrameDelays
 #: If delays do not fit the array, the search covers delays up to these path lengths, m.
 REACHES_M = (0.3, 3.0)
 
-# Least number of frames that agree on their delays, and least share of such frames.
+# _LEAST_FRAMES: least number of frames that agree on their delays.
+# _LEAST_SHARE: least share of such frames among all frames.
 _LEAST_FRAMES, _LEAST_SHARE = 5, 0.2
 
 # Limits of delays, as a share of the longest possible delay:
@@ -38,10 +39,7 @@ _SAMPLES = 1.0
 
 
 class DelayScale(NamedTuple):
-    """Delays that do not match the size of the array, relative to the longest ones.
-
-    The longest ones are the delays that sound along the array would have.
-    """
+    """Ratio of measured delays to the longest delays that the array allows."""
 
     kind: Literal["beyond", "nothing"]
     share: float
@@ -59,8 +57,8 @@ def delay_scale(delays: FrameDelays) -> DelayScale | None:
         delays: Delays of all pairs of microphones in some frames.
 
     Returns:
-        The delays relative to the longest possible ones. None if they match the size of
-        the array, or if too few frames agree on their delays.
+        The ratio of the delays to the longest possible delays. None if the delays match
+        the size of the array, or if the pairs agree in too few frames.
     """
     shape, error = delays.shape, _SAMPLES * delays.metres_per_sample
     d, _ = delays.agreeing(error)

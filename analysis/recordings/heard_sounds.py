@@ -131,11 +131,11 @@ def heard_sound(
 ) -> HeardSound:
     """Averages the delays of a sound at rest over the stretches of a recording.
 
-    The weight of each stretch follows from the errors of its delays. The covariance of
-    the mean follows in these steps:
+    A stretch with smaller errors has a larger weight. The covariance of the mean
+    follows in these steps:
 
-    1. The errors of the stretches are combined.
-    2. Only every second stretch counts as independent, because stretches overlap.
+    1. The errors of the stretches are combined as if they were independent.
+    2. The covariance is doubled, because stretches overlap by half.
     3. If the stretches scatter more than their errors say, the covariance grows
        accordingly.
     4. The error from reflections is added, because it is the same in all stretches.

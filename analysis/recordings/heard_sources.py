@@ -32,8 +32,8 @@ _PAUSE_S = 0.3
 # _NEAR_DEG: directions within this of each other count as equal, deg.
 _MOVES_DEG, _NEAR_DEG = 20.0, 8.0
 
-# Two directions are of one moving source if they are heard together for less than this
-# share of the time. The time is that of the direction that is heard for less time.
+# Largest overlap in time of two directions of one moving source, as a share of the
+# shorter of the two spans of time.
 _TOGETHER = 0.25
 
 # Largest confidence of a source or track in steady sound.
@@ -151,8 +151,9 @@ def _counted_once(
 ) -> list[HeardSource]:
     """Removes directions that a moving source only passed on its way.
 
-    A direction is removed if a moving track also passes another source of the list, and
-    if both directions are hardly ever heard at the same time.
+    A direction is removed if the track of a moving source passes this direction and
+    another direction in the list. The two directions must hardly ever be heard at the
+    same time.
     """
     moving = [track for track in tracks if _extent_deg(track) > _MOVES_DEG]
     kept: list[HeardSource] = []

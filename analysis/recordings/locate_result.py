@@ -179,7 +179,7 @@ class LocateResult:
     def _alternatives(
         self, bearing: float | None, elevation: float | None
     ) -> list[dict[str, float | None]]:
-        """Returns the mirror image of a direction at the row or plane."""
+        """Returns the direction with the same delays on the other side of the array."""
         ahead = self.shape.ahead
         if ahead is None or bearing is None or self.shape.ambiguity == "none":
             return []
@@ -256,9 +256,8 @@ def _median(
 ) -> tuple[float | None, float | None]:
     """Computes the weighted median of values, and the error of a single value.
 
-    The weight of a value is the inverse square of its error. Averaging does not reduce
-    the error of the result: a few equal values prove little, and they may have a common
-    error.
+    The weight of a value is the inverse square of its error. A larger number of values
+    does not reduce the error of the result, because the values may have a common error.
 
     Args:
         estimates: Pairs of a value and its standard deviation. Pairs with None are

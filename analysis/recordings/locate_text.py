@@ -90,7 +90,7 @@ def _range(result: LocateResult) -> str:
 def _sources(result: LocateResult) -> list[str]:
     """Describes all sources if there are several.
 
-    For a steady sound, it states that the number of sources is unknown.
+    For a steady sound, the text states that the number of sources is unknown.
     """
     sources = result.heard.sources
     if result.heard.steady:

@@ -1,4 +1,4 @@
-"""Cuts a recording into one short window per sound, starting at the onset of the sound.
+"""Takes one short window of a recording per sound, from just before its onset.
 
 A click or a chirp of a few milliseconds ends before its first echo arrives, or soon
 after. A window around such a sound contains the direct sound and few echoes, even if

@@ -245,8 +245,8 @@ class RecordingSearch:
         Several sets of delays are compared, because the grid position with the greatest
         response can be wrong for two reasons:
 
-        - In a short window, one microphone may receive an echo as strong as the sound.
-          A wrong position then has the greatest response, although only most pairs
+        - In a short window, the echo at one microphone may be as strong as the sound. A
+          wrong position may then have the greatest response, although not all pairs
           agree on it.
         - If the microphones are not at their stated positions, the nearest grid
           position may lie on a side lobe instead of the peak.
@@ -310,9 +310,9 @@ class RecordingSearch:
 
 
 def _earlier(one: AlignedDelays, other: AlignedDelays) -> bool:
-    """Returns whether ``one`` is earlier than ``other`` in a minority of the channels.
+    """Returns whether ``one`` is earlier than ``other`` in some of the channels.
 
-    In all other channels, which are more than half, the two sets of delays must be
+    In all other channels, which must be more than half, the two sets of delays must be
     equal.
     """
     later = np.concatenate(([0.0], other.tau - one.tau))

@@ -1,10 +1,10 @@
 """Computes short spectra of a recording, and the weight of each spectrum.
 
 The recording is cut into short overlapping windows, the snapshots. The weight of a
-snapshot at a frequency is larger if its power exceeds two levels. One level is the
-noise. The other level is the remaining echo of earlier snapshots in the room. The onset
-of a sound arrives directly from the source, but the later sound also arrives from the
-walls.
+snapshot at a frequency grows with its power relative to two levels. The first level is
+the noise. The second level is the remaining echo of earlier snapshots in the room. The
+onset of a sound therefore has the largest weight. The onset arrives directly from the
+source, but the later sound also arrives from the walls.
 """
 
 from __future__ import annotations

@@ -43,9 +43,8 @@ _STEPS = 6
 # Prior standard deviation of the inverse range, 1/m. Large arrays measure near sources.
 _INVERSE_RANGE = 1.0
 
-# Least significant lateness, in standard deviations. The standard deviation is that of
-# one stretch, because the errors of the array are the same in all stretches and do not
-# average out.
+# Least significant lateness, in standard deviations. The errors of the array are the
+# same in all stretches, so their part of the standard deviation does not average out.
 _DEVIATIONS = 2.7
 
 # Channels that explain at least this share of the best explanation are also reported.

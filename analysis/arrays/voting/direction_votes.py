@@ -59,7 +59,7 @@ _SPEEDS_M_S = (100.0, 2_000.0)
 class DirectionVotes(NamedTuple):
     """Votes for directions in the order of time, and levels of the sound over time.
 
-    A group is a run of consecutive frames. A vote belongs to a group.
+    A vote is an estimated direction of the sound in a group of consecutive frames.
     """
 
     t_s: NDArray[np.float64]
@@ -84,7 +84,7 @@ class DirectionVotes(NamedTuple):
 
 
 class VoteMemory(NamedTuple):
-    """State that earlier blocks of samples leave for the next block."""
+    """State of the voting between two blocks of samples."""
 
     tail: NDArray[np.float32]
     """(n, m) last samples of n channels, which the next votes need."""
@@ -98,7 +98,10 @@ class VoteMemory(NamedTuple):
 
 @dataclass(frozen=True)
 class VotePlan:
-    """Settings for the votes of an array. To make a plan, call ``VotePlan.of``."""
+    """Settings with which an array votes for directions of sound.
+
+    To make the settings for an array, call ``VotePlan.of``.
+    """
 
     shape: ArrayShape
     c: float
@@ -127,19 +130,20 @@ class VotePlan:
         band_hz: tuple[float, float] = (200.0, 8_000.0),
         least_ratio: float = 20.0,
     ) -> VotePlan:
-        """Makes the plan for an array and a sample rate.
+        """Makes the settings with which an array votes for directions of sound.
 
         Args:
             shape: The microphones, which must measure bearings.
             c: Speed of sound, m/s.
             sample_rate_hz: Sample rate, Hz.
-            band_hz: Lowest and highest frequency to use, Hz. Single bins vote only up
-                to the frequency at which the phases of the shortest pairs wrap.
-            least_ratio: Least ratio of the two largest eigenvalues of a covariance that
-                counts as one wave.
+            band_hz: Lowest and highest frequency to use, Hz. Single frequencies vote
+                only up to the frequency at which the phases of the shortest pairs wrap.
+            least_ratio: Least ratio of the two largest eigenvalues of the channels'
+                covariance. If the ratio is smaller, the covariance is not that of one
+                wave.
 
         Returns:
-            The plan.
+            The settings.
 
         Raises:
             InputError: The array cannot measure bearings, or a number is invalid.
@@ -195,19 +199,19 @@ class VotePlan:
 def cast_votes(
     plan: VotePlan, memory: VoteMemory, block: NDArray[np.floating | np.integer]
 ) -> tuple[DirectionVotes, VoteMemory]:
-    """Computes the votes that one more block of samples makes possible.
+    """Computes the votes for directions from one more block of samples.
 
-    The lengths of the blocks do not affect the votes, apart from rounding errors.
+    A vote is an estimated direction of the sound in a group of consecutive frames. The
+    lengths of the blocks do not affect the votes, apart from rounding errors.
 
     Args:
-        plan: Settings for the votes.
-        memory: Memory after the previous block; ``plan.blank()`` before the first
-            block.
+        plan: Settings of the votes.
+        memory: State after the previous block; ``plan.blank()`` before the first block.
         block: (n, k) samples of n channels, in any unit, of any length k.
 
     Returns:
         votes: The new votes.
-        memory: The memory after this block.
+        memory: State after this block.
 
     Raises:
         InputError: The block does not have one channel per microphone, or a sample is
@@ -242,7 +246,7 @@ def cast_votes(
 
 
 def join_votes(parts: list[DirectionVotes]) -> DirectionVotes:
-    """Joins the votes of several blocks in the order of time.
+    """Joins the votes for directions from several blocks in the order of time.
 
     Args:
         parts: Votes of the blocks, as ``cast_votes`` returns them.
@@ -331,14 +335,14 @@ def _levels_db(powers: NDArray[np.float32]) -> NDArray[np.float64]:
 def _louder(
     powers: NDArray[np.float32], level: float
 ) -> tuple[NDArray[np.bool_], float]:
-    """Finds the bins that are louder than the weakest share of recent bins.
+    """Finds the bins whose power is above an adaptive limit.
 
-    The power limit adapts from group to group, so that a constant share of the bins is
-    below it.
+    A bin is one frequency in one group of frames. The limit adapts from group to group,
+    so that about 30 % of the bins are below it.
 
     Returns:
-        loud: (g, b) whether each bin is above the limit.
-        level: Power limit after the last group.
+        loud: (g, b) whether each of the b bins of g groups is above the limit.
+        level: Limit after the last group, as power.
     """
     loud = np.zeros(powers.shape, dtype=bool)
     for row, kept in zip(powers, loud, strict=True):
@@ -355,8 +359,10 @@ def _risen(
 ) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
     """Finds the bins that are louder than the echo of earlier sound.
 
+    A bin is one frequency in one group of frames.
+
     Returns:
-        fresh: (g, b) whether each bin is louder than the echo.
+        fresh: (g, b) whether each of the b bins of g groups is louder than the echo.
         echo: (b,) largest possible echo after the last group, as power.
     """
     decay = np.float32(10.0 ** (-0.1 * _DECAY_DB_S * hop_s))
@@ -374,9 +380,10 @@ def _steered_votes(
     t_s: NDArray[np.float64],
     groups: int,
 ) -> DirectionVotes:
-    """Computes the votes of the steered response for every fourth group.
+    """Computes votes for the directions at which the steered response is greatest.
 
-    These groups have no frames in common.
+    Only every fourth group of frames votes. A group has four frames, so these groups
+    have no frames in common.
     """
     found = []
     times = []

@@ -13,17 +13,17 @@ _HIGHEST_HZ = 8_000.0
 def vote_plan(
     shape: ArrayShape, c: float, sample_rate_hz: float, band_hz: tuple[float, float]
 ) -> VotePlan:
-    """Makes the plan for an array, and limits its band to the useful frequencies.
+    """Makes the settings with which an array votes for directions in a useful band.
 
     Args:
         shape: The n microphones, which must measure bearings.
         c: Speed of sound, m/s.
         sample_rate_hz: Sample rate, Hz.
-        band_hz: Lowest and highest frequency of the sound, Hz. Frequencies above 8 kHz
-            or twice the lowest frequency, whichever is larger, are not used.
+        band_hz: Lowest and highest frequency of the sound, Hz. The votes use no
+            frequencies above 8 kHz or twice the lowest frequency, whichever is larger.
 
     Returns:
-        The plan.
+        The settings.
 
     Raises:
         InputError: The array cannot measure bearings.

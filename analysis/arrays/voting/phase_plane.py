@@ -129,10 +129,11 @@ class PhasePlane:
     def fit(
         self, pattern: NDArray[np.complex128], frequency_hz: NDArray[np.float64]
     ) -> PlaneFits:
-        """Fits a plane wave to each of k patterns.
+        """Fits a plane wave to each of k patterns of amplitudes at the microphones.
 
         Args:
-            pattern: (k, n) common complex amplitudes of n channels, up to any factor.
+            pattern: (k, n) complex amplitudes at n microphones. A common factor of all
+                amplitudes of a pattern has no effect.
             frequency_hz: (k,) frequency of each pattern, up to ``highest_hz``, Hz.
 
         Returns:

@@ -55,16 +55,18 @@ def find_rank_one(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.complex128]]:
     """Finds the bins that contain only one wave.
 
+    A bin is one frequency in one group of frames.
+
     Args:
-        spectra: (f, n, b) spectra of f frames, n channels and b bins.
-        candidates: (g, b) whether to examine each group and bin. The groups are those
-            of ``group_powers``.
+        spectra: (f, n, b) spectra of f frames and n channels at b frequencies.
+        candidates: (g, b) whether to examine each bin. The g groups are those of
+            ``group_powers``.
         least_ratio: Least ratio of the two largest eigenvalues of the covariance.
 
     Returns:
-        group: (k,) numbers of the groups.
-        bins: (k,) numbers of the bins.
-        pattern: (k, n) dominant eigenvector of each, with any length and phase.
+        group: (k,) numbers of the groups of the k bins.
+        bins: (k,) numbers of the frequencies of the k bins.
+        pattern: (k, n) dominant eigenvector of each bin, with any length and phase.
     """
     products = _products(spectra)
     power = _running(products[0].real, GROUP_FRAMES)

@@ -57,7 +57,7 @@ class TrackedSources:
 
 @dataclass(frozen=True)
 class ListenerMemory:
-    """State that the sound so far leaves for the next block.
+    """State of the listener between two blocks of samples.
 
     To make the initial state, call ``ListenerMemory.blank``.
     """
@@ -75,7 +75,7 @@ class ListenerMemory:
         """Makes the state before the first block.
 
         Args:
-            plan: Settings for the votes of the array.
+            plan: Settings with which the array votes for directions.
 
         Returns:
             The initial state.
@@ -86,7 +86,7 @@ class ListenerMemory:
         """Returns the state after missing samples or a change of the channels.
 
         Args:
-            plan: Settings for the votes after the gap.
+            plan: Settings with which the array votes for directions after the gap.
             keeps_tracks: Whether the tracks from before the gap continue.
 
         Returns:
@@ -105,13 +105,16 @@ def hear_sources(
     plan: VotePlan,
     parameters: ListenerParameters,
 ) -> tuple[list[TrackedSources], ListenerMemory]:
-    """Computes the steps that one more block of samples completes.
+    """Tracks sources in one more block of samples.
+
+    The tracks are updated in steps of constant length, 0.1 s by default. A block may
+    complete any number of steps.
 
     Args:
         block: (n, k) samples of n channels, in any unit, of any length k.
         memory: State after the previous block.
-        plan: Settings for the votes of the array.
-        parameters: How votes become tracks.
+        plan: Settings with which the array votes for directions.
+        parameters: Parameters that determine how votes become tracks.
 
     Returns:
         found: Sources at the end of each completed step.
@@ -146,13 +149,13 @@ def follow_sources(
     plan: VotePlan,
     parameters: ListenerParameters,
 ) -> list[TrackedSources]:
-    """Computes all steps of a recording from its votes.
+    """Tracks sources in a whole recording, from its votes for directions.
 
     Args:
         votes: Votes of the whole recording, in the order of time.
         seconds: Length of the recording, s.
         plan: Settings with which the array voted.
-        parameters: How votes become tracks.
+        parameters: Parameters that determine how votes become tracks.
 
     Returns:
         Sources at the end of each step, as ``hear_sources`` returns them.

@@ -66,10 +66,11 @@ class TrackParameters(Parameters):
     least_hits: int = Field(default=4, ge=1, le=100)
     """Least number of detections of a track that is reported."""
     ends_after_s: Positive = 1.5
-    """Time without a detection after which a track ends, s."""
+    """Time without a detection after which a track ends, s. A detection that the track
+    shares with a nearby track also counts."""
     hidden_s: Positive = 3.0
-    """Time without an own detection after which a track ends although another track may
-    hide it, s."""
+    """Time without a detection of its own after which a track ends, s. It limits how
+    long a nearby track may hide a track."""
 
 
 class Detection(NamedTuple):
@@ -108,7 +109,7 @@ class SourceTrack:
     t_born: float
     """Time of the first detection, s."""
     t_heard: float
-    """Time of the last detection of this track, s."""
+    """Time of the last detection that is assigned to this track, s."""
     t_shared: float
     """Time of the last detection that this track shared with another track, s."""
     hits: int
@@ -346,8 +347,8 @@ def _is_told(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
 def _over(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
     """Returns whether a track ends at the time t_s.
 
-    A track that is not reported yet must not pause. A hidden track ends after the time
-    ``hidden_s``.
+    A track that is not reported yet ends after a short pause. A reported track may
+    pause longer, and even longer if another track may hide it.
     """
     silence = t_s - track.t_heard
     if track.identity == 0:

@@ -87,16 +87,15 @@ class SteeredSearch:
     def votes(
         self, spectra: NDArray[np.complex64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Finds up to three peaks of the response to a group of frames.
+        """Finds up to three peaks of the steered response to a group of frames.
 
         Args:
             spectra: (f, n, b) spectra of f frames, n channels and all b bins from 0.
 
         Returns:
-            azimuth: (k,) azimuths of the peaks, rad.
+            azimuth: (k,) azimuths of the peaks, rad. Empty if no peak stands out.
             elevation: (k,) elevations of the peaks, rad.
-            response: (k,) responses of the peaks. All three are empty if no peak stands
-                out.
+            response: (k,) responses of the peaks.
         """
         i, j = self.shape.pairs.T
         chosen = spectra[:, :, self.bins]

@@ -1,9 +1,11 @@
-"""Finds sources at the peaks of a histogram of directions.
+"""Finds sources at the peaks of a histogram of votes for directions.
 
-The weight of a vote is its frequency, because phases determine directions more exactly
-at higher frequencies. If both single bins and the steered response vote, there are two
-densities of votes. The sources are then at the peaks of the geometric mean of both.
-Echoes cause errors in both densities, but at different directions.
+There are two kinds of votes: those of single frequencies, and those of the steered
+response, which uses all frequencies together. The weight of a vote of a single
+frequency is this frequency, because phases determine directions more exactly at higher
+frequencies. If both kinds vote, there are two densities of votes. The sources are then
+at the peaks of the geometric mean of both densities. Echoes cause errors in both
+densities, but at different directions.
 """
 
 from __future__ import annotations
@@ -76,19 +78,19 @@ class VotedSource(NamedTuple):
 def gather_sources(
     votes: DirectionVotes, *, least_votes: float = _LEAST_VOTES
 ) -> list[VotedSource]:
-    """Finds the sources in a span of time from its votes.
+    """Finds the sources in a span of time from its votes for directions.
 
-    If enough single bins vote, single bins and the steered response decide together.
+    If enough single frequencies vote, they decide together with the steered response.
     Otherwise, the steered response decides alone. Two steady sounds at the same time
     cannot be separated, because no time or frequency contains only one of them.
 
     Args:
         votes: Votes of the span of time.
-        least_votes: Least number of single bins that vote for a source. Use a smaller
-            number for less than one second of sound.
+        least_votes: Least number of votes of single frequencies for a source. Use a
+            smaller number for less than one second of sound.
 
     Returns:
-        The sources. The source with most votes is first.
+        The sources. The source with the largest share of the votes is first.
     """
     single = ~votes.steered
     enough = np.count_nonzero(single) >= least_votes
