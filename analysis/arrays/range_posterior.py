@@ -139,7 +139,7 @@ def _delays(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Computes the delays of a source at the position u r.
+    """Computes the delays of a source at the distance r in the direction u.
 
     Returns:
         tau: (n - 1,) delays, s.

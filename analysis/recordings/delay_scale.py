@@ -43,9 +43,9 @@ class DelayScale(NamedTuple):
 
     kind: Literal["beyond", "nothing"]
     share: float
-    """Delay divided by the longest delay that the array allows. For ``beyond``, it is
-    the median of all frames. For ``nothing``, three quarters of the frames have a
-    smaller value."""
+    """Delay divided by the longest delay that the array allows. If ``kind`` is
+    ``beyond``, it is the median of all frames. If ``kind`` is ``nothing``, three
+    quarters of the frames have a smaller value."""
     least_range_m: float
     """Least distance of the source, m, if the array really has the stated size."""
 

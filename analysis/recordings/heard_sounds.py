@@ -71,7 +71,7 @@ def sightings_of(
 ) -> tuple[list[Sighting], list[str]]:
     """Finds the stretches of a recording in which a source is clearly audible.
 
-    A stretch is a run of short windows, the snapshots.
+    A stretch is a run of consecutive short windows, which are called snapshots.
 
     Args:
         path: WAV or FLAC file with one channel per microphone.

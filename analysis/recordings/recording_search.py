@@ -54,8 +54,8 @@ _ALIKE_S, _EARLIER_S = 1e-4, 4e-4
 class Sighting(AlignedDelays):
     """A stretch of the recording in which one source position stands out.
 
-    Its delays are the total delays, not only the remaining delays after an alignment.
-    Its coherence is the share of the sound that arrives directly from the source.
+    The delays ``tau`` include the shifts of the channels before the fit. The coherence
+    is the share of the sound that arrives directly from the source.
     """
 
     t_s: float
@@ -78,8 +78,8 @@ class RecordingSearch:
     slack_s: float = 0.0
     """Time by which delays may exceed the limit from the stated positions, s."""
     has_place: Callable[[AlignedDelays], bool] = field(default=lambda _: True)
-    """Returns whether delays fit some source position. It is called if there are
-    several sets of delays to choose from."""
+    """Function that returns whether delays fit some source position. It is called if
+    there are several sets of delays to choose from."""
 
     @cached_property
     def stretches(self) -> list[slice]:
@@ -119,8 +119,8 @@ class RecordingSearch:
         """Computes the correlations of p pairs of microphones.
 
         Args:
-            cross: (p, f) cross-spectra of the pairs, normalized so that they add up to
-                1.
+            cross: (p, f) cross-spectra of the pairs. For each pair, the magnitudes add
+                up to at most 1.
             slack: Number of lags to add on either side.
 
         Returns:
@@ -134,8 +134,8 @@ class RecordingSearch:
         """Computes the steered response of each grid position.
 
         Args:
-            cross: (p, f) cross-spectra of the pairs, normalized so that they add up to
-                1.
+            cross: (p, f) cross-spectra of the pairs. For each pair, the magnitudes add
+                up to at most 1.
 
         Returns:
             (g,) responses of the g grid positions.

@@ -64,8 +64,9 @@ class PlaneFits(NamedTuple):
 
 @dataclass(frozen=True)
 class PhasePlane:
-    """Fits plane waves to phases, starting with pairs so short that phases do not wrap.
+    """Fits plane waves to the phases at the microphones of an array.
 
+    The fit starts with pairs of microphones so close together that phases do not wrap.
     To make a fit for an array, call ``PhasePlane.of``.
     """
 
@@ -78,14 +79,14 @@ class PhasePlane:
     """Frequency at which the phase along the longest of the short pairs changes by half
     a period, Hz."""
     guesses: NDArray[np.float64]
-    """(g, r) initial directions for frequencies above ``wraps_hz``, along
+    """(g, r) initial directions for frequencies above ``wraps_hz``, as components along
     ``shape.span``. Empty if these frequencies are not used."""
     to_slowness: NDArray[np.float64]
-    """(r, s) matrix that converts path differences of the short pairs to a slowness
-    along ``shape.span``."""
+    """(r, s) matrix that converts path differences of the short pairs, m, to components
+    of the direction along ``shape.span``."""
     refine: NDArray[np.float64]
-    """(r, p) matrix that converts path differences of all pairs to a slowness along
-    ``shape.span``."""
+    """(r, p) matrix that converts path differences of all pairs, m, to components of
+    the direction along ``shape.span``."""
     paths: NDArray[np.float64]
     """(p, r) path to the first microphone of each pair minus the path to its second
     microphone, per component of the direction, m."""
@@ -197,6 +198,9 @@ class PhasePlane:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Converts measured slownesses to directions.
 
+        A slowness is the direction of a wave divided by its speed, relative to that of
+        sound.
+
         Returns:
             u: (k, d) directions. They are unit vectors if the component perpendicular
                 to the array can be computed.
@@ -212,7 +216,7 @@ class PhasePlane:
 
 
 def _guesses(shape: ArrayShape, wavelength_m: float) -> NDArray[np.float64]:
-    """Returns a (g, r) grid of all slownesses that a distant sound may have."""
+    """Returns a (g, r) grid of directions, as components along ``shape.span``."""
     step = _GUESS_STEP_RAD * wavelength_m / (2.0 * np.pi * shape.aperture_m)
     count = int(np.ceil(2.0 / step)) + 1
     if count ** len(shape.span) > _MOST_GUESSES:

@@ -34,15 +34,15 @@ def _running(values: NDArray[np.float32], size: int) -> NDArray[np.float32]:
 
 
 def group_powers(spectra: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Computes the power of each group of frames.
+    """Computes the power of each group of consecutive frames.
 
     Args:
-        spectra: (f, n, b) spectra of f frames, n channels and b bins. There are at
-            least ``GROUP_FRAMES`` frames.
+        spectra: (f, n, b) spectra of f frames and n channels at b frequencies. There
+            are at least ``GROUP_FRAMES`` frames.
 
     Returns:
-        (g, b) power of each group, summed over its frames and channels. A group of
-        ``GROUP_FRAMES`` frames begins at each frame, except at the last frames.
+        (g, b) power of each group, summed over its frames and channels. Group k
+        consists of the frames k ... k + ``GROUP_FRAMES`` - 1.
     """
     power = np.einsum("fnb->fb", spectra.real**2 + spectra.imag**2)
     return _running(power, GROUP_FRAMES)

@@ -44,7 +44,7 @@ class SourceListener(Block):
     every ``step_s`` of the parameters, from the sound of the last ``window_s``.
 
     Args:
-        parameters: How votes become tracks.
+        parameters: How votes for directions become tracks.
         robot: Robot with the positions of the microphones.
         sound_speed_m_s: Speed of sound, m/s.
         microphones: Rate and length of the audio frames.

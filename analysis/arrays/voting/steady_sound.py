@@ -63,8 +63,9 @@ def level_scatter_db(votes: DirectionVotes) -> float | None:
 def steered_only(votes: DirectionVotes) -> DirectionVotes:
     """Removes the votes of single frequencies, and keeps those of the steered response.
 
-    If several steady sources sound together, single frequencies vote for directions
-    between the sources.
+    The steered response measures how well all frequencies together agree on a
+    direction. If several steady sources sound together, single frequencies vote for
+    directions between the sources.
 
     Args:
         votes: Votes of a span of time.
