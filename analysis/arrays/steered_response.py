@@ -225,7 +225,7 @@ def _directions(dimension: int, step: float, *, ahead: bool) -> NDArray[np.float
         angles = step * np.arange(math.ceil(2.0 * math.pi / step))
         unit = np.stack((np.cos(angles), np.sin(angles)), axis=1)
     else:
-        # Points of equal areas along a spiral.
+        # These points along a spiral all represent equal areas of the sphere.
         count = math.ceil(4.0 * math.pi / step**2)
         height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
         angles = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)

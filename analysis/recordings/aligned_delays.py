@@ -33,7 +33,8 @@ _FLOOR = 1.0
 # simulated rooms with reverberation times of 0.15-0.6 s.
 _ECHO_ERROR = 1.0
 _STEPS = 12
-_SETTLED = 1e-4  # of the period of the highest frequency
+# The search ends if the steps are below this share of a quarter of the shortest period.
+_SETTLED = 1e-4
 _MOST_COHERENT = 0.9999
 
 

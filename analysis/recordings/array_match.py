@@ -83,7 +83,7 @@ def _given(recording: ArrayLike, sample_rate_hz: float | None) -> RecordedSample
         )
     samples = given.astype(np.float64)
     if given.dtype.kind in "iu":
-        samples /= np.iinfo(given.dtype).max  # as files are read: full scale is 1
+        samples /= np.iinfo(given.dtype).max  # full scale is 1, as in files
     if not np.isfinite(samples).all() or not samples.any():
         raise InputError(
             "recording", f"{where} is silent or not finite; give recorded samples"

@@ -185,7 +185,7 @@ def _plan(axes: Axes, result: LocateResult) -> None:
         axes.plot((0, x), (0, y), color=COLOURS["source"], label="source")
         for other in summary["alternatives"]:
             if math.isclose(other["bearing_deg"], summary["bearing_deg"], abs_tol=0.5):
-                continue  # the mirror image lies below
+                continue  # the mirror image has the same bearing
             x, y = polar_point(0.95 * size, other["bearing_deg"])
             axes.plot((0, x), (0, y), "--", color=COLOURS["empty"], label="or")
     _others(axes, result, 0.95 * size)

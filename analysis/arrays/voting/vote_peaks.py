@@ -142,7 +142,7 @@ def _density(
 
 def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:
     """Returns the cells of the peaks that are high and prominent."""
-    from scipy.signal import find_peaks  # takes a second, which not everyone needs
+    from scipy.signal import find_peaks  # slow import, about 1 s
 
     # The circle is cut at the lowest cell, so that the cut splits no peak.
     first = int(np.argmin(density))
