@@ -1,1 +1,1 @@
-"""Directions, ranges and sources of sounds from microphone arrays, and their errors."""
+"""Estimates directions, ranges and sources of sounds from microphone arrays."""

@@ -1,4 +1,4 @@
-"""What is not known of an array and of the air, and what that does to delays."""
+"""Describes the errors of an array and of the air, and their effect on delays."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ from systems.sound.array_shape import ArrayShape
 
 @dataclass(frozen=True)
 class ArrayBudget:
-    """Standard deviations of what the geometry of n microphones states.
+    """Standard deviations of the errors in the description of n microphones.
 
-    They are one draw for a whole recording: no average over time makes them smaller.
+    The errors are constant during a recording. Averaging over time does not reduce
+    them.
     """
 
     of_places: NDArray[np.float64]
-    """(n d, n d) covariance of the microphones' places, one after another, m^2."""
+    """(n d, n d) covariance of the microphone coordinates, m^2. All d coordinates of a
+    microphone are adjacent."""
     speed_std: float
-    """Of the speed of sound, m/s."""
+    """Standard deviation of the speed of sound, m/s."""
     delay_std: float
-    """Of each channel's instants of sampling, s."""
+    """Standard deviation of the sampling times of each channel, s."""
 
     @classmethod
     def of(
@@ -32,16 +34,16 @@ class ArrayBudget:
         speed_std: float = 0.0,
         delay_std: float = 0.0,
     ) -> ArrayBudget:
-        """A budget with places that are uncertain alike in all directions.
+        """Makes an error budget with equal position errors for all coordinates.
 
         Args:
             shape: The microphones.
-            position_std: Of each coordinate of each microphone, m.
-            speed_std: Of the speed of sound, m/s.
-            delay_std: Of each channel's instants of sampling, s.
+            position_std: Standard deviation of each coordinate of each microphone, m.
+            speed_std: Standard deviation of the speed of sound, m/s.
+            delay_std: Standard deviation of the sampling times of each channel, s.
 
         Returns:
-            The budget.
+            The standard deviations of all errors.
         """
         of_places = position_std**2 * np.eye(shape.p_AM.size)
         return cls(of_places, speed_std, delay_std)
@@ -54,19 +56,19 @@ class ArrayBudget:
     def delay_covariance(
         self, u: NDArray[np.float64], w: float, shape: ArrayShape, c: float
     ) -> NDArray[np.float64]:
-        """Covariance of the delays t_k - t_0 of sound from one place.
+        """Computes the covariance of the delays t_k - t_0 from the errors of the array.
 
-        To first order: a microphone that stands nearer to the source by some
-        length hears it earlier by that over c.
+        The computation is to first order. If a microphone is nearer to the source by a
+        length, the sound arrives earlier by this length divided by c.
 
         Args:
-            u: (d,) unit vector to the source from the microphones' centroid.
-            w: Inverse range, 1/m; 0 for a source far away.
+            u: (d,) unit vector from the centroid of the microphones to the source.
+            w: Inverse range of the source, 1/m; 0 for a distant source.
             shape: The n microphones.
             c: Speed of sound, m/s.
 
         Returns:
-            (n - 1, n - 1) s^2.
+            (n - 1, n - 1) covariance of the delays, s^2.
         """
         count, dimension = shape.p_AM.shape
         to_source = u - w * shape.p_AM
@@ -87,7 +89,11 @@ class ArrayBudget:
 def _arrivals(
     u: NDArray[np.float64], w: float, shape: ArrayShape
 ) -> NDArray[np.float64]:
-    """(n,) how much farther the microphones are than their centroid, m."""
+    """Computes how much farther from the source each microphone is than the centroid.
+
+    Returns:
+        (n,) differences of distance, m.
+    """
     along = shape.p_AM @ u
     square = np.sum(shape.p_AM**2, axis=1)
     ratio = np.sqrt(np.maximum(1.0 - 2.0 * w * along + w * w * square, 0.0))

@@ -1,8 +1,9 @@
-"""Direction of a source so far away that its wave fronts are plane.
+"""Estimates the direction of a source that is so far away that its waves are plane.
 
-The delays are then linear in the direction u: tau_k = (p_0 - p_k) . u / c.
-A row tells one component of u and a plane two; what is left of its unit length
-is the component off the row or plane.
+The delays are then linear in the direction u: tau_k = (p_0 - p_k) . u / c. A row of
+microphones measures one component of u, and a plane of microphones measures two. The
+remaining component is perpendicular to the row or plane. It follows from the condition
+that u has the length 1.
 """
 
 from __future__ import annotations
@@ -28,21 +29,23 @@ def locate_far_source(
     *,
     inverse_range_std: float = 0.0,
 ) -> SourceFix:
-    """Where the sound comes from, if from far away.
+    """Estimates the direction of a distant source.
 
     Args:
         tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
-        covariance: (n - 1, n - 1) of the delays, s^2.
+        covariance: (n - 1, n - 1) covariance of the delays, s^2.
         shape: The n microphones.
         c: Speed of sound, m/s.
-        tolerance: (n - 1, n - 1) further errors that weigh the delays and count
-            in chi-square, but not in the standard deviations, s^2.
-        inverse_range_std: How uncertain it is that waves are plane: standard
-            deviation of the inverse range before anything was heard, 1/m. It
-            counts in the errors as far as the delays leave it open.
+        tolerance: (n - 1, n - 1) covariance of further errors of the delays, s^2. The
+            further errors affect the weights of the delays and chi-square. They do not
+            affect the standard deviations of the result. None: no further errors.
+        inverse_range_std: Prior standard deviation of the inverse range, 1/m. It states
+            how uncertain it is that the waves are plane. If it is positive and the
+            delays do not determine the curvature, the standard deviations of the result
+            increase.
 
     Returns:
-        The source on the side of ``shape.ahead``, without a range.
+        The source without a range, on the side of ``shape.ahead``.
     """
     slopes = (shape.p_AM[0] - shape.p_AM[1:]) / c
     whole = covariance if tolerance is None else covariance + tolerance
@@ -80,10 +83,13 @@ def _bend(
     c: float,
     inverse_range_std: float,
 ) -> NDArray[np.float64]:
-    """(k,) deviation of the direction's coordinates by an unknown curvature.
+    """Computes the error of the direction from an unknown curvature of the wave front.
 
-    A wave front from the distance 1/w reaches a microphone at p later than a
-    plane one by w |p - (p . u) u|^2 / 2c.
+    Compared with a plane wave, a wave front from the distance 1/w reaches a microphone
+    at p later by w |p - (p . u) u|^2 / 2c.
+
+    Returns:
+        (k,) standard deviation of each coordinate of the direction.
     """
     square = np.sum(shape.p_AM**2, axis=1) - (shape.p_AM @ u) ** 2
     curved = root @ (square[1:] - square[0]) / (2.0 * c)
@@ -96,7 +102,12 @@ def _bend(
 def _on_sphere(
     slopes: NDArray[np.float64], tau: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Best unit vector for whitened delays, and the directions across it."""
+    """Finds the unit vector that best fits whitened delays.
+
+    Returns:
+        u: (d,) unit vector to the source.
+        basis: (d, d - 1) orthonormal vectors perpendicular to u.
+    """
     u = _least_squares(slopes, tau)
     u /= max(float(np.linalg.norm(u)), 1e-12)
     for _ in range(_STEPS):
@@ -110,18 +121,26 @@ def _on_sphere(
 def _off_array(
     slopes: NDArray[np.float64], tau: NDArray[np.float64], shape: ArrayShape
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """As ``_on_sphere``, with the component off the array from unit length."""
+    """Finds the unit vector that best fits whitened delays of a row or plane.
+
+    The component perpendicular to the row or plane follows from the unit length.
+
+    Returns:
+        u: (d,) unit vector to the source.
+        basis: (d, r) derivatives of u with respect to its r components along the array.
+    """
     assert shape.ahead is not None
     span = shape.span
     within = slopes @ span.T
     v = _least_squares(within, tau)
     length = float(np.linalg.norm(v))
     if length > 1.0:
-        # More than the array is long: in its line or plane.
+        # The delays are longer than the array allows. The source is then in its line or
+        # plane.
         v = _on_sphere(within, tau)[0] if len(v) > 1 else v / length
     off = math.sqrt(max(0.0, 1.0 - float(v @ v)))
-    # The component off the array is the root of a small difference there: its
-    # error stays below the root of that difference's.
+    # The perpendicular component is the square root of a small difference. Its error is
+    # at most the square root of the error of this difference.
     spread = np.linalg.pinv(within)
     floor = math.sqrt(max(float(np.linalg.norm(spread @ spread.T, 2)), 0.0))
     basis = span.T - np.outer(shape.ahead, v) / max(off, math.sqrt(floor), 1e-6)

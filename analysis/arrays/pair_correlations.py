@@ -1,4 +1,4 @@
-"""Whitened correlations of all pairs of a recording's channels, frame by frame."""
+"""Computes whitened correlations of all pairs of channels, frame by frame."""
 
 from __future__ import annotations
 
@@ -15,46 +15,51 @@ from systems.delays.correlations import (
     whitening,
 )
 
-# Loudest frames that are looked at; they lie anywhere in the recording.
+# Number of frames to use. They are the loudest frames anywhere in the recording.
 _FRAMES = 64
 
-# Where sounds are short, these hold them and the others little but their echoes.
+# Number of loudest frames that are also averaged separately. If sounds are short, these
+# frames contain the sounds, and all other frames contain little more than echoes.
 _LOUDEST = 16
 
-# A frame lasts at least this, and many times what sound needs to cross the array.
+# _FRAME_S: least length of a frame, s.
+# _CROSSINGS: least length of a frame, as a multiple of the travel time of sound across
+#   the array.
 _FRAME_S = 0.05
 _CROSSINGS = 12
 
-# Delays so many times as long as possible are looked at, to see impossible ones.
+# Longest delay to search, as a multiple of the longest possible delay. The search can
+# thus find impossible delays.
 _BEYOND = 3.0
 
-# Points of the correlation a sample.
+# Number of points of the correlation per sample.
 _DENSITY = 4
 
 
 @dataclass(frozen=True)
 class PairCorrelations:
-    """Extremes of the correlations of p pairs in f frames, and levels."""
+    """Peaks of the correlations of p pairs in f frames, and levels of n channels."""
 
     pairs: NDArray[np.int64]
-    """(p, 2) channels i < j."""
+    """(p, 2) numbers i < j of the two channels of each pair."""
     lag_of_highest: NDArray[np.float64]
-    """(f, p) delay t_j - t_i, samples."""
+    """(f, p) delay t_j - t_i of the largest value of the correlation, samples."""
     lag_of_lowest: NDArray[np.float64]
-    """(f, p) samples."""
+    """(f, p) delay t_j - t_i of the smallest value of the correlation, samples."""
     pooled_highest: NDArray[np.float64]
-    """(p,) largest value of the correlation's mean over the frames."""
+    """(p,) largest value of the mean correlation over all frames."""
     pooled_lowest: NDArray[np.float64]
-    """(p,) its smallest value."""
+    """(p,) smallest value of the mean correlation over all frames."""
     shared: NDArray[np.float64]
-    """(p,) largest size of the mean over all frames, or over the loudest of them,
-    against what independent noise has."""
+    """(p,) largest magnitude of the mean correlation, as a multiple of its magnitude
+    for independent noise. The mean is over all frames or over the loudest frames,
+    whichever gives the larger value."""
     levels: NDArray[np.float64]
-    """(f, n) RMS of the channels within the band."""
+    """(f, n) root-mean-square value of each channel within the band."""
     level: NDArray[np.float64]
-    """(n,) RMS over all these frames."""
+    """(n,) root-mean-square value of each channel over these frames."""
     noise: float
-    """About what the pooled extremes are in independent noise."""
+    """Approximate pooled peak value for independent noise."""
 
 
 def correlate_pairs(
@@ -63,17 +68,17 @@ def correlate_pairs(
     sample_rate_hz: float,
     band_hz: tuple[float, float],
 ) -> PairCorrelations | None:
-    """Correlations of the loudest frames.
+    """Computes the peaks of the correlations of all pairs in the loudest frames.
 
     Args:
         samples: (n, samples) channels without NaN.
-        max_delay_s: Longest delay that sound can have, s. Delays three times as
-            long are looked at, to see impossible ones.
-        sample_rate_hz: Rate of the samples, Hz.
+        max_delay_s: Longest delay that sound can have, s. The search covers delays
+            three times as long, so that it also finds impossible delays.
+        sample_rate_hz: Sample rate, Hz.
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        The extremes, or None where the recording is too short or silent.
+        The peaks of the correlations. None if the recording is too short or silent.
     """
     count, total = samples.shape
     crossing = max_delay_s * sample_rate_hz
@@ -83,7 +88,7 @@ def correlate_pairs(
     frames = total // length
     if frames == 0:
         return None
-    # A view of each channel: recordings may be long.
+    # Views avoid copies, because recordings may be long.
     cut = [row[: frames * length].reshape(frames, length) for row in samples]
     energy = np.array([np.var(channel, axis=1) for channel in cut])
     mean = energy.mean(axis=1, keepdims=True)
@@ -128,24 +133,24 @@ def correlate_pairs(
 def _correlation(
     first: NDArray[np.complex128], second: NDArray[np.complex128], gate: int
 ) -> NDArray[np.float64]:
-    """(f, lags) correlation of a pair within the gate."""
+    """Returns the (f, lags) correlation of a pair for lags up to ``gate`` samples."""
     cross = (first.conj() * second).astype(np.complex64)
     cross = cross * whitening(cross)
     total = np.sum(np.abs(cross), axis=1, keepdims=True)
     grid = _DENSITY * 2 * (cross.shape[1] - 1)
-    # All values lie between -1 and 1: the bins' sizes add up to 1.
+    # The magnitudes of the bins add up to 1, so all values are between -1 and 1.
     band = slice(cross.shape[1])
     share = cross / np.maximum(total, 1e-30)
     return correlations_at_lags(share, band, grid, _DENSITY * gate) * (grid / 2.0)
 
 
 def _extremes(values: NDArray[np.float64], gate: int) -> NDArray[np.float64]:
-    """(2, f) lags of the highest and the lowest value."""
+    """Returns the (2, f) lags of the largest and the smallest value, samples."""
     return np.stack((_vertex(values), _vertex(-values))) / _DENSITY - gate
 
 
 def _vertex(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places of the rows' largest values, by a parabola."""
+    """Returns the position of the largest value of each row, refined by a parabola."""
     rows = np.arange(len(values))
     best = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
     left, top, right = (values[rows, best + k] for k in (-1, 0, 1))

@@ -1,11 +1,14 @@
-"""How far a source is, from delays with errors in common: compiled kernels.
+"""Estimates the range of a source from delays with common errors, in compiled code.
 
-Where the array is not known well, the least squares' range is a poor answer: delays
-whose errors happen to bend the waves look certain just because they are near, and an
-array in space may have a second place amid its microphones. Hence the likelihood of
-the delays is taken at many ranges, each with the best direction there and with what
-the array's errors make of delays from there, and is integrated over ranges that are
-all alike likely.
+If the array is not well known, the range from least squares is a poor estimate for two
+reasons. Delay errors may bend the waves by chance, and then the source seems near and
+the range seems certain. An array in space may also have a second solution between its
+microphones.
+
+Therefore, this module computes the likelihood of the delays at many ranges. At each
+range, it uses the best direction and the effect of the array's errors on delays from
+there. The range is then averaged with the likelihood as its weight. All ranges are
+equally likely beforehand.
 """
 
 from __future__ import annotations
@@ -20,11 +23,12 @@ from systems.framework.compiling import njit
 from systems.hearing.delay_fit import across
 from systems.sound.array_shape import ArrayShape
 
-#: Ranges beyond are told by no array, m.
+#: Largest range, m. No array can measure larger ranges.
 FARTHEST_M = 30.0
 
-# So many ranges, evenly by their logarithm, and about the likeliest place, by
-# deviations of the inverse range.
+# _RANGES: number of ranges, at equal steps of their logarithm.
+# _ABOUT: further ranges around the most likely one, in standard deviations of the
+#   inverse range.
 _RANGES = 48
 _ABOUT = np.linspace(-5.0, 5.0, 31)
 
@@ -33,28 +37,28 @@ _LEAST_OFF = 0.2
 
 
 class RangePosterior(NamedTuple):
-    """The range of a source, and the direction at that range."""
+    """Range of a source, and its direction at this range."""
 
     range: float
-    """Mean, m."""
+    """Mean range, m."""
     range_std: float
-    """Standard deviation, m."""
+    """Standard deviation of the range, m."""
     u: NDArray[np.float64]
-    """(d,) unit vector to the source from the microphones' centroid."""
+    """(d,) unit vector from the centroid of the microphones to the source."""
     covariance: NDArray[np.float64]
-    """(d, d) of the place u times range, m^2."""
+    """(d, d) covariance of the source position, which is u times the range, m^2."""
 
 
 class _Kernel(NamedTuple):
-    """Delays, the array and its budget, for compiled code."""
+    """Delays, microphones and errors of the array, as arguments of compiled code."""
 
     tau: NDArray[np.float64]
     own: NDArray[np.float64]
     p: NDArray[np.float64]
     frame: NDArray[np.float64]
-    """(d, q) axes within which directions are sought."""
+    """(d, q) axes of the space in which directions are searched."""
     ahead: NDArray[np.float64]
-    """(q,) unit vector off a row or plane; zeros: there is none."""
+    """(q,) unit vector perpendicular to a row or plane. Zeros if there is none."""
     of_places: NDArray[np.float64]
     speed_share: float
     delay_std: float
@@ -71,20 +75,22 @@ def range_posterior(
     start: tuple[NDArray[np.float64], float, float],
     nearest_m: float,
 ) -> RangePosterior:
-    """The range with all that is not known of the array marginalised.
+    """Estimates the range of a source, averaged over the unknown errors of the array.
 
     Args:
         tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
-        covariance: (n - 1, n - 1) of the delays by noise and reflections, s^2.
+        covariance: (n - 1, n - 1) covariance of the delays from noise and reflections,
+            s^2.
         shape: The n microphones.
-        budget: What is not known of them and of the air.
+        budget: Errors of the microphone positions, sampling times, and speed of sound.
         c: Speed of sound, m/s.
-        start: A direction (d,), an inverse range, 1/m, and its standard deviation,
-            about which the likelihood is looked at more closely.
+        start: First estimate of the source: a (d,) direction, its inverse range in 1/m,
+            and the standard deviation of the inverse range. More ranges are evaluated
+            around this estimate.
         nearest_m: Least range, m.
 
     Returns:
-        Mean and standard deviation over ranges up to 30 m, and the direction.
+        Mean and standard deviation of the range up to 30 m, and the direction.
     """
     u, w, w_std = start
     frame = (
@@ -133,7 +139,13 @@ def _delays(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Delays (n - 1,) from u r, slopes (n - 1, d) along it, and covariance."""
+    """Computes the delays of a source at the distance r in the direction u.
+
+    Returns:
+        tau: (n - 1,) delays, s.
+        slopes: (n - 1, d) derivatives of the delays with respect to the position, s/m.
+        whole: (n - 1, n - 1) covariance of all delay errors, s^2.
+    """
     n, d = kernel.p.shape
     rays = np.empty((n, d))
     later = np.empty(n)
@@ -163,7 +175,7 @@ def _delays(
 
 @njit(cache=True)
 def _across(a: NDArray[np.float64]) -> NDArray[np.float64]:  # pragma: no cover
-    """(q, q - 1) orthonormal directions across a unit vector."""
+    """Returns (q, q - 1) orthonormal vectors perpendicular to a unit vector."""
     if a.size == 2:
         return np.array([[-a[1]], [a[0]]])
     return across(a)
@@ -173,11 +185,11 @@ def _across(a: NDArray[np.float64]) -> NDArray[np.float64]:  # pragma: no cover
 def _turned(
     kernel: _Kernel, a: NDArray[np.float64], r: float
 ) -> tuple[NDArray[np.float64], float]:  # pragma: no cover  (compiled)
-    """The best direction at a range, and the logarithm of its likelihood.
+    """Finds the best direction at a range, and the logarithm of its likelihood.
 
-    Directions about the best one are integrated over, too (Laplace).
+    The likelihood is integrated over directions around the best one (Laplace).
     """
-    # In the plane itself nothing points off it.
+    # At a direction within the plane, the delays have no derivative out of the plane.
     off = np.sum(kernel.ahead**2) * _LEAST_OFF - np.sum(kernel.ahead * a)
     if off > 0.0:
         a = a + off * kernel.ahead
@@ -195,7 +207,8 @@ def _turned(
             value = -0.5 * np.sum(residual**2)
             value += np.sum(np.log(np.diag(root)))
             known = np.linalg.eigvalsh(normal)
-            # Near a plane the angle off it is the root of a small difference.
+            # Near a plane, the angle off the plane is the square root of a small
+            # difference.
             least = max(1.0, 0.5 * np.sqrt(known[-1]))
             value -= 0.5 * np.sum(np.log(np.maximum(known, least)))
             break
@@ -212,7 +225,7 @@ def _turned(
 def _log_likelihood(
     kernel: _Kernel, a: NDArray[np.float64], ranges: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(k,) at falling ranges."""
+    """Returns the (k,) logarithms of the likelihood at k decreasing ranges."""
     out = np.empty(ranges.size)
     for k in range(ranges.size):
         a, out[k] = _turned(kernel, a, ranges[k])
@@ -223,7 +236,12 @@ def _log_likelihood(
 def _place(
     kernel: _Kernel, a: NDArray[np.float64], r: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """The best direction at a range, and the covariance (d, d) of the place there."""
+    """Finds the best direction at a range, and the error of the source position.
+
+    Returns:
+        a: (q,) unit vector to the source, along the axes ``kernel.frame``.
+        covariance: (d, d) covariance of the position, m^2.
+    """
     a, _ = _turned(kernel, a, r)
     _, slopes, whole = _delays(kernel, kernel.frame @ a, r)
     root = np.linalg.inv(np.linalg.cholesky(whole))

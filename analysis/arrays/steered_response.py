@@ -1,10 +1,13 @@
-"""Where the steered response of an array is greatest, over all places.
+"""Computes the steered response of an array at many positions of a search grid.
 
-Each pair of microphones says by its cross-correlation how well a delay fits.
-The response of a place is the mean of that over the pairs, at the delays that
-sound from there would have (DiBiase 2000). Places are directions for a source
-far away, directions with an inverse range where the array is large enough to
-see that wave fronts are curved, and points within a large array.
+The cross-correlation of each pair of microphones measures how well a delay fits. The
+response of a position is the mean over the pairs, taken at the delays of sound from
+this position (DiBiase 2000). The grid has three kinds of positions:
+
+- directions, for a distant source;
+- directions with an inverse range, if the array is large enough to detect curved wave
+  fronts;
+- points between the microphones of a large array.
 """
 
 from __future__ import annotations
@@ -20,66 +23,74 @@ from systems.framework.compiling import njit
 from systems.hearing.source_fix import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
-# Between two neighbours of the grid a pair's path changes by less than twice
-# this share of the shortest wavelength.
+# Half of the largest change of a pair's path difference between two neighbors of the
+# grid, as a share of the shortest wavelength.
 _PATH_SHARE = 0.1
 _WIDEST_STEP_RAD = math.radians(4.0)
 
-# Places times pairs, at most: a few milliseconds a response. Where many microphones
-# need more even with the widest steps, it may be so many times what those need.
+# _LARGEST_GRID: largest number of positions times pairs. A response then takes a few
+#   milliseconds.
+# _OVER_LEAST: if many microphones need a larger grid even with the widest steps, the
+#   limit is this multiple of that grid.
+# _COARSER: factor by which the grid becomes coarser in each trial.
 _LARGEST_GRID = 1_500_000
 _OVER_LEAST = 1.5
 _COARSER = 1.25
 
-# Sources are sought from this many apertures on by direction and inverse range.
+# Least range of grid positions given by a direction and an inverse range, in apertures.
 _OUTSIDE = 0.6
 
-# Amid a large array places are sought down to this share of that, so that a
-# source which is too near is not taken for one farther off.
+# Least range of points between the microphones, as a share of the least range of a
+# source. Without these points, a source that is too near would appear to be farther
+# away.
 _TOO_NEAR = 0.1
 
-#: Samples of a correlation for a period of the highest frequency.
+#: Samples of a correlation per period of the highest frequency.
 LAG_DENSITY = 16.0
 
 
 @dataclass(frozen=True)
 class SearchGrid:
-    """Places, and the delays that sound from there would have."""
+    """Grid of positions, and the delays of sound from each position."""
 
     p_AS: NDArray[np.float64]
-    """(g, d) places from the centroid, m; unit vectors for those far away."""
+    """(g, d) positions relative to the centroid, m. Unit vectors for distant positions.
+    """
     inverse_range: NDArray[np.float64]
-    """(g,) 1/m; 0 for the places far away."""
+    """(g,) inverse range of each position, 1/m; 0 for distant positions."""
     lags: NDArray[np.int32]
-    """(g, p) columns of the correlations, one for each pair."""
+    """(g, p) column of each pair's correlation for each position."""
     lag_rate_hz: float
-    """Columns of a correlation in a second."""
+    """Columns of a correlation per second of delay."""
     max_lag: int
-    """Columns on either side of no delay."""
+    """Number of columns on either side of the column for delay 0."""
     blur: NDArray[np.int64]
-    """(p,) columns over which the correlations' greatest value is taken, so
-    that a grid coarser than the peaks does not miss them."""
+    """(p,) width of the maximum filter over each pair's correlation, columns. With the
+    filter, a grid that is coarser than the peaks does not miss them."""
     coarseness: float
-    """How much coarser the grid is than the peaks; 1: as fine as they are."""
+    """Step of the grid relative to the width of the peaks; 1 if the grid is as fine as
+    the peaks."""
 
     @classmethod
     def of(
         cls, shape: ArrayShape, c: float, high_hz: float, lag_rate_hz: float
     ) -> SearchGrid:
-        """Covers every place that the array can tell apart.
+        """Makes a grid with all positions that the array can distinguish.
 
-        A plane array with positions in its plane is searched above the plane,
-        too, far away: a source there has shorter delays than any in the plane.
+        If all microphones of a plane array are given by (x, y), the grid also contains
+        distant positions above the plane. Their delays are shorter than those of any
+        position in the plane.
 
         Args:
             shape: The microphones.
             c: Speed of sound, m/s.
             high_hz: Highest frequency of the correlations, Hz.
-            lag_rate_hz: Columns of a correlation in a second, about
-                ``LAG_DENSITY`` times as many.
+            lag_rate_hz: Columns of a correlation per second, about ``LAG_DENSITY``
+                times ``high_hz``.
 
         Returns:
-            The g places, and the column of each pair's correlation for each of them.
+            The g positions, and the column of each pair's correlation for each
+            position.
         """
         path = _PATH_SHARE * c / high_hz
         coarseness = 1.0
@@ -110,16 +121,18 @@ def centroid_delays(
     shape: ArrayShape,
     c: float,
 ) -> NDArray[np.float64]:
-    """How much later than their centroid the microphones hear each place.
+    """Computes how much later sound arrives at each microphone than at their centroid.
 
     Args:
-        places: (g, d) places in A, m; unit vectors where they are infinitely far.
-        inverse_range: (g,) 1/m; 0 where they are infinitely far.
+        places: (g, d) source positions in the frame A of the array, m. Unit vectors for
+            infinitely distant sources.
+        inverse_range: (g,) inverse ranges, 1/m; 0 for infinitely distant sources.
         shape: The n microphones.
         c: Speed of sound, m/s.
 
     Returns:
-        (g, n) s; negative: earlier.
+        (g, n) delays, s. They are negative if the sound arrives at the microphone
+        first.
     """
     far = -places @ shape.p_AM.T
     ranges = np.linalg.norm(places, axis=1, keepdims=True)
@@ -130,21 +143,21 @@ def centroid_delays(
 
 @dataclass(frozen=True)
 class _Steps:
-    """Steps of the grid between whose neighbours paths differ by 2 ``path``."""
+    """Steps of the grid. The paths of neighbors differ by at most 2 ``path``."""
 
     angle: float
     levels: NDArray[np.float64]
-    """Inverse ranges beside 0."""
+    """Inverse ranges of the grid except 0, 1/m."""
     lattice: float
-    """Step of the lattice within the array; 0: there is none."""
+    """Step of the lattice of points within the array, m; 0 if there is no lattice."""
     nearest: float
-    """Radius of that lattice, m."""
+    """Radius of the lattice, m."""
 
     @classmethod
     def of(cls, shape: ArrayShape, path: float) -> _Steps:
         aperture = shape.aperture_m
         nearest = max(_OUTSIDE * aperture, NEAREST_M)
-        # A wave front from a range r is off the plane by aperture^2 / (8 r).
+        # A wave front from the range r differs from a plane by aperture^2 / (8 r).
         step = 16.0 * path / aperture**2
         count = math.ceil(1.0 / (nearest * step) - 0.5)
         return cls(
@@ -156,7 +169,7 @@ class _Steps:
 
 
 def _count(shape: ArrayShape, path: float) -> float:
-    """About how many places there are."""
+    """Returns the approximate number of grid positions."""
     steps = _Steps.of(shape, path)
     flat = len(_basis(shape)) == 2
     directions = 2.0 * math.pi / steps.angle if flat else 4.0 * math.pi / steps.angle**2
@@ -173,7 +186,7 @@ def _count(shape: ArrayShape, path: float) -> float:
 def _places(
     shape: ArrayShape, path: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places and inverse ranges."""
+    """Returns the grid positions and their inverse ranges."""
     steps = _Steps.of(shape, path)
     basis = _basis(shape)
     ahead = shape.ahead is not None
@@ -197,19 +210,22 @@ def _is_flat_plane(shape: ArrayShape) -> bool:
 
 
 def _basis(shape: ArrayShape) -> NDArray[np.float64]:
-    """(2 or 3, d) axes of the sought places; the last one points ahead."""
+    """Returns (2 or 3, d) axes of the searched space. The last axis points ahead."""
     if shape.ahead is None:
         return shape.span
     return np.vstack((shape.span, shape.ahead))
 
 
 def _directions(dimension: int, step: float, *, ahead: bool) -> NDArray[np.float64]:
-    """(g, dimension) unit vectors; ahead: those with a positive last part."""
+    """Returns (g, dimension) unit vectors in all directions.
+
+    If ``ahead`` is true, these are only the vectors with a positive last component.
+    """
     if dimension == 2:
         angles = step * np.arange(math.ceil(2.0 * math.pi / step))
         unit = np.stack((np.cos(angles), np.sin(angles)), axis=1)
     else:
-        # Points of equal areas along a spiral.
+        # These points along a spiral all represent equal areas of the sphere.
         count = math.ceil(4.0 * math.pi / step**2)
         height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
         angles = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
@@ -222,7 +238,7 @@ def _directions(dimension: int, step: float, *, ahead: bool) -> NDArray[np.float
 
 
 def _lattice(dimension: int, steps: _Steps, *, ahead: bool) -> NDArray[np.float64]:
-    """(g, dimension) points about the centroid, between the microphones."""
+    """Returns (g, dimension) points around the centroid, between the microphones."""
     line = np.arange(-steps.nearest, steps.nearest, steps.lattice) + steps.lattice / 2.0
     axes = [line] * dimension
     if ahead:
@@ -236,15 +252,15 @@ def _lattice(dimension: int, steps: _Steps, *, ahead: bool) -> NDArray[np.float6
 def steered_response(
     correlations: NDArray[np.float32], grid: SearchGrid
 ) -> NDArray[np.float32]:
-    """Mean over the pairs of the correlations at each place's delays.
+    """Computes the mean of the pairs' correlations at the delays of each grid position.
 
     Args:
-        correlations: (p, 2 max_lag + 1) at the rate of the grid; no delay
-            stands in the middle.
-        grid: The places.
+        correlations: (p, 2 max_lag + 1) correlations at the rate ``grid.lag_rate_hz``.
+            Delay 0 is in the middle.
+        grid: Grid of g positions.
 
     Returns:
-        (g,) in the unit of the correlations.
+        (g,) responses in the unit of the correlations.
     """
     if grid.coarseness > 1.0:
         correlations = np.stack(

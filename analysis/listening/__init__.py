@@ -1,1 +1,1 @@
-"""Sources while they sound: streams of sound, what is wrong with them, and views."""
+"""Listens to live sound: streams of samples, their faults, and views of the sources."""

@@ -1,4 +1,4 @@
-"""What is wrong with the channels of a stream, looked at while it comes."""
+"""Finds faults of the channels of a stream while it arrives."""
 
 from __future__ import annotations
 
@@ -14,35 +14,46 @@ from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
 from analysis.recordings.clock_drift import STRETCH_S, clock_drift, common_lags
 
-# Share of samples at full scale from which on a channel is clipped.
+# _CLIPPED: magnitude that counts as full scale.
+# _CLIPPED_SHARE: a channel is clipped if at least this share of its samples is at full
+#   scale.
 _CLIPPED, _CLIPPED_SHARE = 0.999, 1e-3
 
-# A channel so far below the others is dead, dB, where those hear more than the last
-# bits of a converter.
+# _DEAD_DB: a channel is dead if it is this far below the second loudest channel, dB.
+# _LEAST_DB: least level of the second loudest channel for this test, dB. At lower
+#   levels, the channels contain only the last bits of a converter.
 _DEAD_DB, _LEAST_DB = 40.0, -75.0
 
-# Stretches that are looked at together beside the stream; how many later what they show
-# is told; and how many later the next look begins, for the first looks and afterwards.
+# A look examines several stretches together, in a separate thread. All numbers except
+# _FIRST_LOOKS are numbers of stretches:
+# - _TOGETHER: stretches in a look.
+# - _TOLD: stretches from the start of a look to the report of its faults.
+# - _NEXT: stretches from one of the first looks to the next look.
+# - _FIRST_LOOKS: number of the first looks.
+# - _LATER: stretches from a later look to the next look.
 _TOGETHER, _TOLD, _NEXT, _FIRST_LOOKS, _LATER = 6, 4, 6, 3, 60
 
-# Delays of no more than so many stretches count, every other one of twice as many.
+# Largest number of stretches whose delays are used. If there are twice as many, every
+# second stretch is dropped.
 _MOST_LAGS = 240
 
 
 @dataclass
 class LiveFaults:
-    """Looks at every half second of a stream, and at three seconds now and then.
+    """Examines each half second of a stream, and occasionally the last three seconds.
 
-    The latter takes a quarter of a second, more with many channels, and is done in a
-    thread of its own, beside the stream; what it has found is told two seconds of sound
-    later, or when it is done, or at the end of the stream.
+    The examination of three seconds takes a quarter of a second, or more with many
+    channels. It therefore runs in a separate thread. Its faults are reported two
+    seconds of sound after its start. If the examination takes longer, they are reported
+    when it has finished. At the end of the stream, the remaining faults are reported at
+    once.
     """
 
     geometry: ArrayGeometry
     sample_rate_hz: int
 
     def __post_init__(self) -> None:
-        """Makes the thread."""
+        """Starts the thread."""
         self._known = self.geometry.known
         self._size = round(STRETCH_S * self.sample_rate_hz)
         self._worker = ThreadPoolExecutor(1)
@@ -50,10 +61,11 @@ class LiveFaults:
         self.begin(range(len(self.geometry.microphones)))
 
     def begin(self, alive: Sequence[int] | None = None) -> None:
-        """Begins anew, as after a gap or with fewer channels.
+        """Restarts the examination, for example after a gap in the stream.
 
         Args:
-            alive: Channels that count from here on; none: those of before.
+            alive: Numbers of the channels to use from now on. None: the same channels
+                as before.
         """
         if alive is not None:
             self._alive = list(alive)
@@ -68,13 +80,14 @@ class LiveFaults:
         self._worker.shutdown(cancel_futures=True)
 
     def look(self, channels: NDArray[np.float32]) -> Iterator[ChannelFault]:
-        """What is seen with another block of samples; its channels count from 0.
+        """Examines another block of samples.
 
         Args:
-            channels: (n, k) of the array.
+            channels: (n, k) samples of the array's channels.
 
         Yields:
-            Faults, the same ones again and again.
+            Faults, with channel numbers from 0. A lasting fault is reported again and
+            again.
         """
         self._held.append(channels)
         while sum(part.shape[1] for part in self._held) >= self._size:
@@ -83,10 +96,10 @@ class LiveFaults:
             yield from self._of_stretch(joined[:, : self._size])
 
     def finish(self) -> Iterator[ChannelFault]:
-        """What the stream showed that was not told yet.
+        """Reports the remaining faults at the end of the stream.
 
         Yields:
-            Faults.
+            Faults that were not reported before.
         """
         if not self._looks and self._stretches and self._hears():
             self._pending = self._begin_look()
@@ -113,7 +126,7 @@ class LiveFaults:
         self._pending = self._begin_look()
 
     def _hears(self) -> bool:
-        """Whether there is sound in what would be looked at: silence shows nothing."""
+        """Returns whether the stretches contain sound. Silence shows no faults."""
         return max(_heard_db(stretch) for stretch in self._stretches) > _LEAST_DB
 
     def _begin_look(self) -> Future[list[ChannelFault]]:
@@ -128,7 +141,11 @@ class LiveFaults:
         )
 
     def _is_done(self, pending: Future[list[ChannelFault]]) -> bool:
-        """Waits for it only as long as sound that is made now would have taken."""
+        """Returns whether an examination has finished, after a wait of limited length.
+
+        The wait ends 2 s after the start of the examination. Live sound would arrive no
+        faster.
+        """
         spare = self._begun + _TOLD * STRETCH_S - time.monotonic()
         return bool(wait([pending], max(0.0, spare)).done)
 
@@ -166,10 +183,13 @@ def _dead(stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
 
 
 def _levels_db(stretch: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(n,) of the channels."""
+    """Returns the (n,) levels of the channels, dB."""
     return 10.0 * np.log10(np.maximum(np.var(stretch, axis=1), 1e-30))
 
 
 def _heard_db(stretch: NDArray[np.float32]) -> float:
-    """The second highest level: the source may be at one microphone."""
+    """Returns the second highest level of the channels, dB.
+
+    The highest level is not used, because the source may be at one microphone.
+    """
     return float(np.sort(_levels_db(stretch))[-2])

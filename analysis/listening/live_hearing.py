@@ -1,4 +1,4 @@
-"""Who sounds from where, told while it sounds."""
+"""Tracks the sources in a stream of sound and reports them while they sound."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ from systems.framework.input_error import InputError
 _BAND_HZ = (200.0, 15_000.0)
 _TOP_OF_RATE = 0.45
 
-# With these, bearings are wrong: it is the user who has to mend them.
+# Kinds of faults that make bearings wrong. Only the user can correct them.
 _FATAL = ("copied", "swapped", "units", "drift")
 
 _QUIET_DB = -120.0
 
-# What is larger, of a full scale of 1, is no sound.
+# Largest magnitude of a valid sample; full scale is 1.
 _WILD = 1e3
 
 
 @dataclass
 class HeardStream:
-    """All that a stream held."""
+    """Summary of what was heard in a stream."""
 
     seconds: float = 0.0
     identities: set[int] = field(default_factory=set)
-    """Of all sources."""
+    """Identities of all sources."""
     faults: list[str] = field(default_factory=list)
-    """Each named once."""
+    """Messages about faults, without repetitions."""
     status: str = "the stream has ended"
     failed: bool = False
-    """Whether it ended otherwise than by its end or by an interrupt."""
+    """Whether the stream ended by a fault, not by its end or by an interrupt."""
 
     def document(self) -> dict[str, Any]:
-        """The last line of JSON."""
+        """Returns the last line of the JSON output."""
         return {
             "status": self.status,
             "seconds": round(self.seconds, 6),
@@ -63,24 +63,26 @@ class HeardStream:
 
 @dataclass(frozen=True)
 class HeardStep:
-    """What there is to tell of a step."""
+    """Sources and level of a step."""
 
     sources: TrackedSources
     level_db: float
-    """RMS of all channels since the last step, of full scale 1, dB."""
+    """Root-mean-square level of all channels since the last step, dB relative to full
+    scale."""
 
 
 class LiveHearing:
-    """A stream and the array that hears it.
+    """Tracks the sources in a stream with the array that hears it.
 
     Args:
-        stream: The sound.
-        geometry: The array.
-        name_fault: Called with each fault and the time in s, once, as soon as it is
-            seen.
+        stream: Stream of sound.
+        geometry: Geometry of the array.
+        name_fault: Function that is called once for each fault, as soon as the fault is
+            detected. Its arguments are the message and the time in s.
 
     Raises:
-        InputError: The stream is not of the array, or that tells no bearings.
+        InputError: The stream does not match the array, or the array cannot measure
+            bearings.
     """
 
     def __init__(
@@ -112,10 +114,14 @@ class LiveHearing:
         return vote_plan(known.shape, known.c, rate, band)
 
     def steps(self) -> Iterator[HeardStep]:
-        """The sources of each step, as soon as its sound has come.
+        """Tracks the sources to the end of the stream.
+
+        Yields:
+            The sources of each step, as soon as the sound of the step has arrived.
 
         Raises:
-            StreamBrokenError: The stream broke off, or no array is left that hears it.
+            StreamBrokenError: The stream broke off, or too few channels are left to
+                measure bearings.
         """
         looks = LiveFaults(self._geometry, self._stream.sample_rate_hz)
         powers: list[float] = []
@@ -140,7 +146,10 @@ class LiveHearing:
             self._stream.close()
 
     def _accepted(self, block: SoundBlock, looks: LiveFaults) -> NDArray[np.float32]:
-        """The array's channels of a block, which are samples beyond doubt."""
+        """Returns the array's channels of a block, and reports faults of the block.
+
+        A block with invalid samples counts as silence.
+        """
         channels = block.samples[list(self._geometry.columns)]
         self._samples += channels.shape[1]
         self.heard.seconds = self._samples / self._stream.sample_rate_hz
@@ -161,7 +170,10 @@ class LiveHearing:
         return self._signs * channels
 
     def _mend(self, fault: ChannelFault, looks: LiveFaults) -> None:
-        """Names a fault, and goes on without what it is of."""
+        """Reports a fault, and continues without its effect if possible.
+
+        An inverted channel is corrected, and a dead channel is left out.
+        """
         if fault.kind == "dead" and not set(fault.channels) & set(self._alive):
             return
         if fault.kind in _FATAL:
@@ -173,7 +185,7 @@ class LiveHearing:
         self._name(fault.message, (fault.kind, *fault.channels))
         if fault.kind in ("inverted", "dead"):
             looks.begin(self._alive)
-            # What an inverted channel made of a source is none.
+            # Tracks from an inverted channel are wrong.
             keeps_tracks = fault.kind == "dead"
             self._memory = self._memory.after_gap(self._plan, keeps_tracks=keeps_tracks)
 
@@ -205,14 +217,14 @@ def listen(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStre
     """Listens to the end of a stream.
 
     Args:
-        hearing: The stream and its array.
-        tell: Called for each step.
+        hearing: Stream and array.
+        tell: Function that is called with the sources of each step.
 
     Returns:
-        What was heard; its status says how the stream ended.
+        Summary of the stream. Its status says how the stream ended.
 
     Raises:
-        InputError: The stream turns out to be none at its first sample.
+        InputError: The first samples show that the stream cannot be used.
     """
     try:
         for step in hearing.steps():
@@ -224,13 +236,13 @@ def listen(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStre
 
 
 def track_document(step: HeardStep) -> list[dict[str, Any]]:
-    """A line of JSON for each source of a step.
+    """Makes a JSON object for each source of a step.
 
     Args:
-        step: Its sources.
+        step: Sources of a step.
 
     Returns:
-        Time in s, angles in deg.
+        One dictionary per source, with the time in s and angles in deg.
     """
     return [
         {

@@ -1,4 +1,4 @@
-"""Sound from a sound card, by the ``sounddevice`` package."""
+"""Records a stream of sound with a sound card, using the ``sounddevice`` package."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from analysis.listening.sound_stream import (
 )
 from systems.framework.input_error import InputError
 
-# Blocks that may wait to be heard, 5 s of them.
+# Largest number of blocks that wait to be processed. They last 5 s.
 _MOST_WAITING = 250
 
-# By how much a card's rate may differ from what was asked for.
+# Largest relative difference between the card's sample rate and the requested rate.
 _RATE_OFF = 1e-3
 
 _LOST = "samples were lost; close other programs, or lower the rate"
@@ -33,18 +33,20 @@ _LOST = "samples were lost; close other programs, or lower the rate"
 def open_card(
     device: str | int | None, *, channels: int, sample_rate_hz: int
 ) -> SoundStream:
-    """Sound from a sound card.
+    """Opens a stream from a sound card.
 
     Args:
-        device: Its name, or a part of it, or its number; None: the default one.
-        channels: To record.
-        sample_rate_hz: Hz.
+        device: Name of the card, a part of its name, or its number. None: the default
+            card.
+        channels: Number of channels to record.
+        sample_rate_hz: Sample rate, Hz.
 
     Returns:
         The stream, which has no end.
 
     Raises:
-        InputError: The package or the device is missing, or it cannot record so.
+        InputError: The package or the card is missing, or the card cannot record these
+            channels at this rate.
     """
     try:
         import sounddevice
@@ -86,7 +88,7 @@ def open_card(
 
 
 class _Recorder:
-    """What a card has recorded and nobody has heard yet."""
+    """Queue of recorded blocks that are not processed yet."""
 
     def __init__(self, channels: int, sample_rate_hz: int) -> None:
         self._channels = channels
@@ -96,7 +98,10 @@ class _Recorder:
         self._lost = False
 
     def came(self, samples: Any, _frames: int, _time: Any, status: Any) -> None:
-        """Called by PortAudio's thread, with (k, channels) samples for the moment."""
+        """Stores (k, channels) samples, which are valid only during this call.
+
+        The thread of PortAudio calls this function.
+        """
         lost = self._lost or bool(status.input_overflow)
         try:
             self._waiting.put_nowait((samples.T.copy(), lost))
@@ -105,7 +110,7 @@ class _Recorder:
             self._lost = True
 
     def blocks(self, card: Any) -> Iterator[SoundBlock]:
-        """Each block as it comes, for as long as the card is there."""
+        """Yields each block when it arrives, until the card is disconnected."""
         if abs(card.samplerate - self._rate) > _RATE_OFF * self._rate:
             raise InputError(
                 "--rate",

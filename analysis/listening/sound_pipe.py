@@ -1,4 +1,8 @@
-"""Sound from a pipe or a file: WAV, FLAC, or raw samples of all channels in turn."""
+"""Reads a stream of sound from a pipe or a file.
+
+The sound is WAV, FLAC, or raw samples. Raw samples are interleaved: one sample of each
+channel in turn.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +33,8 @@ from systems.framework.input_error import InputError
 
 SampleFormat = Literal["s16le", "s24le", "s32le", "f32le"]
 
-#: Names of raw samples, as other programs use them, and their bytes.
+#: Formats of raw samples, by the names that other programs use, and their bytes per
+#: sample.
 SAMPLE_FORMATS: dict[SampleFormat, int] = {
     "s16le": 2,
     "s24le": 3,
@@ -40,15 +45,18 @@ SAMPLE_FORMATS: dict[SampleFormat, int] = {
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
 _MOST_HEADER, _MOST_CHUNKS = 2**16, 64
 
-# Recorders that write to a pipe state lengths of 0, or at about the limits of signed
-# and unsigned numbers.
+# Least length in a WAV header that means an unknown length. Recorders that write to a
+# pipe state 0, or a value near the limit of a signed or unsigned number.
 _UNKNOWN = 0x7FFF_0000
 
-# How another WAV begins, its bytes, and what may be a part of that.
+# _BEGIN: first bytes of a further WAV in the stream.
+# _BEGIN_SIZE: number of these bytes.
+# _BEGIN_AT_END: a possible incomplete beginning at the end of the data.
 _BEGIN, _BEGIN_SIZE = re.compile(rb"RIFF.{4}WAVEfmt ", re.DOTALL), 16
 _BEGIN_AT_END = re.compile(rb"RIFF|RIF$|RI$|R$")
 
-# First bytes of files that are neither WAV nor raw.
+# First bytes of files that are neither WAV nor raw samples, and the text of the
+# message.
 _OTHERS = {
     b"fLaC": "FLAC; name the file, or decode it: flac -dc FILE.flac |",
     b"OggS": "Ogg; decode it: ffmpeg -i FILE -f wav - |",
@@ -67,7 +75,7 @@ class _Format(NamedTuple):
 
     @property
     def width(self) -> int:
-        """Bytes of a sample of all channels."""
+        """Bytes of one sample of all channels."""
         return self.channels * SAMPLE_FORMATS[self.samples]
 
     def __str__(self) -> str:
@@ -82,22 +90,25 @@ def open_pipe(
     sample_rate_hz: int | None = None,
     sample_format: SampleFormat = "s16le",
 ) -> SoundStream:
-    """Sound from a pipe or a file, which is read to its end, and never sought in.
+    """Opens a stream from a pipe or a file.
+
+    The pipe is read to its end, without seeking.
 
     Args:
-        pipe: With a file descriptor; nothing was read from it before. It is the
-            stream's from here on, and closed with it.
-        raw_channels: Of raw samples, where nothing is stated.
-        channels: That are stated; none: those of the WAV header.
-        sample_rate_hz: That is stated, Hz; none: that of the WAV header.
-        sample_format: Of raw samples.
+        pipe: Pipe or file with a file descriptor, from which nothing was read before.
+            The stream owns it and closes it.
+        raw_channels: Number of channels of raw samples if ``channels`` is None.
+        channels: Stated number of channels. None: the number in the WAV header.
+        sample_rate_hz: Stated sample rate, Hz. None: the rate in the WAV header.
+        sample_format: Format of raw samples.
 
     Returns:
         The stream.
 
     Raises:
-        InputError: It is empty, its header is of another kind or contradicts what is
-            stated, or it is raw and nobody says its rate.
+        InputError: There are three possible causes. The input is empty. Its header is
+            not WAV or contradicts the stated values. The input is raw and no sample
+            rate is stated.
     """
     with ExitStack() as stack:
         stack.callback(pipe.close)
@@ -114,7 +125,12 @@ def open_pipe(
 
 
 def _begin(source: _Source, raw: _Format | None) -> tuple[_Format, int | None]:
-    """What comes, and its bytes if that is known; ``raw`` where there is no header."""
+    """Reads the beginning of the input up to the samples.
+
+    Returns:
+        form: Format of the samples; ``raw`` if there is no header.
+        length: Number of bytes of the samples. None if it is unknown.
+    """
     start = source.read(4)
     if not start:
         raise InputError("input", "it is empty; pipe in WAV or raw samples")
@@ -133,7 +149,7 @@ def _begin(source: _Source, raw: _Format | None) -> tuple[_Format, int | None]:
 
 
 class _Source:
-    """Bytes of a pipe or file, and how long they were waited for."""
+    """Reads bytes from a pipe or file, and measures the time spent waiting for them."""
 
     def __init__(self, pipe: BinaryIO) -> None:
         self._descriptor = pipe.fileno()
@@ -141,11 +157,19 @@ class _Source:
         self.waited_s = 0.0
 
     def unread(self, data: bytes) -> None:
-        """Comes next."""
+        """Puts bytes back, so that they are read next."""
         self._unread = data + self._unread
 
     def some(self, size: int) -> bytes | None:
-        """Up to ``size`` bytes; none at the end, None where nothing has come."""
+        """Reads up to ``size`` bytes.
+
+        Args:
+            size: Largest number of bytes.
+
+        Returns:
+            The bytes. Empty at the end of the input. None if nothing has arrived for
+            1 s.
+        """
         if self._unread:
             data, self._unread = self._unread[:size], self._unread[size:]
             return data
@@ -155,7 +179,7 @@ class _Source:
         return os.read(self._descriptor, size) if ready else None
 
     def read(self, size: int) -> bytes:
-        """So many bytes, or all until the end."""
+        """Reads ``size`` bytes, or all bytes to the end if there are fewer."""
         data = b""
         while len(data) < size:
             more = self.some(size - len(data))
@@ -168,18 +192,18 @@ class _Source:
 def open_flac(
     path: Path, *, channels: int | None = None, sample_rate_hz: int | None = None
 ) -> SoundStream:
-    """Sound from a FLAC file.
+    """Opens a stream from a FLAC file.
 
     Args:
-        path: The file.
-        channels: That are stated; none: those of the file.
-        sample_rate_hz: That is stated, Hz; none: that of the file.
+        path: FLAC file.
+        channels: Stated number of channels. None: the number in the file.
+        sample_rate_hz: Stated sample rate, Hz. None: the rate in the file.
 
     Returns:
         The stream.
 
     Raises:
-        InputError: It cannot be decoded, or contradicts what is stated.
+        InputError: The file cannot be decoded, or it contradicts the stated values.
     """
     try:
         sound = soundfile.SoundFile(path)
@@ -216,10 +240,11 @@ def _check_stated(
 
 
 def _wav_header(source: _Source) -> tuple[_Format, int | None]:
-    """Reads from behind RIFF up to the samples.
+    """Reads a WAV header after the bytes RIFF, up to the samples.
 
     Returns:
-        What they are, and their bytes; None where the header leaves that open.
+        form: Format of the samples.
+        length: Number of bytes of the samples. None if the header does not state it.
     """
     _exactly(source, 4)
     if _exactly(source, 4) != b"WAVE":
@@ -265,7 +290,16 @@ def _exactly(source: _Source, size: int) -> bytes:
 
 
 def _blocks(source: _Source, form: _Format, length: int | None) -> Iterator[SoundBlock]:
-    """The samples, ``length`` bytes if that is known, and those of WAV that follow."""
+    """Yields blocks of samples, including those of further WAV files in the stream.
+
+    Args:
+        source: Input after the header.
+        form: Format of the samples.
+        length: Number of bytes of the samples. None if it is unknown.
+
+    Yields:
+        Blocks of samples. A block without samples reports a pause or an incomplete end.
+    """
     pace, gap, cut = Pace(form.sample_rate_hz), False, 0
     for data in _chunks(source, form, length):
         if data is None:
@@ -288,7 +322,11 @@ def _blocks(source: _Source, form: _Format, length: int | None) -> Iterator[Soun
 def _chunks(
     source: _Source, form: _Format, length: int | None
 ) -> Iterator[bytes | None]:
-    """Whole samples, but for the last ones; None where nothing has come for a while."""
+    """Yields the bytes of whole samples. Only the last bytes may be incomplete.
+
+    Yields:
+        Bytes, or None if nothing has arrived for 1 s.
+    """
     most = form.width * max(1, round(BLOCK_S * form.sample_rate_hz))
     while True:
         data = b""
@@ -322,7 +360,11 @@ def _chunks(
 
 
 def _reaches_another(source: _Source) -> bool:
-    """Reads what stands behind the samples of a WAV, up to one that is joined to it."""
+    """Skips the chunks after the samples of a WAV until another WAV begins.
+
+    Returns:
+        True if another WAV begins, False at the end of the input.
+    """
     while (name := source.read(4)) != b"RIFF":
         size = source.read(4)
         if len(name + size) < 8:
@@ -333,10 +375,14 @@ def _reaches_another(source: _Source) -> bool:
 
 
 def _another(source: _Source, form: _Format) -> int | None:
-    """Reads the header of a further WAV from behind RIFF on; its bytes, if known."""
+    """Reads the header of a further WAV after the bytes RIFF.
+
+    Returns:
+        Number of bytes of its samples. None if it is unknown.
+    """
     other, length = _wav_header(source)
     if other != form:
-        # Times and delays are counted in samples of one rate.
+        # Times and delays are counted in samples, so the rate must not change.
         raise StreamBrokenError(
             f"the stream changes from {form} to {other}; listen to the second part by "
             "itself"
@@ -345,7 +391,7 @@ def _another(source: _Source, form: _Format) -> int | None:
 
 
 def _samples(data: bytes, form: _Format) -> NDArray[np.float32]:
-    """(channels, k), full scale 1."""
+    """Converts bytes to (channels, k) samples; full scale is 1."""
     return _numbers(data, form.samples).reshape(-1, form.channels).T
 
 

@@ -1,4 +1,4 @@
-"""Sound that comes in as it is made, and what goes wrong on the way."""
+"""Describes streams of live sound, and checks the rate at which samples arrive."""
 
 from __future__ import annotations
 
@@ -9,24 +9,26 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-#: Blocks are this long, s: short beside a step of the listener.
+#: Length of a block, s. It is short compared with a step of the listener.
 BLOCK_S = 0.02
 
-#: A stream that brings nothing for so long has stopped, s.
+#: Time without samples after which a stream counts as stopped, s.
 SILENT_AFTER_S = 1.0
 STOPPED = (
     f"no sound has come for {SILENT_AFTER_S:g} s; tracks of sources restart when it "
     "continues, and times count the sound only"
 )
 
-# Seconds over which the pace of samples is measured; what it may be off; beyond what it
-# is no rate; and the part of the time that is spent on waiting where the pace is that
-# of the sender.
+# The pace is the ratio between the rate at which samples arrive and the stated rate.
+# - _PACE_S: duration of a measurement of the pace, s.
+# - _PACE_OFF: largest permitted deviation of the pace from 1.
+# - _PACE_MOST: a larger pace is not that of a live sender.
+# - _WAITING: least share of time spent waiting if the sender determines the pace.
 _PACE_S, _PACE_OFF, _PACE_MOST, _WAITING = 10.0, 0.03, 4.0, 0.2
 
 
 class StreamBrokenError(Exception):
-    """A stream ended otherwise than at its end; says how."""
+    """A stream ended before its regular end. The message says why."""
 
 
 @dataclass(frozen=True)
@@ -34,34 +36,36 @@ class SoundBlock:
     """The next samples of all channels."""
 
     samples: NDArray[np.float32]
-    """(channels, k), full scale 1; k may be 0."""
+    """(channels, k) samples; full scale is 1. k may be 0."""
     faults: tuple[str, ...] = ()
-    """What went wrong before them."""
+    """Messages about faults before these samples."""
     gap: bool = False
-    """Whether samples may be missing before them."""
+    """Whether samples may be missing before these samples."""
 
 
 @dataclass(frozen=True)
 class SoundStream:
-    """Samples of all channels, block after block."""
+    """A stream of samples of all channels, in blocks."""
 
     channels: int
     sample_rate_hz: int
     blocks: Iterator[SoundBlock] = field(repr=False)
-    """They end with the stream, and raise ``StreamBrokenError`` where it breaks off."""
+    """Blocks until the end of the stream. The iterator raises ``StreamBrokenError`` if
+    the stream breaks off."""
     close: Callable[[], None] = field(default=lambda: None, repr=False)
-    """Gives back what it comes from; called by whoever hears it, or refuses to."""
+    """Closes the source of the stream. The code that listens to the stream, or rejects
+    it, calls this function."""
 
 
 class Pace:
-    """Tells whether samples come at the rate that is stated.
+    """Checks whether samples arrive at the stated rate.
 
-    It is measured only while this program waits for them: a file comes as fast as it
-    is read.
+    The check is made only if this program waits for the samples. A file arrives as fast
+    as it is read.
 
     Args:
-        sample_rate_hz: That is stated, Hz.
-        clock: Of this computer, s.
+        sample_rate_hz: Stated sample rate, Hz.
+        clock: Function that returns the time of this computer, s.
     """
 
     def __init__(
@@ -73,20 +77,20 @@ class Pace:
         self.begin()
 
     def begin(self) -> None:
-        """Begins anew, as after a stop."""
+        """Restarts the measurement, for example after a stop of the stream."""
         self._since = self._clock()
         self._samples = 0
         self._waited = 0.0
 
     def came(self, samples: int, waited_s: float) -> tuple[str, ...]:
-        """Counts a block.
+        """Counts a block of samples.
 
         Args:
-            samples: That have come, of a channel.
-            waited_s: Time that was spent on waiting for them, s.
+            samples: Number of samples per channel that have arrived.
+            waited_s: Time spent waiting for them, s.
 
         Returns:
-            What is wrong: nothing, or one message.
+            One message if the rate is wrong, otherwise nothing.
         """
         self._samples += samples
         self._waited += waited_s

@@ -1,4 +1,4 @@
-"""How ``phonotaxis listen`` tells what it hears: JSON lines, text, or a screen."""
+"""Displays the steps of ``phonotaxis listen``: as JSON, as text, or on a screen."""
 
 from __future__ import annotations
 
@@ -12,31 +12,34 @@ from analysis.arrays.voting.source_listener import TrackedSources
 from analysis.arrays.voting.source_tracks import SourceTrack
 from analysis.listening.live_hearing import HeardStep, track_document
 
-# Columns of the compass, which is odd so that ahead is in its middle, and its least.
+# _COLUMNS: largest number of columns of the compass. It is odd so that the direction
+#   ahead is in the middle.
+# _LEAST_COLUMNS: least number of columns of the compass.
 _COLUMNS, _LEAST_COLUMNS = 73, 25
 
-# Levels from the quietest to the loudest that are shown, dB, by so many bars.
+# _LEVELS_DB: lowest and highest level that the level bar shows, dB.
+# _BARS: number of characters of the level bar.
 _LEVELS_DB, _BARS = (-72.0, 0.0), 12
 
 _HIDE, _SHOW, _TO_END, _BELOW = "\x1b[?25l", "\x1b[?25h", "\x1b[K", "\x1b[J"
 
 
 class Teller(Protocol):
-    """Tells steps and faults while they come."""
+    """Displays steps and faults while they arrive."""
 
     def tell(self, step: HeardStep) -> None:
-        """The sources of a step."""
+        """Displays the sources of a step."""
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault that was seen at t.
+        """Displays a fault.
 
         Args:
-            fault: In words.
-            t_s: When it was seen, s of sound.
+            fault: Message about the fault.
+            t_s: Time of the fault, s of sound.
         """
 
     def __enter__(self) -> object:
-        """Begins."""
+        """Begins the display."""
 
     def __exit__(
         self,
@@ -44,22 +47,22 @@ class Teller(Protocol):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Ends, however that comes."""
+        """Ends the display, also after an error."""
 
 
 class TextLines:
-    """A line a second.
+    """Writes one line of text per second.
 
     Args:
-        out: Where sources are told.
-        errors: Where faults are named.
+        out: Where to write the sources.
+        errors: Where to write the faults.
     """
 
     def __init__(self, out: TextIO, errors: TextIO) -> None:
         self._out, self._errors = out, errors
 
     def tell(self, step: HeardStep) -> None:
-        """The sources of a step, if a second is full."""
+        """Writes the sources of a step if its time is a whole second."""
         t_s = step.sources.t_s
         if abs(t_s - round(t_s)) < 1e-6:
             each = "  ".join(_words(track) for track in step.sources.tracks)
@@ -67,11 +70,11 @@ class TextLines:
             self._out.flush()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault, on standard error.
+        """Writes a fault to ``errors``.
 
         Args:
-            fault: In words.
-            t_s: When it was seen, s of sound.
+            fault: Message about the fault.
+            t_s: Time of the fault, s of sound.
         """
         self._errors.write(f"phonotaxis: at {t_s:.1f} s: {fault}\n")
         self._errors.flush()
@@ -85,24 +88,24 @@ class TextLines:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Nothing to end."""
+        """Does nothing, because there is nothing to end."""
 
 
 class JsonLines(TextLines):
-    """A line for each source and step, and for each fault."""
+    """Writes one JSON line per source and step, and one per fault."""
 
     def tell(self, step: HeardStep) -> None:
-        """The sources of a step, at once."""
+        """Writes the sources of a step immediately, one line per source."""
         for line in track_document(step):
             self._out.write(f"{json.dumps(line, allow_nan=False)}\n")
         self._out.flush()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault, on both streams.
+        """Writes a fault to both streams.
 
         Args:
-            fault: In words.
-            t_s: When it was seen, s of sound.
+            fault: Message about the fault.
+            t_s: Time of the fault, s of sound.
         """
         super().name_fault(fault, t_s)
         self._out.write(f"{json.dumps({'t_s': round(t_s, 6), 'fault': fault})}\n")
@@ -110,11 +113,11 @@ class JsonLines(TextLines):
 
 
 class Screen(TextLines):
-    """All of it in place, each step written at once over the last one.
+    """Draws the latest step on a terminal, over the previous step.
 
     Args:
-        out: A terminal.
-        errors: Not used: faults stay on the screen.
+        out: Terminal.
+        errors: Not used, because faults stay on the screen.
     """
 
     def __init__(self, out: TextIO, errors: TextIO) -> None:
@@ -124,16 +127,16 @@ class Screen(TextLines):
         self._height = 0
 
     def tell(self, step: HeardStep) -> None:
-        """Draws a step over the last one."""
+        """Draws a step over the previous step."""
         self._step = step
         self._draw()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault stays on the screen.
+        """Adds a fault, which stays on the screen.
 
         Args:
-            fault: In words.
-            t_s: When it was seen, s of sound.
+            fault: Message about the fault.
+            t_s: Time of the fault, s of sound.
         """
         self._faults.append(f"! {t_s:.1f} s: {fault}")
         self._draw()
@@ -157,21 +160,25 @@ class Screen(TextLines):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Leaves the last step where it is, and the cursor below it."""
+        """Leaves the last step on the screen, and shows the cursor below it."""
         self._out.write(_SHOW)
         self._out.flush()
 
 
 def view(step: HeardStep, width: int, faults: list[str]) -> list[str]:
-    """A step as lines of text: a compass, and a line for each source and fault.
+    """Formats a step as lines of text.
+
+    The lines are a compass, one line per source, and one line per fault. The middle of
+    the compass is ahead (+x). Its left half goes to the left and its right half to the
+    right. Both ends are behind.
 
     Args:
-        step: What was heard.
-        width: Columns that there are.
-        faults: A line each.
+        step: Sources and level of a step.
+        width: Number of columns of the screen.
+        faults: Messages about faults, one line each.
 
     Returns:
-        The lines. The compass goes from behind over the left and ahead (+x) to behind.
+        The lines.
     """
     columns = min(_COLUMNS, max(_LEAST_COLUMNS, width - 3) // 2 * 2 + 1)
     marks, names = ["·"] * columns, [" "] * columns
@@ -181,7 +188,7 @@ def view(step: HeardStep, width: int, faults: list[str]) -> list[str]:
         name = f"{degrees:+d}" if degrees % 180 else f"{abs(degrees)}"
         first = min(max(0, column - len(name) // 2), columns - len(name))
         names[first : first + len(name)] = name
-    # The surest one on top, where several are in a column.
+    # If several sources share a column, the most certain one is visible.
     for track in sorted(step.sources.tracks, key=lambda track: track.sounding):
         marks[_column(track.bearing, columns)] = str(track.identity % 10)
     low, high = _LEVELS_DB

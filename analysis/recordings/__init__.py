@@ -1,1 +1,1 @@
-"""Sounds in recordings of arrays that people have."""
+"""Locates sounds in the recordings of microphone arrays."""

@@ -1,9 +1,13 @@
-"""Delays of channels that are nearly aligned, from many short spectra at once.
+"""Estimates the delays of nearly aligned channels from many short spectra together.
 
-The delays are those that make the channels agree best in phase, over all
-pairs, snapshots and frequencies. Frequencies where the channels agree count
-more. How much the bands of frequencies disagree on the delays gives the errors
-that noise makes, and reflections, as far as they move bands apart.
+The estimated delays are those at which the phases of the channels agree best. The
+agreement is summed over all pairs of channels, all frequencies and all snapshots, which
+are short windows of the recording. If the channels are more coherent at a frequency,
+this frequency has a larger weight.
+
+The errors follow from how much frequency bands disagree about the delays. They include
+the errors from noise. They include errors from reflections only as far as the
+reflections shift the bands differently.
 """
 
 from __future__ import annotations
@@ -20,32 +24,35 @@ from systems.framework.compiling import njit
 _BANDS = 24
 _LEAST_BANDS = 4
 
-# Added to the power that whitens, as a share of the frequency's mean: what is
-# weak says little.
+# Power added before whitening, as a share of the mean power at the frequency. With it,
+# weak snapshots count little.
 _FLOOR = 1.0
 
-# Reflections move bands alike as well as apart: by how much the errors are
-# larger than the bands' disagreement, for each part that is not coherent.
-# From simulated rooms with reverberation times of 0.15-0.6 s.
+# Factor for the errors from reflections, which also shift all bands equally. The errors
+# grow by this share for each part of the sound that is not coherent. The value is from
+# simulated rooms with reverberation times of 0.15-0.6 s.
 _ECHO_ERROR = 1.0
 _STEPS = 12
-_SETTLED = 1e-4  # of the period of the highest frequency
+# The search ends if the steps are below this share of a quarter of the shortest period.
+_SETTLED = 1e-4
 _MOST_COHERENT = 0.9999
 
 
 @dataclass(frozen=True)
 class AlignedDelays:
-    """What is left of the delays after the alignment."""
+    """Estimated delays that remain after the alignment of the channels."""
 
     tau: NDArray[np.float64]
-    """(n - 1,) of channels 1 ... n - 1 against channel 0, s."""
+    """(n - 1,) delays of channels 1 ... n - 1 after channel 0, s."""
     covariance: NDArray[np.float64]
-    """(n - 1, n - 1), s^2."""
+    """(n - 1, n - 1) covariance of the delays, s^2."""
     coherence: float
-    """Mean over pairs and frequencies of the part in phase, at most 1; frequencies
-    count as far as they are coherent."""
+    """Share of the sound that is in phase in two channels, at most 1. It is the mean
+    over all pairs and frequencies. More coherent frequencies have a larger weight in
+    the mean."""
     agreement: float = field(default=0.0, kw_only=True)
-    """The same with all frequencies alike: how well these delays explain all."""
+    """Share of the sound that is in phase in two channels, with equal weights for all
+    frequencies. It measures how well the delays explain the whole sound."""
 
 
 def fit_aligned_delays(
@@ -54,17 +61,19 @@ def fit_aligned_delays(
     angular_frequency: NDArray[np.float64],
     coarseness: float = 1.0,
 ) -> AlignedDelays | None:
-    """Delays of aligned channels.
+    """Estimates the delays that remain between channels after a rough alignment.
 
     Args:
-        spectra: (n, k, f) of k snapshots of n channels, each about as large.
-        weights: (k, f) of the snapshots' frequencies, 0 to 1.
-        angular_frequency: (f,) rad/s, rising.
-        coarseness: By how much the alignment may be off, against a tenth of
-            the shortest period: the search begins at lower frequencies.
+        spectra: (n, k, f) spectra of n channels at f frequencies in k snapshots. A
+            snapshot is a short window of the recording. All channels have about the
+            same power.
+        weights: (k, f) weights of the frequencies of each snapshot, 0 to 1.
+        angular_frequency: (f,) increasing angular frequencies, rad/s.
+        coarseness: Possible error of the alignment, in tenths of the shortest period.
+            If it exceeds 1, the search begins with the lower frequencies only.
 
     Returns:
-        The delays, or None where the channels do not agree.
+        The delays and their errors. None if the channels do not agree on any delays.
     """
     first, second = np.triu_indices(len(spectra), 1)
     power = np.mean(np.abs(spectra) ** 2, axis=0)
@@ -109,7 +118,7 @@ def fit_aligned_delays(
 
 
 def _band_edges(total: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Edges of bands that hold about the same weight."""
+    """Returns the edges of frequency bands that have about the same total weight."""
     share = np.cumsum(total) / total.sum()
     edges = np.searchsorted(share, np.arange(1, _BANDS) / _BANDS)
     return np.unique(np.concatenate(([0], edges, [total.size])))
@@ -122,14 +131,14 @@ def _coherence_gain(
     tau: NDArray[np.float64],
     edges: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """(f,) weights of phases with coherence r: r / (1 - r^2)."""
+    """Returns (f,) weights r / (1 - r^2) of phases with the coherence r."""
     later = np.concatenate(([0.0], tau))
     first, second = np.triu_indices(later.size, 1)
     turned = cross * np.exp(1j * np.outer(later[second] - later[first], w))
     in_phase = np.add.reduceat(turned.real.mean(axis=0), edges[:-1])
     whole = np.add.reduceat(total, edges[:-1])
     r = np.clip(in_phase / np.maximum(whole, 1e-30), 0.0, _MOST_COHERENT)
-    # What noise alone would reach is nothing.
+    # A coherence that noise alone can reach counts as 0.
     noise = 2.0 / np.sqrt(np.maximum(whole * len(first), 1.0))
     r[r < noise] = 0.0
     return np.repeat(r / (1.0 - r**2), np.diff(edges))
@@ -141,7 +150,10 @@ def _climb(
     w: NDArray[np.float64],
     tau: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Newton's method, kept within a quarter of the shortest period a step."""
+    """Maximizes the agreement by Newton's method, at most a quarter period per step.
+
+    The period is that of the highest frequency with a weight.
+    """
     top = w[np.flatnonzero(gain)[-1]]
     limit = 0.5 * math.pi / top
     edges = np.array([0, w.size])
@@ -164,11 +176,15 @@ def _climb(
 def _sums(  # pragma: no cover  (compiled)
     cross: Any, gain: Any, w: Any, tau: Any, edges: Any
 ) -> tuple[Any, Any, float]:
-    """Derivatives of the agreement, sum over pairs of Re(cross e^(j w delay)).
+    """Computes the agreement of the channels and its derivatives.
+
+    The agreement is the sum over all pairs and frequencies of Re(cross e^(j w delay)).
 
     Returns:
-        The slope of each band (b, n - 1), minus the second derivative of all
-        (n - 1, n - 1), and the agreement itself.
+        slope: (b, n - 1) derivative of the agreement of each of b bands with respect to
+            the delays.
+        curve: (n - 1, n - 1) negative second derivative of the total agreement.
+        agreement: Total agreement over all pairs and frequencies.
     """
     bands, count = edges.size - 1, tau.size + 1
     slope = np.zeros((bands, count - 1))

@@ -1,4 +1,4 @@
-"""Microphones of a recording: where they stand, and how to read that."""
+"""Describes the microphones of a recording, and reads them from a geometry file."""
 
 from __future__ import annotations
 
@@ -19,21 +19,27 @@ from systems.framework.parameters import Parameters, Point, Positive
 from systems.sound.acoustics import SOUND_SPEED_M_S, sound_speed
 from systems.sound.array_shape import ArrayShape
 
-# Positions that are farther apart are in other units than metres.
+# Largest distance between two microphones, m. Larger distances mean that the positions
+# are not in meters.
 _LARGEST_M = 30.0
 
-# The work grows with the number of pairs.
+# Largest number of microphones. The computing time grows with the number of pairs.
 _MOST_MICROPHONES = 64
 
 _LEAST_BAND_HZ = 500.0
 
-# Where a geometry does not say how well it is known: places to this share of the
-# aperture, as by a tape for a large array and as on a board for a small one, but to
-# this at best; the air to these, with and without a word on it.
+# _PLACES_SHARE: default standard deviation of positions as a share of the aperture. It
+#   corresponds to a tape measure for a large array, and to a circuit board for a small
+#   one.
+# _PLACES_M: least default standard deviation of positions, m.
+# _TEMPERATURE_C: default standard deviation of a stated temperature, deg C.
+# _SPEED_SHARE: default relative standard deviation of the speed of sound, if the
+#   geometry states neither the speed nor the temperature.
 _PLACES_SHARE, _PLACES_M = 0.01, 0.0005
 _TEMPERATURE_C, _SPEED_SHARE = 2.0, 0.01
 
-# Covariances are symmetric and positive to this part of their largest variance.
+# Tolerance for the symmetry and the eigenvalues of a covariance, as a share of its
+# largest variance.
 _ROUNDING = 1e-6
 
 _Point3 = Annotated[tuple[float, float, float], Strict(False)]
@@ -50,54 +56,66 @@ _Side = Literal["ahead", "behind", "above", "below"]
 
 @dataclass(frozen=True)
 class KnownArray:
-    """An array, and how well it is known."""
+    """Microphone array with the errors of its description."""
 
     shape: ArrayShape
-    """The microphones, looking to the side that is stated."""
+    """The microphones, facing the stated side."""
     c: float
     """Speed of sound, m/s."""
     budget: ArrayBudget
-    """What is not known of the places, of the air and of the channels."""
+    """Errors of the positions, of the speed of sound, and of the channels' sampling
+    times."""
     gain_std_db: float = 2.0
     """Standard deviation of a channel's gain, dB."""
     largest_range_error: float = 0.2
-    """Ranges are given up to this standard deviation over range."""
+    """Largest standard deviation of a reported range, as a share of the range."""
 
 
 class ArrayGeometry(Parameters):
-    """A geometry file. The default places are those of the robot's own array."""
+    """Contents of a geometry file.
+
+    The default positions are those of the robot's own array.
+    """
 
     microphones: _Points | _Points3 = ((0.0, 0.4), (0.0, 0.0), (0.0, -0.4))
-    """Places (x, y) or (x, y, z) in the order of the channels, m."""
+    """Positions (x, y) or (x, y, z) of the microphones in the order of the channels, m.
+    """
     channels: _Channels | None = None
-    """Columns of the file to use, from 0; none: the first ones."""
+    """Columns of the recording to use, counted from 0. None: the first columns."""
     sound_speed: float | None = Field(default=None, ge=100.0, le=8000.0)
-    """Speed of sound, m/s; none: 340, or from the temperature."""
+    """Speed of sound, m/s. None: the speed at the stated temperature, or 340 m/s."""
     temperature_c: float | None = Field(default=None, ge=-50.0, le=60.0)
-    """Temperature, deg C."""
+    """Air temperature, deg C."""
     band: _Band | None = None
-    """Band of the sound, Hz; none: 300 to 15000 or 0.45 of the sample rate."""
+    """Lowest and highest frequency of the sound, Hz. None: 300 Hz up to 15000 Hz or
+    0.45 times the sample rate, whichever is lower."""
     position_std_m: _PlaceStd | _PlaceStds | None = None
-    """Standard deviation of each coordinate of the microphones' places, one for all or
-    one each, m; none: 1 % of the aperture, 0.5 mm at least."""
+    """Standard deviation of each coordinate of the microphones, m. Give one value for
+    all microphones, or one value per microphone. None: 1 % of the aperture, but at
+    least 0.5 mm."""
     position_covariance_m2: _Matrix | None = None
-    """Covariance of a microphone's coordinates, alike for all, or of all coordinates
-    of all microphones in their order, m^2; instead of ``position_std_m``."""
+    """Covariance of the microphone coordinates, m^2, instead of ``position_std_m``.
+    Give the covariance of one microphone, which then applies to all. Or give the
+    covariance of all coordinates in the order of the microphones."""
     sound_speed_std: float | None = Field(default=None, ge=0.0, le=400.0)
-    """Standard deviation of the speed of sound, m/s; none: from that of the
-    temperature, or 1 % where nothing is said of the air."""
+    """Standard deviation of the speed of sound, m/s. None: the value that follows from
+    the standard deviation of the temperature. If the file states nothing about the air,
+    it is 1 % of the speed."""
     temperature_std_c: float | None = Field(default=None, ge=0.0, le=50.0)
-    """Standard deviation of the temperature, deg C; none: 2."""
+    """Standard deviation of the temperature, deg C. None: 2 deg C."""
     delay_std_s: float = Field(default=1e-6, ge=0.0, le=0.01)
-    """Standard deviation of each channel's instants of sampling, s."""
+    """Standard deviation of the sampling times of each channel, s."""
     gain_std_db: float = Field(default=2.0, ge=0.0, le=40.0)
-    """Standard deviation of each channel's gain, dB. Delays do not depend on it; a
-    channel is named as far louder or fainter than the others beyond it."""
+    """Standard deviation of the gain of each channel, dB. The delays do not depend on
+    it. It determines when a channel is reported as much louder than the other channels.
+    """
     largest_range_error: float = Field(default=0.2, gt=0.0, le=1.0)
-    """Ranges are given where their standard deviation is at most this share of them."""
+    """Largest standard deviation of a reported range, as a share of the range. Less
+    certain ranges are not reported."""
     side: _Side | None = None
-    """On which side of a row (ahead, behind) or of a plane (above, below) all sources
-    are; none: either, and the other one is named as an alternative."""
+    """Side on which all sources are: ahead of or behind a row, above or below a plane.
+    None: both sides are possible, and the mirrored direction is reported as an
+    alternative."""
 
     @model_validator(mode="after")
     def _check(self) -> ArrayGeometry:
@@ -167,7 +185,7 @@ class ArrayGeometry(Parameters):
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """Columns of the recording, one a microphone."""
+        """Columns of the recording to use, one per microphone."""
         return self.channels or tuple(range(len(self.microphones)))
 
     @property
@@ -181,7 +199,7 @@ class ArrayGeometry(Parameters):
 
     @property
     def known(self) -> KnownArray:
-        """The array with its budget, as estimators take it."""
+        """The array with the errors of its description, as the estimators need it."""
         shape = ArrayShape.of(self.microphones)
         of_places = self._of_places(shape)
         return KnownArray(
@@ -214,7 +232,7 @@ class ArrayGeometry(Parameters):
         return warmer - sound_speed(0.0)
 
 
-#: The robot's own array, built to a millimetre.
+#: The robot's own array, built to an accuracy of 1 mm.
 ROBOT_ARRAY = ArrayGeometry(position_std_m=0.001)
 
 
@@ -243,17 +261,18 @@ def _check_covariance(given: tuple[tuple[float, ...], ...], shape: ArrayShape) -
 def make_geometry(
     geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None,
 ) -> ArrayGeometry:
-    """A geometry from whatever says where microphones are.
+    """Makes a geometry from any supported description of the microphones.
 
     Args:
-        geometry: It, its file, places (x, y) or (x, y, z) in m, or none: the
-            robot's own array.
+        geometry: A geometry, the path of a geometry file, or a list of positions (x, y)
+            or (x, y, z) in m. None: the robot's own array.
 
     Returns:
-        The geometry.
+        The geometry of the array.
 
     Raises:
-        InputError: It makes no sense; says why, and the remedy.
+        InputError: The description is invalid. The message states the cause and the
+            remedy.
     """
     if geometry is None:
         return ROBOT_ARRAY
@@ -277,11 +296,14 @@ def load_geometry(path: str | Path) -> ArrayGeometry:
     """Reads a geometry file.
 
     Args:
-        path: YAML with ``microphones`` and optionally the other fields of
+        path: YAML file with ``microphones`` and optionally the other fields of
             ``ArrayGeometry``.
 
+    Returns:
+        The geometry in the file.
+
     Raises:
-        InputError: The file is missing, not YAML or makes no sense; the
+        InputError: The file is missing, is not YAML, or has an invalid value. The
             message names the field and the remedy.
     """
     path = require_file(path, "geometry", "YAML")
@@ -310,7 +332,7 @@ def load_geometry(path: str | Path) -> ArrayGeometry:
 
 def _first_error(error: ValidationError) -> str:
     first = error.errors()[0]
-    # Members of a union stand in the path, too, by names with brackets.
+    # The path of the error also contains the members of a union, as names in brackets.
     where = ".".join(str(part) for part in first["loc"] if "[" not in str(part))
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] in {"tuple_type", "too_short", "too_long"}:

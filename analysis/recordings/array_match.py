@@ -1,4 +1,4 @@
-"""Recordings of an array, and arrays of some of its microphones."""
+"""Reads recordings, checks that they match an array, and selects microphones."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _RATES_HZ = (8_000, 192_000)
 
 
 class RecordedSamples(NamedTuple):
-    """A recording in memory, which can be of the array that it was read for."""
+    """A recording in memory. Its channels and rate match the array it was read for."""
 
     samples: NDArray[np.float64]
-    """(channels, samples), full scale 1."""
+    """(channels, samples) recorded sound; full scale is 1."""
     rate: int
-    """Of the samples, Hz."""
+    """Sample rate, Hz."""
     name: str
-    """What to call it in messages."""
+    """Name of the recording in messages."""
 
 
 def recorded_samples(
@@ -33,18 +33,20 @@ def recorded_samples(
     geometry: ArrayGeometry,
     sample_rate_hz: float | None = None,
 ) -> RecordedSamples:
-    """Reads a recording.
+    """Reads a recording and checks that the array can have made it.
 
     Args:
-        recording: As of ``analysis.recordings.locate.locate``.
-        geometry: The array.
-        sample_rate_hz: Of samples, Hz; a file has its own.
+        recording: WAV or FLAC file with one channel per microphone, or
+            (channels, samples) recorded samples.
+        geometry: Geometry of the array.
+        sample_rate_hz: Rate of recorded samples, Hz. None for a file, which states its
+            own rate.
 
     Returns:
-        What it holds.
+        The samples, their rate, and a name for messages.
 
     Raises:
-        InputError: It cannot be read, or this array cannot have made it.
+        InputError: The recording cannot be read, or the array cannot have made it.
     """
     if isinstance(recording, str | Path):
         if sample_rate_hz is not None:
@@ -81,7 +83,7 @@ def _given(recording: ArrayLike, sample_rate_hz: float | None) -> RecordedSample
         )
     samples = given.astype(np.float64)
     if given.dtype.kind in "iu":
-        samples /= np.iinfo(given.dtype).max  # as files are read: full scale is 1
+        samples /= np.iinfo(given.dtype).max  # full scale is 1, as in files
     if not np.isfinite(samples).all() or not samples.any():
         raise InputError(
             "recording", f"{where} is silent or not finite; give recorded samples"
@@ -90,15 +92,16 @@ def _given(recording: ArrayLike, sample_rate_hz: float | None) -> RecordedSample
 
 
 def array_mismatch(geometry: ArrayGeometry, channels: int, rate: int) -> str:
-    """Why an array cannot have made a recording.
+    """Explains why an array cannot have made a recording.
 
     Args:
-        geometry: The array.
-        channels: Their number in the recording.
-        rate: Its sample rate, Hz.
+        geometry: Geometry of the array.
+        channels: Number of channels of the recording.
+        rate: Sample rate of the recording, Hz.
 
     Returns:
-        What goes on from its name; empty if it can have.
+        The reason, worded so that it continues a sentence that begins with the name of
+        the recording. Empty if the array can have made the recording.
     """
     count, needed = channels, len(geometry.microphones)
     if geometry.channels is not None and max(geometry.channels) >= count >= needed:
@@ -134,17 +137,17 @@ def array_mismatch(geometry: ArrayGeometry, channels: int, rate: int) -> str:
 
 
 def chosen_microphones(geometry: ArrayGeometry, chosen: Sequence[int]) -> ArrayGeometry:
-    """An array of some of the microphones.
+    """Makes the geometry of an array that has only some of the microphones.
 
     Args:
-        geometry: All of them.
-        chosen: The numbers of those that stay, from 0.
+        geometry: Geometry of all microphones.
+        chosen: Numbers of the microphones to keep, from 0.
 
     Returns:
-        Their array.
+        The geometry of the chosen microphones, with their columns and position errors.
 
     Raises:
-        ValueError: They are too few.
+        ValueError: There are too few chosen microphones for an array.
     """
     fields = geometry.model_dump(exclude_unset=True)
     fields["microphones"] = [geometry.microphones[k] for k in chosen]

@@ -1,10 +1,16 @@
-"""Faults of a recording's channels, named before they become wrong places.
+"""Finds faulty channels of a recording, which would otherwise cause wrong positions.
 
-A channel is first looked at alone (NaN, constant, clipped), then beside the
-others: whether it copies one (``systems.delays.copied_channels``), its level, the
-height and the sign of its correlation with them, and whether the delays of all are of
-the array's size (``analysis.recordings.delay_scale``) and belong to a place
-(``analysis.recordings.channel_order``).
+There are these checks:
+
+- Each channel alone: whether it has NaN values, is constant, or is clipped.
+- Pairs of channels: whether one is a copy of the other
+  (``systems.delays.copied_channels``).
+- Each channel compared with the others: its level, and the height and the sign of its
+  correlation with them.
+- The delays of all channels: whether they match the size of the array
+  (``analysis.recordings.delay_scale``).
+- The delays of all channels: whether they fit a position of a source
+  (``analysis.recordings.channel_order``).
 """
 
 from __future__ import annotations
@@ -22,47 +28,57 @@ from analysis.recordings.delay_scale import REACHES_M, DelayScale, delay_scale
 from systems.delays.copied_channels import copied_pairs
 from systems.sound.array_shape import ArrayShape
 
-# Below the median of all channels by this, a channel is dead, dB; above it by
-# this, the source is at it.
+# _DEAD_DB: a channel is dead if it is more than this below the second loudest of the
+#   others, dB.
+# _NEAR_DB: the source is near a channel that is more than this above the median of the
+#   others, dB.
+# _GAIN_DEVIATIONS: limit with the same meaning as _NEAR_DB, in standard deviations of
+#   the gain. The larger of the two limits applies.
 _DEAD_DB = 30.0
 _NEAR_DB = 15.0
 _GAIN_DEVIATIONS = 5.0
 
-# Least number and share of a channel's samples at an extreme, and how much more
-# often it occurs than the next values do: with a sine 2.4 times.
+# _LEAST_PILE: least number of samples of a clipped channel at an extreme value.
+# _CLIPPED_SHARE: least share of the samples of a clipped channel at an extreme value.
+# _PILE: how many times more often the extreme value occurs than each of the next three
+#   values. For a sine, the factor is 2.4.
 _LEAST_PILE = 5
 _CLIPPED_SHARE = 1e-4
 _PILE = 4.0
 
-# Correlations over those of noise: above the one a sound is shared, below the
-# other nothing is.
+# Limits of a correlation, as multiples of the correlation of noise. Above _COHERENT,
+# two channels share a sound. Below _INCOHERENT, they share nothing.
 _COHERENT, _INCOHERENT = 5.0, 2.5
 
-# Fewer frames than this may agree by chance; in a few long ones little is heard.
+# Least number of frames that must agree. Fewer frames may agree by chance, for example
+# in a recording with few long frames.
 _LEAST_FRAMES = 16
 
-# Delays so many times too long are not of wrong channels, but of wrong units.
+# Delays that are too long by more than this factor mean wrong units of the positions.
+# Up to this factor, they mean wrong positions or wrongly ordered channels.
 _OTHER_UNITS = 3.5
 
-# A source that would be farther off than this, straight above, is none, m.
+# Largest plausible distance of a source straight above the array, m.
 _FARTHEST_M = 20.0
 
-# Least lead of one sign of a correlation over the other, as a share of both.
+# Least difference between the positive and the negative peak of a correlation, as a
+# share of the sum of both.
 _LEAD = 0.1
 
 
 @dataclass(frozen=True)
 class ChannelFault:
-    """What is wrong with some channels."""
+    """A fault of one or more channels, or of the description of the array."""
 
     kind: Literal[
         "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
         "units", "size", "late", "drift"
     ]  # fmt: skip
     channels: tuple[int, ...]
-    """Their numbers, from 0; empty where all are concerned."""
+    """Numbers of the faulty channels, from 0. Empty if the fault concerns all channels.
+    """
     message: str
-    """One line: what was seen, and the remedy. It counts channels from 1."""
+    """One line with the observation and the remedy. It counts channels from 1."""
 
 
 def find_channel_faults(
@@ -72,18 +88,18 @@ def find_channel_faults(
     sample_rate_hz: float,
     band_hz: tuple[float, float] | None = None,
 ) -> list[ChannelFault]:
-    """What is wrong with the channels of a recording.
+    """Finds the faults of the channels of a recording.
 
     Args:
-        samples: (n, samples) one row a microphone.
-        array: The n microphones and their budget.
-        sample_rate_hz: Rate of the samples, Hz.
-        band_hz: Lowest and highest frequency of the sound, Hz; None: from 300
-            to 8000 or 0.45 of the rate.
+        samples: (n, samples) recorded samples, one row per microphone.
+        array: The n microphones and the errors of their description.
+        sample_rate_hz: Sample rate, Hz.
+        band_hz: Lowest and highest frequency of the sound, Hz. None: 300 Hz up to
+            8000 Hz or 0.45 times the sample rate, whichever is lower.
 
     Returns:
-        The faults; empty where none is seen, which is no proof that all is
-        well: a silent recording shows little.
+        The faults that were found. An empty list does not prove that all channels are
+        good, because a silent recording shows few faults.
     """
     shape, c = array.shape, array.c
     faults = [_unreadable(k, channel) for k, channel in enumerate(samples)]
@@ -165,7 +181,10 @@ def _copied(
 
 
 def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
-    """A channel whose samples pile up at an extreme, far above the next values."""
+    """Returns a fault if many samples of a channel have its lowest or highest value.
+
+    The value must occur far more often than each of the next three values.
+    """
     _, counts = np.unique(channel, return_counts=True)
     most = 0
     for ends in (counts, counts[::-1]):
@@ -185,17 +204,19 @@ def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
 def _levels(
     measured: PairCorrelations, use: NDArray[np.int64], gain_std_db: float
 ) -> list[ChannelFault]:
-    """Channels far below or above the others."""
+    """Finds channels whose level is far below or above the level of the others."""
     near_db = max(_NEAR_DB, _GAIN_DEVIATIONS * gain_std_db)
     level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
     faults = []
     for k, channel in enumerate(use.tolist()):
         others = np.sort(np.delete(level, k))
         over = float(level[k] - np.median(others))
-        # The loudest alone may have the source at its microphone.
+        # The loudest of the others does not count, because the source may be at its
+        # microphone.
         if level[k] - others[max(-2, -others.size)] < -_DEAD_DB:
             faults.append(_dead(channel, f"{-over:.0f} dB below the others"))
-        # It is near alone, among others with levels like each other's.
+        # The source is near one microphone if the levels of all other channels are
+        # similar.
         if over > near_db and np.ptp(others) < near_db:
             faults.append(
                 ChannelFault(
@@ -212,7 +233,10 @@ def _levels(
 def _strangers(
     measured: PairCorrelations, use: NDArray[np.int64]
 ) -> list[ChannelFault]:
-    """Channels that share nothing with the others, which share a sound."""
+    """Finds channels that have no sound in common with the others.
+
+    The others must share a sound with each other.
+    """
     table = np.zeros((use.size, use.size))
     table[tuple(measured.pairs.T)] = measured.shared
     best = (table + table.T).max(axis=0)
@@ -228,7 +252,7 @@ def _strangers(
 def _inverted(
     measured: PairCorrelations, use: NDArray[np.int64], dead: set[int]
 ) -> list[ChannelFault]:
-    """Channels whose correlations with most others are upside down."""
+    """Finds channels that have negative correlations with most other channels."""
     high, low = measured.pooled_highest, -measured.pooled_lowest
     heard = np.maximum(high, low) > _COHERENT * measured.noise
     table = np.zeros((use.size, use.size))
@@ -239,7 +263,7 @@ def _inverted(
     signs[signs == 0.0] = 1.0
     if np.sum(signs * alive) < 0.0:
         signs = -signs
-    # Every channel must agree with the others, on average, once signs are mended.
+    # After the signs are corrected, each channel must agree with the others on average.
     agreement = signs * (table @ (signs * alive)) / max(alive.sum() - 1, 1)
     if np.any(agreement[alive] < _LEAD):
         return []
@@ -251,7 +275,8 @@ def _inverted(
             "is negative; exchange the wires of its microphone, or the sign of its "
             "samples",
         )
-        # Channels that share nothing with the rest have any sign.
+        # The sign of a channel without any sound in common with the others is
+        # arbitrary.
         for k in np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
     ]
 
@@ -259,20 +284,23 @@ def _inverted(
 def _lags(
     measured: PairCorrelations, signs: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(f, p) delays, samples, of channels some of which are inverted."""
+    """Returns (f, p) delays of all pairs, samples, corrected for inverted channels."""
     i, j = measured.pairs.T
     upright = signs[i] * signs[j] > 0.0
     return np.where(upright, measured.lag_of_highest, measured.lag_of_lowest)
 
 
 def _fits(delays: FrameDelays) -> bool:
-    """Whether at least half of the frames agree on their delays, and some do."""
+    """Returns whether all pairs agree on delays in enough frames.
+
+    Enough means at least half of the frames, and at least 16.
+    """
     agreed, _ = delays.agreeing()
     return len(agreed) >= max(_LEAST_FRAMES, len(delays.lags) / 2)
 
 
 def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
-    """Delays that are not of the array's size."""
+    """Describes the fault of delays that do not match the size of the array."""
     size = f"an array of {shape.aperture_m:.3g} m"
     if scale.kind == "beyond":
         remedy = "check the positions (in m) and the order of the channels"
@@ -302,7 +330,7 @@ def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
 
 
 def _order(delays: FrameDelays) -> list[ChannelFault]:
-    """Exchanged channels, or a geometry that no exchange mends."""
+    """Finds exchanged channels, or a geometry that the delays do not fit."""
     exchanges = exchanged_channels(delays)
     if exchanges:
         names = " or ".join(f"{a + 1} and {b + 1}" for a, b in exchanges)

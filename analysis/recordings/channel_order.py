@@ -1,10 +1,14 @@
-"""Whether delays belong to a place, or only do so with two channels exchanged.
+"""Checks whether delays fit a source position, as given or with two channels exchanged.
 
-Not to be seen from sound is an exchange that makes the array its own mirror
-image (the ends of a symmetric row, opposite corners of a square), and which of
-two exchanges it was if they differ by such an image (the two ends of either
-side of a square: both are named). A source straight ahead of a row shows no
-exchange at all, for all its delays are alike.
+The delays cannot reveal the following exchanges:
+
+- Some exchanges turn the array into its own mirror image. Examples are the ends of a
+  symmetric row and opposite corners of a square.
+- Two different exchanges can give mirror images of each other. For example, exchanging
+  the two ends of one side of a square gives the mirror image of exchanging the ends of
+  the opposite side. Both exchanges are then reported.
+- If a source is straight ahead of a row, all delays are equal. They then reveal no
+  exchange.
 """
 
 from __future__ import annotations
@@ -19,67 +23,74 @@ from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# Delays fit where they are right to this part of a sample, to this share of what
-# sound needs across the array, or to so many deviations of the microphones' places.
+# Delays fit if their error is below the largest of three tolerances:
+# - _FIT_SAMPLES: share of a sample.
+# - _FIT_SHARE: share of the time that sound needs to cross the array.
+# - _FIT_DEVIATIONS: multiple of the standard deviation of the microphone positions.
 _FIT_SAMPLES = 0.25
 _FIT_SHARE = 0.05
 _FIT_DEVIATIONS = 5.0
 
-# Fewer frames whose pairs agree prove nothing.
+# Least number of frames in which all pairs agree. Fewer frames prove nothing.
 _LEAST_FRAMES = 5
 
-# Exchanges times frames that are tried, at most.
+# Largest number of trials. Each trial tests one exchange on one frame.
 _MOST_TRIALS = 20_000
 
-# Shares of such frames that fit a wrong geometry at most, and a right one at
-# least; shares nearer to each other than this are alike; and one that is hopeless.
+# Shares of the agreeing frames that fit a source position:
+# - _WRONG: largest share for a wrong geometry.
+# - _RIGHT: least share for a correct geometry.
+# - _ALIKE: largest difference between two shares that count as equal.
+# - _HOPELESS: below this share, the geometry is reported as wrong.
 _WRONG, _RIGHT, _ALIKE, _HOPELESS = 0.35, 0.6, 0.1, 0.1
 
-# Spread of 1/R below which levels say nothing of a range, dB, and in deviations of
-# the channels' gains.
+# Least spread of the expected levels at which levels say something about the range:
+# - _LEAST_SPREAD_DB: in dB.
+# - _LEAST_SPREAD: in standard deviations of the channel gains.
 _LEAST_SPREAD_DB, _LEAST_SPREAD = 3.0, 1.5
 
 
 @dataclass(frozen=True)
 class FrameDelays:
-    """Delays of all pairs of microphones in f frames of a recording."""
+    """Delays of p pairs of n microphones in f frames of a recording."""
 
     lags: NDArray[np.float64]
-    """(f, p) of ``shape.pairs``, samples."""
+    """(f, p) delays of the pairs in ``shape.pairs``, samples."""
     levels: NDArray[np.float64]
-    """(f, n) of the channels, any unit."""
+    """(f, n) levels of the channels, in any unit."""
     shape: ArrayShape
     """The n microphones."""
     metres_per_sample: float
-    """Speed of sound over the sample rate."""
+    """Speed of sound divided by the sample rate, m per sample."""
     position_std_m: float = 0.0
-    """Of the microphones' places, root mean square."""
+    """Standard deviation of the microphone positions, root mean square, m."""
     gain_std_db: float = 0.0
-    """Of the channels, dB."""
+    """Standard deviation of the channel gains, dB."""
 
     @property
     def tolerance_m(self) -> float:
-        """By how much delays may be off that fit a place, m."""
+        """Largest error of delays that fit a source position, as a distance, m."""
         across = _FIT_SHARE * self.shape.aperture_m
         return max(_FIT_SAMPLES * self.metres_per_sample, across, self.misplaced_m)
 
     @property
     def misplaced_m(self) -> float:
-        """By how much the microphones' places alone may put delays off, m."""
+        """Largest error of delays from wrong microphone positions, as a distance, m."""
         return _FIT_DEVIATIONS * self.position_std_m
 
     def agreeing(
         self, tolerance_m: float = np.inf
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Differences of range, and levels, of the frames in which all pairs agree.
+        """Returns range differences and levels of the frames in which all pairs agree.
 
         Args:
-            tolerance_m: How well they agree, m, where that is less than what serves
-                to find a place.
+            tolerance_m: Largest root-mean-square disagreement between the pairs, m.
+                Values above ``self.tolerance_m`` have no effect.
 
         Returns:
-            (k, n - 1) range from each microphone less that from microphone 0, m, and
-            levels (k, n); k frames of f.
+            differences: (k, n - 1) distance of the source from microphones 1 ... n - 1
+                minus its distance from microphone 0, m, in k of the f frames.
+            levels: (k, n) levels of the channels in these frames.
         """
         i, j = self.shape.pairs.T
         identity = np.eye(self.shape.count)
@@ -92,16 +103,20 @@ class FrameDelays:
 
 
 def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
-    """Exchanges, each of two channels, of which one makes the delays fit.
+    """Finds the exchanges of two channels that make the delays fit a source position.
+
+    Args:
+        delays: Delays of all pairs of microphones in some frames.
 
     Returns:
-        Pairs of numbers from 0. Empty where the delays fit as they are, or where
-        no exchange helps.
+        Pairs of channel numbers, from 0. If there are several pairs, one of them is the
+        exchange. Empty if the delays fit as they are, if no exchange helps, or if the
+        pairs agree in too few frames.
     """
     (d, levels), shape = delays.agreeing(), delays.shape
     if len(d) < _LEAST_FRAMES or _fitting(d, levels, delays)[0] > _WRONG:
         return []
-    # Nearer ones may well stand the other way round.
+    # Microphones that are nearer to each other may really be in the other order.
     apart = shape.distances_m > np.sqrt(2.0) * delays.misplaced_m
     exchanges = [(int(i), int(j)) for i, j in shape.pairs[apart]]
     if not exchanges:
@@ -127,10 +142,14 @@ def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
 
 
 def misfit(delays: FrameDelays) -> float | None:
-    """Share of the frames that fit no place, if it is hopeless; else None.
+    """Returns the share of frames that fit no source position, if nearly all fit none.
+
+    Args:
+        delays: Delays of all pairs of microphones in some frames.
 
     Returns:
-        0 to 1, or None where too few frames agree or enough of them fit.
+        Share of the agreeing frames that fit no source position, more than 0.9. None if
+        more than 10 % of them fit, or if too few frames agree.
     """
     d, levels = delays.agreeing()
     if len(d) < 2 * _LEAST_FRAMES:
@@ -140,15 +159,15 @@ def misfit(delays: FrameDelays) -> float | None:
 
 
 def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
-    """An array with two of its rows exchanged.
+    """Returns an array with two of its rows exchanged.
 
     Args:
-        rows: (n, ...).
-        i: Number of one row, from 0.
-        j: Number of the other one.
+        rows: (n, ...) array, which stays as it is.
+        i: Number of the first row to exchange, from 0.
+        j: Number of the second row to exchange, from 0.
 
     Returns:
-        (n, ...), a copy.
+        (n, ...) copy with the two rows exchanged.
     """
     order = np.arange(len(rows))
     order[[i, j]] = j, i
@@ -160,14 +179,17 @@ def _fitting(
     levels: NDArray[np.float64],
     delays: FrameDelays,
 ) -> tuple[float, float]:
-    """Share of the frames that a place outside the array explains, and RMS error.
+    """Computes how many frames fit a source position outside the array, and how well.
 
-    The error in m is that of the frames that it explains.
+    Returns:
+        share: Share of the frames that fit, 0 to 1.
+        error: Root-mean-square error of the frames that fit, m. Infinite if no frame
+            fits.
     """
     shape, tolerance = delays.shape, delays.tolerance_m
     gain_std_db = delays.gain_std_db
     if shape.kind == "plane" and shape.dimension == 2:
-        # The source need not lie in the plane.
+        # The source may be above or below the plane.
         shape = ArrayShape.of(np.column_stack((shape.p_AM, np.zeros(shape.count))))
     covariance = (0.5 * tolerance) ** 2 * (np.eye(shape.count - 1) + 1.0)
     errors = []
@@ -188,19 +210,21 @@ def levels_contradict(
     shape: ArrayShape,
     gain_std_db: float = 0.0,
 ) -> bool:
-    """Whether a near source would be heard at other levels than these.
+    """Returns whether the measured levels contradict a near source position.
 
-    Exchanged neighbours in a row, for one, make the delays of a source very
-    near to the array. Its levels would fall as 1/R.
+    The level of sound from a near source falls as 1/R with the distance R. The check
+    rejects wrong near positions. For example, if two neighbors in a row are exchanged,
+    the delays can be those of a source very near to the array.
 
     Args:
-        levels: (n,) RMS of the channels' sound, any unit.
-        fix: A fix, with a range or without.
+        levels: (n,) root-mean-square levels of the channels, in any unit.
+        fix: Estimated source position, with or without a range.
         shape: The n microphones.
-        gain_std_db: Standard deviation of the channels' gains, dB.
+        gain_std_db: Standard deviation of the channel gains, dB.
 
     Returns:
-        True where the levels follow less than half of what 1/R asks for.
+        True if the levels vary by less than half of what the law 1/R requires. False if
+        the position has no range, or if the expected levels are too similar to compare.
     """
     if not fix.range_valid:
         return False

@@ -1,9 +1,12 @@
-"""Channels of recorders whose clocks drift apart.
+"""Finds channels from recorders whose clocks drift apart.
 
-Sound cannot come later at one microphone than at another by more than it takes between
-them. Delays that grow steadily until they are longer are those of two clocks. They are
-looked for over all that clocks may have drifted by, in cross-correlations with phase
-transform of short stretches (Knapp and Carter 1976).
+Sound can arrive at two microphones with a delay of at most the travel time between
+them. If a delay grows steadily beyond this limit, the two channels have different
+clocks.
+
+The recording is cut into short stretches. The delays of each stretch are the peaks of
+cross-correlations with the phase transform (Knapp and Carter 1976). The search covers
+all delays that drifting clocks may have reached.
 """
 
 from __future__ import annotations
@@ -18,43 +21,48 @@ from scipy.stats import theilslopes
 from analysis.recordings.channel_faults import ChannelFault
 from systems.delays.correlations import correlations_at_lags
 
-#: Length of a stretch, s: clocks that are off by 100 ppm drift by 50 us in it.
+#: Length of a stretch, s. If clocks differ by 100 ppm, they drift by 50 us in this
+#: time.
 STRETCH_S = 0.5
 
-# Delays up to this are looked for, s.
+# Largest delay in the search, s.
 _REACH_S = 0.05
 
-# Highest frequency that counts: drift within a stretch blurs those above, Hz.
+# Lowest and highest frequency in use, Hz. At higher frequencies, the drift within a
+# stretch blurs the correlation.
 _BAND_HZ = (200.0, 4_000.0)
 
-# A peak is one if it stands so many times above the root mean square beside it.
+# Least height of a peak, as a multiple of the root mean square of the correlation.
 _STANDS_OUT = 6.0
 
-# Stretches that are needed, and the time that they have to span, s.
+# _LEAST: least number of stretches.
+# _LEAST_S: least time from the first to the last stretch, s.
+# _MOST: largest number of stretches.
 _LEAST, _LEAST_S, _MOST = 8, 4.0, 240
 
-# By how much delays have to exceed what the array allows.
+# Least ratio between a delay and the longest delay that the array allows.
 _BEYOND = 1.15
 
-# Channels whose delays grow by at least this share of the fastest drift with it.
+# Channels drift together if their delays grow by at least this share of the fastest
+# drift, in the same direction.
 _TOGETHER = 0.5
 
-# Clocks that are worse than this are no clocks, 1.
+# Largest relative drift of a clock, s/s. A faster change has another cause.
 _MOST_DRIFT = 2e-3
 
 
 def common_lags(
     samples: NDArray[np.floating], sample_rate_hz: float
 ) -> NDArray[np.float64]:
-    """Delays of a stretch of sound.
+    """Measures the delays of all channels relative to channel 0 in a stretch of sound.
 
     Args:
-        samples: (n, k) channels.
-        sample_rate_hz: Their rate, Hz.
+        samples: (n, k) samples of n channels.
+        sample_rate_hz: Sample rate, Hz.
 
     Returns:
-        (n - 1,) delay after channel 0 of each further one, s; NaN where they have
-        nothing in common.
+        (n - 1,) delays of channels 1 ... n - 1 after channel 0, s. NaN for a channel
+        that has no sound in common with channel 0.
     """
     length = samples.shape[1]
     size = int(fft.next_fast_len(2 * length, real=True))
@@ -79,17 +87,18 @@ def clock_drift(
     c: float,
     channels: Sequence[int] | None = None,
 ) -> ChannelFault | None:
-    """Channels whose delays grow steadily beyond what the array allows.
+    """Finds channels whose delays grow steadily beyond what the array allows.
 
     Args:
-        t_s: (k,) middles of stretches, s.
-        lags: (k, n - 1) their delays, as ``common_lags`` tells them.
-        p_AM: (m, 2 or 3) places of all microphones, m.
+        t_s: (k,) times of the middles of k stretches of the recording, s.
+        lags: (k, n - 1) delays of each stretch, as ``common_lags`` returns them, s.
+        p_AM: (m, 2) or (m, 3) positions of all microphones, m.
         c: Speed of sound, m/s.
-        channels: Numbers of the n that are looked at, from 0; none: all.
+        channels: Numbers of the n channels in ``lags``, from 0. None: all channels.
 
     Returns:
-        Which ones, and how fast; None: no drift can be told.
+        The drifting channels and the rate of their drift. None if there is no clear
+        drift.
     """
     numbers = list(range(len(p_AM)) if channels is None else channels)
     allowed = np.linalg.norm(p_AM[numbers[1:]] - p_AM[numbers[0]], axis=1) / c
@@ -123,16 +132,17 @@ def recording_drift(
     p_AM: NDArray[np.float64],
     c: float,
 ) -> ChannelFault | None:
-    """The same for a whole recording.
+    """Finds channels of a whole recording whose clocks drift.
 
     Args:
-        samples: (n, k) channels without NaN.
-        sample_rate_hz: Their rate, Hz.
-        p_AM: (n, 2 or 3) places of the microphones, m.
+        samples: (n, k) samples of n channels, without NaN.
+        sample_rate_hz: Sample rate, Hz.
+        p_AM: (n, 2) or (n, 3) positions of the microphones, m.
         c: Speed of sound, m/s.
 
     Returns:
-        As ``clock_drift``.
+        The drifting channels and the rate of their drift. None if there is no clear
+        drift, or if the recording is too short.
     """
     size = round(STRETCH_S * sample_rate_hz)
     starts = np.arange(0, samples.shape[1] - size + 1, size)
@@ -148,7 +158,12 @@ def recording_drift(
 def _slope(
     t_s: NDArray[np.float64], lag: NDArray[np.float64], allowed: float
 ) -> tuple[float, bool]:
-    """Of a line through delays, and whether that leads out of what is allowed."""
+    """Fits a line through delays, and returns whether the line shows a clock drift.
+
+    Returns:
+        slope: Slope of the line, s/s.
+        drifts: Whether the delays grow steadily and leave the allowed range.
+    """
     heard = np.isfinite(lag)
     if np.count_nonzero(heard) < _LEAST:
         return 0.0, False

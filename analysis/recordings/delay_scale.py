@@ -1,8 +1,9 @@
-"""Whether delays are of an array's size, or of one many times larger or smaller.
+"""Checks whether delays match the size of an array, or a much larger or smaller array.
 
-Sound cannot take longer from microphone to microphone than straight along. It can
-take much less in all pairs, but only from straight ahead of a row or above a plane;
-and, for its wave fronts to be so flat, from far away.
+Sound takes at most the straight travel time from one microphone to another. The delays
+of all pairs can be much shorter in only one case. In this case, the source is straight
+ahead of a row, or straight above a plane. It is also far away, because the wave fronts
+must be nearly flat.
 """
 
 from __future__ import annotations
@@ -13,41 +14,51 @@ import numpy as np
 
 from analysis.recordings.channel_order import FrameDelays
 
-#: Where delays do not fit an array they are looked for within these lengths, m.
+#: If delays do not fit the array, the search covers delays up to these path lengths, m.
 REACHES_M = (0.3, 3.0)
 
-# Frames that agree on delays, at least; and their share.
+# _LEAST_FRAMES: least number of frames that agree on their delays.
+# _LEAST_SHARE: least share of such frames among all frames.
 _LEAST_FRAMES, _LEAST_SHARE = 5, 0.2
 
-# Delays over the longest possible ones: above the first number for a half of the
-# frames they are impossible; below the second for three quarters they are of sound from
-# straight above. Positions in inches make 0.025 of them, in cm 0.01.
+# Limits of delays, as a share of the longest possible delay:
+# - _IMPOSSIBLE: if half of the frames exceed this share, the delays are too long.
+# - _NOTHING: if the share _MOST of the frames stays below this, the delays are too
+#   short. They may also be those of a source straight above the array.
+# - _MOST: share of the frames for _NOTHING.
+# For comparison, positions in inches give a share of 0.025, and positions in cm 0.01.
 _IMPOSSIBLE, _NOTHING = 1.5, 0.03
 _MOST = 0.75
 
-# Pairs nearer than this share of the aperture have delays too short to compare.
+# Least distance of a pair as a share of the aperture. The delays of shorter pairs are
+# too short to compare.
 _LONG = 0.3
 
-# What a delay may be off, samples.
+# Possible error of a delay, samples.
 _SAMPLES = 1.0
 
 
 class DelayScale(NamedTuple):
-    """Delays over the longest ones that the array allows."""
+    """Ratio of measured delays to the longest delays that the array allows."""
 
     kind: Literal["beyond", "nothing"]
     share: float
-    """Median of the frames if beyond, else what three quarters stay below."""
+    """Delay divided by the longest delay that the array allows. If ``kind`` is
+    ``beyond``, it is the median of all frames. If ``kind`` is ``nothing``, three
+    quarters of the frames have a smaller value."""
     least_range_m: float
-    """Where the source at least is, if the array is as large as it says, m."""
+    """Least distance of the source, m, if the array really has the stated size."""
 
 
 def delay_scale(delays: FrameDelays) -> DelayScale | None:
-    """What is wrong with the size of delays, if anything.
+    """Checks whether delays are too long or too short for the size of the array.
+
+    Args:
+        delays: Delays of all pairs of microphones in some frames.
 
     Returns:
-        Delays over the longest ones possible, or None where they are of the array's
-        size or too few agree.
+        The ratio of the delays to the longest possible delays. None if the delays match
+        the size of the array, or if the pairs agree in too few frames.
     """
     shape, error = delays.shape, _SAMPLES * delays.metres_per_sample
     d, _ = delays.agreeing(error)
@@ -65,6 +76,7 @@ def delay_scale(delays: FrameDelays) -> DelayScale | None:
     share = float(np.quantile(shares, _MOST))
     if share > _NOTHING:
         return None
-    # A wave front from R is off the plane by a share a / 8 R of the aperture a.
+    # At the edge of the aperture a, a wave front from the distance R differs from a
+    # plane by a^2 / (8 R). As a share of the aperture, this is a / (8 R).
     flat = max(share, 0.25 * delays.metres_per_sample / shape.aperture_m)
     return DelayScale("nothing", share, shape.aperture_m / (8.0 * flat))

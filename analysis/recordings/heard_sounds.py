@@ -1,4 +1,4 @@
-"""Delays of a resting sound, from all stretches of a recording that it is heard in."""
+"""Estimates the delays of a sound at rest from the stretches of a recording."""
 
 from __future__ import annotations
 
@@ -21,38 +21,45 @@ from systems.sound.sound_file import read_sound
 
 _RATES_HZ = (8_000, 192_000)
 
-# Where a geometry names no band, and up to which share of the sample rate.
+# _BAND_HZ: default band for a geometry without a band, Hz.
+# _TOP_OF_RATE: upper limit of the default band, as a share of the sample rate.
 _BAND_HZ = (300.0, 15_000.0)
 _TOP_OF_RATE = 0.45
 _LEAST_BAND_HZ = 500.0
 
-# Snapshots of a stretch: more of them where few show a source.
+# _SNAPSHOTS: numbers of snapshots per stretch to try, in this order. More snapshots are
+#   needed if few stretches show a source.
+# _ENOUGH: number of stretches with a source that ends the trials.
 _SNAPSHOTS = (8, 32, 128)
 _ENOUGH = 3
 
-# Of normally distributed values, standard deviation over median deviation.
+# Ratio of the standard deviation to the median absolute deviation of normally
+# distributed values.
 _TO_STANDARD = 1.4826
 
-# Stretches farther off the median than so many deviations are of something else.
+# Largest distance of a stretch from the median, in standard deviations. A stretch
+# beyond it belongs to a different sound.
 _FARTHEST = 3.0
 
-# Reflections move each channel by its own, alike in all stretches, by this share of
-# what sound takes along the array, for each part that is not coherent.
+# Error from reflections that is the same in all stretches, and independent for each
+# channel. It is a share of the travel time of sound along the array, for each part of
+# the sound that is not coherent.
 _SCATTER_SHARE = 0.015
 
 
 @dataclass(frozen=True)
 class HeardSound:
-    """Delays of a sound that rests."""
+    """Delays of a sound at rest."""
 
     tau: NDArray[np.float64]
-    """(n - 1,) delays t_k - t_0, s."""
+    """(n - 1,) delays t_k - t_0 of channels 1 ... n - 1 after channel 0, s."""
     covariance: NDArray[np.float64]
-    """(n - 1, n - 1) from noise, reflections and the scatter of the stretches, s^2."""
+    """(n - 1, n - 1) covariance of the delays, s^2. It contains noise, reflections, and
+    the scatter of the stretches."""
     stretches: int
-    """In which it was heard."""
+    """Number of stretches that contain a sound."""
     used: int
-    """Of these, those that agree."""
+    """Number of these stretches that agree on the delays."""
 
 
 def sightings_of(
@@ -62,18 +69,22 @@ def sightings_of(
     to_s: float | None = None,
     top_hz: float = math.inf,
 ) -> tuple[list[Sighting], list[str]]:
-    """Stretches of a recording in which a source stands out.
+    """Finds the stretches of a recording in which a source is clearly audible.
+
+    A stretch is a run of consecutive short windows, which are called snapshots.
 
     Args:
-        path: WAV or FLAC with one channel a microphone.
-        geometry: The microphones.
-        from_s: Where to begin, s from the start of the recording.
-        to_s: Where to end, s; None: at the end of the recording.
-        top_hz: Higher frequencies are left out, Hz: their periods are shorter than
-            what the microphones may be off by.
+        path: WAV or FLAC file with one channel per microphone.
+        geometry: Geometry of the microphones.
+        from_s: Start of the part to use, s from the start of the recording.
+        to_s: End of the part to use, s from the start of the recording. None: the end
+            of the recording.
+        top_hz: Highest frequency to use, Hz. At higher frequencies, the periods are
+            shorter than the possible delay errors from wrong microphone positions.
 
     Returns:
-        The stretches in order of time, and remarks on the channels.
+        sightings: The stretches with a source, in the order of time.
+        remarks: Messages about faulty channels.
 
     Raises:
         InputError: The recording cannot be used.
@@ -94,7 +105,8 @@ def sightings_of(
     faults = find_channel_faults(
         channels, geometry.known, sample_rate_hz=float(rate), band_hz=geometry.band
     )
-    # Whether channels are exchanged is told by the geometry, which is in doubt here.
+    # Only the geometry can reveal exchanged channels, and the geometry is uncertain
+    # here.
     faults = [fault for fault in faults if fault.kind != "swapped"]
     channels, faults = channels_without_faults(channels, faults, lambda _: 0.0, where)
     recording = spectra(channels)
@@ -117,19 +129,24 @@ def sightings_of(
 def heard_sound(
     sightings: Sequence[Sighting], shape: ArrayShape, c: float
 ) -> HeardSound:
-    """The delays of a resting sound, as the mean of its stretches.
+    """Averages the delays of a sound at rest over the stretches of a recording.
 
-    Stretches count by their errors. The error of the mean is what these leave, one
-    stretch in two being independent, made larger where the stretches scatter more
-    than they say; what reflections do alike in all of them is added.
+    A stretch with smaller errors has a larger weight. The covariance of the mean
+    follows in these steps:
+
+    1. The errors of the stretches are combined as if they were independent.
+    2. The covariance is doubled, because stretches overlap by half.
+    3. If the stretches scatter more than their errors say, the covariance grows
+       accordingly.
+    4. The error from reflections is added, because it is the same in all stretches.
 
     Args:
-        sightings: Stretches in which it is heard, at least one.
+        sightings: Stretches that contain the sound, at least one.
         shape: The n microphones.
         c: Speed of sound, m/s.
 
     Returns:
-        The delays, and their errors.
+        The mean delays and their covariance.
     """
     tau = np.array([sighting.tau for sighting in sightings])
     near = _near_median(tau)
@@ -149,7 +166,7 @@ def heard_sound(
 
 
 def _near_median(tau: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(stretches,) which of them are of the sound that most are of."""
+    """Returns for each stretch whether it contains the same sound as most stretches."""
     off = np.linalg.norm(tau - np.median(tau, axis=0), axis=1)
     usual = _TO_STANDARD * float(np.median(off))
     near: NDArray[np.bool_] = off <= max(_FARTHEST * usual, float(off.min()))
@@ -159,7 +176,12 @@ def _near_median(tau: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _channels(
     path: Path, geometry: ArrayGeometry, from_s: float, to_s: float | None
 ) -> tuple[NDArray[np.float64], int]:
-    """(n, samples) of the array's columns between two times, and the rate, Hz."""
+    """Reads the channels of the array between two times of a recording.
+
+    Returns:
+        samples: (n, samples) samples of the array's channels.
+        rate: Sample rate, Hz.
+    """
     samples, rate = read_sound(path, "recording")
     where = repr(str(path))
     needed = max(geometry.columns) + 1

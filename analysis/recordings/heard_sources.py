@@ -1,4 +1,4 @@
-"""All sources of a recording: where each is, and its track over time."""
+"""Finds all sources in a recording, their directions, and their tracks over time."""
 
 from __future__ import annotations
 
@@ -21,20 +21,22 @@ from analysis.arrays.voting.steady_sound import is_steady, steered_only
 from analysis.arrays.voting.vote_peaks import VotedSource, gather_sources
 from systems.sound.array_shape import ArrayShape
 
-# Samples of a channel that vote at once.
+# Samples per channel in each block of votes.
 _BLOCK = 2**16
 
-# Where a source was not heard for longer its place is a guess, s.
+# Longest pause of a source within a track, s. After a longer pause, its direction is
+# only a guess.
 _PAUSE_S = 0.3
 
-# A track that turns by more moves, and what is within so much of it is the same, deg.
+# _MOVES_DEG: a source moves if its track turns by more than this, deg.
+# _NEAR_DEG: directions within this of each other count as equal, deg.
 _MOVES_DEG, _NEAR_DEG = 20.0, 8.0
 
-# Of the time in which the one of two directions is heard that is heard for less: if the
-# other is heard too in less of that, they may be of one source that moves.
+# Largest overlap in time of two directions of one moving source, as a share of the
+# shorter of the two spans of time.
 _TOGETHER = 0.25
 
-# What is not told has no greater confidence.
+# Largest confidence of a source or track in steady sound.
 _NOT_TOLD = 0.5
 
 
@@ -43,25 +45,27 @@ class HeardSource:
     """A direction from which sound came, over the whole recording."""
 
     bearing_deg: float
-    """Azimuth from the microphones' centroid, CCW from +x, in (-180, 180]."""
+    """Azimuth from the centroid of the microphones, CCW from +x, in (-180, 180], deg.
+    """
     bearing_std_deg: float
-    """By the scatter of what votes for it; errors of the array are not in it."""
+    """Standard deviation from the scatter of the votes for the source, deg. It does not
+    include errors of the array."""
     elevation_deg: float | None
-    """From the x-y plane; None where the array does not tell it."""
+    """Elevation from the x-y plane, deg. None if the array cannot measure it."""
     share: float
-    """Of all that votes, 0 to 1."""
+    """Share of all votes that belong to the source, 0 to 1."""
     confidence: float
-    """0 to 1."""
+    """Confidence that the source exists, 0 to 1."""
 
     @classmethod
     def of(cls, voted: VotedSource) -> HeardSource:
-        """From a peak of votes.
+        """Makes a source from a peak of the votes.
 
         Args:
-            voted: The peak.
+            voted: Peak of the votes, with angles in rad.
 
         Returns:
-            The same in deg.
+            The source, with angles in deg.
         """
         height = voted.elevation
         return cls(
@@ -75,29 +79,29 @@ class HeardSource:
 
 @dataclass(frozen=True)
 class FollowedSource:
-    """A source that was followed for some time."""
+    """Track of a source over some time."""
 
     identity: int
-    """From 1, in the order in which they began."""
+    """Number of the source, from 1, in the order in which the sources began."""
     t_s: list[float]
-    """Times, s from the start of the recording."""
+    """Times of the bearings, s from the start of the recording."""
     bearing_deg: list[float]
-    """Its bearing at each."""
+    """Bearing of the source at each time, deg."""
     confidence: float
-    """Greatest probability that it existed, 0 to 1."""
+    """Greatest probability during the track that the source existed, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class HeardSources:
-    """All that was heard in a recording."""
+    """All sources and tracks in a recording."""
 
     sources: list[HeardSource] = field(default_factory=list)
-    """The one that is heard most first."""
+    """The sources. The source with most votes is first."""
     tracks: list[FollowedSource] = field(default_factory=list)
-    """In order of their begin."""
+    """The tracks, in the order of their beginnings."""
     steady: bool = False
-    """The sound is steady: where most of it comes from is told, but not whether it
-    is one source or several. No confidence is above 0.5."""
+    """Whether the sound is steady. The direction of most of a steady sound is known,
+    but the number of its sources is unknown. No confidence then exceeds 0.5."""
 
 
 _Told = TypeVar("_Told", HeardSource, FollowedSource)
@@ -110,17 +114,17 @@ def heard_sources(
     sample_rate_hz: float,
     band_hz: tuple[float, float],
 ) -> HeardSources:
-    """Every source that stands out, and its track.
+    """Finds all sources that stand out in a recording, and their tracks.
 
     Args:
-        channels: (n, samples).
+        channels: (n, samples) samples of n channels.
         shape: The n microphones.
         c: Speed of sound, m/s.
-        sample_rate_hz: Of the samples, Hz.
-        band_hz: Lowest and highest frequency that counts, Hz.
+        sample_rate_hz: Sample rate, Hz.
+        band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        The sources and tracks; none for an array that tells no bearings.
+        The sources and tracks. Empty if the array cannot measure bearings.
     """
     if "bearing" not in shape.angles:
         return HeardSources()
@@ -145,7 +149,12 @@ def heard_sources(
 def _counted_once(
     sources: list[HeardSource], tracks: list[FollowedSource], votes: DirectionVotes
 ) -> list[HeardSource]:
-    """Without directions that a source passed on its way, after or before another."""
+    """Removes directions that a moving source only passed on its way.
+
+    A direction is removed if the track of a moving source passes this direction and
+    another direction in the list. The two directions must hardly ever be heard at the
+    same time.
+    """
     moving = [track for track in tracks if _extent_deg(track) > _MOVES_DEG]
     kept: list[HeardSource] = []
     for source in sources:
@@ -161,7 +170,7 @@ def _counted_once(
 
 
 def _apart_in_time(votes: DirectionVotes, *sources: HeardSource) -> bool:
-    """Whether two directions are hardly heard at the same time."""
+    """Returns whether two directions are hardly ever heard at the same time."""
     spans = []
     for source in sources:
         off = np.degrees(votes.azimuth) - source.bearing_deg
@@ -174,7 +183,7 @@ def _apart_in_time(votes: DirectionVotes, *sources: HeardSource) -> bool:
 
 
 def _extent_deg(track: FollowedSource) -> float:
-    """How far it moved between the places where it was most of the time."""
+    """Returns the angle from the 10 % to the 90 % quantile of the bearings, deg."""
     turned = np.unwrap(track.bearing_deg, period=360.0)
     return float(np.ptp(np.quantile(turned, (0.1, 0.9))))
 
@@ -193,7 +202,7 @@ def _tracks(
 ) -> list[FollowedSource]:
     tracks: dict[int, FollowedSource] = {}
     parameters = ListenerParameters()
-    # A step ends with the sound that it gathers: the bearing is that of its middle.
+    # The time of a step is the end of its window. The bearing belongs to the middle.
     late = 0.5 * parameters.window_s
     for step in follow_sources(votes, seconds, plan, parameters):
         for track in step.tracks:

@@ -1,4 +1,4 @@
-"""Bearing, elevation and range over time of a recording by any array."""
+"""Estimates the bearing, elevation and range of a recorded source over time."""
 
 from __future__ import annotations
 
@@ -31,38 +31,43 @@ from analysis.recordings.source_placement import has_place, place_source
 from analysis.recordings.wavefront_misfit import late_channel
 from systems.framework.input_error import InputError
 
-# Where a geometry names no band.
+# Default band for a geometry without a band, Hz.
 _BAND_HZ = (300.0, 15_000.0)
 
-# A band may not reach up to half the sample rate, where recorders' filters fall.
+# Upper limit of the default band, as a share of the sample rate. Near half the sample
+# rate, the filters of recorders attenuate the sound.
 _TOP_OF_RATE = 0.45
 
 
-# Snapshots of a stretch: more of them for a source that is faint or far, of
-# which fewer show too little.
+# _SNAPSHOTS: numbers of snapshots per stretch to try, in this order. A faint or distant
+#   source needs more snapshots.
+# _LEAST_ESTIMATES: number of estimates that ends the trials.
 _SNAPSHOTS = (8, 32, 128)
 _LEAST_ESTIMATES = 3
 
-# Where channels agree by less than this part of what they do in another window, it
-# holds more echoes than sound.
+# Least agreement of the channels in a window, as a share of the agreement in the best
+# window. Below this share, the window contains more echoes than direct sound.
 _CLEAR = 0.5
 
-# Microphones may stand so many deviations farther apart than it is stated.
+# Largest error of the distances between microphones, in standard deviations.
 _SLACK = 4.0
 
-# Faults that make channels seem late.
+# Faults that make channels appear late.
 _EXPLAINS_LATENESS = ("size", "near")
 
 
 class HeardRecording(NamedTuple):
-    """What was heard in a recording, stretch by stretch."""
+    """Results for all stretches of a recording.
+
+    A stretch is a run of snapshots. A snapshot is a short window of the recording.
+    """
 
     recording: RecordingSpectra
     search: RecordingSearch
     sightings: list[Sighting]
-    """Delays of the stretches in which one place stands out."""
+    """Delays of the stretches in which one source position stands out."""
     estimates: list[SourceEstimate]
-    """Their places, where the delays belong to one."""
+    """Estimated source positions, for the sightings whose delays fit a position."""
     faults: list[ChannelFault]
 
 
@@ -72,39 +77,42 @@ def locate(
     *,
     sample_rate_hz: float | None = None,
 ) -> LocateResult:
-    """Locates the source of a recording, stretch by stretch.
+    """Locates the source of a recording in each short stretch of time.
 
     Args:
-        recording: WAV or FLAC with one channel a microphone, 8-192 kHz; or samples,
-            (n, samples), one row a microphone.
-        geometry: The microphones, as an object, a file, or their places (x, y) or
-            (x, y, z) in m; none: the robot's own array.
-        sample_rate_hz: Of samples, Hz; a file has its own.
+        recording: WAV or FLAC file with one channel per microphone, at 8-192 kHz. Or
+            (n, samples) recorded samples, one row per microphone.
+        geometry: Geometry of the microphones, the path of a geometry file, or a list of
+            positions (x, y) or (x, y, z) in m. None: the robot's own array.
+        sample_rate_hz: Rate of recorded samples, Hz. None for a file, which states its
+            own rate.
 
     Returns:
-        ``LocateResult``. Standard deviations count what the geometry says of its
-        own errors; a range is reported where its standard deviation is at most
-        ``largest_range_error`` of it.
+        The estimates over time. Their standard deviations include the errors that the
+        geometry states. A range is reported if its standard deviation is at most the
+        share ``largest_range_error`` of the range.
 
     Raises:
-        InputError: The recording cannot be used; says why, and the remedy.
+        InputError: The recording cannot be used. The message states the cause and the
+            remedy.
     """
     geometry = make_geometry(geometry)
     return located(recorded_samples(recording, geometry, sample_rate_hz), geometry)
 
 
 def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocateResult:
-    """``locate`` of what has been read.
+    """Locates the source of a recording that has already been read.
 
     Args:
-        recorded: Of this array.
-        geometry: The microphones.
+        recorded: Recording that matches the array.
+        geometry: Geometry of the microphones.
 
     Returns:
-        As of ``locate``.
+        The estimates over time, as ``locate`` returns them.
 
     Raises:
-        InputError: The recording cannot be used; says why, and the remedy.
+        InputError: The recording cannot be used. The message states the cause and the
+            remedy.
     """
     samples, rate, where = recorded
     heard = hear(samples, rate, geometry, where)
@@ -146,19 +154,20 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocateResult:
 def hear(
     samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry, name: str
 ) -> HeardRecording:
-    """Locates the source of a recording in memory.
+    """Finds the delays and positions of the source in a recording in memory.
 
     Args:
-        samples: (channels, samples).
-        rate: Of the samples, Hz.
-        geometry: The microphones.
-        name: Of the recording, for messages.
+        samples: (channels, samples) recorded samples.
+        rate: Sample rate, Hz.
+        geometry: Geometry of the microphones.
+        name: Name of the recording in messages.
 
     Returns:
-        Delays and places of its stretches.
+        Delays and source positions of the stretches, and faults of the channels.
 
     Raises:
-        InputError: The recording cannot be used; says why, and the remedy.
+        InputError: The recording cannot be used. The message states the cause and the
+            remedy.
     """
     complaint = array_mismatch(geometry, len(samples), rate)
     if complaint:
@@ -187,7 +196,12 @@ def _recording(
     band: tuple[float, float] | None,
     where: str,
 ) -> tuple[RecordingSpectra, list[ChannelFault]]:
-    """The channels that were chosen, mended where they can be; and their faults."""
+    """Prepares the chosen channels, and corrects the faults that can be corrected.
+
+    Returns:
+        recording: Short spectra of the corrected channels.
+        faults: The faults that remain worth reporting.
+    """
     low, high = band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
     shape = array.shape
 
@@ -202,7 +216,8 @@ def _recording(
         return search.mean_response()
 
     drift = recording_drift(channels, float(rate), shape.p_AM, array.c)
-    # What drifts belongs to no place, nor anything else that follows from delays.
+    # The delays of drifting channels fit no position, so no other check of delays
+    # applies.
     faults = (
         [drift]
         if drift
@@ -218,9 +233,10 @@ _Heard = tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]
 
 
 def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
-    """By each sound, if they are short, or by stretches of time.
+    """Locates each short sound of a recording, or else each stretch of time.
 
-    The stretches are the shortest ones in which something is heard often enough.
+    If most of the recording consists of short sounds, each sound gives an estimate.
+    Otherwise the stretches are the shortest ones that give enough estimates.
     """
     sounds = [
         OnsetSpectra(
@@ -247,7 +263,11 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
 
 
 def _clearest(heard: list[_Heard]) -> _Heard:
-    """Of clear windows that hear most sounds, the one whose delays are known best."""
+    """Chooses the window length whose delays have the smallest errors.
+
+    The choice is among the window lengths that detect the most sounds. Window lengths
+    that contain more echoes than direct sound are excluded.
+    """
     most = max(len(sightings) for _, sightings, _ in heard)
     full = [each for each in heard if len(each[1]) == most]
     if not most:

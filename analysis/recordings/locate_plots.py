@@ -1,4 +1,4 @@
-"""Pictures of a located source, and the files of its result directory."""
+"""Plots a located source, and writes the files of its result directory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from analysis.recordings.locate_result import LocateResult
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS, draw_grid
 from analysis.reporting.plain_values import write_json
 
-# Tracks are not drawn over longer pauses, s.
+# Longest pause over which a track is drawn, s.
 _GAP_S = 0.5
 
 _WIDTH_IN, _PANEL_IN, _PLAN_IN = 9.0, 1.9, 3.6
@@ -24,19 +24,28 @@ _WIDTH_IN, _PANEL_IN, _PLAN_IN = 9.0, 1.9, 3.6
 def write_locate(
     result: LocateResult, document: dict[str, Any], directory: Path
 ) -> None:
-    """Writes ``locate.json`` and ``locate.png`` into a directory that exists.
+    """Writes ``locate.json`` and ``locate.png`` into a directory.
 
     Args:
-        result: Estimates over time.
-        document: Plain values.
-        directory: Exists.
+        result: Estimates over time, for the plot.
+        document: Plain values, for the JSON file.
+        directory: Directory, which must exist.
     """
     write_json(document, directory / "locate.json")
     plot_locate(result).savefig(directory / "locate.png", dpi=150)
 
 
 def plot_locate(result: LocateResult) -> Figure:
-    """Angles and range over time, one standard deviation each, and a plan."""
+    """Plots the angles and the range over time, and a plan view.
+
+    Error bars show one standard deviation.
+
+    Args:
+        result: Estimates over time.
+
+    Returns:
+        The figure.
+    """
     known = [
         (name, label)
         for name, label in (
@@ -79,7 +88,7 @@ def _title(result: LocateResult) -> str:
 
 
 def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
-    """Estimates with bars; the summary as a line, its error as a band."""
+    """Plots estimates with error bars, and the summary as a line with an error band."""
     std_name = name.replace("_deg", "_std_deg").replace("_m", "_std_m")
     rows = [
         (e.t_s, getattr(e, name), getattr(e, std_name))
@@ -90,8 +99,8 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
     summary = result.summary()
     centre, std = summary[name], summary[std_name]
     if name == "bearing_deg" and centre is not None:
-        # A bearing near 180 deg must not jump from top to bottom; its labels are
-        # those of the table.
+        # A bearing near 180 deg must not jump from the top to the bottom of the plot.
+        # The axis labels show the same wrapped bearings as the table.
         middle = _middle_deg(result, centre)
         values = middle + (values - middle + 180.0) % 360.0 - 180.0
         centre = middle + (centre - middle + 180.0) % 360.0 - 180.0
@@ -114,7 +123,7 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
 
 
 def _others(axes: Axes, result: LocateResult, length: float) -> None:
-    """The sources beside the main one."""
+    """Draws the bearings of all sources except the main source."""
     main = result.summary()["bearing_deg"]
     if main is None or len(result.heard.sources) < 2:
         return
@@ -128,7 +137,10 @@ def _others(axes: Axes, result: LocateResult, length: float) -> None:
 
 
 def _middle_deg(result: LocateResult, main: float) -> float:
-    """Across from the widest gap between the sources; the main one, if it is alone."""
+    """Returns the bearing opposite the widest gap between the sources, deg.
+
+    If there are fewer than two sources, it is the bearing of the main source.
+    """
     bearings = np.sort([source.bearing_deg for source in result.heard.sources])
     if len(bearings) < 2:
         return main
@@ -138,7 +150,7 @@ def _middle_deg(result: LocateResult, main: float) -> float:
 
 
 def _tracks(axes: Axes, result: LocateResult, middle: float) -> None:
-    """Where there are several: each in a colour of its own, gaps left open."""
+    """Plots each track in its own color if there are several. Pauses stay blank."""
     if len(result.heard.tracks) < 2:
         return
     for k, track in enumerate(result.heard.tracks):
@@ -154,12 +166,12 @@ def _tracks(axes: Axes, result: LocateResult, middle: float) -> None:
 
 
 def _wrapped_deg(angle: float) -> float:
-    """In (-180, 180]."""
+    """Returns an angle wrapped to (-180, 180], deg."""
     return 180.0 - (180.0 - round(angle, 6)) % 360.0
 
 
 def _plan(axes: Axes, result: LocateResult) -> None:
-    """Microphones and bearings seen from above, in the frame of the geometry."""
+    """Draws the microphones and bearings from above, in the frame of the geometry."""
     places = result.shape.p_AM[:, :2]
     ranges = [e.range_m for e in result.estimates if e.range_m is not None]
     size = max(1.6 * float(np.abs(places).max()), 1.15 * max(ranges, default=0.0))
@@ -173,7 +185,7 @@ def _plan(axes: Axes, result: LocateResult) -> None:
         axes.plot((0, x), (0, y), color=COLOURS["source"], label="source")
         for other in summary["alternatives"]:
             if math.isclose(other["bearing_deg"], summary["bearing_deg"], abs_tol=0.5):
-                continue  # the mirror image lies below
+                continue  # the mirror image has the same bearing
             x, y = polar_point(0.95 * size, other["bearing_deg"])
             axes.plot((0, x), (0, y), "--", color=COLOURS["empty"], label="or")
     _others(axes, result, 0.95 * size)

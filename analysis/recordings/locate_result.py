@@ -1,4 +1,4 @@
-"""What was located in a recording: estimates over time, and their summary."""
+"""Holds the estimates of a located source over time, and their summary."""
 
 from __future__ import annotations
 
@@ -16,52 +16,57 @@ from analysis.recordings.heard_sources import HeardSource, HeardSources
 from analysis.recordings.source_placement import PlacedSource
 from systems.sound.array_shape import ArrayShape
 
-# Estimates this near to the commonest direction are of one source, deg.
+# Estimates within this angle of the most common direction belong to one source, deg.
 _NEAR_DEG = 15.0
 
-# In a median no error counts as less than this share of the usual one.
+# Least error that counts in a weighted median, as a share of the median error.
 _LEAST_ERROR = 0.3
 
-# Of normally distributed values, standard deviation over median deviation.
+# Ratio of the standard deviation to the median absolute deviation of normally
+# distributed values.
 _TO_STANDARD = 1.4826
 
 
 @dataclass(frozen=True)
 class SourceEstimate:
-    """Where the sound of a stretch of time came from, in the geometry's frame."""
+    """Estimated source position for one stretch of time, in the geometry's frame."""
 
     t_s: float
     """Middle of the stretch, s from the start of the recording."""
     bearing_deg: float | None
-    """Azimuth from the microphones' centroid, CCW from +x, in (-180, 180].
-    None: an upright row of microphones cannot tell."""
+    """Azimuth from the centroid of the microphones, CCW from +x, in (-180, 180], deg.
+    None for an upright row of microphones, which cannot measure the azimuth."""
     bearing_std_deg: float | None
-    """Its standard deviation: noise, scattered reflections, errors of the array."""
+    """Standard deviation of the bearing, deg. It includes noise, scattered reflections
+    and errors of the array."""
     bearing_systematic_deg: float | None
-    """The part of that by errors of the array, alike in all estimates."""
+    """Part of the standard deviation from errors of the array, deg. These errors are
+    the same in all estimates."""
     elevation_deg: float | None
-    """From the x-y plane. None: positions in the plane or a row cannot tell."""
+    """Elevation from the x-y plane, deg. None if the array cannot measure it.
+    Microphones in a row and positions without a z coordinate cannot."""
     elevation_std_deg: float | None
-    """Its standard deviation."""
+    """Standard deviation of the elevation, deg."""
     elevation_systematic_deg: float | None
-    """The part of that by errors of the array."""
+    """Part of the standard deviation of the elevation from errors of the array, deg."""
     range_m: float | None
-    """Distance from the centroid; None where it cannot be told."""
+    """Distance from the centroid of the microphones, m. None if the delays do not
+    determine it."""
     range_std_m: float | None
-    """Its standard deviation."""
+    """Standard deviation of the range, m."""
     range_systematic_m: float | None
-    """The part of that by errors of the array."""
+    """Part of the standard deviation of the range from errors of the array, m."""
 
     @classmethod
     def of(cls, t_s: float, placed: PlacedSource) -> SourceEstimate:
-        """From a place; what the array cannot tell becomes None.
+        """Makes an estimate from a source position. Unmeasurable values become None.
 
         Args:
             t_s: Middle of the stretch, s from the start of the recording.
-            placed: Place in the array's frame, m, with its errors.
+            placed: Source position in the frame of the array, m, and its errors.
 
         Returns:
-            Angles in deg, range in m.
+            The estimate, with angles in deg and the range in m.
         """
         fix, systematic = placed.fix, placed.systematic
         bearing = math.isfinite(fix.bearing_std)
@@ -88,33 +93,40 @@ class SourceEstimate:
 
 @dataclass(frozen=True, repr=False)
 class LocateResult:
-    """Estimates of the stretches in which a source was heard."""
+    """Estimates for the stretches of a recording in which a source was heard."""
 
     array: dict[str, Any]
-    """Geometry, band and rate that were used."""
+    """Geometry, frequency band and sample rate in use."""
     shape: ArrayShape
     """The microphones."""
     estimates: list[SourceEstimate]
-    """In order of time."""
+    """Estimates in the order of time."""
     frames: int
-    """Stretches of the recording, of which each may have an estimate."""
+    """Number of stretches of the recording. Each stretch has at most one estimate."""
     faults: list[ChannelFault] = field(default_factory=list)
-    """Channels that are not as they should be."""
+    """Faults of the channels."""
     heard: HeardSources = field(default_factory=HeardSources)
-    """All sources over the recording, and their tracks."""
+    """All sources in the recording, and their tracks."""
     largest_range_error: float = 0.2
-    """Ranges are given up to this standard deviation over range."""
+    """Largest standard deviation of a reported range, as a share of the range."""
 
     def __repr__(self) -> str:
         heard = f"{len(self.estimates)} of {self.frames} stretches heard"
         return f"<LocateResult {self.shape.count} microphones, {heard}>"
 
     def summary(self) -> dict[str, Any]:
-        """Medians over the estimates of the main source, and what is not told.
+        """Summarizes the main source by medians, and lists what could not be measured.
 
-        The main source is the one of ``heard.sources`` that most estimates are near;
-        where most are near none of them, that of the commonest direction: the
-        estimates near it, or all of them where most are not near any one direction.
+        The estimates of the main source are the following:
+
+        - If most estimates are near a source in ``heard.sources``, they are the
+          estimates near the source that has the most estimates.
+        - Otherwise, if most estimates are near one common direction, they are the
+          estimates near this direction.
+        - Otherwise, they are all estimates.
+
+        Returns:
+            Values by name. A value is None if it could not be measured.
         """
         main = _main_source(self.estimates, self.heard.sources)
         bearing, bearing_std = _median_angle(
@@ -124,7 +136,7 @@ class LocateResult:
             [(e.elevation_deg, e.elevation_std_deg) for e in main]
         )
         ranges = [(e.range_m, e.range_std_m) for e in main if e.range_m is not None]
-        # A range that few frames give is no property of the recording.
+        # The summary has a range only if at least half of the estimates have one.
         enough = 2 * len(ranges) >= len(main)
         range_m, range_std = _median(ranges if enough else [])
         if (range_std or 0.0) > self.largest_range_error * (range_m or 0.0):
@@ -156,10 +168,10 @@ class LocateResult:
 
     @property
     def number_of_sources(self) -> int | None:
-        """How many were heard; None where that is not told.
+        """Number of sources in the recording, or None if it is unknown.
 
-        It is not of a steady sound, of too short a recording, and by an array that
-        tells no bearings.
+        It is unknown in three cases: the sound is steady, the recording is too short,
+        or the array cannot measure bearings.
         """
         count = len(self.heard.sources)
         return None if self.heard.steady or (self.estimates and not count) else count
@@ -167,7 +179,7 @@ class LocateResult:
     def _alternatives(
         self, bearing: float | None, elevation: float | None
     ) -> list[dict[str, float | None]]:
-        """The other side of a row or plane."""
+        """Returns the direction with the same delays on the other side of the array."""
         ahead = self.shape.ahead
         if ahead is None or bearing is None or self.shape.ambiguity == "none":
             return []
@@ -188,7 +200,7 @@ class LocateResult:
         ]
 
     def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command line."""
+        """Returns the JSON document that the command line writes."""
         return {
             "schema_version": 1,
             "array": self.array,
@@ -202,12 +214,15 @@ class LocateResult:
 def _main_source(
     estimates: list[SourceEstimate], sources: Sequence[HeardSource]
 ) -> list[SourceEstimate]:
-    """The estimates near the main source; all, where most are near no direction."""
+    """Returns the estimates of the main source.
+
+    If most estimates are not near any common direction, these are all estimates.
+    """
     if not estimates:
         return []
     azimuth = np.radians([e.bearing_deg or 0.0 for e in estimates])
     height = np.radians([e.elevation_deg or 0.0 for e in estimates])
-    # Elevations are far less certain than azimuths, where there are both.
+    # If the array measures both angles, elevations are much less certain than azimuths.
     upright = estimates[0].bearing_deg is None
     known = np.radians([] if upright else [s.bearing_deg for s in sources])
     near = _near(known, azimuth)
@@ -223,7 +238,15 @@ def _main_source(
 def _near(
     directions: NDArray[np.float64], angles: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """(d, e) which angles are near which directions, all in rad."""
+    """Returns whether each angle is near each direction.
+
+    Args:
+        directions: (d,) directions, rad.
+        angles: (e,) angles, rad.
+
+    Returns:
+        (d, e) True where the angle is within 15 deg of the direction.
+    """
     off = np.angle(np.exp(1j * (angles - directions[:, np.newaxis])))
     return np.asarray(np.abs(off) <= math.radians(_NEAR_DEG))
 
@@ -231,12 +254,19 @@ def _near(
 def _median(
     estimates: Sequence[tuple[float | None, float | None]],
 ) -> tuple[float | None, float | None]:
-    """Median of values with errors, and the error of a single one.
+    """Computes the weighted median of values, and the error of a single value.
 
-    Values count by their errors, as in a mean. Their error is the scatter about
-    the median, or what is usually stated, whichever is larger: a few values
-    that agree say little, and what they have in common nothing. None, None
-    where there are no values.
+    The weight of a value is the inverse square of its error. A larger number of values
+    does not reduce the error of the result, because the values may have a common error.
+
+    Args:
+        estimates: Pairs of a value and its standard deviation. Pairs with None are
+            ignored.
+
+    Returns:
+        median: The weighted median. None if there are no values.
+        error: Scatter of the values around the median, or the median of their standard
+            deviations, whichever is larger. None if there are no values.
     """
     rows = [row for row in estimates if row[0] is not None and row[1] is not None]
     if not rows:
@@ -249,7 +279,7 @@ def _median(
 
 
 def _usual(values: Sequence[float | None]) -> float | None:
-    """The median of what is known; None where nothing is."""
+    """Returns the median of the values that are not None, or None if there are none."""
     known = [value for value in values if value is not None]
     return float(np.median(known)) if known else None
 
@@ -265,7 +295,10 @@ def _weighted_median(
 def _median_angle(
     estimates: Sequence[tuple[float | None, float | None]],
 ) -> tuple[float | None, float | None]:
-    """As ``_median``, for azimuths in deg: about where most of them point."""
+    """Computes the weighted median of angles in deg, like ``_median``.
+
+    The angles are wrapped around their mean direction first.
+    """
     known = [row for row in estimates if row[0] is not None]
     mean = sum(cmath.exp(1j * math.radians(angle or 0.0)) for angle, _ in known)
     centre = math.degrees(cmath.phase(mean))
@@ -276,5 +309,5 @@ def _median_angle(
 
 
 def _wrapped_deg(angle: float) -> float:
-    """The angle in (-180, 180]."""
+    """Returns an angle wrapped to (-180, 180], deg."""
     return 180.0 - (180.0 - angle) % 360.0

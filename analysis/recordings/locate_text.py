@@ -1,4 +1,4 @@
-"""A located source on a terminal."""
+"""Describes a located source in text for a terminal."""
 
 from __future__ import annotations
 
@@ -20,7 +20,16 @@ _COLUMNS = (
 
 
 def locate_text(result: LocateResult) -> str:
-    """A summary, and a row for each estimate; faults are not in it."""
+    """Describes a result by a summary and one row per estimate.
+
+    The text does not contain the faults of the channels.
+
+    Args:
+        result: Estimates over time.
+
+    Returns:
+        The text, with several lines.
+    """
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
     if not result.estimates:
         return f"{heard}: nothing to locate{_WHY_NOTHING}"
@@ -79,7 +88,10 @@ def _range(result: LocateResult) -> str:
 
 
 def _sources(result: LocateResult) -> list[str]:
-    """Where there are several; one is what the lines above speak of."""
+    """Describes all sources if there are several.
+
+    For a steady sound, the text states that the number of sources is unknown.
+    """
     sources = result.heard.sources
     if result.heard.steady:
         return ["the sound is steady: the number of sources is unknown"]

@@ -1,8 +1,8 @@
-"""Short sounds of a recording: one window each, which begins where the sound does.
+"""Takes one short window of a recording per sound, from just before its onset.
 
-A click or a chirp of a few milliseconds is over before its first echo has come, or
-soon after. A window that begins just before it and ends soon after holds the direct
-sound and few echoes, however much of them follows.
+A click or a chirp of a few milliseconds ends before its first echo arrives, or soon
+after. A window around such a sound contains the direct sound and few echoes, even if
+many echoes follow.
 """
 
 from __future__ import annotations
@@ -19,40 +19,50 @@ from scipy.signal import butter, sosfilt
 
 from analysis.recordings.recording_spectra import ABOVE_NOISE, RecordingSpectra
 
-# A window begins so long before an onset, beside what sound takes along the array, and
-# ends as softly.
+# Time from the start of a window to the onset, s, in addition to the travel time of
+# sound along the array. The window rises over this time, and falls over the same time
+# at its end.
 _BEFORE_S = 0.003
-#: How long windows may last after an onset, s: for clicks, and for what takes longer.
+#: Possible lengths of a window after the onset, s. The first is for clicks, the others
+#: are for longer sounds.
 AFTER_S = (0.014, 0.04, 0.11)
 
-# Steps in which onsets are looked for. Within the attack, in steps, they rise over all
-# that was heard for some time before it, and over the quiet parts of the recording, by
-# the one, and have begun where they are above it by the other.
+# An onset is a rise of the energy above two levels: the level for some time before it,
+# and the level of the quiet parts of the recording.
+# - _STEP_S: time step of the energy, s.
+# - _QUIET_BEFORE_S: duration of the comparison before the onset, s.
+# - _ATTACK: longest duration of the rise, steps.
+# - _RISE_DB: least rise of an onset, dB.
+# - _BEGUN_DB: rise at which the sound has begun, dB.
+# - _QUIET: quantile of the energy that counts as the level of the quiet parts.
 _STEP_S = 0.001
 _QUIET_BEFORE_S = 0.05
 _ATTACK = 15
 _RISE_DB, _BEGUN_DB = 10.0, 5.0
 _QUIET = 0.2
 
-# A sound is short where this share of it has come within this time of its onset,
-# echoes included; so is the recording where most of it are short sounds.
+# _MOST: share of the energy of a short sound, echoes included, that arrives within
+#   _SHORT_S of its onset. It is also the least share of short sounds in a recording of
+#   short sounds.
+# _SHORT_S: longest duration of a short sound, s.
+# _LONGEST_S: longest time that counts as part of one sound, s.
 _MOST, _SHORT_S = 0.9, 0.25
 _LONGEST_S = 0.6
 
-# Of the sample rate, highest corner of the filter.
+# Highest corner frequency of the filter, as a share of the sample rate.
 _HIGHEST = 0.49
 
 
 @dataclass(frozen=True)
 class OnsetSpectra(RecordingSpectra):
-    """As a recording of short sounds, of which each is a snapshot."""
+    """Spectra of a recording of short sounds. Each sound is one snapshot."""
 
     after_s: float = AFTER_S[0]
-    """How long a window lasts after the onset, s."""
+    """Length of a window after the onset, s."""
 
     @cached_property
     def window(self) -> NDArray[np.float32]:
-        """(w,) shape of a snapshot: soft before the onset and at its end."""
+        """(w,) window of a snapshot. It rises before the onset and falls at its end."""
         soft = round(_BEFORE_S * self.sample_rate_hz)
         flat = round(self.after_s * self.sample_rate_hz)
         rise = np.sin(0.5 * math.pi * (np.arange(soft) + 0.5) / soft) ** 2
@@ -60,9 +70,9 @@ class OnsetSpectra(RecordingSpectra):
 
     @cached_property
     def energy(self) -> NDArray[np.float64]:
-        """(k,) power in the band in steps of a millisecond, all channels."""
+        """(k,) mean power of all channels within the band, in steps of 1 ms."""
         step = round(_STEP_S * self.sample_rate_hz)
-        # Causal: nothing of a sound may come before it.
+        # The filter is causal, so no part of a sound appears before its onset.
         high_hz = min(self.high_hz, _HIGHEST * self.sample_rate_hz)
         band = butter(
             2, (self.low_hz, high_hz), "band", fs=self.sample_rate_hz, output="sos"
@@ -74,11 +84,11 @@ class OnsetSpectra(RecordingSpectra):
 
     @cached_property
     def onsets(self) -> NDArray[np.int64]:
-        """(s,) steps at which a sound begins."""
+        """(s,) numbers of the 1 ms steps at which sounds begin."""
         energy, before = self.energy, round(_QUIET_BEFORE_S / _STEP_S)
         if energy.size <= before:
             return np.zeros(0, dtype=np.int64)
-        # The louder of the steps that end so long before this one.
+        # Largest energy in the 50 ms before the possible attack.
         past = maximum_filter1d(energy, before, origin=before - 1 - before // 2)
         past = np.concatenate((np.full(_ATTACK, np.inf), past[:-_ATTACK]))
         past = np.maximum(past, np.quantile(energy, _QUIET))
@@ -86,7 +96,7 @@ class OnsetSpectra(RecordingSpectra):
         high[: before + _ATTACK] = False
         steps = np.flatnonzero(high)
         begun = steps[np.diff(steps, prepend=-before) >= before]
-        # A slow attack has begun before it is as loud as that.
+        # A sound with a slow attack begins before it reaches the threshold.
         for row, k in enumerate(begun):
             rising = energy[k - _ATTACK : k] > 10.0 ** (_BEGUN_DB / 10.0) * past[k]
             quiet = np.flatnonzero(~rising)
@@ -95,7 +105,7 @@ class OnsetSpectra(RecordingSpectra):
 
     @cached_property
     def starts(self) -> NDArray[np.int64]:
-        """(s,) first samples of the snapshots."""
+        """(s,) numbers of the first samples of the snapshots."""
         step = round(_STEP_S * self.sample_rate_hz)
         lead = self.travel_s * self.sample_rate_hz + self._soft
         first = self.onsets * step - round(lead)
@@ -104,7 +114,7 @@ class OnsetSpectra(RecordingSpectra):
 
     @property
     def are_most(self) -> bool:
-        """Whether most of what the recording holds are short sounds."""
+        """Whether most of the energy in the recording belongs to short sounds."""
         energy = self.energy - np.quantile(self.energy, _QUIET)
         ends = np.append(self.onsets, energy.size)[1:]
         longest = round(_LONGEST_S / _STEP_S)
@@ -122,7 +132,7 @@ class OnsetSpectra(RecordingSpectra):
 
     @cached_property
     def noise_before(self) -> NDArray[np.float32]:
-        """(s, f) power in a window that ends where a snapshot begins."""
+        """(s, f) power in a window that ends where the snapshot begins."""
         take = self.starts[:, np.newaxis] + np.arange(-self.window.size, 0)
         frames = self.channels[:, np.maximum(take, 0)] * self.window
         spectra = fft.rfft(frames, axis=-1)[..., self.bins]
@@ -130,7 +140,7 @@ class OnsetSpectra(RecordingSpectra):
 
     @cached_property
     def weights(self) -> NDArray[np.float32]:
-        """(s, f) what each snapshot is worth, 0 to 1."""
+        """(s, f) weight of each snapshot and frequency, 0 to 1."""
         power = np.maximum(self.power, np.finfo(np.float32).tiny)
         kernel = np.full(5, 0.2, dtype=np.float32)
         noise = np.array(

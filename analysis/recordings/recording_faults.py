@@ -1,4 +1,4 @@
-"""Channels of a recording that are not as they should be."""
+"""Corrects faulty channels of a recording, or rejects the recording."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.channel_order import exchanged
 from systems.framework.input_error import InputError
 
-# What leaves nothing to locate with.
+# Kinds of faults that make it impossible to locate a source.
 _FATAL = ("nan", "dead", "copied", "units", "drift")
 
-# Channels that one message names.
+# Largest number of channels in one message.
 _MOST_NAMED = 8
 
 
@@ -25,24 +25,25 @@ def channels_without_faults(
     agreement: Callable[[NDArray[np.float64]], float],
     where: str,
 ) -> tuple[NDArray[np.float64], list[ChannelFault]]:
-    """Mends what can be mended, and refuses what would give wrong places.
+    """Corrects inverted channels, and rejects recordings with serious faults.
 
-    An inverted channel is turned back. Exchanged channels are no guess to be
-    made here: whether the cables or the file's description are wrong is for the
-    user to say.
+    Exchanged channels are not corrected. Either the cables or the geometry file may be
+    wrong, and only the user can know which.
 
     Args:
-        samples: (n, samples) one row a microphone.
-        faults: What seems wrong with them.
-        agreement: How well channels fit the geometry; the higher the better.
-        where: Begins a message.
+        samples: (n, samples) recorded samples, one row per microphone.
+        faults: Possible faults of the channels.
+        agreement: Function that measures how well channels fit the geometry. A larger
+            value means a better fit.
+        where: Name of the recording, which begins a message.
 
     Returns:
-        The channels, and the faults that remain worth saying.
+        samples: The corrected channels.
+        faults: The faults that remain worth reporting.
 
     Raises:
-        InputError: Channels are dead, not finite, copies, or exchanged; or positions
-            are not in metres.
+        InputError: Channels are dead, not finite, copied, exchanged, or drift apart. Or
+            the positions are not in meters.
     """
     fatal = [fault for fault in faults if fault.kind in _FATAL]
     if fatal:
@@ -70,7 +71,7 @@ def _fits_better_exchanged(
     channels: tuple[int, ...],
     agreement: Callable[[NDArray[np.float64]], float],
 ) -> bool:
-    """Whether some exchange makes all delays fit better, not the peaks alone."""
+    """Returns whether exchanging two of the channels improves the fit of all delays."""
     as_given = agreement(samples)
     return any(
         agreement(exchanged(samples, a, b)) > as_given

@@ -1,4 +1,4 @@
-"""From where a recording sounds, stretch by stretch."""
+"""Searches the source position of each stretch of a recording."""
 
 from __future__ import annotations
 
@@ -24,54 +24,66 @@ from systems.delays.correlations import correlations_at_lags
 from systems.delays.delay_sets import consistent_lags
 from systems.sound.array_shape import ArrayShape
 
-# Least mean weight of a stretch's snapshots: the rest is silence or echo.
+# Least mean weight of a stretch with a source. Other stretches are silence or echoes.
 _LEAST_WEIGHT = 0.02
-# A response counts above that of a diffuse field by this many deviations of
-# what independent noise would give, and by this share of what direct sound
-# alone would: no real noise comes from all around quite alike.
+# A source needs a response above that of a diffuse field. The difference must exceed
+# both limits, because real noise never comes equally from all directions:
+# - _DEVIATIONS: in standard deviations of the response to independent noise.
+# - _LEAST_DIRECT: as a share of the difference for direct sound alone.
 _DEVIATIONS = 5.0
 _LEAST_DIRECT = 0.1
-# To choose among the peaks of a stretch its neighbours help: how many on either
-# side, and by which share.
+# The neighbors of a stretch help to choose among its peaks:
+# - _NEIGHBOURS: number of neighbors before and after the stretch.
+# - _HELP: weight of their mean response.
 _NEIGHBOURS, _HELP = 4, 0.5
-# Sets of lags that are looked at more closely for a sound that stands alone, or where
-# microphones may be off by more than this share of the shortest period. Those that
-# agree less than the best one by this factor are side lobes, or of echoes alone.
+# Several sets of lags are compared for a single short sound, or if the microphone
+# positions are too uncertain.
+# - _CANDIDATES: largest number of sets.
+# - _MISPLACED: positions are too uncertain if their delay error exceeds this share of
+#   the shortest period.
+# - _LEAST_AGREEMENT: least agreement of a set, as a share of the best agreement. Sets
+#   below it are side lobes or echoes.
 _CANDIDATES, _MISPLACED, _LEAST_AGREEMENT = 8, 0.5, 0.75
-# Sound that has come straight is the earlier, though it may agree a little less: delays
-# are alike within the one time, and earlier beyond the other, s.
+# Direct sound arrives before its echoes, although its delays may agree slightly less:
+# - _ALIKE_S: delays within this time of each other count as equal, s.
+# - _EARLIER_S: a delay counts as earlier if the difference exceeds this time, s.
 _ALIKE_S, _EARLIER_S = 1e-4, 4e-4
 
 
 @dataclass(frozen=True)
 class Sighting(AlignedDelays):
-    """A stretch of the recording in which one place stands out.
+    """A stretch of the recording in which one source position stands out.
 
-    Its delays are whole, not what an alignment leaves; its coherence is the share of
-    the sound that comes straight from the source.
+    The delays ``tau`` include the shifts of the channels before the fit. The coherence
+    is the share of the sound that arrives directly from the source.
     """
 
     t_s: float
-    """Middle of the stretch, s."""
+    """Middle of the stretch, s from the start of the recording."""
 
 
 @dataclass(frozen=True)
 class RecordingSearch:
-    """A recording and the array that made it."""
+    """Search for the source in each stretch of a recording.
+
+    A stretch is a run of snapshots. A snapshot is a short window of the recording.
+    """
 
     recording: RecordingSpectra
     shape: ArrayShape
     c: float
     snapshots: int
-    """Of a stretch; stretches overlap by half, unless each is one snapshot."""
+    """Number of snapshots per stretch. Stretches overlap by half if there are several
+    snapshots."""
     slack_s: float = 0.0
-    """By how much delays may be longer than the stated places allow, s."""
+    """Time by which delays may exceed the limit from the stated positions, s."""
     has_place: Callable[[AlignedDelays], bool] = field(default=lambda _: True)
-    """Whether delays are of some place; asked where there is a choice."""
+    """Function that returns whether delays fit some source position. It is called if
+    there are several sets of delays to choose from."""
 
     @cached_property
     def stretches(self) -> list[slice]:
-        """Snapshots of each stretch."""
+        """Snapshots of each stretch, as slices."""
         count = len(self.recording.starts)
         size = min(self.snapshots, count)
         firsts = range(0, count - size + 1, max(1, size // 2))
@@ -79,14 +91,14 @@ class RecordingSearch:
 
     @property
     def stretch_s(self) -> float:
-        """How long a stretch is, s."""
+        """Duration of a stretch, s."""
         count = self.stretches[0].stop
         samples = self.recording.window.size + (count - 1) * self.recording.hop
         return samples / self.recording.sample_rate_hz
 
     @cached_property
     def grid(self) -> SearchGrid:
-        """Places to search."""
+        """Positions to search."""
         return SearchGrid.of(
             self.shape, self.c, self.recording.high_hz, self._length / self._window_s
         )
@@ -97,25 +109,42 @@ class RecordingSearch:
 
     @cached_property
     def _length(self) -> int:
-        """Samples of a correlation in a whole window."""
+        """Number of samples of a correlation that covers a whole window."""
         least = LAG_DENSITY * self.recording.high_hz * self._window_s
         return int(fft.next_fast_len(math.ceil(least), real=True))
 
     def _correlations(
         self, cross: NDArray[np.complex64], slack: int = 0
     ) -> NDArray[np.float32]:
-        """(p, 2 m + 1) of the pairs' cross-spectra (p, f), which add up to 1."""
+        """Computes the correlations of p pairs of microphones.
+
+        Args:
+            cross: (p, f) cross-spectra of the pairs. For each pair, the magnitudes add
+                up to at most 1.
+            slack: Number of lags to add on either side.
+
+        Returns:
+            (p, 2 m + 1) correlations. Lag 0 is in the middle.
+        """
         m = self.grid.max_lag + slack
         values = correlations_at_lags(cross, self.recording.bins, self._length, m)
         return values * np.float32(0.5 * self._length)
 
     def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
-        """(g,) of the pairs' cross-spectra (p, f), which add up to 1."""
+        """Computes the steered response of each grid position.
+
+        Args:
+            cross: (p, f) cross-spectra of the pairs. For each pair, the magnitudes add
+                up to at most 1.
+
+        Returns:
+            (g,) responses of the g grid positions.
+        """
         return steered_response(self._correlations(cross), self.grid)
 
     @cached_property
     def diffuse_response(self) -> NDArray[np.float32]:
-        """(g,) response to sound that comes from all around alike."""
+        """(g,) response of each grid position to equal sound from all directions."""
         weights = self.recording.weights.mean(axis=0, dtype=np.float64)
         phase = np.outer(self.shape.distances_m, self.recording.angular_frequency)
         share = weights / max(weights.sum(), 1e-30)
@@ -123,7 +152,13 @@ class RecordingSearch:
         return self._responses(cross.astype(np.complex64))
 
     def mean_response(self) -> float:
-        """Greatest response of a stretch, on average: how well all pairs agree."""
+        """Averages the greatest response of each stretch.
+
+        The mean measures how well all pairs of channels agree on a source position.
+
+        Returns:
+            Mean over the stretches, weighted by the weights of the stretches.
+        """
         weights = [float(self.recording.weights[s].mean()) for s in self.stretches]
         best = [
             float(self._stretch_response(s, w).max())
@@ -132,7 +167,11 @@ class RecordingSearch:
         return float(np.average(best, weights=np.array(weights) + 1e-30))
 
     def sightings(self) -> Iterator[Sighting]:
-        """Stretches with a source, in order of time."""
+        """Finds the stretches that have a source.
+
+        Yields:
+            The stretches with a source, in the order of time.
+        """
         held: deque[tuple[slice, float, NDArray[np.float32]]] = deque()
         near = np.zeros(len(self.grid.lags))
         weight = 0.0
@@ -166,7 +205,7 @@ class RecordingSearch:
         return self._responses(cross / self.recording.weights[stretch].sum())
 
     def _cross(self, stretch: slice) -> NDArray[np.complex64]:
-        """(p, f) whitened cross-spectra of the pairs, weighted."""
+        """Returns (p, f) whitened and weighted cross-spectra of the pairs."""
         weights = self.recording.weights[stretch]
         spectra = self.recording.spectra(stretch)
         power = np.mean(np.abs(spectra) ** 2, axis=0)
@@ -201,12 +240,16 @@ class RecordingSearch:
         return Sighting(**vars(fit), t_s=ends / (2.0 * recording.sample_rate_hz))
 
     def _consistent(self, place: int, stretch: slice) -> AlignedDelays | None:
-        """The delays on which all channels agree best, of those that have a place.
+        """Returns the delays with the best agreement that also fit a source position.
 
-        In a short window an echo at one microphone may pass for the sound: a wrong
-        place of the grid then has the greatest response, though most pairs alone agree
-        on it. Where microphones stand elsewhere than stated, no place of the grid may
-        be near enough to find the peak and not its side lobe.
+        Several sets of delays are compared, because the grid position with the greatest
+        response can be wrong for two reasons:
+
+        - In a short window, the echo at one microphone may be as strong as the sound. A
+          wrong position may then have the greatest response, although not all pairs
+          agree on it.
+        - If the microphones are not at their stated positions, the nearest grid
+          position may lie on a side lobe instead of the peak.
         """
         weight = float(self.recording.weights[stretch].sum())
         rate = self._length / self._window_s
@@ -234,8 +277,8 @@ class RecordingSearch:
         return best
 
     def _threshold(self, place: int, stretch: slice) -> float:
-        # Windows that overlap by half, with the shape used, are worth half as
-        # many independent values; and few of the pairs are independent.
+        # Windows that overlap by half contain half as many independent values. Few of
+        # the pairs are independent, too.
         values = self.recording.weights[stretch].sum() / 2.0
         deviation = 1.0 / math.sqrt(2.0 * (self.shape.count - 1) * values)
         diffuse = float(self.diffuse_response[place])
@@ -243,7 +286,7 @@ class RecordingSearch:
         return diffuse + max(_DEVIATIONS * deviation, least)
 
     def _delays(self, place: int, stretch: slice) -> AlignedDelays | None:
-        """Delays of the channels, aligned for a place of the grid first."""
+        """Estimates delays after aligning the channels for a grid position."""
         grid = self.grid
         chosen = slice(place, place + 1)
         later = centroid_delays(
@@ -254,7 +297,7 @@ class RecordingSearch:
     def _delays_at(
         self, later: NDArray[np.float64], stretch: slice, coarseness: float = 1.0
     ) -> AlignedDelays | None:
-        """Delays of the channels, aligned for these (n,) first, s."""
+        """Estimates delays after shifting the channels by (n,) given delays, s."""
         rate = self.recording.sample_rate_hz
         lags = np.rint(later * rate).astype(np.int64)
         fit = fit_aligned_delays(
@@ -267,7 +310,11 @@ class RecordingSearch:
 
 
 def _earlier(one: AlignedDelays, other: AlignedDelays) -> bool:
-    """Whether most channels hear both alike, and the rest hear the one earlier."""
+    """Returns whether ``one`` is earlier than ``other`` in some of the channels.
+
+    In all other channels, which must be more than half, the two sets of delays must be
+    equal.
+    """
     later = np.concatenate(([0.0], other.tau - one.tau))
     for common in later:
         off = later - common

@@ -1,9 +1,10 @@
-"""Short spectra of a recording, and how much each of them is worth.
+"""Computes short spectra of a recording, and the weight of each spectrum.
 
-A recording is cut into short overlapping windows, the snapshots. What a
-snapshot holds at a frequency counts as far as it stands out of the noise, and
-out of what a room still echoes from the snapshots before: the start of a sound
-comes straight from its source, what follows comes from the walls as well.
+The recording is cut into short overlapping windows, the snapshots. The weight of a
+snapshot at a frequency grows with its power relative to two levels. The first level is
+the noise. The second level is the remaining echo of earlier snapshots in the room. The
+onset of a sound therefore has the largest weight. The onset arrives directly from the
+source, but the later sound also arrives from the walls.
 """
 
 from __future__ import annotations
@@ -17,36 +18,40 @@ from numpy.typing import NDArray
 from scipy import fft
 
 WINDOW_S = 0.032
-#: Windows are at least this many times as long as sound takes along the array.
+#: Least length of a window, as a multiple of the travel time of sound along the array.
 TRAVELS = 6.0
-# Quiet snapshots have at most this quantile of the power. In noise, the lowest
-# tenth lies below the mean by about the second factor.
+# _QUIET: quantile of the power that counts as the level of the quiet snapshots.
+# _QUIET_TO_MEAN: ratio of the mean power of noise to the quantile _QUIET of its power.
 _QUIET = 0.1
 _QUIET_TO_MEAN = 1.5
-# A recording whose level varies by less holds no quiet snapshots, dB.
+# Least variation of the level in a recording with quiet snapshots, dB.
 _LEAST_CONTRAST_DB = 6.0
-#: What is below this much of the noise's power counts nothing.
+#: Least power that counts, as a multiple of the noise power.
 ABOVE_NOISE = 2.0
-# A room's echo: reverberation time, and the share of it that is taken away.
+# _REVERBERATION_S: assumed reverberation time of the room, s.
+# _ECHO_SHARE: share of the expected echo that is subtracted.
 _REVERBERATION_S = 0.5
 _ECHO_SHARE = 0.8
 
 
 @dataclass(frozen=True)
 class RecordingSpectra:
-    """A recording of n channels, ready to be looked at in snapshots."""
+    """A recording of n channels, divided into snapshots.
+
+    A snapshot is a short window of the recording.
+    """
 
     channels: NDArray[np.float32]
-    """(n, samples), each of unit power."""
+    """(n, samples) samples; the mean power of each channel is 1."""
     sample_rate_hz: float
     low_hz: float
     high_hz: float
     travel_s: float
-    """Longest time that sound takes from microphone to microphone, s."""
+    """Longest travel time of sound between two microphones, s."""
 
     @cached_property
     def window(self) -> NDArray[np.float32]:
-        """(w,) shape of a snapshot."""
+        """(w,) window function of a snapshot."""
         from scipy.signal.windows import hann
 
         seconds = max(WINDOW_S, TRAVELS * self.travel_s)
@@ -55,39 +60,41 @@ class RecordingSpectra:
 
     @property
     def hop(self) -> int:
-        """Samples from one snapshot to the next."""
+        """Number of samples from one snapshot to the next."""
         return self.window.size // 2
 
     @cached_property
     def starts(self) -> NDArray[np.int64]:
-        """(s,) first samples of the snapshots."""
+        """(s,) numbers of the first samples of the snapshots."""
         last = self.channels.shape[1] - self.window.size
         return np.arange(0, last + 1, self.hop)
 
     @cached_property
     def bins(self) -> slice:
-        """Bins of the band."""
+        """Frequency bins within the band."""
         period = self.window.size / self.sample_rate_hz
         first = max(1, math.ceil(self.low_hz * period))
         return slice(first, math.floor(self.high_hz * period) + 1)
 
     @cached_property
     def angular_frequency(self) -> NDArray[np.float64]:
-        """(f,) of the bins, rad/s."""
+        """(f,) angular frequencies of the bins, rad/s."""
         step = 2.0 * math.pi * self.sample_rate_hz / self.window.size
         return step * np.arange(self.bins.start, self.bins.stop)
 
     def spectra(
         self, snapshots: slice, lags: NDArray[np.int64] | None = None
     ) -> NDArray[np.complex64]:
-        """Spectra of some snapshots within the band.
+        """Computes the spectra of some snapshots within the band.
 
         Args:
-            snapshots: Which ones.
-            lags: (n,) samples by which each channel is read later.
+            snapshots: Snapshots to use.
+            lags: (n,) shift of each channel, samples. A positive shift reads later
+                samples. None: no shifts.
 
         Returns:
-            (n, k, f) channels, snapshots and bins, in the unit of the samples.
+            (n, k, f) spectra of n channels, k snapshots and f bins, in the unit of the
+            samples.
         """
         size = self.window.size
         if lags is None:
@@ -104,7 +111,7 @@ class RecordingSpectra:
 
     @cached_property
     def power(self) -> NDArray[np.float32]:
-        """(s, f) mean over the channels."""
+        """(s, f) power of each snapshot and bin, averaged over the channels."""
         parts = [
             np.mean(np.abs(self.spectra(slice(k, k + 256))) ** 2, axis=0)
             for k in range(0, self.starts.size, 256)
@@ -113,10 +120,10 @@ class RecordingSpectra:
 
     @cached_property
     def noise(self) -> NDArray[np.float32]:
-        """(f,) power of the quiet snapshots; 0 where there are none.
+        """(f,) power of the quiet snapshots. It is 0 if there are no quiet snapshots.
 
-        A sound that never stops is not taken for noise: whether it comes from
-        one place is for the coherence to tell.
+        A continuous sound does not count as noise. Its coherence later shows whether it
+        comes from one position.
         """
         level = self.power.mean(axis=1)
         low, high = np.quantile(level, [_QUIET, 1.0 - _QUIET])
@@ -127,7 +134,7 @@ class RecordingSpectra:
 
     @cached_property
     def weights(self) -> NDArray[np.float32]:
-        """(s, f) what each snapshot is worth, 0 to 1."""
+        """(s, f) weight of each snapshot and frequency, 0 to 1."""
         tiny = np.finfo(np.float32).tiny
         power = np.maximum(self.power, tiny)
         hop_s = self.hop / self.sample_rate_hz
@@ -137,5 +144,5 @@ class RecordingSpectra:
             echo[k] = decay * np.maximum(echo[k - 1], power[k - 1])
         above = 1.0 - np.minimum(ABOVE_NOISE * self.noise, power) / power
         direct = 1.0 - np.minimum(_ECHO_SHARE * echo, power) / power
-        # Digital silence is worth nothing, however long ago its last echo was.
+        # Digital silence has the weight 0, even long after the last echo.
         return (above * direct * (self.power > tiny)).astype(np.float32)

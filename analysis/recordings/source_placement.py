@@ -1,8 +1,9 @@
-"""From delays to a place, with only as much range as the geometry supports.
+"""Estimates a source position from delays, with a range only if the array supports it.
 
-Range is in the small differences between a plane and a curved wave front. What is
-not known of the array and of the air makes such differences where there are none, and
-so do reflections. All three weigh the delays and count in the errors.
+The range follows from the small difference between a plane and a curved wave front.
+Three kinds of errors cause similar differences: errors of the array, errors of the
+speed of sound, and reflections. All three determine the weights of the delays and are
+part of the reported errors.
 """
 
 from __future__ import annotations
@@ -21,74 +22,87 @@ from systems.hearing.multilateration import angles_of, locate_source
 from systems.hearing.source_fix import NEAREST_M, SourceFix
 from systems.sound.array_shape import ArrayShape
 
-# Reflections move each channel by its own, for each part that is not coherent by
-# this share of what sound takes along the array, or of the time within which an
-# echo cannot be told apart. From simulated rooms.
+# _REFLECTED_SHARE: error from reflections, for each part of the sound that is not
+#   coherent. The error is a share of the travel time along the array or of
+#   _UNRESOLVED_S, whichever is shorter. Each channel has its own error. The value is
+#   from simulated rooms.
+# _UNRESOLVED_S: time within which an echo cannot be separated from the direct sound, s.
 _REFLECTED_SHARE = 0.015
 _UNRESOLVED_S = 2e-4
 
-# Waves are taken as curved where that lowers the chi-square of plane ones by more.
+# Least reduction of chi-square for curved waves instead of plane waves.
 _CURVED = 1.0
 
-# Ranges with errors beyond so many times the largest are not looked at more closely.
+# Largest error of a range that is worth a closer computation, as a multiple of the
+# largest range error to report.
 _HOPELESS = 2.0
 
-# Sources may be beyond the farthest range, unless nearer by so many deviations.
+# A range is reported only if it is below the farthest range by this many standard
+# deviations.
 _CERTAINLY = 2.0
 
-# What the budget makes of delays depends on the place, and hardly so.
+# Number of iterations. The effect of the array's errors on the delays depends slightly
+# on the source position.
 _ROUNDS = 2
 
-# Sources are rarely nearer than half a metre, nor than two apertures: deviation
-# of the inverse range, 1/m, and of its product with the aperture.
+# _INVERSE_RANGE: prior standard deviation of the inverse range, 1/m. Sources are rarely
+#   nearer than 0.5 m.
+# _APERTURES: prior standard deviation of the inverse range times the aperture. Sources
+#   are rarely nearer than two apertures.
 _INVERSE_RANGE, _APERTURES = 1.0, 0.5
 
-# Directions that vary by more are none: of a source nearly above a flat array, or
-# where microphones may stand anywhere.
+# Largest standard deviation of a reported bearing, rad. It is exceeded by a source
+# nearly above a flat array, or if the microphone positions are unknown.
 _LARGEST_STD_RAD = math.radians(20.0)
 
-# A place whose delays are off by more is no place: deviations of chi-square.
+# Largest misfit of the delays of a source position, in standard deviations of
+# chi-square.
 _MISFIT_DEVIATIONS = 5.0
 
 
 @dataclass(frozen=True)
 class PlacedSource:
-    """A source, and which part of its errors no average makes smaller."""
+    """A source position with its total errors and with its systematic errors.
+
+    Averaging over time does not reduce the systematic errors.
+    """
 
     fix: SourceFix
-    """With all errors: noise, reflections and the array's budget."""
+    """Source position with all errors: noise, reflections, and errors of the array."""
     systematic: SourceFix
-    """The same place with the errors of the budget alone."""
+    """The same source position with the errors of the array and the air only."""
 
 
 def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
-    """Where the sound of a stretch came from.
+    """Estimates the position of the source of a sound.
 
     Args:
-        delays: Of the channels, with their errors.
-        array: The microphones and their budget.
+        delays: Delays of the channels, and their errors.
+        array: The microphones and the errors of their description.
 
     Returns:
-        The source; with a range where its standard deviation is at most the share
-        of it that the array names. None where no place fits the delays, or where
-        the budget supports no bearing.
+        The source position. It has a range if the standard deviation of the range is at
+        most the share ``largest_range_error`` of the range. None if no position fits
+        the delays, or if the bearing is too uncertain.
     """
     placed = _placed(delays, array)
-    # An upright row has no bearing at all, and tells the elevation.
+    # An upright row cannot measure the bearing, but it measures the elevation.
     if placed and _LARGEST_STD_RAD < placed.fix.bearing_std < math.inf:
         return None
     return placed
 
 
 def has_place(delays: AlignedDelays, array: KnownArray) -> bool:
-    """Whether some place fits the delays, be its bearing ever so uncertain.
+    """Returns whether some source position fits the delays.
+
+    The bearing of the position may be arbitrarily uncertain.
 
     Args:
-        delays: Of the channels, with their errors.
-        array: The microphones and their budget.
+        delays: Delays of the channels, and their errors.
+        array: The microphones and the errors of their description.
 
     Returns:
-        False where the delays belong to no place at all.
+        False if no source position fits the delays.
     """
     return _placed(delays, array) is not None
 
@@ -122,7 +136,8 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
         return PlacedSource(near, systematic)
     allowed = _budget(u, 0.0, array)
     if lying:
-        # A source above the plane has shorter delays than any within it.
+        # The delays of a source above the plane are shorter than those of any source in
+        # it.
         shape = ArrayShape.of(np.pad(shape.p_AM, ((0, 0), (0, 1))))
     far = locate_far_source(tau, own + allowed, shape, c, inverse_range_std=bent)
     systematic = locate_far_source(tau, allowed, shape, c, own)
@@ -136,7 +151,7 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
 def _direction(
     tau: NDArray[np.float64], own: NDArray[np.float64], array: KnownArray
 ) -> NDArray[np.float64]:
-    """(d,) towards the source, as if it were far away."""
+    """Returns the (d,) unit vector to the source, as if the source were far away."""
     shape = array.shape
     allowed = (array.budget.position_std / array.c) ** 2 * (
         np.eye(shape.count - 1) + 1.0
@@ -153,7 +168,13 @@ def _near(
     u: NDArray[np.float64],
     array: KnownArray,
 ) -> tuple[SourceFix, NDArray[np.float64]]:
-    """The place at a finite range, and what the budget does to the delays there."""
+    """Estimates a source position at a finite range.
+
+    Returns:
+        fix: The source position.
+        allowed: (n - 1, n - 1) covariance of the delays from the errors of the array,
+            for this position, s^2.
+    """
     allowed = _budget(u, 0.0, array)
     for _ in range(_ROUNDS):
         near = locate_source(tau, own + allowed, array.shape, array.c)
@@ -169,7 +190,10 @@ def _marginal(
     own: NDArray[np.float64],
     array: KnownArray,
 ) -> SourceFix:
-    """The source at a range that counts all places, where one may be believed."""
+    """Averages the range over all likely source positions.
+
+    If the range is too uncertain to report, the position stays as it is.
+    """
     if near.range_std > _HOPELESS * array.largest_range_error * near.range:
         return near
     shape, w = array.shape, 1.0 / near.range
@@ -209,7 +233,18 @@ def _of_budget(
     shape: ArrayShape,
     c: float,
 ) -> SourceFix:
-    """The same place with the errors that a part of the delays' errors makes."""
+    """Computes the errors of a source position from one part of the delay errors.
+
+    Args:
+        near: Source position at a finite range.
+        whole: (n - 1, n - 1) covariance of all delay errors, s^2.
+        allowed: (n - 1, n - 1) covariance of the part to use, s^2.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+
+    Returns:
+        The same position with the errors from this part.
+    """
     to_microphones = near.p_AS - shape.p_AM
     to_microphones /= np.linalg.norm(to_microphones, axis=1, keepdims=True)
     slopes = (to_microphones[1:] - to_microphones[0]) / c
@@ -228,21 +263,24 @@ def _of_budget(
 
 
 def _reflections(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
-    """(n - 1, n - 1) s^2 of delays by reflections that are alike in all bands."""
+    """Returns the covariance of delay errors from reflections, (n - 1, n - 1) s^2.
+
+    These errors are the same in all frequency bands.
+    """
     share = _REFLECTED_SHARE * (1.0 - min(delays.coherence, 1.0))
     moved = share * min(array.shape.max_delay(array.c), _UNRESOLVED_S)
     return moved**2 * (np.eye(len(delays.tau)) + 1.0)
 
 
 def tolerance(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
-    """Covariance of delays by all but noise, for a source far away.
+    """Computes the covariance of all delay errors except noise, for a distant source.
 
     Args:
-        delays: n - 1 of them, with their coherence.
-        array: The microphones and their budget.
+        delays: n - 1 delays and their coherence.
+        array: The n microphones and the errors of their description.
 
     Returns:
-        (n - 1, n - 1) s^2, to be added to that from noise.
+        (n - 1, n - 1) covariance to add to the covariance of the noise, s^2.
     """
     reflected = _reflections(delays, array)
     u = _direction(delays.tau, delays.covariance + reflected, array)
@@ -250,18 +288,18 @@ def tolerance(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
 
 
 def _inverse_range_std(shape: ArrayShape) -> float:
-    """Of a source that was not heard yet, 1/m."""
+    """Returns the prior standard deviation of the inverse range, 1/m."""
     return min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
 
 
 def _limit(freedom: int) -> float:
-    """A chi-square above this is a misfit."""
+    """Returns the largest chi-square of a source position that fits the delays."""
     freedom = max(freedom, 1)
     return freedom + _MISFIT_DEVIATIONS * math.sqrt(2.0 * freedom)
 
 
 def _level(fix: SourceFix) -> SourceFix:
-    """The azimuth alone, as of a source within the plane."""
+    """Returns the azimuth of a source without its elevation."""
     u = np.array([math.cos(fix.bearing), math.sin(fix.bearing)])
     across = np.array([-u[1], u[0]])
     covariance = fix.bearing_std**2 * np.outer(across, across)

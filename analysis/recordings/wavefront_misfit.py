@@ -1,8 +1,9 @@
-"""A channel that is late at every direction, told from the fit of the wave fronts.
+"""Finds a channel that is always late, from the fit of the wave fronts.
 
-Delays of more microphones than a source has coordinates must fit a wave front. What
-one channel is off by, in the same way in all stretches of a recording, is no noise
-and no echo: the channel is late, or its microphone does not stand where it should.
+If there are more microphones than unknown source coordinates, the delays must fit a
+wave front. Noise and echoes cause different errors in each stretch of a recording. If
+one channel has the same error in all stretches, there are two explanations. The channel
+is late, or its microphone is not at the stated position.
 """
 
 from __future__ import annotations
@@ -21,55 +22,58 @@ from systems.hearing.multilateration import locate_source, whitening_matrix
 from systems.hearing.source_fix import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
-# Stretches that are looked at; they lie anywhere in the recording.
+# _MOST_STRETCHES: largest number of stretches to use, from anywhere in the recording.
+# _LEAST_STRETCHES: least number of stretches.
 _MOST_STRETCHES = 64
 _LEAST_STRETCHES = 3
 
-# Channels that one message names.
+# Largest number of channels in one message.
 _MOST_NAMED = 8
 
-# Of normally distributed values, standard deviation over median deviation.
+# Ratio of the standard deviation to the median absolute deviation of normally
+# distributed values.
 _TO_STANDARD = 1.4826
 
-# A channel of which nothing is known within a second.
+# Least information about the lateness of a channel, 1/s^2. It corresponds to a standard
+# deviation of 1 s, which means that nothing is known.
 _LEAST_INFORMATION = 1.0
 
 _STEPS = 6
 
-# Of the inverse range before anything is heard, 1/m: large arrays hear near sources.
+# Prior standard deviation of the inverse range, 1/m. Large arrays measure near sources.
 _INVERSE_RANGE = 1.0
 
-# A lateness counts beyond so many deviations of what the tolerances of one stretch
-# allow: those are alike in all of them, and do not average out.
+# Least significant lateness, in standard deviations. The errors of the array are the
+# same in all stretches, so their part of the standard deviation does not average out.
 _DEVIATIONS = 2.7
 
-# Channels that explain nearly as much are no less to be blamed.
+# Channels that explain at least this share of the best explanation are also reported.
 _ALIKE = 0.8
 
 
 @dataclass(frozen=True)
 class Lateness:
-    """By how much each channel alone would have to be late to fit best."""
+    """Lateness of each channel that gives the best fit if only this channel is late."""
 
     late_s: NDArray[np.float64]
-    """(n,) median over the stretches, s."""
+    """(n,) lateness of each channel, median over the stretches, s."""
     deviations: NDArray[np.float64]
-    """(n,) the same over its standard deviation in one stretch."""
+    """(n,) magnitude of the lateness divided by its standard deviation."""
     explained: NDArray[np.float64]
-    """(n,) share of the misfit that it explains, 0 to 1."""
+    """(n,) share of the misfit that the lateness of the channel explains, 0 to 1."""
 
 
 def channel_lateness(
     sightings: Sequence[Sighting], array: KnownArray
 ) -> Lateness | None:
-    """How late each channel seems.
+    """Estimates how late each channel is, from the misfit of the wave fronts.
 
     Args:
-        sightings: Delays and their errors.
-        array: The microphones and their budget.
+        sightings: Stretches of the recording with a source, their delays and errors.
+        array: The n microphones and the errors of their description.
 
     Returns:
-        The latenesses; None where there are too few stretches.
+        The lateness of each channel. None if there are too few stretches.
     """
     every = -(-len(sightings) // _MOST_STRETCHES) or 1
     chosen = sightings[::every]
@@ -81,7 +85,7 @@ def channel_lateness(
     found = [_of_stretch(sighting, shape, array) for sighting in chosen]
     late, info, alike, misfit = (np.array(part) for part in zip(*found, strict=True))
     middle = np.median(late, axis=0)
-    # Noise averages out over the stretches, of which one in two is independent.
+    # The noise averages out over the stretches. Half of the stretches are independent.
     scatter = _TO_STANDARD * np.median(np.abs(late - middle), axis=0)
     deviation = np.sqrt(np.median(alike, axis=0) + 2.0 * scatter**2 / len(late))
     explained = (2.0 * late * middle - middle**2) * info
@@ -95,14 +99,15 @@ def channel_lateness(
 def late_channel(
     sightings: Sequence[Sighting], array: KnownArray
 ) -> ChannelFault | None:
-    """The channel that is late, if one is beyond doubt.
+    """Finds the channel that is late, if the evidence is strong.
 
     Args:
-        sightings: Delays and their errors.
-        array: The microphones and their budget.
+        sightings: Stretches of the recording with a source, their delays and errors.
+        array: The n microphones and the errors of their description.
 
     Returns:
-        Which one, and by how much; None: none is beyond doubt.
+        The late channel and its lateness. Several channels are listed if they explain
+        the misfit equally well. None if there is no strong evidence.
     """
     found = channel_lateness(sightings, array)
     if found is None:
@@ -126,11 +131,16 @@ def late_channel(
 def _of_stretch(
     sighting: Sighting, shape: ArrayShape, array: KnownArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
-    """Lateness of each channel alone, and what is known of it.
+    """Estimates the lateness of each channel in one stretch.
+
+    Each estimate assumes that only this channel is late.
 
     Returns:
-        (n,) latenesses, s; (n,) their information, 1/s^2; (n,) the part of their
-        variances that is alike in all stretches, s^2; and the whole misfit.
+        late: (n,) lateness of each channel, s.
+        information: (n,) inverse variance of each lateness, 1/s^2.
+        alike: (n,) part of each variance from errors that are the same in all
+            stretches, s^2.
+        misfit: Total misfit of the stretch, a sum of squared whitened residuals.
     """
     c = array.c
     allowed = tolerance(sighting, array)
@@ -140,7 +150,8 @@ def _of_stretch(
     u = start.p_AS / np.linalg.norm(start.p_AS)
     root = whitening_matrix(whole)
     residual, slopes = _fit(sighting.tau, root, u, w, shape, c)
-    # What a place may explain is taken out of the misfit and of each lateness.
+    # The part that a change of the source position explains is removed from the misfit
+    # and from each lateness.
     late = np.vstack((-np.ones(shape.count - 1), np.eye(shape.count - 1))).T
     sides = np.vstack((root @ late, np.zeros((1, shape.count))))
     across = np.linalg.svd(slopes, full_matrices=True)
@@ -148,7 +159,8 @@ def _of_stretch(
     free = across[0][:, rank:]
     misfit, sides = free.T @ residual, free.T @ sides
     info = np.maximum(np.sum(sides**2, axis=0), _LEAST_INFORMATION)
-    # The tolerances, whitened; and the range, of which as little is known.
+    # These are the whitened errors of the array. The last row is the range, which is
+    # just as unknown in all stretches.
     steady = np.zeros((shape.count, shape.count))
     steady[:-1, :-1] = root @ allowed @ root.T
     steady[-1, -1] = 1.0
@@ -165,7 +177,22 @@ def _fit(
     shape: ArrayShape,
     c: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Whitened residual of the best place and its slopes, with a row for the range."""
+    """Fits a source position to delays.
+
+    Args:
+        tau: (n - 1,) delays, s.
+        root: (n - 1, n - 1) matrix that whitens delays.
+        u: (3,) initial unit vector to the source.
+        w: Initial inverse range, 1/m.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+
+    Returns:
+        residual: (n,) whitened residual of the best position. The last value is that of
+            the prior of the range.
+        slopes: (n, 3) derivatives of the modeled values with respect to two coordinates
+            of the direction and the inverse range.
+    """
     for k in range(_STEPS + 1):
         delays, along_u, along_w = _wave_front(u, w, shape.p_AM, c)
         basis = np.linalg.svd(u[np.newaxis])[2][1:].T
@@ -189,10 +216,15 @@ def _fit(
 def _wave_front(
     u: NDArray[np.float64], w: float, p: NDArray[np.float64], c: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Delays after channel 0 of sound from u / w, and their slopes along u and w.
+    """Computes the delays of a wave front from the position u / w.
 
-    A microphone at p is nearer to it than the origin by (2 p.u - w p^2) / (1 + s),
-    where s is its distance times w.
+    A microphone at p is nearer to the source than the origin by (2 p.u - w p^2) /
+    (1 + s). Here s is the distance of the microphone from the source times w.
+
+    Returns:
+        delays: (n - 1,) delays of channels 1 ... n - 1 after channel 0, s.
+        along_u: (n - 1, d) derivatives of the delays with respect to u, s.
+        along_w: (n - 1,) derivatives of the delays with respect to w, m s.
     """
     square = np.sum(p**2, axis=1)
     s = np.sqrt(np.maximum(1.0 - 2.0 * w * (p @ u) + w * w * square, 1e-12))

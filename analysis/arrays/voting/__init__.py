@@ -1,1 +1,1 @@
-"""Directions of single times and frequencies, gathered into sources and tracks."""
+"""Gathers directions of single times and frequencies into sources and tracks."""

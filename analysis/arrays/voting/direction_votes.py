@@ -1,13 +1,15 @@
-"""Directions from which single times and frequencies of a sound come.
+"""Estimates the direction of the sound at single times and frequencies.
 
-Of several people who talk at once, one is far louder than the others at most times and
-frequencies: averages over all of them lie between the talkers, single ones do not. Each
-bin in which one wave alone reaches the array votes for a direction (after Mohan et al.
-2008, and Pavlidi et al. 2013); ``analysis.arrays.voting.vote_peaks`` gathers the votes.
-What is no louder than an echo of what came before does not vote.
+If several people talk at once, one voice is much louder than the others at most times
+and frequencies. An average over all times and frequencies gives a direction between the
+talkers, but a single bin does not. A bin is one frequency at one time. If only one wave
+reaches the array in a bin, the bin votes for a direction (after Mohan et al. 2008, and
+Pavlidi et al. 2013). If a bin is no louder than the possible echo of earlier sound, it
+does not vote. The module ``analysis.arrays.voting.vote_peaks`` gathers the votes.
 
-The band ends where sound along the array's shortest pairs turns by half a period:
-beyond it phases wrap, and votes pile up on the other side.
+The band has an upper limit. At this limit, the phase of sound along the shortest pairs
+of the array changes by half a period. At higher frequencies, phases wrap, and votes
+would pile up on the opposite side.
 """
 
 from __future__ import annotations
@@ -31,63 +33,75 @@ from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 
 _FRAME_S = 0.032
-# At least so many times what sound takes along the array.
+# Least length of a frame, as a multiple of the travel time of sound along the array.
 _CROSSINGS = 6.0
 _HOPS = 4
 
-# Bins with less power than this share of all are dropped, and by how much its estimate
-# follows in a hop.
+# _WEAKEST: share of the bins that do not vote because their power is lowest.
+# _FOLLOW: rate at which the power limit of these bins adapts, per hop.
 _WEAKEST, _FOLLOW = 0.3, 0.1
 
-# A bin votes where it is louder than what is left of the loudest so far by this factor;
-# that decays so far in a second, as in a room of T60 1 s.
+# _RISE: least power of a voting bin, as a multiple of the remaining echo.
+# _DECAY_DB_S: decay of the echo, dB/s, as in a room with the reverberation time T60 = 1
+#   s.
 _RISE, _DECAY_DB_S = 1.6, 62.5
 
-# Frequencies whose levels are kept.
+# Number of frequencies whose levels are stored.
 _LEVELS = 24
 
-# A band that ends below this holds too little of speech.
+# Least upper limit of a band whose bins vote, Hz. A lower band contains too little
+# speech.
 _LEAST_HIGHEST_HZ = 1_000.0
 
 _SPEEDS_M_S = (100.0, 2_000.0)
 
 
 class DirectionVotes(NamedTuple):
-    """Votes in order of time, and levels over time."""
+    """Votes for directions in the order of time, and levels of the sound over time.
+
+    A vote is an estimated direction of the sound in a group of consecutive frames.
+    """
 
     t_s: NDArray[np.float64]
-    """(k,) middle of the frames, s from the first sample."""
+    """(k,) middles of the groups of the votes, s from the first sample."""
     azimuth: NDArray[np.float64]
-    """(k,) rad, in (-pi, pi], from +x towards +y; on the side of ``ahead``."""
+    """(k,) azimuths from +x towards +y, in (-pi, pi], rad. They are on the side of
+    ``shape.ahead``."""
     elevation: NDArray[np.float64]
-    """(k,) rad, above +z = 0; NaN where the array does not tell it."""
+    """(k,) elevations above the x-y plane, rad. NaN if the array cannot measure them.
+    """
     weight: NDArray[np.float64]
-    """(k,) frequency, Hz; of steered votes the response, 0 to 1."""
+    """(k,) weights. The weight of a single bin is its frequency, Hz. The weight of a
+    steered vote is its response, 0 to 1."""
     steered: NDArray[np.bool_]
-    """(k,) whether it is a vote of the steered response, not of a single bin."""
+    """(k,) True for a vote of the steered response, False for a vote of a single bin.
+    """
     group_t_s: NDArray[np.float64]
-    """(g,) middles of all groups of frames, s."""
+    """(g,) middles of all groups of frames, s from the first sample."""
     group_levels_db: NDArray[np.float64]
-    """(g, 24) power of all channels at some frequencies of the band, dB over the
+    """(g, 24) power of all channels at 24 frequencies of the band, dB relative to the
     unit of the samples."""
 
 
 class VoteMemory(NamedTuple):
-    """What the blocks so far leave behind."""
+    """State of the voting between two blocks of samples."""
 
     tail: NDArray[np.float32]
-    """(n, m) samples that further votes need."""
+    """(n, m) last samples of n channels, which the next votes need."""
     groups: int
-    """Groups of frames so far."""
+    """Number of groups of frames so far."""
     level: float
-    """Power of a bin below which the weakest lie; 0: nothing was heard yet."""
+    """Power limit of the weakest bins; 0 before the first sound."""
     echo: NDArray[np.float32]
-    """(b,) power of each bin that what came before may have left."""
+    """(b,) largest remaining echo of earlier sound in each bin, as power."""
 
 
 @dataclass(frozen=True)
 class VotePlan:
-    """How an array votes. Make one by ``VotePlan.of``."""
+    """Settings with which an array votes for directions of sound.
+
+    To make the settings for an array, call ``VotePlan.of``.
+    """
 
     shape: ArrayShape
     c: float
@@ -96,13 +110,15 @@ class VotePlan:
     window: NDArray[np.float32]
     """(w,) Hann window of a frame."""
     hop: int
-    """Samples from frame to frame."""
+    """Number of samples from one frame to the next."""
     bins: slice
-    """Of the spectra, that vote one by one; empty where they cannot."""
+    """Frequency bins that vote one by one. Empty if the array is too large for such
+    votes."""
     plane: PhasePlane
     steered: SteeredSearch
     least_ratio: float
-    """Of the covariance's two largest eigenvalues."""
+    """Least ratio of the two largest eigenvalues of the covariance in a bin with one
+    wave."""
 
     @classmethod
     def of(
@@ -114,22 +130,23 @@ class VotePlan:
         band_hz: tuple[float, float] = (200.0, 8_000.0),
         least_ratio: float = 20.0,
     ) -> VotePlan:
-        """A plan for an array and a rate.
+        """Makes the settings with which an array votes for directions of sound.
 
         Args:
-            shape: The microphones; they must tell bearings.
+            shape: The microphones, which must measure bearings.
             c: Speed of sound, m/s.
-            sample_rate_hz: Of the samples, Hz.
-            band_hz: Lowest and highest frequency that may count, Hz. Bins vote only
-                as far as the phases of the shortest pairs do not wrap.
-            least_ratio: Of the two largest eigenvalues of a covariance that counts
-                as one wave.
+            sample_rate_hz: Sample rate, Hz.
+            band_hz: Lowest and highest frequency to use, Hz. Single frequencies vote
+                only up to the frequency at which the phases of the shortest pairs wrap.
+            least_ratio: Least ratio of the two largest eigenvalues of the channels'
+                covariance. If the ratio is smaller, the covariance is not that of one
+                wave.
 
         Returns:
-            The plan.
+            The settings.
 
         Raises:
-            InputError: The array tells no bearings, or a number makes no sense.
+            InputError: The array cannot measure bearings, or a number is invalid.
         """
         if "bearing" not in shape.angles:
             raise InputError(
@@ -162,19 +179,19 @@ class VotePlan:
         )
 
     def blank(self) -> VoteMemory:
-        """The memory before the first block."""
+        """Returns the memory before the first block."""
         tail = np.zeros((self.shape.count, 0), np.float32)
         echo = np.zeros(max(0, self.bins.stop - self.bins.start), np.float32)
         return VoteMemory(tail, 0, 0.0, echo)
 
     @property
     def group_samples(self) -> int:
-        """Samples of the frames of a vote."""
+        """Number of samples in the group of frames of one vote."""
         return len(self.window) + (GROUP_FRAMES - 1) * self.hop
 
     @property
     def frequencies_hz(self) -> NDArray[np.float64]:
-        """Of ``bins``, Hz."""
+        """Frequencies of ``bins``, Hz."""
         k = np.arange(self.bins.start, self.bins.stop, dtype=np.float64)
         return k * self.sample_rate_hz / len(self.window)
 
@@ -182,20 +199,23 @@ class VotePlan:
 def cast_votes(
     plan: VotePlan, memory: VoteMemory, block: NDArray[np.floating | np.integer]
 ) -> tuple[DirectionVotes, VoteMemory]:
-    """The votes that another block of samples makes possible.
+    """Computes the votes for directions from one more block of samples.
 
-    However a recording is cut into blocks, the votes are the same, but for rounding.
+    A vote is an estimated direction of the sound in a group of consecutive frames. The
+    lengths of the blocks do not affect the votes, apart from rounding errors.
 
     Args:
-        plan: How to vote.
-        memory: What the last block left; ``plan.blank()`` at first.
-        block: (n, k) samples of each channel, any unit, any k.
+        plan: Settings of the votes.
+        memory: State after the previous block; ``plan.blank()`` before the first block.
+        block: (n, k) samples of n channels, in any unit, of any length k.
 
     Returns:
-        The votes, and the new memory.
+        votes: The new votes.
+        memory: State after this block.
 
     Raises:
-        InputError: The block has other channels than the array, or is not finite.
+        InputError: The block does not have one channel per microphone, or a sample is
+            not finite.
     """
     samples = np.concatenate((memory.tail, _checked(plan, block)), axis=1)
     groups = (samples.shape[1] - plan.group_samples) // plan.hop + 1
@@ -226,13 +246,13 @@ def cast_votes(
 
 
 def join_votes(parts: list[DirectionVotes]) -> DirectionVotes:
-    """Votes of several blocks together, in order of time.
+    """Joins the votes for directions from several blocks in the order of time.
 
     Args:
-        parts: As ``cast_votes`` returns them.
+        parts: Votes of the blocks, as ``cast_votes`` returns them.
 
     Returns:
-        All of them.
+        All votes.
     """
     if not parts:
         return _no_votes()
@@ -298,14 +318,14 @@ def _cast(
     *,
     steered: bool,
 ) -> DirectionVotes:
-    """Votes of one kind, without the groups."""
+    """Makes votes of one kind, without the times and levels of the groups."""
     kind = np.full(len(t_s), steered)
     levels = np.empty((0, _LEVELS))
     return DirectionVotes(t_s, azimuth, elevation, weight, kind, np.empty(0), levels)
 
 
 def _levels_db(powers: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(g, 24) levels of single bins, as many in each octave."""
+    """Returns (g, 24) levels of single bins in dB, with equal numbers per octave."""
     last = powers.shape[1] - 1
     kept = np.rint(np.geomspace(1.0, last + 1.0, _LEVELS)).astype(int) - 1
     chosen = powers[:, kept].astype(np.float64)
@@ -315,9 +335,14 @@ def _levels_db(powers: NDArray[np.float32]) -> NDArray[np.float64]:
 def _louder(
     powers: NDArray[np.float32], level: float
 ) -> tuple[NDArray[np.bool_], float]:
-    """(g, b) bins above the weakest share of the last second, and its new level.
+    """Finds the bins whose power is above an adaptive limit.
 
-    The level of one group after another rises and falls with the share below it.
+    A bin is one frequency in one group of frames. The limit adapts from group to group,
+    so that about 30 % of the bins are below it.
+
+    Returns:
+        loud: (g, b) whether each of the b bins of g groups is above the limit.
+        level: Limit after the last group, as power.
     """
     loud = np.zeros(powers.shape, dtype=bool)
     for row, kept in zip(powers, loud, strict=True):
@@ -332,7 +357,14 @@ def _louder(
 def _risen(
     powers: NDArray[np.float32], echo: NDArray[np.float32], hop_s: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
-    """(g, b) bins that are louder than an echo of those before, and what they leave."""
+    """Finds the bins that are louder than the echo of earlier sound.
+
+    A bin is one frequency in one group of frames.
+
+    Returns:
+        fresh: (g, b) whether each of the b bins of g groups is louder than the echo.
+        echo: (b,) largest possible echo after the last group, as power.
+    """
     decay = np.float32(10.0 ** (-0.1 * _DECAY_DB_S * hop_s))
     fresh = np.empty(powers.shape, dtype=bool)
     for row, kept in zip(powers, fresh, strict=True):
@@ -348,7 +380,11 @@ def _steered_votes(
     t_s: NDArray[np.float64],
     groups: int,
 ) -> DirectionVotes:
-    """Of groups that do not overlap by more than a frame."""
+    """Computes votes for the directions at which the steered response is greatest.
+
+    Only every fourth group of frames votes. A group has four frames, so these groups
+    have no frames in common.
+    """
     found = []
     times = []
     first = -groups % GROUP_FRAMES
@@ -369,7 +405,7 @@ def _bin_votes(
     loud: NDArray[np.bool_],
     t_s: NDArray[np.float64],
 ) -> DirectionVotes:
-    """Of times and frequencies at which there is one wave."""
+    """Computes the votes of single bins that contain only one wave."""
     group, bins, pattern = find_rank_one(spectra, loud, plan.least_ratio)
     frequency = plan.frequencies_hz[bins]
     fits = plan.plane.fit(pattern, frequency)

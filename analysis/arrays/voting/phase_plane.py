@@ -1,4 +1,8 @@
-"""A plane wave fitted to the phases that one frequency has at the microphones."""
+"""Fits a plane wave to the phases of one frequency at the microphones.
+
+The slowness of a wave is its direction divided by its speed. In this module, it is
+relative to that of sound, so the slowness of a sound wave has the length 1.
+"""
 
 from __future__ import annotations
 
@@ -10,77 +14,93 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-# Short pairs span the array if their narrowest extent is this share of their widest.
+# Least ratio of the narrowest to the widest extent of the short pairs. Only then do the
+# short pairs span the array.
 _LEAST_SPAN = 0.3
 
-# Pairs that are longer by less than this are as long.
+# Largest ratio of the lengths of two pairs that count as equally long.
 _ALIKE = 1.05
 
-#: Sound along an array's line or plane may seem slower or faster by this share: phases
-#: are noisy. Lower: nearly overhead, where a bearing means nothing.
+#: _LARGEST: largest measured slowness along the line or plane of an array. It may
+#:   exceed 1 because phases are noisy.
+#: _LEAST_LEVEL: least horizontal component of a direction. A source with a smaller
+#:   component is nearly overhead, where a bearing has no meaning.
 _LARGEST, _LEAST_LEVEL = 1.08, 0.35
-# An array in space measures all of the slowness, which sound has.
+# Least measured slowness of an array in space, which measures all components. The true
+# value is 1.
 _LEAST_IN_SPACE = 0.85
 
-# Beyond where phases of the shortest pairs wrap, all pairs together still tell where a
-# wave is from, up to this many times that frequency; but for directions that differ by
-# more than so much of the slowness and fit nearly as well: a mean cosine of the phases.
+# Above the frequency at which the phases of the shortest pairs wrap, all pairs together
+# still determine the direction:
+# - _BEYOND: largest usable frequency, as a multiple of the frequency at which phases
+#   wrap.
+# - _APART: least difference in slowness between two distinct directions.
+# - _ALMOST: a direction is ambiguous if a distinct direction fits nearly as well,
+#   within this difference of the mean cosine of the phase errors.
 _BEYOND, _APART, _ALMOST = 1.3, 0.6, 0.2
-# Guesses are so near to each other, in phase along the array, rad.
+# Largest phase change along the array between two neighboring guesses, rad.
 _GUESS_STEP_RAD = 1.0
-# Wide arrays with short pairs would need more: they end where phases wrap.
+# Largest number of guesses. Wide arrays with short pairs need more, so their band ends
+# at the frequency at which phases wrap.
 _MOST_GUESSES = 4_000
 
-# Largest phase by which pairs may be off the plane wave, RMS over all pairs, rad.
+# Largest root-mean-square phase error of all pairs relative to a plane wave, rad.
 _LARGEST_RESIDUAL_RAD = 0.6
 
 
 class PlaneFits(NamedTuple):
-    """Directions of those bins that a plane wave fits."""
+    """Directions of the bins to which a plane wave fits.
+
+    A bin is one frequency at one time.
+    """
 
     azimuth: NDArray[np.float64]
-    """(m,) rad, from +x towards +y."""
+    """(m,) azimuths from +x towards +y, rad."""
     elevation: NDArray[np.float64]
-    """(m,) rad; NaN where the array does not tell it."""
+    """(m,) elevations, rad. NaN if the array cannot measure them."""
     fits: NDArray[np.bool_]
-    """(k,) which of the bins those are."""
+    """(k,) True for the m of k bins to which a plane wave fits."""
 
 
 @dataclass(frozen=True)
 class PhasePlane:
-    """Pairs of an array that are short enough for their phases not to wrap.
+    """Fits plane waves to the phases at the microphones of an array.
 
-    Make one by ``PhasePlane.of``.
+    The fit starts with pairs of microphones so close together that phases do not wrap.
+    To make a fit for an array, call ``PhasePlane.of``.
     """
 
     shape: ArrayShape
     c: float
     """Speed of sound, m/s."""
     short: NDArray[np.int64]
-    """(s,) which of ``shape.pairs`` they are."""
+    """(s,) numbers of the short pairs in ``shape.pairs``."""
     wraps_hz: float
-    """Where sound along the longest of them turns by half a period, Hz."""
+    """Frequency at which the phase along the longest of the short pairs changes by half
+    a period, Hz."""
     guesses: NDArray[np.float64]
-    """(g, r) directions, along ``shape.span``, to begin with above that; none: the
-    array is not used there."""
+    """(g, r) initial directions for frequencies above ``wraps_hz``, as components along
+    ``shape.span``. Empty if these frequencies are not used."""
     to_slowness: NDArray[np.float64]
-    """(r, s) along ``shape.span``, from the paths between short pairs."""
+    """(r, s) matrix that converts path differences of the short pairs, m, to components
+    of the direction along ``shape.span``."""
     refine: NDArray[np.float64]
-    """(r, p) the same from all pairs."""
+    """(r, p) matrix that converts path differences of all pairs, m, to components of
+    the direction along ``shape.span``."""
     paths: NDArray[np.float64]
-    """(p, r) path to each pair's first microphone less that to its second one, for
-    each component of the direction, m."""
+    """(p, r) path to the first microphone of each pair minus the path to its second
+    microphone, per component of the direction, m."""
 
     @classmethod
     def of(cls, shape: ArrayShape, c: float) -> PhasePlane:
-        """The shortest pairs that span what the array spans.
+        """Makes the fit for an array from the shortest pairs that span the array.
 
         Args:
             shape: The microphones.
             c: Speed of sound, m/s.
 
         Returns:
-            What fits plane waves to them.
+            The fit for the array.
         """
         i, j = shape.pairs.T
         paths = (shape.p_AM[j] - shape.p_AM[i]) @ shape.span.T
@@ -104,20 +124,21 @@ class PhasePlane:
 
     @property
     def highest_hz(self) -> float:
-        """Up to which waves can be fitted, Hz."""
+        """Highest frequency at which a wave can be fitted, Hz."""
         return _BEYOND * self.wraps_hz if len(self.guesses) else self.wraps_hz
 
     def fit(
         self, pattern: NDArray[np.complex128], frequency_hz: NDArray[np.float64]
     ) -> PlaneFits:
-        """Directions of plane waves.
+        """Fits a plane wave to each of k patterns of amplitudes at the microphones.
 
         Args:
-            pattern: (k, n) what the channels have in common, up to any factor.
-            frequency_hz: (k,) Hz, up to ``highest_hz``.
+            pattern: (k, n) complex amplitudes at n microphones. A common factor of all
+                amplitudes of a pattern has no effect.
+            frequency_hz: (k,) frequency of each pattern, up to ``highest_hz``, Hz.
 
         Returns:
-            Those that a plane wave fits.
+            Directions of the patterns to which a plane wave fits.
         """
         i, j = self.shape.pairs.T
         phase = np.angle(pattern[:, j] * pattern[:, i].conj())
@@ -129,7 +150,7 @@ class PhasePlane:
             slowness[wrapped], clear[wrapped] = self._guessed(
                 phase[wrapped], number[wrapped, 0]
             )
-        # The long pairs' phases are taken as near as they can be to the short ones'.
+        # The phases of long pairs are unwrapped with the slowness from the short pairs.
         left = _wrapped(phase - number * (slowness @ self.paths.T))
         turn = left @ self.refine.T / number
         slowness += turn
@@ -150,7 +171,12 @@ class PhasePlane:
     def _guessed(
         self, phase: NDArray[np.float64], number: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """(k, r) guesses that fit best, and (k,) where no other fits nearly as well."""
+        """Finds the guessed direction that fits the phases of all pairs best.
+
+        Returns:
+            slowness: (k, r) best guess for each pattern.
+            clear: (k,) True if no clearly different guess fits nearly as well.
+        """
         slowness = np.empty((len(phase), self.guesses.shape[1]))
         clear = np.empty(len(phase), dtype=bool)
         apart = np.linalg.norm(self.guesses[:, np.newaxis] - self.guesses, axis=2)
@@ -170,9 +196,15 @@ class PhasePlane:
     def _directions(
         self, slowness: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Directions (k, d), and (k,) how long the slowness is that is measured.
+        """Converts measured slownesses to directions.
 
-        The directions have unit length where that is known.
+        A slowness is the direction of a wave divided by its speed, relative to that of
+        sound.
+
+        Returns:
+            u: (k, d) directions. They are unit vectors if the component perpendicular
+                to the array can be computed.
+            length: (k,) lengths of the measured slownesses.
         """
         length = np.linalg.norm(slowness, axis=1)
         u = slowness @ self.shape.span
@@ -184,7 +216,7 @@ class PhasePlane:
 
 
 def _guesses(shape: ArrayShape, wavelength_m: float) -> NDArray[np.float64]:
-    """(g, r) slownesses side by side, all that sound from afar may have."""
+    """Returns a (g, r) grid of directions, as components along ``shape.span``."""
     step = _GUESS_STEP_RAD * wavelength_m / (2.0 * np.pi * shape.aperture_m)
     count = int(np.ceil(2.0 / step)) + 1
     if count ** len(shape.span) > _MOST_GUESSES:

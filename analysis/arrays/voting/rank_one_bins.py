@@ -1,8 +1,9 @@
-"""Times and frequencies at which one wave alone reaches an array.
+"""Finds times and frequencies at which only one wave reaches an array.
 
-The covariance of the channels over a few frames then has rank 1. Its eigenvalues are
-those of the frames' products with each other, which are fewer than the microphones of
-a large array, and can be had for all groups of frames at once.
+The covariance of the channels over a few frames then has the rank 1. Its nonzero
+eigenvalues are equal to those of the matrix of products between the frames. This matrix
+is smaller if an array has more microphones than there are frames. It can be computed
+for all groups of frames at once.
 """
 
 from __future__ import annotations
@@ -10,12 +11,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-#: Frames of a covariance.
+#: Number of frames in a covariance.
 GROUP_FRAMES = 4
 
 
 def _products(spectra: NDArray[np.complex64]) -> list[NDArray[np.complex64]]:
-    """Of each frame with the one m later, summed over channels: (frames - m, bins)."""
+    """Returns products of each frame with the frame m later, for m = 0, 1, 2, 3.
+
+    Each product is summed over the channels and has the shape (frames - m, bins).
+    """
     frames = len(spectra)
     return [
         np.einsum("fnb,fnb->fb", spectra[: frames - m], spectra[m:].conj())
@@ -24,20 +28,21 @@ def _products(spectra: NDArray[np.complex64]) -> list[NDArray[np.complex64]]:
 
 
 def _running(values: NDArray[np.float32], size: int) -> NDArray[np.float32]:
-    """Sums of so many rows after one another."""
+    """Returns the sums of ``size`` consecutive rows, starting at each row."""
     count = len(values) - size + 1
     return np.sum([values[k : k + count] for k in range(size)], axis=0)
 
 
 def group_powers(spectra: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Powers of groups of frames.
+    """Computes the power of each group of consecutive frames.
 
     Args:
-        spectra: (f, n, b) frames, channels, bins; at least ``GROUP_FRAMES`` frames.
+        spectra: (f, n, b) spectra of f frames and n channels at b frequencies. There
+            are at least ``GROUP_FRAMES`` frames.
 
     Returns:
-        (g, b) sum over the frames of a group and channels; a group begins with each
-        frame that enough others follow.
+        (g, b) power of each group, summed over its frames and channels. Group k
+        consists of the frames k ... k + ``GROUP_FRAMES`` - 1.
     """
     power = np.einsum("fnb->fb", spectra.real**2 + spectra.imag**2)
     return _running(power, GROUP_FRAMES)
@@ -48,24 +53,29 @@ def find_rank_one(
     candidates: NDArray[np.bool_],
     least_ratio: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.complex128]]:
-    """Bins in which one wave is all there is.
+    """Finds the bins that contain only one wave.
+
+    A bin is one frequency in one group of frames.
 
     Args:
-        spectra: (f, n, b) frames, channels, bins.
-        candidates: (g, b) groups and bins to look at, as of ``group_powers``.
-        least_ratio: Of the two largest eigenvalues.
+        spectra: (f, n, b) spectra of f frames and n channels at b frequencies.
+        candidates: (g, b) whether to examine each bin. The g groups are those of
+            ``group_powers``.
+        least_ratio: Least ratio of the two largest eigenvalues of the covariance.
 
     Returns:
-        (k,) groups, (k,) bins, and (k, n) the dominant eigenvector of each, of any
-        length and phase.
+        group: (k,) numbers of the groups of the k bins.
+        bins: (k,) numbers of the frequencies of the k bins.
+        pattern: (k, n) dominant eigenvector of each bin, with any length and phase.
     """
     products = _products(spectra)
     power = _running(products[0].real, GROUP_FRAMES)
-    # The sum of the eigenvalues squared.
+    # Sum of the squared eigenvalues.
     squares = _running(np.abs(products[0]) ** 2, GROUP_FRAMES)
     for m in range(1, GROUP_FRAMES):
         squares += 2.0 * _running(np.abs(products[m]) ** 2, GROUP_FRAMES - m)
-    # The least that it can be, beside the square of their sum, at that ratio.
+    # Least sum of squares at this ratio, as a share of the squared sum of the
+    # eigenvalues.
     rest = GROUP_FRAMES - 1
     least = (1.0 + rest / least_ratio**2) / (1.0 + rest / least_ratio) ** 2
     group, bins = np.nonzero(candidates & (squares >= least * power**2) & (power > 0.0))

@@ -1,4 +1,4 @@
-"""Sources heard live: from blocks of samples to tracks, a step at a time."""
+"""Tracks sources in live sound, from blocks of samples to tracks at regular steps."""
 
 from __future__ import annotations
 
@@ -25,70 +25,75 @@ from analysis.arrays.voting.source_tracks import (
 from analysis.arrays.voting.vote_peaks import gather_sources
 from systems.framework.parameters import Parameters, Positive
 
-# Bins that vote for a source in a window, for each second of it, and at least.
+# _VOTES_S: least number of bins that vote for a source, per second of the window.
+# _LEAST_VOTES: least number of bins that vote for a source in any window.
 _VOTES_S, _LEAST_VOTES = 20.0, 6.0
 
-# Windows overlap, so that the errors of neighbouring ones are alike: a detection counts
-# as one that is off by this much more.
+# Factor for the error of a detection. Windows overlap, so consecutive detections have
+# similar errors.
 _OVERLAP = 1.5
 
 
 class ListenerParameters(Parameters):
-    """How votes become tracks."""
+    """Parameters that determine how votes for directions become tracks of sources."""
 
     step_s: Positive = 0.1
-    """Time from step to step, s."""
+    """Time from one step to the next, s."""
     window_s: Positive = 0.5
-    """Length of sound whose votes a step gathers, s."""
+    """Length of the sound whose votes each step uses, s."""
     tracks: TrackParameters = TrackParameters()
-    """How sources move and are heard."""
+    """Parameters of the motion and the detection of sources."""
 
 
 @dataclass(frozen=True)
 class TrackedSources:
-    """The sources at the end of a step."""
+    """Tracked sources at the end of a step."""
 
     t_s: float
-    """End of the sound that they were heard in, s."""
+    """End of the sound in which the sources were heard, s."""
     tracks: tuple[SourceTrack, ...]
-    """Oldest first."""
+    """Tracks of the sources. The oldest track is first."""
 
 
 @dataclass(frozen=True)
 class ListenerMemory:
-    """What the sound so far leaves behind. Make one by ``ListenerMemory.blank``."""
+    """State of the listener between two blocks of samples.
+
+    To make the initial state, call ``ListenerMemory.blank``.
+    """
 
     votes: VoteMemory
     recent: DirectionVotes
     tracks: TrackMemory
     samples: int
-    """Heard so far, of a channel."""
+    """Number of samples per channel so far."""
     steps: int
-    """Done so far."""
+    """Number of steps so far."""
 
     @classmethod
     def blank(cls, plan: VotePlan) -> ListenerMemory:
-        """Before the first block.
+        """Makes the state before the first block.
 
         Args:
-            plan: How the array votes.
+            plan: Settings with which the array votes for directions.
 
         Returns:
-            The memory.
+            The initial state.
         """
         return cls(plan.blank(), join_votes([]), TrackMemory(), 0, 0)
 
     def after_gap(self, plan: VotePlan, *, keeps_tracks: bool) -> ListenerMemory:
-        """Where samples are missing, or from where on other channels count.
+        """Returns the state after missing samples or a change of the channels.
 
         Args:
-            plan: How the array votes from here on.
-            keeps_tracks: Whether the sources are still those of before.
+            plan: Settings with which the array votes for directions after the gap.
+            keeps_tracks: Whether the tracks from before the gap continue.
 
         Returns:
-            The memory; times go on, and no identity is used again.
+            The new state. Times continue, and no identity of a track is used again.
         """
-        # The first group of frames after it begins within a hop of where it should.
+        # The first group of frames after the gap begins at most one hop from its exact
+        # time.
         votes = plan.blank()._replace(groups=round(self.samples / plan.hop))
         tracks = self.tracks if keeps_tracks else replace(self.tracks, tracks=())
         return replace(self, votes=votes, recent=join_votes([]), tracks=tracks)
@@ -100,19 +105,24 @@ def hear_sources(
     plan: VotePlan,
     parameters: ListenerParameters,
 ) -> tuple[list[TrackedSources], ListenerMemory]:
-    """The steps that another block of samples completes.
+    """Tracks sources in one more block of samples.
+
+    The tracks are updated in steps of constant length, 0.1 s by default. A block may
+    complete any number of steps.
 
     Args:
-        block: (n, k) samples of each channel, any unit, any k.
-        memory: What the last block left.
-        plan: How the array votes.
-        parameters: How votes become tracks.
+        block: (n, k) samples of n channels, in any unit, of any length k.
+        memory: State after the previous block.
+        plan: Settings with which the array votes for directions.
+        parameters: Parameters that determine how votes become tracks.
 
     Returns:
-        The sources of each step, and the new memory.
+        found: Sources at the end of each completed step.
+        memory: State after this block.
 
     Raises:
-        InputError: The block has other channels than the array, or is not finite.
+        InputError: The block does not have one channel per microphone, or a sample is
+            not finite.
     """
     rate = plan.sample_rate_hz
     found, first = [], 0
@@ -139,19 +149,20 @@ def follow_sources(
     plan: VotePlan,
     parameters: ListenerParameters,
 ) -> list[TrackedSources]:
-    """The same for a recording whose votes are all known.
+    """Tracks sources in a whole recording, from its votes for directions.
 
     Args:
-        votes: Of all of it, in order of time.
-        seconds: Its length, s.
-        plan: How the array voted.
-        parameters: How votes become tracks.
+        votes: Votes of the whole recording, in the order of time.
+        seconds: Length of the recording, s.
+        plan: Settings with which the array voted.
+        parameters: Parameters that determine how votes become tracks.
 
     Returns:
-        The sources of each step, as ``hear_sources`` tells them.
+        Sources at the end of each step, as ``hear_sources`` returns them.
     """
     memory, found = TrackMemory(), []
-    # A vote stands in the middle of what it was cast on, and live it comes at its end.
+    # The time of a vote is the middle of its samples. In live sound, the vote exists
+    # only after its last sample.
     late = 0.5 * plan.group_samples / plan.sample_rate_hz - 1e-9
     for k in range(1, math.floor(seconds / parameters.step_s + 1e-9) + 1):
         t_s = k * parameters.step_s

@@ -1,4 +1,4 @@
-"""Follows every source that the microphones hear."""
+"""Provides a block that tracks every source that the microphones hear."""
 
 from __future__ import annotations
 
@@ -26,31 +26,32 @@ class _Heard(NamedTuple):
     sources: TrackedSources
 
     def __deepcopy__(self, memo: dict[int, Any]) -> _Heard:
-        """Itself: nothing in it changes."""
+        """Returns the object itself, because its contents never change."""
         return self
 
 
 class SourceListener(Block):
-    """Tracks every source that the microphones hear, each with an identity.
+    """Tracks every source that the microphones hear. Each track has an identity.
 
-    Bearings are in the robot's frame B, seen from the centroid of the microphones;
-    those of a row of microphones are on the side of +x. ``hear_sources`` takes each
-    frame, as it takes the blocks of a stream in ``phonotaxis listen``. The frame that
-    ends at t = 0 was recorded before the start and does not count.
+    Bearings are in the robot frame B, seen from the centroid of the microphones. If the
+    microphones are in a row, all bearings are on the side of +x. The block calls
+    ``hear_sources`` for each audio frame. The command ``phonotaxis listen`` calls the
+    same function for each block of a stream. The frame that ends at t = 0 is ignored,
+    because it was recorded before the start.
 
     State (abstract): ``ListenerMemory``, and the sources of the last step.
-    Rate and latency: the state is updated every ``frame_s``, the sources every
-    ``step_s`` of the parameters; they are those of the last ``window_s``.
+    Rate and latency: the state is updated every ``frame_s``. The sources are updated
+    every ``step_s`` of the parameters, from the sound of the last ``window_s``.
 
     Args:
-        parameters: How votes become tracks.
-        robot: Places of the microphones.
+        parameters: How votes for directions become tracks.
+        robot: Robot with the positions of the microphones.
         sound_speed_m_s: Speed of sound, m/s.
-        microphones: Rate and length of the frames.
-        band_hz: Lowest and highest frequency that is used, Hz.
+        microphones: Rate and length of the audio frames.
+        band_hz: Lowest and highest frequency to use, Hz.
 
     Raises:
-        InputError: The array gives no bearings.
+        InputError: The array cannot measure bearings.
     """
 
     part, stage = "listener", "hearing"

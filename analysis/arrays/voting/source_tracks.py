@@ -1,13 +1,17 @@
-"""Tracks of several sources: each keeps its identity while it moves, pauses or crosses.
+"""Tracks several sources. Each keeps its identity while it moves, pauses or crosses.
 
-A Kalman filter a track, for a bearing that moves at a rate which changes slowly;
-detections go to tracks by the likeliest assignment (global nearest neighbour, Blackman
-and Popoli 1999, 6.4); a track exists with a probability that hits raise and misses
-lower, and a source that pauses is not gone: "Markov chain two" of Musicki, Evans and
-Stankovic 1994.
+Each track has a Kalman filter for the bearing. The filter assumes that the rate of the
+bearing changes slowly. Detections are assigned to tracks by the most likely assignment
+(global nearest neighbor, Blackman and Popoli 1999, section 6.4).
 
-Two sources nearer than the detector resolves are one detection in between. It then
-tells that both sound, but not where: motion decides which is which when they part.
+Each track has a probability of existence. Detections increase it, and missed detections
+decrease it. A source that pauses continues to exist, as in "Markov chain two" of
+Musicki, Evans and Stankovic 1994.
+
+If two sources are nearer to each other than the resolution of the detector, they give
+one detection between them. This detection shows that both sources sound, but does not
+give their bearings. When the sources separate, their predicted motion decides which is
+which.
 """
 
 from __future__ import annotations
@@ -24,105 +28,113 @@ from scipy.optimize import linear_sum_assignment
 
 from systems.framework.parameters import Fraction, Parameters, Positive
 
-# A detection farther from a track than so many deviations is not of it.
+# Largest distance of a detection from its track, in standard deviations.
 _GATE = 3.5
 
-# Rates of a speaker who falls silent, who speaks again, and who is gone, 1/s.
+# _FALLS_SILENT: rate at which a sounding source pauses, 1/s.
+# _SPEAKS_AGAIN: rate at which a pausing source sounds again, 1/s.
+# _GOES: rate at which a source disappears, 1/s.
 _FALLS_SILENT, _SPEAKS_AGAIN, _GOES = 1.0, 2.0, 0.2
 
-# Of a track's first detection: probability that there is a source, and what its rate
-# may be, rad/s.
+# _BORN: probability that the first detection of a track is from a source.
+# _RATE_STD: standard deviation of the bearing rate of a new track, rad/s.
 _BORN, _RATE_STD = 0.05, 0.4
 
 
 class TrackParameters(Parameters):
-    """How sources move and are heard."""
+    """Parameters of the motion and the detection of sources."""
 
     acceleration_std_deg_s2: Positive = 6.0
-    """How fast a source's rate of bearing changes, in a second, deg/s^2."""
+    """Standard deviation of the change of a source's bearing rate within one second,
+    deg/s^2."""
     rate_memory_s: Positive = 8.0
-    """Time after which a rate is forgotten, s."""
+    """Time constant with which the estimated bearing rate decays, s."""
     detection_probability: Fraction = 0.7
-    """That a source which sounds is detected in a step."""
+    """Probability that a sounding source is detected in a step."""
     false_detections: Positive = 0.05
-    """Mean number in a step, anywhere around the circle."""
+    """Mean number of false detections per step, over the whole circle."""
     smear_s: Positive = 0.15
-    """Detections of a source that moves scatter by what it moves in so long, s."""
+    """Time that determines the scatter of the detections of a moving source, s. The
+    scatter is the motion of the source in this time."""
     resolution_deg: float = Field(default=20.0, gt=0.0, le=90.0)
-    """Sources nearer than this may be one detection, deg."""
+    """Angle below which two sources may give only one detection, deg."""
     begins_after_s: Positive = 0.25
-    """A track is told after so long, s."""
+    """Least age of a track that is reported, s."""
     least_share: Fraction = 0.25
-    """A track begins where a detection has this share of what is heard, and it must
-    have it on average of those until the track is told."""
+    """Least share of the heard sound for the first detection of a track. The mean share
+    of its detections must also be at least this value when the track is reported."""
     least_hits: int = Field(default=4, ge=1, le=100)
-    """And after so many detections."""
+    """Least number of detections of a track that is reported."""
     ends_after_s: Positive = 1.5
-    """A track that was not heard for so long ends, s."""
+    """Time without a detection after which a track ends, s. A detection that the track
+    shares with a nearby track also counts."""
     hidden_s: Positive = 3.0
-    """And one that may be behind another one after so long, s."""
+    """Time without a detection of its own after which a track ends, s. It limits how
+    long a nearby track may hide a track."""
 
 
 class Detection(NamedTuple):
     """A direction from which sound came in a step."""
 
     bearing: float
-    """rad."""
+    """Bearing, rad."""
     bearing_std: float
-    """rad."""
+    """Standard deviation of the bearing, rad."""
     elevation: float | None
-    """rad; None where the array does not tell it."""
+    """Elevation, rad. None if the array cannot measure it."""
     share: float = 1.0
-    """Of all that was heard in the step, 0 to 1."""
+    """Share of all sound in the step, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class SourceTrack:
-    """A source that is followed."""
+    """Track of one source."""
 
     identity: int
-    """From 1; never used again."""
+    """Number of the track, from 1. It is never used again. It is 0 until the track is
+    reported."""
     bearing: float
-    """rad, in (-pi, pi]."""
+    """Bearing, in (-pi, pi], rad."""
     rate: float
-    """Of the bearing, rad/s."""
+    """Rate of the bearing, rad/s."""
     covariance: NDArray[np.float64] = field(repr=False)
-    """(2, 2) of bearing and rate."""
+    """(2, 2) covariance of the bearing, rad, and its rate, rad/s."""
     elevation: float | None
-    """Mean of the latest detections, rad; None where it is not told."""
+    """Weighted mean of the latest elevations, rad. None if the array cannot measure
+    them."""
     sounding: float
-    """Probability that it exists and sounds."""
+    """Probability that the source exists and sounds."""
     silent: float
-    """Probability that it exists and pauses."""
+    """Probability that the source exists and pauses."""
     t_born: float
-    """First detection, s."""
+    """Time of the first detection, s."""
     t_heard: float
-    """Last detection of its own, s."""
+    """Time of the last detection that is assigned to this track, s."""
     t_shared: float
-    """Last detection that it shared with another track, s."""
+    """Time of the last detection that this track shared with another track, s."""
     hits: int
-    """Detections so far."""
+    """Number of detections so far."""
     share: float
-    """Mean of its detections, of what was heard in their steps."""
+    """Mean share of the sound that its detections had in their steps, 0 to 1."""
 
     @property
     def confidence(self) -> float:
-        """Probability that there is a source."""
+        """Probability that the source exists."""
         return self.sounding + self.silent
 
     @property
     def bearing_std(self) -> float:
-        """rad."""
+        """Standard deviation of the bearing, rad."""
         return math.sqrt(float(self.covariance[0, 0]))
 
 
 @dataclass(frozen=True)
 class TrackMemory:
-    """All tracks, those that are not told yet as well."""
+    """All tracks, including those that are not reported yet."""
 
     tracks: tuple[SourceTrack, ...] = ()
     t_s: float | None = None
-    """Of the last step; None before the first."""
+    """Time of the last step, s. None before the first step."""
     next_identity: int = 1
 
 
@@ -132,20 +144,21 @@ def step_tracks(
     memory: TrackMemory,
     parameters: TrackParameters,
 ) -> tuple[list[SourceTrack], TrackMemory]:
-    """The sources after another step.
+    """Updates the tracks with the detections of one step.
 
     Args:
-        detections: Of this step, in any order.
-        t_s: Its time, s; steps need not be equal.
-        memory: ``TrackMemory()`` at first.
-        parameters: How sources move and are heard.
+        detections: Detections of this step, in any order.
+        t_s: Time of this step, s. Steps may have different lengths.
+        memory: Tracks after the previous step; ``TrackMemory()`` before the first step.
+        parameters: Parameters of the motion and the detection of sources.
 
     Returns:
-        The tracks that are told, oldest first, and the new memory. A track gets its
-        identity when it is told.
+        told: The tracks to report. The oldest track is first. A track gets its identity
+            when it is first reported.
+        memory: All tracks after this step.
 
     Raises:
-        ValueError: Time does not run forward.
+        ValueError: The time is before the time of the previous step.
     """
     elapsed = 0.0 if memory.t_s is None else t_s - memory.t_s
     if elapsed < 0.0:
@@ -182,14 +195,14 @@ def step_tracks(
 
 
 def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack:
-    """Later by dt."""
+    """Predicts a track by the time dt."""
     forget = math.exp(-dt / p.rate_memory_s)
     F = np.array([[1.0, dt], [0.0, forget]])
     q = math.radians(p.acceleration_std_deg_s2) ** 2
     Q = q * np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
     falls, again = _FALLS_SILENT * dt, _SPEAKS_AGAIN * dt
     stays = math.exp(-_GOES * dt)
-    # The exact share of a chain of two states that changes at these rates.
+    # Exact share of changes within dt in a Markov chain with two states.
     part = -math.expm1(-(falls + again)) / max(falls + again, 1e-12)
     to_silent, to_sounding = falls * part, again * part
     sounding = track.sounding * (1.0 - to_silent) + track.silent * to_sounding
@@ -209,7 +222,7 @@ def _assigned(
     detections: Sequence[Detection],
     p: TrackParameters,
 ) -> list[int | None]:
-    """The detection of each track."""
+    """Returns the number of the detection of each track, or None."""
     chosen: list[int | None] = [None] * len(tracks)
     if not tracks or not detections:
         return chosen
@@ -218,7 +231,8 @@ def _assigned(
         for k, d in enumerate(detections):
             variance = float(track.covariance[0, 0]) + _scatter(track, d, p)
             off = _wrapped(d.bearing - track.bearing)
-            # Tracks that were told come first: what is new must not take theirs.
+            # Reported tracks have priority, so that a new track does not take their
+            # detections.
             late = 0.0 if track.identity else 4.0
             cost[i, k] = off**2 / variance + math.log(variance) + late
             if off**2 > _GATE**2 * variance:
@@ -236,7 +250,11 @@ def _hidden(
     chosen: list[int | None],
     p: TrackParameters,
 ) -> dict[int, int]:
-    """Tracks without a detection that is near them and another one, by that one's."""
+    """Finds tracks without a detection that another nearby track may hide.
+
+    Returns:
+        For the number of each hidden track, the number of the track that hides it.
+    """
     resolution = math.radians(p.resolution_deg)
     hidden: dict[int, int] = {}
     for i, track in enumerate(tracks):
@@ -255,7 +273,7 @@ def _hidden(
 
 
 def _scatter(track: SourceTrack, detection: Detection, p: TrackParameters) -> float:
-    """Variance of a detection about its track, rad^2."""
+    """Returns the variance of a detection relative to its track, rad^2."""
     rate_squared = track.rate**2 + float(track.covariance[1, 1])
     return detection.bearing_std**2 + p.smear_s**2 * rate_squared
 
@@ -266,13 +284,13 @@ def _heard(
     t_s: float,
     p: TrackParameters,
 ) -> SourceTrack:
-    """With its detection."""
+    """Updates a track with its detection."""
     of_detection = _scatter(track, detection, p)
     C = track.covariance
     variance = float(C[0, 0]) + of_detection
     off = _wrapped(detection.bearing - track.bearing)
     gain = C[:, 0] / variance
-    # Joseph's form stays symmetric.
+    # Joseph's form of the covariance update keeps the covariance symmetric.
     A = np.eye(2) - np.outer(gain, [1.0, 0.0])
     height = math.exp(-0.5 * off**2 / variance) / math.sqrt(2.0 * math.pi * variance)
     density = p.false_detections / (2.0 * math.pi)
@@ -327,7 +345,11 @@ def _is_told(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
 
 
 def _over(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
-    """What is not told yet may not pause, and what is hidden not for ever."""
+    """Returns whether a track ends at the time t_s.
+
+    A track that is not reported yet ends after a short pause. A reported track may
+    pause longer, and even longer if another track may hide it.
+    """
     silence = t_s - track.t_heard
     if track.identity == 0:
         return silence > p.begins_after_s
@@ -336,7 +358,7 @@ def _over(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
 
 
 def _single(tracks: list[SourceTrack], p: TrackParameters) -> list[SourceTrack]:
-    """Without new tracks beside one that is told: they are of the same source."""
+    """Removes new tracks beside a reported track, because both have the same source."""
     kept: list[SourceTrack] = []
     near = math.radians(0.5 * p.resolution_deg)
     for track in sorted(tracks, key=lambda t: (t.identity == 0, t.t_born)):
@@ -349,5 +371,5 @@ def _single(tracks: list[SourceTrack], p: TrackParameters) -> list[SourceTrack]:
 
 
 def _wrapped(angle: float) -> float:
-    """In (-pi, pi]."""
+    """Returns an angle wrapped to (-pi, pi], rad."""
     return math.pi - (math.pi - angle) % (2.0 * math.pi)

@@ -1,9 +1,9 @@
-"""Whether a sound is steady: then no time or frequency holds one source of it alone.
+"""Detects steady sound, in which no time or frequency contains only one source.
 
-Of a stationary sound the level in a narrow band scatters as that of Gaussian noise
-does, by 3.1 dB for the four windows of a vote, and by less where several sources or
-echoes reach the microphones. Speech, and what else comes and goes, scatters by 5 dB and
-more, in reverberation too.
+The level of a steady sound in a narrow band scatters like that of Gaussian noise. For
+the four windows of a vote, the scatter is 3.1 dB. It is smaller if several sources or
+echoes reach the microphones. The level of speech and other changing sounds scatters by
+5 dB or more, even in reverberant rooms.
 """
 
 from __future__ import annotations
@@ -13,39 +13,43 @@ from numpy.typing import NDArray
 
 from analysis.arrays.voting.direction_votes import DirectionVotes
 
-# Steady is what scatters by less; halfway, in dB, from noise to speech.
+# Largest scatter of the level of steady sound, dB. The value is halfway between noise
+# and speech.
 _STEADY_DB = 4.4
 
-# It counts while it sounds: within this of its loudest parts, and for so long, s.
+# A group of frames counts as sounding if its level is within _SOUNDS_DB of the quantile
+# _LOUD_SHARE of all levels. The sound must last at least _LEAST_S, s.
 _SOUNDS_DB, _LOUD_SHARE = 10.0, 0.9
 _LEAST_S = 0.5
 
-# In noise only some of the bands hold the source.
+# Quantile of the scatter over the bands. If there is noise, only some bands contain the
+# source.
 _OF_BANDS = 0.75
 
 
 def is_steady(votes: DirectionVotes) -> bool:
-    """Whether too little of a sound comes and goes to tell its sources apart.
+    """Returns whether a sound is so steady that its sources cannot be separated.
 
     Args:
-        votes: Of a span of time, with its levels.
+        votes: Votes of a span of time, with the levels of the sound.
 
     Returns:
-        False for what sounds for less than half a second: that is not known.
+        True for a steady sound. False also if the sound lasts less than 0.5 s, because
+        its steadiness is then unknown.
     """
     scatter = level_scatter_db(votes)
     return scatter is not None and scatter < _STEADY_DB
 
 
 def level_scatter_db(votes: DirectionVotes) -> float | None:
-    """By how much narrow bands scatter in level while there is sound.
+    """Computes how much the level in narrow bands scatters while there is sound.
 
     Args:
-        votes: Of a span of time, with its levels.
+        votes: Votes of a span of time, with the levels of the sound.
 
     Returns:
-        Standard deviation, dB, of which a quarter of the bands have more. None where
-        it sounds for less than half a second.
+        Standard deviation of the level, dB; a quarter of the bands exceed it. None if
+        the sound lasts less than 0.5 s.
     """
     levels, t_s = votes.group_levels_db, votes.group_t_s
     if len(levels) < 2:
@@ -57,19 +61,23 @@ def level_scatter_db(votes: DirectionVotes) -> float | None:
 
 
 def steered_only(votes: DirectionVotes) -> DirectionVotes:
-    """Without the votes of single bins, which point between steady sources.
+    """Removes the votes of single frequencies, and keeps those of the steered response.
+
+    The steered response measures how well all frequencies together agree on a
+    direction. If several steady sources sound together, single frequencies vote for
+    directions between the sources.
 
     Args:
-        votes: Of a span of time.
+        votes: Votes of a span of time.
 
     Returns:
-        Its steered votes, with all levels.
+        Votes of the steered response, with all levels.
     """
     kept = votes.steered
     return DirectionVotes._make([*(each[kept] for each in votes[:5]), *votes[5:]])
 
 
 def _sounds(levels_db: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(g,) groups that are nearly as loud as the loudest."""
+    """Returns for each of g groups whether it is nearly as loud as the loudest."""
     whole = 10.0 * np.log10(np.sum(10.0 ** (0.1 * levels_db), axis=1))
     return np.asarray(whole >= np.quantile(whole, _LOUD_SHARE) - _SOUNDS_DB)

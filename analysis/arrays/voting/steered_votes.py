@@ -1,7 +1,9 @@
-"""Votes of the steered response: where all frequencies together agree best.
+"""Computes votes of the steered response, at the directions where it is greatest.
 
-They serve where too few times and frequencies hold a single wave alone: a steady sound
-in a room, or an array whose neighbours are too far apart for phases of speech.
+The steered response measures how well all frequencies together agree on a direction.
+Its votes are needed if few times and frequencies contain only one wave. This is the
+case for a steady sound in a room. It is also the case if adjacent microphones are too
+far apart for the phases of speech.
 """
 
 from __future__ import annotations
@@ -17,14 +19,16 @@ from analysis.arrays.steered_response import LAG_DENSITY, SearchGrid, steered_re
 from systems.delays.correlations import correlations_at_lags
 from systems.sound.array_shape import ArrayShape
 
-# A frame's peaks count above this share of its highest, and above so many deviations
-# of what noise gives.
+# _LEAST_SHARE: least height of a peak, as a share of the highest peak.
+# _DEVIATIONS: least height of a peak, in standard deviations of the response to noise.
+# _MOST_PEAKS: largest number of peaks.
+# _LEAST_RESPONSE: least height of a peak in any sound.
 _LEAST_SHARE = 0.6
 _DEVIATIONS = 5.0
 _MOST_PEAKS = 3
 _LEAST_RESPONSE = 0.1
 
-# Peaks nearer than this to a higher one are its slopes.
+# Least distance between two peaks, rad. A nearer peak is the slope of the higher one.
 _APART_RAD = math.radians(20.0)
 
 _LEAST_LEVEL = 0.35
@@ -32,33 +36,34 @@ _LEAST_LEVEL = 0.35
 
 @dataclass(frozen=True)
 class SteeredSearch:
-    """Places that are searched, and the frequencies that count.
+    """Positions to search with the steered response, and the frequencies to use.
 
-    Make one by ``SteeredSearch.of``.
+    To make a search, call ``SteeredSearch.of``.
     """
 
     shape: ArrayShape
     grid: SearchGrid
     bins: slice
-    """Of the spectra."""
+    """Bins of the spectra to use."""
     length: int
-    """Samples of a correlation."""
+    """Number of samples of a correlation."""
     azimuth: NDArray[np.float64]
-    """(g,) of the places, rad; NaN nearly overhead."""
+    """(g,) azimuth of each position, rad. NaN for positions nearly overhead."""
     elevation: NDArray[np.float64]
-    """(g,) rad."""
+    """(g,) elevation of each position, rad. NaN if the array cannot measure elevations.
+    """
 
     @classmethod
     def of(
         cls, shape: ArrayShape, c: float, window_s: float, band_hz: tuple[float, float]
     ) -> SteeredSearch:
-        """A search over all places that the array tells apart.
+        """Makes a search over all positions that the array can distinguish.
 
         Args:
             shape: The microphones.
             c: Speed of sound, m/s.
             window_s: Length of the frames, s.
-            band_hz: Lowest and highest frequency that counts, Hz.
+            band_hz: Lowest and highest frequency to use, Hz.
 
         Returns:
             The search.
@@ -82,14 +87,15 @@ class SteeredSearch:
     def votes(
         self, spectra: NDArray[np.complex64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Peaks of the response to a few frames together.
+        """Finds up to three peaks of the steered response to a group of frames.
 
         Args:
-            spectra: (f, n, b) frames, channels, all bins from 0 on.
+            spectra: (f, n, b) spectra of f frames, n channels and all b bins from 0.
 
         Returns:
-            (k,) azimuths, (k,) elevations, rad, and (k,) responses of up to three
-            peaks: none where nothing stands out.
+            azimuth: (k,) azimuths of the peaks, rad. Empty if no peak stands out.
+            elevation: (k,) elevations of the peaks, rad.
+            response: (k,) responses of the peaks.
         """
         i, j = self.shape.pairs.T
         chosen = spectra[:, :, self.bins]
@@ -98,7 +104,8 @@ class SteeredSearch:
         cross = np.where(size > 0.0, cross / np.maximum(size, 1e-30), 0.0)
         response = self._response(cross.astype(np.complex64))
         response[np.isnan(self.azimuth)] = -1.0
-        # Frames that overlap are worth half; their bins are not independent either.
+        # Overlapping frames count half, and so do their bins, because neither are
+        # independent.
         values = 0.5 * cross.shape[1] * len(spectra) / 2.0
         noise = 1.0 / math.sqrt(2.0 * (self.shape.count - 1) * values)
         least = max(_DEVIATIONS * noise, _LEAST_RESPONSE)
@@ -112,7 +119,7 @@ class SteeredSearch:
         return steered_response(gated, self.grid).astype(np.float64)
 
     def _peaks(self, response: NDArray[np.float64], least: float) -> NDArray[np.int64]:
-        """The highest places whose bearings are apart."""
+        """Returns the positions of the highest peaks whose bearings differ enough."""
         left = response.copy()
         least = max(least, _LEAST_SHARE * float(response.max(initial=0.0)))
         found: list[int] = []
@@ -122,7 +129,8 @@ class SteeredSearch:
                 break
             off = self.azimuth - self.azimuth[best]
             near = np.cos(off) > math.cos(_APART_RAD)
-            # What is higher just beyond the edge is a slope, too.
+            # If the response is higher just beyond the edge of a removed peak, it is
+            # its slope, too.
             if found and response[near].max() > left[best]:
                 left[near] = -1.0
                 continue

@@ -1,8 +1,11 @@
-"""Sources at the peaks of a histogram of directions.
+"""Finds sources at the peaks of a histogram of votes for directions.
 
-A vote counts by its frequency: phases tell directions the better, the higher it is.
-Where both single bins and the steered response vote, sources are at the peaks of a
-geometric mean of their densities: echoes mislead each of them elsewhere.
+There are two kinds of votes: those of single frequencies, and those of the steered
+response, which uses all frequencies together. The weight of a vote of a single
+frequency is this frequency, because phases determine directions more exactly at higher
+frequencies. If both kinds vote, there are two densities of votes. The sources are then
+at the peaks of the geometric mean of both densities. Echoes cause errors in both
+densities, but at different directions.
 """
 
 from __future__ import annotations
@@ -17,31 +20,36 @@ from analysis.arrays.voting.direction_votes import DirectionVotes
 
 _CELLS = 360
 
-# Deviation of the von Mises kernel: wider ones merge talkers, narrower ones split them.
+# Standard deviation of the von Mises kernel, rad. A wider kernel merges talkers, and a
+# narrower kernel splits them.
 _KERNEL_RAD = math.radians(4.5)
 
-# Of a peak, as a share of the highest one, and above the higher of the valleys beside
-# it, as a share of its own height.
+# _LEAST_HEIGHT: least height of a peak, as a share of the highest peak.
+# _LEAST_PROMINENCE: least height of a peak above the higher of the two adjacent
+#   valleys, as a share of the height of the peak.
 _LEAST_HEIGHT, _LEAST_PROMINENCE = 0.18, 0.12
 
-# Of a source's share of the votes, as a share of the largest one: the votes of a strong
-# echo are few but agree, so that its peak is narrow and high.
+# Least share of a source in the votes, as a fraction of the largest share. A strong
+# echo has few votes, but they agree, so its peak is narrow and high.
 _LEAST_SHARE = 0.17
 
-# Exponent of the single bins' density in the mean, and what either one has everywhere,
-# as a share of all: a source that one of them hardly hears is not lost.
+# _OF_BINS: exponent of the density of single bins in the geometric mean.
+# _ANYWHERE: share of each density that is spread over all directions. It preserves a
+#   source that has few votes in one of the two densities.
 _OF_BINS, _ANYWHERE = 0.6, 0.1
 
-# Single bins that vote for a source, within this of its peak.
+# _LEAST_VOTES: least number of single bins that vote for a source.
+# _NEAR_RAD: largest distance of these votes from the peak, rad.
 _LEAST_VOTES, _NEAR_RAD = 15.0, math.radians(12.0)
 
-# Of bins near a peak that the steered response shows as well so much less will do.
+# Factor for the least number of bins if the steered response also votes.
 _AGREED = 0.5
 
-# Fewer steered votes than this in all are chance.
+# Least number of steered votes in total. Fewer votes may be random.
 _LEAST_STEERED = 3
 
-# Votes of one source have errors in common, by reflections: no more of them count.
+# Largest number of votes of a source that count as independent. Reflections cause
+# common errors of more votes.
 _INDEPENDENT = 30.0
 _LEAST_STD_RAD = math.radians(0.5)
 
@@ -49,39 +57,40 @@ _STEPS = 4
 
 
 class VotedSource(NamedTuple):
-    """A direction from which sound came."""
+    """A direction from which sound came, with the votes for it."""
 
     bearing: float
-    """rad, in (-pi, pi]."""
+    """Bearing, in (-pi, pi], rad."""
     bearing_std: float
-    """By the scatter of its votes, of which 30 count at most, rad."""
+    """Standard deviation of the bearing from the scatter of the votes, rad. At most 30
+    votes count as independent."""
     elevation: float | None
-    """Median of its votes, rad; None where the array does not tell it."""
+    """Median elevation of the votes, rad. None if the array cannot measure it."""
     share: float
-    """Of all votes' weight, 0 to 1."""
+    """Share of the total weight of all votes, 0 to 1."""
     votes: int
-    """Near its peak."""
+    """Number of votes near the peak."""
     confidence: float
-    """0 to 1: 1 for a peak as high as the highest that as many votes as are asked for
-    stand behind several times over."""
+    """Confidence that the source exists, 0 to 1. It is 1 if the peak is the highest and
+    has at least three times the required number of votes."""
 
 
 def gather_sources(
     votes: DirectionVotes, *, least_votes: float = _LEAST_VOTES
 ) -> list[VotedSource]:
-    """The sources of a span of time.
+    """Finds the sources in a span of time from its votes for directions.
 
-    Single bins and the steered response decide together where enough bins vote, and
-    the steered response alone where not.
+    If enough single frequencies vote, they decide together with the steered response.
+    Otherwise, the steered response decides alone. Two steady sounds at the same time
+    cannot be separated, because no time or frequency contains only one of them.
 
     Args:
-        votes: Of that time.
-        least_votes: Single bins that vote for a source; for less than a second of
-            sound fewer are to be had.
+        votes: Votes of the span of time.
+        least_votes: Least number of votes of single frequencies for a source. Use a
+            smaller number for less than one second of sound.
 
     Returns:
-        The sources, the one with most votes first. Two steady sounds at once are not
-        told apart: no time or frequency holds one of them alone.
+        The sources. The source with the largest share of the votes is first.
     """
     single = ~votes.steered
     enough = np.count_nonzero(single) >= least_votes
@@ -116,7 +125,12 @@ def gather_sources(
 def _density(
     azimuth: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(c,) density of the votes in the cells of the circle, and their bearings."""
+    """Computes the smoothed density of the votes around the circle.
+
+    Returns:
+        density: (c,) density in each of c cells of the circle.
+        bearings: (c,) bearings of the middles of the cells, rad.
+    """
     cells = np.floor((azimuth + math.pi) / (2.0 * math.pi) * _CELLS).astype(int)
     histogram = np.bincount(cells % _CELLS, weight, _CELLS)
     centres = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
@@ -127,10 +141,10 @@ def _density(
 
 
 def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Cells of the peaks that are high and stand out."""
-    from scipy.signal import find_peaks  # takes a second, which not everyone needs
+    """Returns the cells of the peaks that are high and prominent."""
+    from scipy.signal import find_peaks  # slow import, about 1 s
 
-    # From the lowest cell around to itself nothing is cut.
+    # The circle is cut at the lowest cell, so that the cut splits no peak.
     first = int(np.argmin(density))
     turned = np.append(np.roll(density, -first), density[first])
     height = _LEAST_HEIGHT * density.max()
@@ -146,9 +160,18 @@ def _source(
     bearing: float,
     nearest: NDArray[np.bool_],
 ) -> VotedSource | None:
-    """The source at a peak, of the votes that are nearer to it than to others.
+    """Makes the source at a peak from the votes that are nearest to this peak.
 
-    None where there are none: a peak of the steered response beside single bins.
+    Args:
+        azimuth: (k,) azimuths of the votes, rad.
+        elevation: (k,) elevations of the votes, rad.
+        weight: (k,) weights of the votes.
+        bearing: Bearing of the peak, rad.
+        nearest: (k,) whether this peak is the nearest one to each vote.
+
+    Returns:
+        The source. None if no vote is near the peak, for example if only the steered
+        response has a peak there.
     """
     near = np.abs(_wrapped(azimuth - bearing)) < _NEAR_RAD
     count = int(np.count_nonzero(near))
@@ -175,5 +198,5 @@ def _source(
 
 
 def _wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """In (-pi, pi]."""
+    """Returns angles wrapped to (-pi, pi], rad."""
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
