@@ -33,7 +33,7 @@ class ArrayUnknowns:
 
     @cached_property
     def origin(self) -> NDArray[np.float64]:
-        """(d,) origin of the frame of source positions: the microphones' centroid, m.
+        """(d,) centroid of the microphones, m: origin of the frame of source positions.
         """
         return np.asarray(self.places.mean(axis=0))
 
