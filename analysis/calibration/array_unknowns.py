@@ -33,8 +33,7 @@ class ArrayUnknowns:
 
     @cached_property
     def origin(self) -> NDArray[np.float64]:
-        """(d,) centroid of the microphones, m: origin of the frame of source positions.
-        """
+        """(d,) centroid of the microphones, m. Source positions are relative to it."""
         return np.asarray(self.places.mean(axis=0))
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Pictures of what is certified, beside what simulation says."""
+"""Plots certified sets and simulated trials."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""The sum-of-squares programs of ``analysis.certificates.sos_region``, and their proof.
+"""The sum-of-squares programs of ``analysis.certificates.sos_region``, and the proof.
 
-For both signs of the error of h, with y the scaled state and V = y' P y,
+Let y be the scaled state, V = y' P y, and h the stiffness polynomial of the model. For
+both signs of the error of h, the programs require a multiplier sigma such that
 
-    -V' - sigma (1 - V) is a sum of squares, sigma a sum of squares.
+    -V' - sigma (1 - V) is a sum of squares, and sigma is a sum of squares.
 """
 
 from __future__ import annotations
@@ -33,27 +34,30 @@ from analysis.certificates.exact_polynomials import (
 from analysis.certificates.lag_model import LagModel
 from systems.framework.input_error import InputError
 
-#: The first region is the largest of the linear model's, shrunk by the least of
-#: these that has multipliers.
+# Factors that shrink the largest region of the linear model. The first region uses the
+# least factor for which multipliers exist.
 _SHRINKINGS = (4.0, 16.0, 64.0, 256.0, 1024.0)
-#: V' is to fall at least by this share of |y|^2, 1/s.
+# Least rate of decrease of V, as a multiple of |y|^2, 1/s.
 _DECAY = 1e-4
-#: The multipliers' monomials, degrees 1 and 2; those of V; those of the sum, 1 to 3.
+# Monomials of the multipliers, of degrees 1 and 2.
 _MULTIPLIER_BASIS = [m for m in product(range(3), repeat=3) if 1 <= sum(m) <= 2]
+# Monomials of V, of degree 1.
 _UNIT: list[Exponents] = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+# Monomials of the sum of squares, of degrees 1 to 3.
 _SUM_BASIS = [m for m in product(range(4), repeat=3) if 1 <= sum(m) <= 3]
 
 
 def box(model: LagModel) -> list[tuple[float, float]]:
-    """Bounds of y: the domain, the clamp of v, and the top speed of w."""
+    """Bounds of the scaled state y: domain of x, clamp of v, and top speed for w."""
     a = model.scales[0]
     return [(model.domain_m[0] / a, model.domain_m[1] / a), (-1.0, 1.0), (-1.0, 1.0)]
 
 
 def faces(model: LagModel) -> list[NDArray[np.float64]]:
-    """n with n . y <= 1 where the model holds: on the domain, below the clamp.
+    """Vectors n such that the model holds for n . y <= 1.
 
-    w follows v, and needs no bound.
+    The vectors bound x to the domain, and v to the clamp. w follows v and needs no
+    bound.
     """
     (low, high), *_ = box(model)
     eye = np.eye(3)
@@ -63,7 +67,10 @@ def faces(model: LagModel) -> list[NDArray[np.float64]]:
 def first_region(
     model: LagModel,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """P of the linear model, scaled until a region is found, and its multipliers."""
+    """Finds a first region, and its multipliers.
+
+    P is a Lyapunov matrix of the linear model, scaled until multipliers exist.
+    """
     A = np.zeros((3, 3))
     for i, rate in enumerate(model.rates(0.0)):
         for monomial, value in rate.terms.items():
@@ -87,7 +94,7 @@ def first_region(
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
-    """A program in the multipliers for a fixed P, and its Gram matrices."""
+    """A program that searches multipliers for a fixed P, with its Gram matrices."""
 
     program: MathematicalProgram
     multipliers: list[Any]
@@ -105,7 +112,10 @@ def _basis(exponents: list[Exponents], y: NDArray[Any]) -> NDArray[Any]:
 
 
 def _form(matrix: Any, basis: NDArray[Any], y: NDArray[Any]) -> SymbolicPolynomial:
-    """z' G z of monomials z, of y alone where G has decision variables."""
+    """Builds z' G z for monomials z, as a polynomial of y.
+
+    G may contain decision variables.
+    """
     z = [monomial.ToExpression() for monomial in basis]
     size = range(len(z))
     total = sum(matrix[i, j] * z[i] * z[j] for i in size for j in size)
@@ -115,7 +125,7 @@ def _form(matrix: Any, basis: NDArray[Any], y: NDArray[Any]) -> SymbolicPolynomi
 def _gap(
     model: LagModel, P: NDArray[Any], sigma: Any, y: NDArray[Any], sign: float
 ) -> SymbolicPolynomial:
-    """-V' - decay |y|^2 - sigma (1 - V), which is to be a sum of squares."""
+    """-V' - decay |y|^2 - sigma (1 - V), which must be a sum of squares."""
     V = _form(P, _basis(_UNIT, y), y)
     gap = SymbolicPolynomial(-_DECAY * sum(v * v for v in y), y)
     for variable, rate in zip(y, model.rates(sign), strict=True):
@@ -124,14 +134,14 @@ def _gap(
 
 
 def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
-    """The program that looks for multipliers of the region of P.
+    """Builds the program that searches multipliers for the region of P.
 
     Args:
-        model: Polynomial rates of the state.
-        P: (3, 3) symmetric; the region is y' P y <= 1, y the scaled state.
+        model: Model with the polynomial rates of the state.
+        P: (3, 3) symmetric. The region is y' P y <= 1, with the scaled state y.
 
     Returns:
-        The program, and its Gram matrices, one for either sign of the error of h.
+        The program, with Gram matrices for both signs of the error of h.
     """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
@@ -147,14 +157,14 @@ def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
 def solve(
     solver: SolverInterface, program: MathematicalProgram
 ) -> MathematicalProgramResult | None:
-    """What the solver finds; none: it says that there is no solution.
+    """Solves a program.
 
     Args:
-        solver: What solves semidefinite programs.
-        program: What is to be solved.
+        solver: Solver for semidefinite programs.
+        program: The program.
 
     Returns:
-        The solution, or None.
+        The solution. None if the solver finds no solution.
     """
     result = solver.Solve(program)
     return result if result.is_success() else None
@@ -163,14 +173,15 @@ def solve(
 def find_multipliers(
     model: LagModel, P: NDArray[np.float64]
 ) -> list[NDArray[np.float64]] | None:
-    """Multipliers for the region as it is; none: V does not fall all over it.
+    """Searches multipliers that prove the decrease of V on a region.
 
     Args:
-        model: Polynomial rates of the state.
-        P: (3, 3) symmetric; the region is y' P y <= 1, y the scaled state.
+        model: Model with the polynomial rates of the state.
+        P: (3, 3) symmetric. The region is y' P y <= 1, with the scaled state y.
 
     Returns:
-        Their Gram matrices, one for either sign of the error of h, or None.
+        Gram matrices of the multipliers, one for each sign of the error of h. None if
+        no multipliers are found.
     """
     problem = feasibility(model, P)
     result = solve(ClarabelSolver(), problem.program)
@@ -182,15 +193,15 @@ def find_multipliers(
 def larger_region(
     model: LagModel, P: NDArray[np.float64], multipliers: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """P of a larger region inside the box, the multipliers held.
+    """Searches a larger region inside the box, with fixed multipliers.
 
     Args:
-        model: Polynomial rates, and the box of the domain.
-        P: (3, 3) of the region that is to grow.
-        multipliers: Gram matrices, from ``find_multipliers``.
+        model: Model with the polynomial rates, and the box of the domain.
+        P: (3, 3) matrix of the region that should grow.
+        multipliers: Gram matrices from ``find_multipliers``.
 
     Returns:
-        (3, 3) symmetric; P itself where the solver finds none.
+        (3, 3) symmetric matrix of the larger region. P itself if the solver finds none.
     """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
@@ -205,7 +216,7 @@ def larger_region(
         program.AddPositiveSemidefiniteConstraint(
             np.array([[Expression(v) for v in row] for row in block])
         )
-    # The volume falls with log det P, here linearised about the last P.
+    # The volume decreases with log det P. The cost is log det P, linearized about P.
     slope = np.linalg.inv(P)
     program.AddLinearCost(
         sum(slope[i, j] * new[i, j] for i in range(3) for j in range(3))
@@ -218,7 +229,7 @@ def larger_region(
 
 
 def _rational(matrix: Any) -> list[list[Fraction]]:
-    """The symmetric part, as the rational numbers that its floats are."""
+    """Symmetric part of a matrix, as exact rational numbers."""
     return [[Fraction(float(v)) for v in row] for row in 0.5 * (matrix + matrix.T)]
 
 
@@ -228,20 +239,21 @@ def is_proved(
     problem: Feasibility,
     result: MathematicalProgramResult | None,
 ) -> bool:
-    """Proves the region in rational arithmetic, from the solver's numbers.
+    """Proves the region in rational arithmetic, from the numbers of the solver.
 
-    The multipliers are what the solver found, as rationals; the sum's Gram
-    matrix is moved until it makes -V' - sigma (1 - V) exactly, and then must be
-    positive definite. So must P and its blocks with the faces of the box.
+    The multipliers are those of the solver, as rational numbers. The Gram matrix of the
+    sum is corrected until the sum equals -V' - sigma (1 - V) exactly. The corrected
+    matrix must be positive definite. P, and the blocks of P with the faces of the box,
+    must be positive definite, too.
 
     Args:
-        model: Polynomial rates, and the box of the domain.
-        P: (3, 3) of the region.
-        problem: What was solved for P.
-        result: What the solver found; None: nothing.
+        model: Model with the polynomial rates, and the box of the domain.
+        P: (3, 3) matrix of the region.
+        problem: The program that was solved for P.
+        result: The solution. None: the solver found no solution.
 
     Returns:
-        True only where every step holds exactly.
+        True only if every step holds exactly.
     """
     if result is None:
         return False

@@ -67,8 +67,7 @@ class SlopeEnergy:
         return cls(integral, start_time, sample_rate_hz)
 
     def before(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Integral of the squared slope that had left the source before ``times`` in s.
-        """
+        """Integral of the squared slope that left the source before ``times`` in s."""
         last = len(self.integral) - 1
         place = (np.asarray(times) - self.start_time) * self.sample_rate_hz
         place = np.clip(place, 0.0, last)

@@ -24,8 +24,8 @@ from diagrams import Scenario, load_scenario
 from systems.hearing.tdoa_estimator import TDOAEstimator
 from systems.sound.array_shape import ArrayShape
 
-#: Changes to the default scenario. No force moves the robot. The sound is continuous, so
-#: that every frame is a measurement.
+#: Changes to the default scenario. No force moves the robot. The sound is continuous.
+#: Every frame is therefore a measurement.
 _SETTING = (
     "name=localization",
     "description=A resting source heard by a resting robot",
@@ -112,8 +112,7 @@ class LocalizationCell:
 def _moments(
     name: str, unit: str, values: NDArray[np.float64], truth: float
 ) -> dict[str, float | None]:
-    """Computes mean, standard deviation and RMS error; None if there are too few values.
-    """
+    """Computes mean, standard deviation and RMS error; None for too few values."""
     some, several = len(values) > 0, len(values) > 1
     return {
         f"{name}_mean_{unit}": float(values.mean()) if some else None,

@@ -39,7 +39,7 @@ def localization_summary(
     """
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.follower.microphones, scenario.sound_speed_m_s
-    # Without limits, the table also shows large range errors due to errors of the array.
+    # Without limits, the table also shows large range errors due to array errors.
     estimate = frame_estimator(scenario.follower.tdoa, shape, c, limited=False)
     return {
         "schema_version": SCHEMA_VERSION,
@@ -115,8 +115,7 @@ def _tolerances_text(tolerances: dict[str, float]) -> str:
 
 
 def _table(cells: list[dict[str, Any]], name: str, unit: str) -> list[str]:
-    """Formats mean and standard deviation by position, with one column per estimator.
-    """
+    """Formats mean and standard deviation by position, in one column per estimator."""
     places = _by_place(cells)
     titles = "".join(f"{cell['estimator']:>18}" for cell in places[0])
     heading = f"{name} in {unit}"
@@ -148,8 +147,7 @@ def _place(row: dict[str, Any]) -> str:
 
 
 def _pair(mean: float | None, std: float | None, lost: int) -> str:
-    """Formats mean and standard deviation, with the number of lost frames in brackets.
-    """
+    """Formats mean and standard deviation, with the lost frames' number in brackets."""
     missing = f" ({lost})" if lost else ""
     if mean is None:
         return f"none{missing}"
