@@ -200,8 +200,7 @@ def _ultimate_bound(model: PointMass, speed: float, d: float, e: float) -> float
 
 
 def _peak_gain(model: PointMass) -> float:
-    """Integral of the magnitude of the impulse response of 1/(M s^2 + D_r s + K_r), m/N.
-    """
+    """Integral of |impulse response| of 1/(M s^2 + D_r s + K_r) over time, m/N."""
     M, K, D = model.mass_kg, model.stiffness_n_m, model.damping_n_s_m
     ratio = D / (2.0 * math.sqrt(K * M))
     if ratio >= 1.0:

@@ -88,19 +88,17 @@ class EnergyCertificate:
 
     @property
     def contact_energy_j(self) -> float:
-        """Least energy at contact, J. With less energy, no state leads to a collision.
-        """
+        """Least energy at contact, J. States with less energy never collide."""
         return float(self.escape_j[:, self.free].min())
 
     @property
     def rest_share(self) -> float:
-        """Share of the free floor on which starts at rest are certified."""
+        """Share of the free floor with starts certified at rest."""
         return float(np.mean(np.isfinite(self.largest_speed()[self.free])))
 
     @property
     def any_speed_share(self) -> float:
-        """Share of the free floor on which starts at any allowed speed are certified.
-        """
+        """Share of the free floor with starts certified at any allowed speed."""
         return float(np.mean(np.all(self.any_speed[:, self.free], axis=0)))
 
     def largest_speed(self) -> NDArray[np.float64]:

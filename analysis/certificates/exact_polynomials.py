@@ -122,8 +122,7 @@ def match_gram(
 
 
 def is_positive_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
-    """Whether a symmetric rational matrix is positive definite, by exact elimination.
-    """
+    """Whether a symmetric rational matrix is positive definite, by elimination."""
     work = [list(row) for row in rows]
     size = len(work)
     for k in range(size):

@@ -104,7 +104,7 @@ def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cov
     for tick in range(ticks):
         p[0] = first[tick]
         places[tick] = p
-        # Observed positions are one latency old. Before the start, all speeds are equal.
+        # Observed positions are one latency old. Before the start, speeds are equal.
         seen, speed = np.empty(robots), np.full(robots, begin)
         for i in range(robots):
             then = tick - late
