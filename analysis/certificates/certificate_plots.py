@@ -148,8 +148,7 @@ def plot_energy_balance(balance: EnergyBalance) -> Figure:
 
 
 def plot_sos_region(region: SosRegion) -> Figure:
-    """Plots the region's slice w = v, and the region that energy certifies without lag.
-    """
+    """Plots the region's slice w = v, and the region from energy without motor lag."""
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     axes = figure.subplots()
     model = region.model

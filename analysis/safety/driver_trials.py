@@ -249,8 +249,7 @@ def _walls(draw: np.random.Generator) -> list[tuple[float, ...]]:
 
 
 def _bubble(draw: np.random.Generator) -> list[tuple[float, ...]]:
-    """Boxes near the edge of the free circle, with a corner or face toward the start.
-    """
+    """Boxes near the edge of the free circle, with corners or faces toward it."""
     boxes = []
     for angle in draw.uniform(-math.pi, math.pi, _BODIES):
         length, width = draw.uniform(0.02, 0.3, 2)
