@@ -18,10 +18,11 @@ _EXACT = 1e-14
 
 @dataclass(frozen=True)
 class ArrayUnknowns:
-    """The unknown positions, speed of sound and channel delays of n microphones.
+    """The unknowns of an array: microphone positions, speed of sound, channel delays.
 
-    The full vector stacks n d coordinates, the speed of sound, and n delays. A delay
-    that all channels share has no effect. The n delays therefore add up to 0.
+    For n microphones in d dimensions, the full vector holds n d coordinates, the speed
+    of sound, and n delays. A delay that all channels share has no effect. The n delays
+    therefore add up to 0.
     """
 
     places: NDArray[np.float64]
@@ -38,7 +39,10 @@ class ArrayUnknowns:
 
     @cached_property
     def scale(self) -> NDArray[np.float64]:
-        """Scales the m unknowns z to physical changes.
+        """Matrix that converts the m unknowns z to changes of the full vector.
+
+        The full vector holds n d microphone coordinates, the speed of sound and n
+        delays.
 
         Returns:
             (n d + 1 + n, m) matrix. Each column is the change of the full vector for
@@ -105,8 +109,8 @@ class ArrayUnknowns:
     ) -> tuple[WaveFront, NDArray[np.float64]]:
         """Computes the delays of one source, and their slopes along the unknowns.
 
-        The source is at h / w from ``origin``. The weight w is 1 if h is a position. If
-        h is a unit vector, w is the inverse range.
+        The source is at h / w relative to ``origin``. If h is a position, w is 1. If h
+        is a unit vector, w is the inverse range.
 
         Args:
             z: (m,) deviations from the stated values, in standard deviations.

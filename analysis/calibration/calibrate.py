@@ -100,11 +100,17 @@ def _listened(
     known: ArrayGeometry,
     top_hz: float,
 ) -> tuple[list[MeasuredSound], ArrayGeometry, list[HeardSound], list[str]]:
-    """Measures the delays in all recordings with the array as known so far.
+    """Measures the delays in all recordings.
+
+    Args:
+        sounds: The recordings.
+        geometry: The array as stated.
+        known: The array as known so far, which is used to measure the delays.
+        top_hz: Highest frequency to use, Hz.
 
     Returns:
-        The measured sounds; ``geometry`` unchanged; the sounds as heard; remarks about
-        recordings.
+        Four values: the measured sounds; ``geometry``, unchanged; the results of the
+        recordings; messages about the recordings.
     """
     measured: list[MeasuredSound] = []
     heard: list[HeardSound] = []
@@ -185,8 +191,8 @@ def calibration_run(
     Args:
         sounds: The delays, with source positions where these are known.
         geometry: The array, with its stated uncertainties.
-        heard: For delays measured in recordings, the sounds as heard. None: the delays
-            were given.
+        heard: Results of the recordings, one per sound. None: the delays do not come
+            from recordings.
         remarks: Messages about the recordings.
 
     Returns:

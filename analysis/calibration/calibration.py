@@ -34,7 +34,7 @@ _LEAST_SLOPE = 0.1
 
 @dataclass(frozen=True)
 class Fit:
-    """One sound linearized about the solution.
+    """Residuals and slopes of one sound, linearized about the solution.
 
     All delays are in standard deviations of the measured delays.
     """
@@ -44,8 +44,7 @@ class Fit:
     by_array: NDArray[np.float64]
     """(n - 1, m) slopes of the expected delays along the array's unknowns."""
     by_place: NDArray[np.float64]
-    """(n - 1, d) slopes of the expected delays along the sound's unknown coordinates.
-    """
+    """(n - 1, d) slopes of the expected delays along the sound's coordinates."""
     root: NDArray[np.float64]
     """(n - 1, n - 1) matrix that converts delays in s to standard deviations."""
     place: SoundPlace
@@ -64,9 +63,9 @@ class Calibration:
     channel_delays: NDArray[np.float64]
     """(n,) delays of the channels minus their mean, s."""
     covariance: NDArray[np.float64]
-    """Joint covariance of positions, speed of sound and channel delays.
+    """(n d + 1 + n, n d + 1 + n) joint covariance.
 
-    The shape is (n d + 1 + n, n d + 1 + n).
+    The order is microphone coordinates, speed of sound, channel delays.
     """
     information: NDArray[np.float64]
     """(m, m) Fisher information of the sounds on the scaled unknowns z."""
@@ -108,9 +107,9 @@ def calibrate_array(
 ) -> Calibration:
     """Estimates microphone positions, speed of sound and channel delays.
 
-    If sounds have stated positions, these positions define the frame as far as the
-    microphone positions are uncertain. If no sound has a stated position, the stated
-    microphone positions define the frame.
+    If sounds have stated positions, these and the stated microphone positions together
+    define the coordinate frame, weighted by their uncertainties. If no sound has a
+    stated position, the stated microphone positions define the frame.
 
     Args:
         places: (n, d) stated microphone positions, m.
@@ -230,8 +229,12 @@ def _eliminated(
     """Eliminates the unknown coordinates of a sound from its delays.
 
     Returns:
-        (n - 1, n - 1) weight of the residuals; (d, n - 1) gain from residuals to the
-        best step of the sound's coordinates; (d,) step toward the expected coordinates.
+        Three arrays:
+
+        1. (n - 1, n - 1) weight of the residuals.
+        2. (d, n - 1) gain from the residuals to the best step of the sound's
+           coordinates.
+        3. (d,) step toward the expected coordinates.
     """
     within = fit.by_place.T @ fit.by_place
     along = np.diag(within)

@@ -40,17 +40,17 @@ class CalibrationMisfit:
 
 
 def calibration_misfit(calibration: Calibration) -> CalibrationMisfit | None:
-    """Finds the likeliest fault if sounds and geometry disagree.
+    """Finds the likeliest fault if measured sounds and stated geometry disagree.
 
-    Each candidate fault removes one constraint. The candidates leave out one sound,
-    free the position of one microphone, or free the delay of one channel. The change of
+    The function compares three kinds of candidates: one sound is left out, the position
+    of one microphone is free, or the delay of one channel is free. The change of
     chi-square is computed to first order about the solution.
 
     Args:
         calibration: The calibration.
 
     Returns:
-        The candidate without which the rest fits best. None if everything fits.
+        The candidate that fits best. None if everything fits without a change.
     """
     whole, freedom = calibration.chi_square, calibration.freedom
     if freedom < 1 or chi2.sf(whole, freedom) > _CHANCE:
@@ -120,7 +120,13 @@ def _drop_of(
 ) -> float:
     """Computes how much chi-square falls if f more parameters are free.
 
-    ``columns`` holds the (n - 1, f) slopes of each sound's delays along the parameters.
+    Args:
+        fits: Fits of the sounds.
+        columns: (n - 1, f) slopes of each sound's delays along the parameters.
+        covariance: (m, m) covariance of the unknowns.
+
+    Returns:
+        The decrease of chi-square.
     """
     free = columns[0].shape[1]
     pull, own = np.zeros(free), np.zeros((free, free))

@@ -35,7 +35,7 @@ class MeasuredSound:
 def check_sounds(
     places: NDArray[np.float64], sounds: Sequence[MeasuredSound], field: str = "sounds"
 ) -> None:
-    """Checks that sounds can calibrate an array.
+    """Checks that measured sounds are suitable to calibrate an array.
 
     Args:
         places: (n, d) microphone positions, m.
@@ -66,7 +66,7 @@ def check_sounds(
 def check_position(
     places: NDArray[np.float64], position: NDArray[np.float64], field: str
 ) -> None:
-    """Checks that a sound can have been made at a position.
+    """Checks that a stated position of a sound is plausible.
 
     Args:
         places: (n, d) microphone positions, m.
@@ -75,7 +75,7 @@ def check_position(
 
     Raises:
         InputError: The position does not have d coordinates, is less than 5 cm from a
-            microphone, or is more than 1 km from a microphone.
+            microphone, or is more than 1 km from the nearest microphone.
     """
     dimension = places.shape[1]
     if position.shape != (dimension,):

@@ -50,15 +50,17 @@ class CalibrationGain:
 def gain_ratios(
     calibration: Calibration,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Finds independent directions of the unknowns, most improved first.
+    """Finds independent directions of the unknowns, ordered by improvement.
 
     Args:
         calibration: A calibration with m unknowns.
 
     Returns:
-        (m,) ratio of the standard deviation after to that before, ascending; and (n d +
-        1 + n, m) directions as columns. Each column is the change of positions, speed
-        of sound and delays for one standard deviation before.
+        Two arrays:
+
+        1. (m,) standard deviation after the calibration over that before, ascending.
+        2. (n d + 1 + n, m) directions as columns. A column is the change of positions,
+           speed of sound and delays for one standard deviation before.
     """
     seen, axes = np.linalg.eigh(calibration.information)
     ratios = 1.0 / np.sqrt(1.0 + np.maximum(seen[::-1], 0.0))
@@ -71,7 +73,7 @@ def gains_nothing(calibration: Calibration) -> bool:
 
 
 def calibration_gains(calibration: Calibration) -> list[CalibrationGain]:
-    """Lists how well each property of the array is known before and after.
+    """Lists how well each property of the array is known before and after calibration.
 
     The properties are:
 
@@ -122,8 +124,9 @@ def _modes(
 ) -> list[tuple[str, str, NDArray[np.float64]]]:
     """Lists the independent shifts, rotations and size changes of an array.
 
-    Each mode has a name, a unit and (n d,) displacements. The displacements are those
-    of a shift by 1 m, of a rotation rate of 1 rad, or of doubling the array's size.
+    Each mode has a name, a unit and (n d,) displacements to first order. The
+    displacements belong to a shift by 1 m, to a rotation by 1 rad, or to doubling the
+    array's size.
     """
     count, dimension = places.shape
     p = places - places.mean(axis=0)

@@ -28,11 +28,13 @@ _ANY_DIRECTION = 10.0
 
 @dataclass(frozen=True)
 class SoundPlace:
-    """A source position h / w with its d unknowns and their prior.
+    """The position of a sound's source, with its d unknowns and their prior.
 
-    If the position is stated, the unknowns are its coordinates over their standard
-    deviation. If the position is not stated, d - 1 unknowns are changes of direction,
-    in rad. The last unknown is then the inverse range over its standard deviation.
+    The position is h / w. The unknowns depend on whether the position was stated:
+
+    - If stated, they are the d coordinates over their standard deviation.
+    - If not stated, they are d - 1 changes of direction, in rad, and the inverse range
+      over its standard deviation.
     """
 
     h: NDArray[np.float64]
@@ -44,20 +46,16 @@ class SoundPlace:
     weights: NDArray[np.float64]
     """(d,) weights of ``off`` in the least squares: 1, or 0 without expectation."""
     deviation: float
-    """Prior standard deviation.
-
-    For a stated position, that of each coordinate, m. Otherwise that of the inverse
-    range, 1/m.
-    """
+    """Prior standard deviation of the coordinates, m, or of the inverse range, 1/m."""
     stated: bool
     """Whether the position was stated."""
 
     @classmethod
     def stated_at(cls, position: NDArray[np.float64], std: float) -> SoundPlace:
-        """Makes the place of a sound from its measured position.
+        """Makes a ``SoundPlace`` from a stated position.
 
         Args:
-            position: (d,) position in the frame, m.
+            position: (d,) position relative to the frame's origin, m.
             std: Standard deviation of each coordinate, m.
 
         Returns:
@@ -76,7 +74,7 @@ class SoundPlace:
     def heard(
         cls, sound: MeasuredSound, shape: ArrayShape, c: float, budget: ArrayBudget
     ) -> SoundPlace:
-        """Makes the initial place of a sound whose position is not stated.
+        """Makes the initial ``SoundPlace`` of a sound whose position is not stated.
 
         Args:
             sound: The measured delays.
@@ -85,7 +83,7 @@ class SoundPlace:
             budget: Uncertainties of the array and of the speed of sound.
 
         Returns:
-            The place that the array as stated would estimate.
+            The place as located by the array as stated.
         """
         far = locate_far_source(sound.tau, sound.covariance, shape, c)
         whole = sound.covariance + budget.delay_covariance(far.p_AS, 0.0, shape, c)

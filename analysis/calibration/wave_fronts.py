@@ -1,7 +1,7 @@
 """Delays of a sound at microphones, and the slopes of these delays.
 
-A pair (h, w) describes a source at the position h / w. With w = 1, h is the position
-itself. With a unit vector h, w is the inverse range, which may be 0.
+A pair (h, w) describes a source at the position h / w. If w is 1, h is the position. If
+h is a unit vector, w is the inverse range, which may be 0.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def wave_front(
 ) -> WaveFront:
     """Computes the delays of sound from a source at h / w.
 
-    The path from the source to a microphone at m is longer than that to the origin by D
-    = (|h - w m| - |h|) / w. The code uses a form of D that allows w = 0.
+    For a microphone at m, the path from the source is longer than the path to the
+    origin by D = (|h - w m| - |h|) / w. The code uses a form of D that allows w = 0.
 
     Args:
         p: (n, d) microphone positions, m.

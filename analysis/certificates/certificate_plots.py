@@ -47,10 +47,10 @@ def draw_bodies(axes: Axes, model: PointMass) -> None:
 
 
 def plot_energy_certificate(certificate: EnergyCertificate) -> Figure:
-    """Plots a map of the largest certified speed over the floor.
+    """Plots a map of the largest speed from which the robot provably never collides.
 
-    In white areas, not even rest is certified. The dotted ring is the follow distance.
-    The cross is control point P at the scenario's start.
+    In white areas, not even a robot at rest is certified. The dotted ring is the follow
+    distance. The cross is the robot's control point at the start of the scenario.
     """
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     axes = figure.subplots()

@@ -110,16 +110,16 @@ def draw_starts(
 def try_certificate(
     certificate: EnergyCertificate, *, starts: int = 300, duration_s: float = 40.0
 ) -> CertificateTrials:
-    """Simulates starts inside the certified set, and as many outside.
+    """Simulates certified initial states, and as many that are not certified.
 
     Args:
         certificate: Certificate to test.
-        starts: Number of starts inside, and number of starts outside if enough are
-            found.
-        duration_s: Simulated time per start, s.
+        starts: Number of certified states, and number of states that are not certified.
+            The second number may be smaller if hardly any such states exist.
+        duration_s: Simulated time per state, s.
 
     Returns:
-        Results of the runs, and the certified shares of the drawn starts.
+        Results of the runs, and the certified shares of the drawn states.
 
     Raises:
         InputError: ``starts`` is below 1.

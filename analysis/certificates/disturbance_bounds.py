@@ -1,21 +1,27 @@
 """Bounds for a moving source and for a moving obstacle, in the point-mass model.
 
+The point mass M at p is the robot's control point, with speed v. K_r and D_r are
+stiffness and damping of the attraction to the source at p_S. d_f is the follow
+distance.
+
 **Source.** Let x = |p - p_S| - d_f be the stretch, w = v - v_S the relative velocity,
-and n the unit vector from the source to P. Then
+and n the unit vector from the source to p. Then
 
     W = M |w|^2 / 2 + K_r x^2 / 2 + e M x (n . w)
 
 decreases wherever z' Q z > d (|w| + e |x|), with z = (|x|, |w|) and d = D_r |v_S| + M
-|a_S|. This is input-to-state stability, and gives an ultimate bound of x. The rotation
-of n adds at most e M |w_t|^2. The clamp on |v| only helps while e |x| <= v_max - |v_S|.
+|a_S|. The stretch is therefore input-to-state stable and ultimately bounded. The
+rotation of n adds at most e M |w_t|^2. The bound requires e |x| <= v_max - |v_S|: the
+clamp of |v| to v_max then does not increase W.
 
-**Obstacle.** The axes are those of an obstacle that moves at v_O. L is the injection of
-the velocity term (``analysis.nonlinear.velocity_passivity``). The energy V obeys
+**Obstacle.** The obstacle moves at v_O, and the axes move with the obstacle. The
+velocity term of the law injects at most L |v|^2
+(``analysis.nonlinear.velocity_passivity``). The energy V then obeys
 
     V' <= sqrt(2 K_r V) v_O + D_r^2 v_O^2 / (4 (D_r - L))
 
 as long as v_O <= v_max. An encounter is certified up to the time at which V may reach
-U(contact).
+U(contact), the energy of the repulsion at contact.
 """
 
 from __future__ import annotations
@@ -42,10 +48,10 @@ _SIDE_M = 0.1
 
 @dataclass(frozen=True)
 class SourceBound:
-    """Bounds for following a source of limited speed and acceleration.
+    """Bounds of the stretch x while the robot follows a source.
 
-    The stretch x is the distance from the source to control point P minus the follow
-    distance.
+    The stretch is the distance from the source to the robot's control point minus the
+    follow distance.
     """
 
     speed_m_s: float
@@ -53,16 +59,16 @@ class SourceBound:
     acceleration_m_s2: float
     """Largest acceleration |a_S| of the source, m/s^2."""
     bound_m: float | None
-    """Proved bound of |x| for starts at rest at the follow point, m.
+    """Proved bound of the stretch |x|, m; None if no bound can be proved.
 
-    None means that no W of the assumed form bounds |x|.
+    The robot starts at rest at the follow distance.
     """
     steady_m: float
     """Stretch D_r v_S / K_r at constant speed, m."""
     linear_peak_m: float
     """Largest |x| along a line for any force up to d, without the speed clamp, m."""
     simulated_m: float | None
-    """Largest simulated |x| after the source starts at constant speed, m.
+    """Largest simulated stretch |x| after the source starts at constant speed, m.
 
     None means that the robot cannot keep up with the source.
     """
@@ -107,14 +113,14 @@ class DisturbanceBounds:
 
 
 def disturbance_bounds(scenario: Scenario, *, runs: int = 200) -> DisturbanceBounds:
-    """Computes the bounds, and simulates the same disturbances.
+    """Computes bounds for a moving source and a moving obstacle, and simulates both.
 
     Args:
         scenario: Scenario with the gains, the law and the source's corner radius.
-        runs: Number of simulated encounters per speed.
+        runs: Number of simulated encounters with an obstacle per speed.
 
     Returns:
-        Rows for the source and for the obstacle, for speeds below the top speed.
+        Bounds and simulation results, for several speeds below the top speed.
 
     Raises:
         InputError: The law is not known.
@@ -146,13 +152,16 @@ def source_bound(
     *,
     simulate: bool = True,
 ) -> SourceBound:
-    """Computes the bound of the stretch, with the best weight e from a list.
+    """Computes a bound of the stretch while the robot follows a source.
+
+    The stretch is the distance to the source minus the follow distance. The bound uses
+    the best weight e from a list (see the module docstring).
 
     Args:
         model: Point-mass model with the gains.
         speed: Largest speed |v_S| of the source, m/s.
         acceleration: Largest acceleration |a_S| of the source, m/s^2.
-        simulate: Whether to simulate a source at constant speed.
+        simulate: Whether to simulate a source at constant speed, too.
 
     Returns:
         Bounds and simulated peak of the stretch, m.
@@ -275,11 +284,11 @@ def encounter_contact_time(
     reach_m: float,
     duration_s: float,
 ) -> NDArray[np.float64]:
-    """Simulates boxes that approach from ahead, and returns the times of contact.
+    """Simulates boxes that approach a robot from ahead, and returns the times of contact.
 
-    The control point P starts at rest at its follow point, with the source behind it.
-    The box moves toward P at constant speed. Its path passes P at the given lateral
-    offset.
+    The robot's control point P starts at rest at the follow distance from the source,
+    which is behind the robot. The box moves toward P at constant speed. The path of the
+    box passes P at the given lateral offset.
 
     Args:
         model: Point-mass model with the gains and the law. The law's force is that at

@@ -1,25 +1,28 @@
 """The energy certificate: initial states that provably never collide.
 
-In the point-mass model (``analysis.models.point_mass``), the energy
+In the point-mass model (``analysis.models.point_mass``), the robot is a mass M at the
+control point p with velocity v. Its energy is
 
     V = M |v|^2 / 2 + K_r (|p_S - p| - d_f)^2 / 2 + U(c)
 
-cannot grow if the damping D_r covers the velocity term
-(``analysis.nonlinear.velocity_passivity``). The clamp on |v| only removes energy.
+The second term is the attraction to the follow distance d_f from the source at p_S.
+U(c) is the energy of the repulsion at distance c from the bodies. V cannot grow if the
+damping D_r covers the velocity term of the law
+(``analysis.nonlinear.velocity_passivity``). The clamp of |v| to v_max only removes
+energy.
 
-For each body, E(p) is the lowest level over which any path from p to contact with the
-body must climb. Two conditions exclude contact with a body:
+For each body, E(p) is the lowest energy level over which any path from p to contact
+with the body must climb. Each of two conditions excludes contact with a body:
 
 - The energy is too low: V < E(p).
 - Every path to contact crosses a place where even the top speed does not suffice. There
-  M v_max^2 / 2 < E - W, with W the potential energy at that place. The clamp limits the
-  kinetic energy to M v_max^2 / 2.
+  M v_max^2 / 2 < E - W, with W the potential energy at that place.
 
 An initial state is certified if one of the conditions holds for each body.
 
 E is computed on a grid, from bounds of W over whole cells. The distances from the
-source and from a body change by no more than P moves. U decreases with c. The result
-therefore also holds between the grid points.
+source and from a body change by no more than p moves, and U decreases with c. The
+result therefore also holds between the grid points.
 """
 
 from __future__ import annotations
@@ -50,10 +53,10 @@ MOST_CELLS = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class EnergyCertificate:
-    """Escape energies and certified cells on a grid.
+    """Result of the energy certificate: escape energies and certified cells on a grid.
 
-    E is the energy that any path from a cell to contact with a body needs. P is the
-    robot's control point.
+    The escape energy E is the energy that any path from a cell to contact with a body
+    needs. P is the robot's control point.
     """
 
     scenario: Scenario
@@ -114,11 +117,11 @@ class EnergyCertificate:
     def certified(self, states: ArrayLike, *, clamp: bool = True) -> NDArray[np.bool_]:
         """Checks whether initial states are certified never to collide.
 
-        States off the grid, in contact or above the top speed are not certified.
+        States outside the grid, in contact, or above the top speed are not certified.
 
         Args:
-            states: (n, 4) x, y, vx, vy of P, m and m/s.
-            clamp: Whether the proof may use the speed clamp as well as the energy.
+            states: (n, 4) x, y, vx, vy of the robot's control point, m and m/s.
+            clamp: Whether the proof may use the speed limit as well as the energy.
 
         Returns:
             (n,) True for certified states.
@@ -170,14 +173,16 @@ def certify_energy(
     contact_m: float | None = None,
     velocity_term: str | None = None,
 ) -> EnergyCertificate:
-    """Computes the certified set of a scenario's point-mass model.
+    """Computes the set of initial states that provably never collide.
+
+    The proof applies to the point-mass model of the scenario.
 
     Args:
         scenario: Scenario. All bodies are assumed to rest where they are at 0 s.
-        cell_m: Side of a cell, m. Finer cells certify more.
-        contact_m: Contact distance of control point P, m. None: the least range of the
-            sensors.
-        velocity_term: Velocity term. None: that of the scenario.
+        cell_m: Side of a grid cell, m. Finer cells certify more states.
+        contact_m: Distance of the robot's control point from a body that counts as
+            contact, m. None: the least range of the sensors.
+        velocity_term: Velocity term of the law. None: that of the scenario.
 
     Returns:
         The certificate.

@@ -19,13 +19,14 @@ from systems.framework.compiling import njit
 def cell_bounds(
     model: PointMass, points: NDArray[np.float64], cell_m: float, contact_m: float
 ) -> tuple[NDArray[Any], ...]:
-    """Computes bounds of the potential in each cell, and the cells in contact.
+    """Computes bounds of the potential energy in each grid cell, and the cells in contact.
 
     Args:
         model: Point-mass model with the bodies and the potential.
         points: (n, 2) centers of square cells, m.
         cell_m: Side of the cells, m.
-        contact_m: Distance from control point P to a body that counts as contact, m.
+        contact_m: Distance from the robot's control point to a body that counts as
+            contact, m.
 
     Returns:
         Four arrays:
@@ -68,10 +69,11 @@ def border_cells(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def climb(
     lower: NDArray[np.float64], seeds: NDArray[np.float64], blocked: NDArray[np.bool_]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the lowest level over which paths from each cell to contact must climb.
+    """Computes the lowest energy over which paths from each cell to contact must climb.
 
-    The algorithm is Dijkstra's, with the largest instead of the sum. It settles cells
-    in ascending order of their levels. Paths may go to all eight neighbors of a cell.
+    The algorithm is Dijkstra's, with the largest energy along a path instead of the
+    sum. Cells are settled in ascending order of their levels. Paths may go to all eight
+    neighbors of a cell.
 
     Args:
         lower: (nx, ny) least potential in each cell, J.

@@ -1,7 +1,7 @@
-"""Polynomial model of a head-on approach with motor lag.
+"""Polynomial model of a robot with motor lag that approaches an obstacle head-on.
 
-With the distance error x = c - c_eq, the velocity v of the virtual mass, and the
-velocity w of control point P, the model is
+The states are the distance error x = c - c_eq from the equilibrium distance, the
+velocity v of the virtual mass M, and the velocity w of the robot's control point:
 
     x' = w,   M v' = -h(x) x - D_r v,   lag w' = v - w
 
@@ -31,8 +31,8 @@ _FARTHEST_M = 0.5
 class LagModel:
     """Polynomial model of a head-on approach, valid on a domain of x.
 
-    x = c - c_eq is the distance error, v the velocity of the virtual mass, and w that
-    of control point P.
+    The states are the distance error x = c - c_eq, the velocity v of the virtual mass,
+    and the velocity w of the robot's control point. h(x) is the stiffness.
     """
 
     contact: HeadOn
@@ -75,14 +75,15 @@ class LagModel:
     def simulate(
         self, starts: NDArray[np.float64], *, contact_m: float, duration_s: float = 40.0
     ) -> NDArray[np.bool_]:
-        """Simulates initial states with the law itself, and detects contacts.
+        """Simulates head-on approaches with the original law, and detects contacts.
 
-        The Runge-Kutta step is 0.4 times the motor lag, but at most 20 ms. The speed
-        clamp acts on v.
+        The Runge-Kutta step is 0.4 times the motor lag, but at most 20 ms. The velocity
+        v of the virtual mass is limited to the top speed.
 
         Args:
-            starts: (n, 3) x = c - c_eq, m, v and w, m/s.
-            contact_m: Distance from P to the face that counts as contact, m.
+            starts: (n, 3) distance error x, m, velocity v of the virtual mass, m/s, and
+                velocity w of the control point, m/s.
+            contact_m: Distance from the obstacle that counts as contact, m.
             duration_s: Simulated time, s.
 
         Returns:
@@ -122,14 +123,15 @@ class LagModel:
 
 
 def lag_model(scenario: Scenario, *, to_go_m: float | None = None) -> LagModel:
-    """Computes the polynomial model on the largest domain on which it fits.
+    """Computes the polynomial model of a head-on approach on the largest possible domain.
 
     Args:
         scenario: Scenario with the law, gains and motor lag.
-        to_go_m: As for ``head_on``, m.
+        to_go_m: Distance from the obstacle's face to the follow point behind it, m.
+            None: chosen by ``head_on``.
 
     Returns:
-        The model. The error of h is at most 1 % of h at the equilibrium.
+        The model. The error of its stiffness h is at most 1 % of h at the equilibrium.
 
     Raises:
         InputError: The law is not known.

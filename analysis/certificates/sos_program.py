@@ -1,7 +1,8 @@
-"""The sum-of-squares programs of ``analysis.certificates.sos_region``, and the proof.
+"""Sum-of-squares programs that find and prove a region of attraction.
 
-Let y be the scaled state, V = y' P y, and h the stiffness polynomial of the model. For
-both signs of the error of h, the programs require a multiplier sigma such that
+``analysis.certificates.sos_region`` uses the programs. Let y be the scaled state, V =
+y' P y, and h the stiffness polynomial of the model. The error of h is bounded. For both
+signs of the error, the programs require a multiplier sigma such that
 
     -V' - sigma (1 - V) is a sum of squares, and sigma is a sum of squares.
 """
@@ -54,10 +55,11 @@ def box(model: LagModel) -> list[tuple[float, float]]:
 
 
 def faces(model: LagModel) -> list[NDArray[np.float64]]:
-    """Vectors n such that the model holds for n . y <= 1.
+    """Vectors n such that the polynomial model holds for n . y <= 1.
 
-    The vectors bound x to the domain, and v to the clamp. w follows v and needs no
-    bound.
+    The scaled state y contains the distance error x, the velocity v of the virtual
+    mass, and the velocity w of the control point. The vectors bound x to the domain of
+    the model, and v to the top speed. w follows v and needs no bound.
     """
     (low, high), *_ = box(model)
     eye = np.eye(3)
@@ -67,9 +69,10 @@ def faces(model: LagModel) -> list[NDArray[np.float64]]:
 def first_region(
     model: LagModel,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Finds a first region, and its multipliers.
+    """Finds a first region of attraction, and its multipliers.
 
-    P is a Lyapunov matrix of the linear model, scaled until multipliers exist.
+    The matrix P of the region is a Lyapunov matrix of the linear model. P is scaled
+    until multipliers exist.
     """
     A = np.zeros((3, 3))
     for i, rate in enumerate(model.rates(0.0)):
@@ -112,7 +115,7 @@ def _basis(exponents: list[Exponents], y: NDArray[Any]) -> NDArray[Any]:
 
 
 def _form(matrix: Any, basis: NDArray[Any], y: NDArray[Any]) -> SymbolicPolynomial:
-    """Builds z' G z for monomials z, as a polynomial of y.
+    """Builds the polynomial z' G z of y, for monomials z and a matrix G.
 
     G may contain decision variables.
     """
@@ -134,14 +137,14 @@ def _gap(
 
 
 def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
-    """Builds the program that searches multipliers for the region of P.
+    """Builds the program that finds multipliers for a given region.
 
     Args:
         model: Model with the polynomial rates of the state.
         P: (3, 3) symmetric. The region is y' P y <= 1, with the scaled state y.
 
     Returns:
-        The program, with Gram matrices for both signs of the error of h.
+        The program, with its Gram matrices for both signs of the stiffness error.
     """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
@@ -173,15 +176,15 @@ def solve(
 def find_multipliers(
     model: LagModel, P: NDArray[np.float64]
 ) -> list[NDArray[np.float64]] | None:
-    """Searches multipliers that prove the decrease of V on a region.
+    """Finds multipliers that prove that V = y' P y decreases on a region.
 
     Args:
         model: Model with the polynomial rates of the state.
-        P: (3, 3) symmetric. The region is y' P y <= 1, with the scaled state y.
+        P: (3, 3) symmetric. The region is V <= 1, with the scaled state y.
 
     Returns:
-        Gram matrices of the multipliers, one for each sign of the error of h. None if
-        no multipliers are found.
+        Gram matrices of the multipliers, one for each sign of the stiffness error. None
+        if no multipliers are found.
     """
     problem = feasibility(model, P)
     result = solve(ClarabelSolver(), problem.program)
@@ -193,15 +196,16 @@ def find_multipliers(
 def larger_region(
     model: LagModel, P: NDArray[np.float64], multipliers: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Searches a larger region inside the box, with fixed multipliers.
+    """Finds a larger region of attraction, with fixed multipliers.
 
     Args:
-        model: Model with the polynomial rates, and the box of the domain.
-        P: (3, 3) matrix of the region that should grow.
+        model: Model with the polynomial rates. The region stays in the model's domain.
+        P: (3, 3) matrix of the present region y' P y <= 1.
         multipliers: Gram matrices from ``find_multipliers``.
 
     Returns:
-        (3, 3) symmetric matrix of the larger region. P itself if the solver finds none.
+        (3, 3) symmetric matrix of the larger region. If the solver finds none, P
+        itself.
     """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
@@ -239,16 +243,17 @@ def is_proved(
     problem: Feasibility,
     result: MathematicalProgramResult | None,
 ) -> bool:
-    """Proves the region in rational arithmetic, from the numbers of the solver.
+    """Proves a region of attraction in rational arithmetic, from the solver's result.
 
-    The multipliers are those of the solver, as rational numbers. The Gram matrix of the
-    sum is corrected until the sum equals -V' - sigma (1 - V) exactly. The corrected
-    matrix must be positive definite. P, and the blocks of P with the faces of the box,
-    must be positive definite, too.
+    The proof checks that these matrices are positive definite:
+
+    - the Gram matrices of the multipliers sigma;
+    - the Gram matrix of -V' - sigma (1 - V), corrected so that it is exact;
+    - P bordered by each face of the model's domain.
 
     Args:
-        model: Model with the polynomial rates, and the box of the domain.
-        P: (3, 3) matrix of the region.
+        model: Model with the polynomial rates, and its domain.
+        P: (3, 3) matrix of the region y' P y <= 1.
         problem: The program that was solved for P.
         result: The solution. None: the solver found no solution.
 

@@ -1,22 +1,22 @@
 """Computes a region of attraction with motor lag, by sums of squares.
 
-The energy certificate cannot cover motor lag. For a head-on approach to an obstacle,
-with the distance error x = c - c_eq, the velocity v of the virtual mass, and the
-velocity w of control point P, the model is
+The energy certificate cannot cover motor lag. The model is a head-on approach to an
+obstacle. The states are the distance error x = c - c_eq, the velocity v of the virtual
+mass M, and the velocity w of the robot's control point:
 
     x' = w,   M v' = -h(x) x - D_r v,   lag w' = v - w
 
 h is a polynomial. On the domain of x, h is within +-e of the law's secant stiffness at
 rest. V = y' P y is a quadratic function of the scaled state y. V decreases on the
-region V <= 1, which excludes contact and the speed clamp. Starts in the region
-therefore never collide. The conditions for both signs of e are:
+region V <= 1, which excludes contact and speeds v beyond the limit. Starts in the
+region therefore never collide. The conditions for both signs of e are:
 
     -V' - sigma (1 - V) is a sum of squares, and sigma is a sum of squares.
 
 The solver Clarabel alternately finds P and the multipliers sigma. The solver CSDP
-repeats the last step. Rational arithmetic checks the result independently of both
-solvers (``analysis.certificates.exact_polynomials``). The solver SCS is not used,
-because its tolerance is too large for a proof.
+repeats the last step. Rational arithmetic then checks the result exactly
+(``analysis.certificates.exact_polynomials``). The solver SCS is not used, because its
+tolerance is too large for a proof.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class SosRegion:
     exact: bool
     """Whether rational arithmetic confirms the region."""
     region_share: float
-    """Share of the box that the region covers.
+    """Share of the model's state box that the region of attraction covers.
 
     The box is the domain of x, with |v| and |w| up to the top speed.
     """
@@ -113,12 +113,13 @@ class SosRegion:
 def sos_region(
     scenario: Scenario, *, to_go_m: float | None = None, starts: int = 1000
 ) -> SosRegion:
-    """Computes, proves and tests a region of attraction.
+    """Computes, proves and tests a region of attraction of a head-on approach.
 
     Args:
         scenario: Scenario with the law, gains and motor lag.
-        to_go_m: As for ``head_on``, m.
-        starts: Number of simulated starts in the region, and in the box.
+        to_go_m: Distance from the obstacle's face to the follow point behind it, m.
+            None: chosen by ``head_on``.
+        starts: Number of simulated starts in the region, and in the whole domain.
 
     Returns:
         The region, whether it is proved, and the results of its simulated starts.

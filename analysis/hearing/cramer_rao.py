@@ -1,21 +1,23 @@
 """The Cramer-Rao bound: the least possible localization error from a frame of sound.
 
-Model: microphone m records a_m s(t - R_m / c) in white Gaussian noise. The waveform s
-is deterministic and unknown. The gains a_m = 1 / R_m are known.
+Model: microphone m at distance R_m records a_m s(t - R_m / c) in white Gaussian noise
+of RMS sigma_m. The waveform s is deterministic and unknown. The gains a_m = 1 / R_m are
+known.
 
-The bound ignores what the sound levels reveal about the position. With channels that
-are equal to within a few thousandths, levels would add a tenth of the information on
-range at 60 deg, and next to nothing straight ahead. Real channels differ by more.
+The bound ignores the information in the sound levels. With channels that are equal to
+within a few thousandths, levels would add a tenth of the information on range at 60
+deg, and next to nothing straight ahead. Real channels differ by more.
 
-Let s' be the slope of the sound. A stretch of sound that a set of microphones heard
-carries this Fisher information on the arrival times at the set:
+A stretch of sound that a set of microphones records carries this Fisher information on
+the arrival times at the set:
 
     rate * integral of s'^2 dt * (diag(g) - g g^T / sum g),   g_m = (a_m / sigma_m)^2
 
-The second term is the loss due to the unknown waveform. A frame covers a different
-stretch of the sound at each microphone. Each stretch counts only for the microphones
-that heard it. A stretch that only one microphone heard counts nothing. For two
-microphones and a strong signal, the bound equals that of Knapp and Carter (1976).
+Here, s' is the slope of the sound, and ``rate`` is the sample rate. The second term is
+the loss due to the unknown waveform. A frame contains a different stretch of the sound
+at each microphone. Each stretch counts only for the microphones that recorded it. A
+stretch that only one microphone recorded has no information. For two microphones and a
+strong signal, the bound equals that of Knapp and Carter (1976).
 """
 
 from __future__ import annotations
@@ -47,7 +49,7 @@ class SlopeEnergy:
     def of(
         cls, samples: ArrayLike, sample_rate_hz: float, start_time: float = 0.0
     ) -> SlopeEnergy:
-        """Integrates the squared slope of samples of the sound pressure at 1 m.
+        """Integrates the squared slope of a sound, from its samples.
 
         The slope is that of the band-limited signal through the samples. The samples
         should begin and end near zero, or form a full period.
@@ -111,7 +113,7 @@ class LocalizationBound:
 def arrival_information(
     energy: SlopeEnergy, begin: float, end: float, travel: ArrayLike, weights: ArrayLike
 ) -> NDArray[np.float64]:
-    """Computes the Fisher information of a frame on the times of arrival.
+    """Computes the Fisher information of a frame on the arrival times of its sound.
 
     Args:
         energy: Slope energy of the sound.
@@ -149,10 +151,10 @@ def position_bound(
     sample_rate_hz: float,
     c: float,
 ) -> LocalizationBound:
-    """Computes the bound for a source at rest and microphones at rest.
+    """Computes the Cramer-Rao bound of a source's position from one frame.
 
-    Bearing and range are seen from the origin, which should be the microphones'
-    centroid.
+    Source and microphones are at rest. Bearing and range are seen from the origin,
+    which should be the microphones' centroid.
 
     Args:
         energy: Slope energy of the sound.

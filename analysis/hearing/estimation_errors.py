@@ -82,8 +82,8 @@ def consistency(
         covariances: (k, d, d) stated covariances, in that unit squared.
 
     Returns:
-        The mean, whose expected value is d if the covariances are correct; and its 95 %
-        interval for correct covariances.
+        The mean with its 95 % interval. If the covariances are correct, the expected
+        value is d.
     """
     from scipy.stats import chi2
 

@@ -1,9 +1,9 @@
 """Measures how near estimators come to the Cramer-Rao bound in the free field.
 
-Source and microphones are at rest. Each trial is one frame, with noise of a given level
-at the array. The trials use the blocks' own functions for the propagation of sound and
-for the converter. They build no diagram. A trial therefore costs little more than the
-estimate.
+Source and microphones are at rest. Each trial is one frame of sound, with noise of a
+given level at the array. The trials call the functions of the blocks for sound
+propagation and analog-to-digital conversion, without building a diagram. A trial
+therefore takes little more time than the estimate.
 """
 
 from __future__ import annotations
@@ -230,9 +230,9 @@ def run_cell(
 ) -> dict[str, FreeFieldCell]:
     """Runs the trials for one position of the source.
 
-    Each trial takes a random stretch of the sound, with new noise. The converter has 10
-    bits, and a full scale of 1.2 times the largest sample. All estimators get the same
-    frames.
+    Each trial takes a random part of the sound, with new noise. The analog-to-digital
+    converter has 10 bits, and a full scale of 1.2 times the largest sample. All
+    estimators get the same frames.
 
     Args:
         loudspeaker: The sound of the source.
@@ -244,10 +244,10 @@ def run_cell(
             kHz, dB.
         c: Speed of sound, m/s.
         trials: Number of frames.
-        seed: Seed of the stretches and of the noise.
+        seed: Seed of the parts of the sound and of the noise.
 
     Returns:
-        One cell per estimator, by name.
+        Results of the trials by name of the estimator.
     """
     rng = np.random.default_rng(seed)
     p_AS = polar_point(range_m, bearing_deg)

@@ -47,10 +47,11 @@ class Heard:
 
 
 class Listener:
-    """A diagram that measures with the source at any number of relative positions.
+    """A diagram that measures a source at any number of relative positions.
 
-    Drake never frees blocks that are written in Python. Therefore, one diagram serves
-    all measurements, and the robot is moved instead of the source.
+    Drake never frees blocks that are written in Python. One diagram therefore serves
+    all measurements. For each relative position, the robot is moved, and the source
+    stays.
 
     Args:
         scenario: Scenario with a continuously sounding source at rest, and a robot that

@@ -37,12 +37,12 @@ def plot_localization(cells: Sequence[LocalizationCell]) -> Figure:
     The origin of both maps is the microphones' centroid.
 
     - The left map is to scale. It shows the estimates of Han 2019, as means with two
-      standard deviations of range and bearing. It also shows each estimator's
+      standard deviations of range and bearing. The left map also shows each estimator's
       estimates.
     - The right map shows ellipses of two standard deviations about each estimator's
       mean, and those of the Cramer-Rao bound. The ellipses are exaggerated along and
-      across the line of sight, by factors that are written beside each distance. The
-      right map leaves out the papers' estimator, whose errors do not form ellipses.
+      across the line of sight. The exaggeration factors are written at each distance.
+      The right map leaves out the papers' estimator, whose errors do not form ellipses.
     """
     figure = Figure(figsize=(13.0, 7.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
@@ -150,7 +150,8 @@ def _along_and_across(cell: LocalizationCell) -> NDArray[np.float64]:
 def _factors(cells: Sequence[LocalizationCell]) -> NDArray[np.float64]:
     """(2,) exaggeration factors along and across the line of sight.
 
-    With these factors, the largest spread at one distance fits into ``_ROOM_M``.
+    With these factors, the largest spread at one distance fits into ``_ROOM_M``, the
+    space for an ellipse.
     """
     stds = [(c.heard.positions @ _along_and_across(c).T).std(axis=0) for c in cells]
     wanted = np.array(_ROOM_M) / np.maximum(_SIGMAS * np.max(stds, axis=0), 1e-9)

@@ -106,9 +106,10 @@ def measured_std(
 ) -> PolarStd:
     """Measures the standard deviations due to Gaussian errors in noise-free frames.
 
-    Large errors give the range a long tail. The result is therefore half the width of
-    the central 68 % of the estimates, which is a Gaussian's standard deviation. A frame
-    without a valid range counts as infinitely far.
+    Large errors give the distribution of the range a long tail. The result is therefore
+    half the width of the central 68 % of the estimates. For a Gaussian distribution,
+    this half width equals the standard deviation. A frame without a valid range counts
+    as infinitely far.
 
     Args:
         errors: Errors of the array and of the speed of sound.
@@ -159,6 +160,8 @@ def sensitivity_table(
     seed: int,
 ) -> list[dict[str, Any]]:
     """Computes the effect of each unit error for each position of the source.
+
+    The unit errors are 1 mm, 1 us, 1 % of the speed of sound, and 1 dB.
 
     Args:
         places: Positions of the source.

@@ -27,8 +27,9 @@ def speech_like(
 ) -> NDArray[np.float64]:
     """Makes syllables of gliding harmonics with formants, noise consonants and pauses.
 
-    The sound is no language. Like speech, it makes talkers separable: at most times and
-    frequencies, one talker is far louder than the others.
+    The sound is not real speech. As in real speech, one of several talkers is far
+    louder than the others at most times and frequencies. Talkers can therefore be
+    separated.
 
     Args:
         rng: Generator that draws the talker's pitch and formants, and the syllables.

@@ -30,9 +30,9 @@ TWIST, AHEAD, BACK, AIM = range(4)
 class Row(NamedTuple):
     """A row of a driver's table: the driver's command until a given time.
 
-    The command is the sum of a mode and a swing. The forward speed swings with
-    ``swing_v * wave(rate * t)``. The yaw rate swings with ``swing_omega * wave(rate * t
-    + phase)``.
+    The command is the sum of two parts: that of the mode, and a swing. The forward
+    speed swings with ``swing_v * wave(rate * t)``. The yaw rate swings with
+    ``swing_omega * wave(rate * t + phase)``.
     """
 
     end_s: float
@@ -325,7 +325,7 @@ _LAWS = ("active", "conventional")
 
 
 def outside(boxes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
-    """Moves boxes outward until no box overlaps the free circle about the start.
+    """Moves boxes outward until no box overlaps a circle of 1 m about the start.
 
     Args:
         boxes: (x, y, theta, length, width) of each box, m and rad.
@@ -490,14 +490,14 @@ def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
 
 
 def drive_at_a_wall(speed: float, body_speed: float) -> tuple[RunResult, float]:
-    """Drives at a wall straight ahead.
+    """Simulates a robot that drives at a wall straight ahead.
 
     Args:
         speed: Commanded speed, m/s.
-        body_speed: Largest speed of obstacles that the guard allows for, m/s.
+        body_speed: Largest obstacle speed that the robot's guard allows for, m/s.
 
     Returns:
-        The run, and x of the wall's face, m.
+        The run, and the x coordinate of the wall's face, m.
     """
     names, rows = ("wall", "straight", "no noise"), [[1e3, TWIST, speed, 0.0, 0, 0]]
     wall_m = 2.9
@@ -557,16 +557,16 @@ def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult
 
 
 def least_clearances(result: RunResult) -> tuple[float, float]:
-    """Computes the least clearance of the body and of its disc from bodies at rest.
+    """Computes the least distance of a robot from obstacles at rest.
 
     The true poses are evaluated at the control periods and halfway between them. A
-    negative clearance means an overlap.
+    negative distance means an overlap.
 
     Args:
         result: A run.
 
     Returns:
-        Clearance of the body, and clearance of the disc that encloses the body, m.
+        Distance of the body, and distance of the disc that encloses the body, m.
     """
     robot = result.scenario.only.robot
     others = result.surroundings.bodies.values()

@@ -76,8 +76,9 @@ def searched_trial(x: NDArray[np.float64]) -> Trial:
     """Converts a point of the search space to a trial.
 
     Args:
-        x: The heading, rad; for each post, direction, rad, and distance, m; and for
-            each command, duration, s, forward speed, m/s, and yaw rate, rad/s.
+        x: Numbers in this order: the heading, rad; for each post, direction, rad, and
+            distance, m; for each command, duration, s, forward speed, m/s, and yaw
+            rate, rad/s.
 
     Returns:
         The trial.
@@ -93,7 +94,9 @@ def searched_trial(x: NDArray[np.float64]) -> Trial:
 
 
 def by_search(runs: int, seed: int) -> list[Found]:
-    """Searches by differential evolution for the least clearance of the disc.
+    """Searches by differential evolution for a run in which the robot nearly collides.
+
+    The search minimizes the clearance of the disc that encloses the robot's body.
 
     Args:
         runs: Approximate number of runs.

@@ -1,8 +1,8 @@
 """Drivers that swing to make the odometry drift, and then press against obstacles.
 
-If the forward speed is in phase with the angular acceleration, the odometry errors of
-successive control periods can have the same sign. A driver of this module does the
-following:
+To swing means to oscillate in forward speed and yaw rate. If the forward speed is in
+phase with the angular acceleration, the odometry errors of successive control periods
+can have the same sign. A driver of this module does the following:
 
 1. Turn around once, and visit each box.
 2. Return to the start, and swing there for minutes.
@@ -47,7 +47,7 @@ _CORNER = math.atan2(0.5 * RobotParameters().width_m, 0.5 * RobotParameters().le
 
 
 class Swing(NamedTuple):
-    """Parameters of a driver's swing.
+    """Parameters of an oscillation of a driver's forward speed and yaw rate.
 
     Fields without a description are those of ``Row``.
     """
@@ -162,9 +162,10 @@ def _nearest_point(box: Sequence[float]) -> tuple[float, float]:
 def swing_once(setting: str) -> Trial:
     """Makes a driver that visits a box, swings once, and visits the box again.
 
-    The swing lasts 150 s. With grid cells of 2 cm, the swing lasts 80 s. With a control
-    period of 50 ms, the swing lasts 40 s. If the odometry approximates the arc of each
-    control period by its chord, the robot touches the box.
+    To swing means to oscillate in forward speed and yaw rate. The swing lasts 150 s.
+    With grid cells of 2 cm, the swing lasts 80 s. With a control period of 50 ms, the
+    swing lasts 40 s. If the odometry approximates the arc of each control period by its
+    chord, the robot touches the box.
 
     Args:
         setting: Name of the robot's setting in ``SETTINGS``.
@@ -276,7 +277,8 @@ def four_boxes(distance_m: float) -> list[tuple[float, ...]]:
 def _searched_trial(x: NDArray[np.float64], setting: str) -> Trial:
     """Converts a point of the unit cube to a trial.
 
-    The point gives the swing, the heading and the distance of the boxes.
+    The coordinates of the point determine the swing, the heading and the distance of
+    the boxes.
     """
     heading, far = math.tau * x[-2], 1.5 + 0.5 * x[-1]
     names = "four boxes", "swing, searched for contact", setting

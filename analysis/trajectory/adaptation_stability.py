@@ -1,7 +1,7 @@
-"""Computes whether adaptive gains stay bounded.
+"""Analyzes whether the adaptive gains of a law stay bounded.
 
-The computations cover a Lyapunov function, the drift under a constant push, a jammed
-robot, and the critical adaptation rate.
+The analysis covers a Lyapunov function, the drift under a constant push, a robot that
+is jammed at a wall, and the critical adaptation rate.
 """
 
 from __future__ import annotations
@@ -79,10 +79,10 @@ class LyapunovRun:
 
 @dataclass(frozen=True)
 class Drift:
-    """Drift of the stiffness K under a constant push that the reference ignores.
+    """Drift of the stiffness K under a constant push.
 
-    "Without limits" means without limits of the gains. "Limited" means with the
-    scenario's own rule.
+    The reference model does not know the push. K is listed without limits of the gains,
+    and with the limits of the scenario ("limited").
     """
 
     push_n: float
@@ -103,9 +103,9 @@ class Drift:
 
 @dataclass(frozen=True)
 class Jam:
-    """Stiffness K while a wall holds the robot, and after the wall disappears.
+    """Stiffness K while a wall blocks the robot, and after the wall is removed.
 
-    The target moves on during the jam.
+    The target moves on while the robot is blocked.
     """
 
     jam_s: float
@@ -156,10 +156,10 @@ class AdaptationStability:
     drift: Drift
     jam: Jam
     critical: CriticalRate
-    """Critical rate for the amplitude ``pull_through_m``.
+    """Critical rate for a target with the amplitude K_e S/K, or 1 m if K_e is 0.
 
-    That is the lead at which the target pulls P through a contact. Without contact
-    stiffness, the amplitude is 1 m.
+    At a lead of K_e S/K, the target pulls the robot through a contact of stiffness K_e.
+    Contacts begin at the distance S. K is the stiffness to the target.
     """
     products: tuple[CriticalRate, ...]
     """Critical rates for the other amplitudes."""
@@ -173,9 +173,9 @@ class AdaptationStability:
 
 
 def adaptation_stability(scenario: Scenario) -> AdaptationStability:
-    """Computes the stability of the adaptation of a robot on a route.
+    """Analyzes the stability of the gain adaptation of a robot on a route.
 
-    The results come from simulations of a point with motor lag, and from formulas.
+    The results come from formulas, and from simulations of a point mass with motor lag.
 
     Args:
         scenario: Scenario whose law adapts its gains.
@@ -224,7 +224,7 @@ def swinging_target(
 ) -> NDArray[np.float64]:
     """Computes a target that oscillates along x: a (sin 0.6 t + 0.5 sin 1.7 t).
 
-    With two frequencies, the adaptation can distinguish K from D.
+    The two frequencies allow the adaptation to distinguish stiffness K from damping D.
 
     Args:
         amplitude_m: Amplitude a, m.
@@ -242,15 +242,18 @@ def swinging_target(
 
 
 def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
-    """Computes the least rate at which the rule without limits runs away within 60 s.
+    """Finds the least adaptation rate at which gains or motion diverge within 60 s.
+
+    The adaptation rule has no limits of the gains. Ten rates per decade are tried. The
+    interval below the first divergent rate is bisected. Some higher rates may not
+    diverge.
 
     Args:
         loop: Loop with the rule, gains, reference, mass, motor lag and control period.
         amplitude_m: Amplitude of the target, m.
 
     Returns:
-        The least critical rate. Ten rates per decade are tried, and the interval below
-        the first critical rate is bisected. Some higher rates may not be critical.
+        The least critical rate. If no allowed rate is critical, the rate is infinite.
     """
     targets = swinging_target(amplitude_m, _CRITICAL_S, loop.tick_s)
 
@@ -273,10 +276,10 @@ def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
 
 
 def drift_stiffness(start: float, rate: float, push: float, time_s: float) -> float:
-    """Computes the stiffness K(t) of the gradient rule under a constant push.
+    """Computes the stiffness K(t) of the gradient rule under a constant push F.
 
-    At rest, P is off by F/K, and dp/dK is -F/K^2. The rule therefore gives K^3 K' =
-    gamma F^2.
+    At rest, the robot is off its target by F/K. The sensitivity of its position p is
+    dp/dK = -F/K^2. The gradient rule therefore gives K^3 K' = gamma F^2.
 
     Args:
         start: Initial stiffness K_0, N/m.

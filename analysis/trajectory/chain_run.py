@@ -87,9 +87,10 @@ def _object(
 
 @njit(cache=True)
 def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cover
-    """Positions P of all robots at each control period.
+    """Positions of the control points P of all robots at each control period.
 
-    The robots start in formation, at the speed of the first robot's first step.
+    The robots start in formation. Their initial speed is that of the first robot's
+    first step.
     """
     ticks, robots, tick_s = len(first), len(gaps) + 1, numbers.tick_s
     places = np.empty((ticks, robots))
@@ -211,8 +212,8 @@ class ChainRun:
 def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
     """Simulates a chain of eight robots whose first robot oscillates.
 
-    The frequency is that of the largest amplification. If nothing is amplified, the
-    frequency is the natural frequency of a robot.
+    The oscillation has the frequency of the largest amplification. If nothing is
+    amplified, the oscillation has the natural frequency of a robot.
 
     Args:
         scenario: Scenario as for ``run_chain``.

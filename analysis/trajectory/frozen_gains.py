@@ -123,7 +123,7 @@ def _frozen(scenario: Scenario, point: RoutePoint) -> FrozenPoint:
 class GainBounds:
     """Bounds of stiffness K and damping D of the sampled loop.
 
-    Curves are computed for several delays of the position ("ages").
+    Several fields have one value per delay of the position measurement.
     """
 
     mass: SampledMass
@@ -133,20 +133,21 @@ class GainBounds:
     damping_n_s_m: NDArray[np.float64]
     """(n,) dampings of the curves, N s/m."""
     stable_n_m: NDArray[np.float64]
-    """(n, ages) stiffness at which the loop becomes unstable, N/m."""
+    """(n, delays) stiffness at which the loop becomes unstable, N/m."""
     damped_n_m: NDArray[np.float64]
-    """(n, ages) stiffness up to which the damping ratio is 0.7 or more, N/m."""
+    """(n, delays) stiffness up to which the damping ratio is 0.7 or more, N/m."""
     today: dict[str, tuple[float, float]]
     """(K, D) of the scenario, for the target alone and with a contact."""
     stable_today_n_m: tuple[float, ...]
-    """Stiffness at which the loop becomes unstable with the scenario's damping, N/m.
+    """Stiffness at which the loop with the scenario's damping becomes unstable, N/m.
 
-    The tuple has one value per delay.
+    The tuple has one value per delay of the position.
     """
     damped_today_n_m: tuple[float, ...]
-    """Stiffness up to which the damping ratio is 0.7 with the scenario's damping, N/m.
+    """Stiffness up to which the loop with the scenario's damping is well damped, N/m.
 
-    The tuple has one value per delay.
+    Well damped means a damping ratio of 0.7 or more. The tuple has one value per delay
+    of the position.
     """
     closed_form_n_m: tuple[float, ...]
     """``stable_today_n_m`` as computed by ``stiffness_bound``, N/m."""
@@ -212,7 +213,7 @@ def gain_bounds(scenario: Scenario) -> GainBounds:
 def axis_damping_ratio(
     scenario: Scenario, stiffness: float, damping: float, late_ticks: int = 0
 ) -> float:
-    """Computes the damping ratio of the least damped mode of one axis.
+    """Computes the damping ratio of the least damped mode along one axis.
 
     Args:
         scenario: Scenario with the robot, plant and control period.
@@ -231,7 +232,7 @@ def axis_damping_ratio(
 
 
 def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) -> float:
-    """Computes the stiffness up to which the damping ratio is at least ``WELL_DAMPED``.
+    """Computes the largest stiffness that gives a damping ratio of at least 0.7.
 
     Args:
         scenario: Scenario with the robot, plant and control period.

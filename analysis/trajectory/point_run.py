@@ -134,10 +134,11 @@ def run_point(
     push: tuple[float, float] = (0.0, 0.0),
     held: ArrayLike = math.inf,
 ) -> PointRun:
-    """Simulates reference, adaptation, law, virtual mass and motor lag.
+    """Simulates a point robot with reference model, gain adaptation and control law.
 
-    The simulation has no heading, and no limits of speed and acceleration. The formulas
-    of the analysis make the same assumptions. P is the robot's control point.
+    The simulation includes the virtual mass of control point P, and the motor lag. The
+    simulation has no heading, and no limits of speed and acceleration. The formulas of
+    the analysis make the same assumptions.
 
     Args:
         loop: The law and the robot.

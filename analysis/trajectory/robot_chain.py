@@ -103,7 +103,7 @@ class RobotChain:
     The chain has no feed-forward. If no tried D suffices, the value is infinite.
     """
     most_feed_forward: float
-    """Largest feed-forward share without amplification at these gains.
+    """Largest share of velocity feed-forward without amplification at these gains.
 
     If motions are amplified even without feed-forward, the value is negative.
     """
@@ -124,9 +124,9 @@ class RobotChain:
 def robot_chain(scenario: Scenario) -> RobotChain:
     """Computes frequency responses of chains of robots like the scenario's robot.
 
-    Each robot's target is a fixed distance behind the robot ahead, and has that robot's
-    velocity. The object sensor observes positions. The velocity is the change of
-    position over the last control period.
+    Each robot's target is a fixed distance behind the robot ahead, and has the velocity
+    of the robot ahead. The object sensor measures the position of the robot ahead. The
+    velocity is computed from the last two positions.
 
     Args:
         scenario: Scenario with the law, mass, motors, control period and latency of
@@ -173,17 +173,18 @@ def robot_chain(scenario: Scenario) -> RobotChain:
 
 
 def chain_spacings(scenario: Scenario) -> tuple[float, float]:
-    """Computes the distances between neighbors without and with contacts.
+    """Computes two distances between neighboring robots: without and with contacts.
 
-    A moving robot is observed as the disc that encloses it. P is a robot's control
-    point.
+    Other robots observe a moving robot as the disc that encloses it. P is a robot's
+    control point.
 
     Args:
         scenario: Scenario with the law and the robot.
 
     Returns:
-        Two distances between points P, m. With the first, P is 1.25 security zones from
-        the disc of the robot ahead. With the second, P is half a zone from the disc.
+        Two distances between the points P of neighbors, m. With the first, P is 1.25
+        security zones from the disc of the robot ahead. With the second, P is half a
+        security zone from the disc.
     """
     zone_m = route_law(scenario).security_zone_m
     offset = disc_offsets(scenario)[0]
@@ -193,13 +194,14 @@ def chain_spacings(scenario: Scenario) -> tuple[float, float]:
 def disc_offsets(scenario: Scenario) -> tuple[float, float]:
     """Computes how much nearer a neighbor's disc is than its control point P.
 
-    The disc has its center at the axle, and P is ahead of the axle.
+    Other robots observe a moving robot as the disc that encloses it. The disc has its
+    center at the axle, and P is ahead of the axle.
 
     Args:
         scenario: Scenario with the robot.
 
     Returns:
-        Offset of the robot ahead, and that of the robot behind, m.
+        Two offsets, m: the first for the robot ahead, the second for the robot behind.
     """
     disc = 0.5 * math.hypot(scenario.only.robot.length_m, scenario.only.robot.width_m)
     epsilon = scenario.only.robot.control_point_m
@@ -279,12 +281,12 @@ def links_of(
 def chain_response(
     scenario: Scenario, links: Sequence[ChainLinks], omega: ArrayLike
 ) -> NDArray[np.complex128]:
-    """Computes the response from the first robot's position to all other positions.
+    """Computes the response of all other robots' positions to that of the first robot.
 
-    Each robot obeys M a = -K (p - p') - D (v - c v'), plus the springs and dampers of
-    its contacts. p' and v' are position and velocity of the robot ahead, and c is the
-    feed-forward share. The wheel command and the plant give p = G_p a and v = G_v a.
-    The first robot's motion is given.
+    Each robot obeys M a = -K (p - p') - D (v - c v'), plus the forces of its contacts.
+    p' and v' are position and velocity of the robot ahead, and c is the share of
+    velocity feed-forward. Wheel command and plant give p = G_p a and v = G_v a. The
+    first robot's motion is given.
 
     Args:
         scenario: Scenario with the mass, motors and control period.
@@ -322,7 +324,7 @@ def chain_response(
 
 
 def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> ChainPeak:
-    """Computes the largest amplifications of a kind of chain.
+    """Computes how much a chain amplifies the motion of its first robot.
 
     The frequencies range from 0.01 rad/s to the Nyquist frequency.
 
@@ -333,8 +335,8 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
         spacing_m: Desired distance between the control points P of neighbors, m.
 
     Returns:
-        Amplifications for chains of 2 to 8 robots, and for each robot of the longest
-        chain.
+        Largest amplifications, for chains of 2 to 8 robots, and for each robot of the
+        longest chain.
     """
     most = ROBOTS[-1]
     links = {n: links_of(scenario, feed_forward, spacing_m, n) for n in ROBOTS}
@@ -463,9 +465,10 @@ def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
 
 
 def most_feed_forward(scenario: Scenario, stiffness: float, damping: float) -> float:
-    """Computes the largest feed-forward share without amplification, without contacts.
+    """Computes the largest share of velocity feed-forward that does not amplify motions.
 
-    The share is that of the robot ahead's velocity in the target's velocity.
+    With feed-forward, a robot's target has this share of the velocity of the robot
+    ahead. The chain has no contacts.
 
     Args:
         scenario: Scenario with the mass, motors, control period and latency of observed

@@ -113,11 +113,11 @@ def contact_gains(
 
 
 def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """Computes a minimal model of the closed loop over a control period.
+    """Computes a minimal linear model of the closed loop over a control period.
 
-    States that the target does not affect or that the position does not show are
-    removed. The law, wheel command, plant and odometry are those of the simulation.
-    Each is linearized by AutoDiff, and equal port names join them. The model assumes
+    The law, wheel command, plant and odometry are those of the simulation. Each block
+    is linearized by AutoDiff. The blocks are connected by the names of their ports.
+    States that are not controllable or not observable are removed. The model assumes
     that the safety filter is inactive, that gains do not adapt, and that no limit is
     reached.
 
