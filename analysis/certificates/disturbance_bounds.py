@@ -284,7 +284,7 @@ def encounter_contact_time(
     reach_m: float,
     duration_s: float,
 ) -> NDArray[np.float64]:
-    """Simulates boxes that approach a robot from ahead, and returns the times of contact.
+    """Simulates boxes that approach a robot, and returns the times of contact.
 
     The robot's control point P starts at rest at the follow distance from the source,
     which is behind the robot. The box moves toward P at constant speed. The path of the

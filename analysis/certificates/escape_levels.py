@@ -19,7 +19,7 @@ from systems.framework.compiling import njit
 def cell_bounds(
     model: PointMass, points: NDArray[np.float64], cell_m: float, contact_m: float
 ) -> tuple[NDArray[Any], ...]:
-    """Computes bounds of the potential energy in each grid cell, and the cells in contact.
+    """Computes bounds of the potential energy in grid cells, and cells in contact.
 
     Args:
         model: Point-mass model with the bodies and the potential.

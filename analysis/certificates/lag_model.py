@@ -123,7 +123,7 @@ class LagModel:
 
 
 def lag_model(scenario: Scenario, *, to_go_m: float | None = None) -> LagModel:
-    """Computes the polynomial model of a head-on approach on the largest possible domain.
+    """Computes the polynomial model of a head-on approach on the largest domain.
 
     Args:
         scenario: Scenario with the law, gains and motor lag.

@@ -465,7 +465,7 @@ def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
 
 
 def most_feed_forward(scenario: Scenario, stiffness: float, damping: float) -> float:
-    """Computes the largest share of velocity feed-forward that does not amplify motions.
+    """Computes the largest velocity feed-forward that does not amplify motions.
 
     With feed-forward, a robot's target has this share of the velocity of the robot
     ahead. The chain has no contacts.
