@@ -186,7 +186,7 @@ def calibration_run(
     heard: list[HeardSound] | None = None,
     remarks: list[str] | None = None,
 ) -> CalibrationRun:
-    """Calibrates an array from measured delays.
+    """Calibrates an array from measured delays between microphones.
 
     Args:
         sounds: The delays, with source positions where these are known.

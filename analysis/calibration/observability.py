@@ -58,7 +58,8 @@ def gain_ratios(
     Returns:
         Two arrays:
 
-        1. (m,) standard deviation after the calibration over that before, ascending.
+        1. (m,) ratios, ascending. A ratio is the standard deviation after the
+           calibration over the standard deviation before.
         2. (n d + 1 + n, m) directions as columns. A column is the change of positions,
            speed of sound and delays for one standard deviation before.
     """

@@ -55,8 +55,8 @@ MOST_CELLS = 4_000_000
 class EnergyCertificate:
     """Result of the energy certificate: escape energies and certified cells on a grid.
 
-    The escape energy E is the energy that any path from a cell to contact with a body
-    needs. P is the robot's control point.
+    The escape energy E of a cell and a body is the least energy that a path from the
+    cell to contact with the body needs. P is the robot's control point.
     """
 
     scenario: Scenario

@@ -1,8 +1,8 @@
 """Sum-of-squares programs that find and prove a region of attraction.
 
-``analysis.certificates.sos_region`` uses the programs. Let y be the scaled state, V =
-y' P y, and h the stiffness polynomial of the model. The error of h is bounded. For both
-signs of the error, the programs require a multiplier sigma such that
+``analysis.certificates.sos_region`` uses the programs. The candidate Lyapunov function
+is V = y' P y, with the scaled state y. The stiffness h of the model has a bounded
+error. For both signs of the error, the programs require a multiplier sigma such that
 
     -V' - sigma (1 - V) is a sum of squares, and sigma is a sum of squares.
 """
@@ -69,7 +69,7 @@ def faces(model: LagModel) -> list[NDArray[np.float64]]:
 def first_region(
     model: LagModel,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Finds a first region of attraction, and its multipliers.
+    """Finds a first region of attraction, and the multipliers that prove it.
 
     The matrix P of the region is a Lyapunov matrix of the linear model. P is scaled
     until multipliers exist.

@@ -81,9 +81,9 @@ class SlopeEnergy:
 
 @dataclass(frozen=True)
 class LocalizationBound:
-    """Least standard deviations of an unbiased position estimate from one frame.
+    """Least standard deviations of an unbiased position estimate from a frame of sound.
 
-    If the frame holds no information on a quantity, its standard deviation is infinite.
+    If the frame has no information on a quantity, its standard deviation is infinite.
     """
 
     delays: NDArray[np.float64]

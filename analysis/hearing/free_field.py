@@ -1,7 +1,7 @@
 """Measures how near estimators come to the Cramer-Rao bound in the free field.
 
-Source and microphones are at rest. Each trial is one frame of sound, with noise of a
-given level at the array. The trials call the functions of the blocks for sound
+Source and microphones are at rest. Each trial is one frame (25 ms of audio), with noise
+of a given level at the array. The trials call the functions of the blocks for sound
 propagation and analog-to-digital conversion, without building a diagram. A trial
 therefore takes little more time than the estimate.
 """

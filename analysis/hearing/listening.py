@@ -47,7 +47,7 @@ class Heard:
 
 
 class Listener:
-    """A diagram that measures a source at any number of relative positions.
+    """Measures a source at any number of positions relative to a robot, in one diagram.
 
     Drake never frees blocks that are written in Python. One diagram therefore serves
     all measurements. For each relative position, the robot is moved, and the source
@@ -79,7 +79,9 @@ class Listener:
         *,
         session: int = 0,
     ) -> Heard:
-        """Takes one measurement per frame.
+        """Takes measurements of the source at one relative position.
+
+        Each frame (25 ms of audio) gives one measurement.
 
         Args:
             distance: Distance of the source from the microphones' centroid, m.

@@ -1,9 +1,9 @@
 """Repeats the localization experiment of the papers, with bounds and tolerances.
 
 In tables 1 and 2 of Han 2019, a robot at rest locates a source at rest. The source is
-1-4 m away at 0, 30 and 60 deg, and each position has 100 measurements. In this module,
-a measurement is one frame in the full diagram. The papers' estimator and the project's
-estimators get the same sound and noise.
+1-4 m away at 0, 30 and 60 deg. Each position has 100 measurements. In this module, a
+measurement is one frame (25 ms of audio) in the full diagram. The papers' estimator and
+the project's estimators get the same sound and noise.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ class LocalizationExperiment:
     scenario: Scenario
     """Scenario with a continuously sounding source at rest, and a robot at rest."""
     trials: int
-    """Number of measurements per cell."""
+    """Number of measurements per position and estimator."""
     sound_speed_tolerance: float
     """Largest error of the speed of sound, as a share of the speed."""
     estimators: tuple[str, ...] = tuple(ESTIMATORS)
@@ -162,16 +162,16 @@ class LocalizationExperiment:
     def run(
         self, progress: Callable[[float], None] | None = None
     ) -> list[LocalizationCell]:
-        """Measures with the source at every position, with every estimator.
+        """Runs the experiment: all positions of the source, with every estimator.
 
-        Errors within the tolerances are redrawn for every measurement. All estimators
-        get the same errors, sound and noise.
+        The errors of the array are redrawn within their tolerances for every
+        measurement. All estimators get the same errors, sound and noise.
 
         Args:
             progress: Called with the number of measurements so far.
 
         Returns:
-            Cells sorted by position, then by estimator.
+            Results sorted by position, then by estimator.
 
         Raises:
             InputError: The sound cannot be played.
@@ -207,11 +207,11 @@ class LocalizationExperiment:
 def prepare_localization(
     overrides: Iterable[str] = (), *, trials: int = 100, tolerances: bool = False
 ) -> LocalizationExperiment:
-    """Prepares the experiment in the default scenario.
+    """Prepares the localization experiment in the default scenario.
 
     Args:
-        overrides: Changes of the scenario, in the form of ``load_scenario``.
-        trials: Number of measurements per cell.
+        overrides: Changes of the scenario, as for ``load_scenario``.
+        trials: Number of measurements per position of the source and estimator.
         tolerances: Whether the array has errors within ``REALISTIC_TOLERANCES``.
 
     Returns:

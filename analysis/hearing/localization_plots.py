@@ -148,10 +148,10 @@ def _along_and_across(cell: LocalizationCell) -> NDArray[np.float64]:
 
 
 def _factors(cells: Sequence[LocalizationCell]) -> NDArray[np.float64]:
-    """(2,) exaggeration factors along and across the line of sight.
+    """(2,) exaggeration factors of the ellipses, along and across the line of sight.
 
-    With these factors, the largest spread at one distance fits into ``_ROOM_M``, the
-    space for an ellipse.
+    The factors are chosen such that the largest ellipse at one distance has the half
+    axes ``_ROOM_M``, or slightly shorter ones.
     """
     stds = [(c.heard.positions @ _along_and_across(c).T).std(axis=0) for c in cells]
     wanted = np.array(_ROOM_M) / np.maximum(_SIGMAS * np.max(stds, axis=0), 1e-9)

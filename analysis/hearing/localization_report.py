@@ -27,11 +27,11 @@ def localization_summary(
     cells: Sequence[LocalizationCell],
     out: Path | None,
 ) -> dict[str, Any]:
-    """Builds the JSON document of the experiment.
+    """Builds the JSON document of the localization experiment.
 
     Args:
         experiment: The experiment.
-        cells: The results, one cell per position and estimator.
+        cells: Results, one per position of the source and estimator.
         out: Name of the result directory in the document. None: no directory.
 
     Returns:
@@ -75,8 +75,8 @@ def write_localization(
     """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``.
 
     Args:
-        experiment: The experiment.
-        cells: The results, one cell per position and estimator.
+        experiment: The localization experiment.
+        cells: Results, one per position of the source and estimator.
         summary: The document from ``localization_summary``.
         directory: Existing directory for the files.
     """

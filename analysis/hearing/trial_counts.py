@@ -1,4 +1,4 @@
-"""Limits the number of measurements per cell of the localization experiment."""
+"""Limits the number of measurements in the localization experiment."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ _MOST_TRIALS = 100_000
 
 
 def check_trials(trials: int) -> None:
-    """Checks the number of measurements per cell.
+    """Checks the number of measurements per position of the source.
 
     Args:
-        trials: Number of measurements per cell.
+        trials: Number of measurements.
 
     Raises:
         InputError: The number is too large, or too small for a standard deviation.

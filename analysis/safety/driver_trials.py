@@ -456,13 +456,13 @@ def draw_trial(
 
 
 def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
-    """Draws a random trial with bodies that cross near the start.
+    """Draws a random trial with obstacles that cross near the robot's start.
 
     Args:
         seed: Seed of all trials.
         number: Number of the trial.
-        bodies: Number of moving bodies, at most six.
-        speed: Speed of the moving bodies, m/s.
+        bodies: Number of moving obstacles, at most six.
+        speed: Speed of the moving obstacles, m/s.
 
     Returns:
         The trial. The same arguments give the same trial.

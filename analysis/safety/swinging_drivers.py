@@ -222,10 +222,10 @@ def _swing_at(x: Any) -> Swing:
 
 
 def _repeated(swing: Swing, setting: str) -> Swing:
-    """Changes the period of a swing to a whole number of control periods.
+    """Changes the period of an oscillation to a whole number of control periods.
 
-    The encoders then round each period of the swing alike. The errors of the periods
-    therefore add up.
+    The encoders then round each period of the oscillation alike. The errors of the
+    periods therefore add up.
     """
     tick_s = SETTINGS[setting].get("tick_s", TICK_S)
     period_s = tick_s * max(round(1.0 / (swing.hz * tick_s)), 2)

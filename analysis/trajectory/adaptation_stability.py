@@ -156,10 +156,11 @@ class AdaptationStability:
     drift: Drift
     jam: Jam
     critical: CriticalRate
-    """Critical rate for a target with the amplitude K_e S/K, or 1 m if K_e is 0.
+    """Critical adaptation rate for a target with the amplitude K_e S/K.
 
-    At a lead of K_e S/K, the target pulls the robot through a contact of stiffness K_e.
-    Contacts begin at the distance S. K is the stiffness to the target.
+    If the target leads by K_e S/K, it pulls the robot through a contact. K_e is the
+    stiffness of contacts, S is the distance at which contacts begin, and K is the
+    stiffness to the target. If K_e is 0, the amplitude is 1 m.
     """
     products: tuple[CriticalRate, ...]
     """Critical rates for the other amplitudes."""

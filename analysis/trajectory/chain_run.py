@@ -45,7 +45,7 @@ _WATCHED_S, _DRIVEN_S = 25.0, 40.0
 
 
 class ChainNumbers(NamedTuple):
-    """Parameters of a simulated chain for the compiled code.
+    """Parameters of a simulated line of robots (chain), for the compiled code.
 
     P is a robot's control point ahead of the axle.
     """
@@ -53,7 +53,7 @@ class ChainNumbers(NamedTuple):
     gains: tuple[float, float, float, float]
     """K, D, K_e and D_e: stiffness and damping to the target, and those of contacts."""
     feed_forward: float
-    """Share of the robot ahead's velocity in the target's velocity."""
+    """Target velocity over velocity of the robot ahead."""
     spacing_m: float
     """Desired distance between the points P of neighbors, m."""
     offset_ahead_m: float
@@ -150,18 +150,18 @@ def run_chain(
     spacing_m: float,
     robots: int = _ROBOTS,
 ) -> NDArray[np.float64]:
-    """Simulates robots on a line, of which the first moves on a given path.
+    """Simulates robots that follow one another on a line, behind a given first robot.
 
-    The simulation uses the law's own functions. It includes contacts with both
-    neighbors, the limits of acceleration and speed, and the motor lag. It has no safety
-    filter. P is a robot's control point ahead of the axle.
+    The simulation uses the law's own functions. The simulation includes contacts with
+    both neighbors, the limits of acceleration and speed, and the motor lag, but no
+    safety filter. P is a robot's control point ahead of the axle.
 
     Args:
         scenario: Scenario with the law, robot, motors, control period and latency of
-            observed objects.
+            the object sensor.
         first_m: (ticks,) positions P of the first robot, m. The first step gives the
             initial speed of all robots.
-        feed_forward: Share of the robot ahead's velocity in the target's velocity.
+        feed_forward: Target velocity over velocity of the robot ahead.
         spacing_m: Desired distance between the points P of neighbors, m.
         robots: Number of robots, including the first.
 
@@ -210,14 +210,14 @@ class ChainRun:
 
 
 def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
-    """Simulates a chain of eight robots whose first robot oscillates.
+    """Simulates eight robots on a line, of which the first oscillates.
 
     The oscillation has the frequency of the largest amplification. If nothing is
     amplified, the oscillation has the natural frequency of a robot.
 
     Args:
         scenario: Scenario as for ``run_chain``.
-        name: Name of the chain.
+        name: Name of the chain of robots.
         peak: Largest amplification of the chain, with its frequency.
 
     Returns:
@@ -269,7 +269,7 @@ def brake_chain(
         scenario: Scenario as for ``run_chain``. Its route gives the speed and the
             braking acceleration.
         name: Name of the chain.
-        feed_forward: Share of the robot ahead's velocity in the target's velocity.
+        feed_forward: Target velocity over velocity of the robot ahead.
         spacing_m: Desired distance between the control points P of neighbors, m.
 
     Returns:

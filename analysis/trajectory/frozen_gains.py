@@ -156,16 +156,20 @@ class GainBounds:
     closed_damping_n_s_m: float
     """Largest stable sum of dampers by the formula 2 M/T, N s/m."""
     contacts: float
-    """Largest number of contacts that are stable with full damping.
+    """Largest number of simultaneous contacts for which the loop is stable.
 
-    If contacts have no damping, the number is infinite.
+    Each contact has its full damping. If contacts have no damping, the number is
+    infinite.
     """
     box: tuple[tuple[float, float], tuple[float, float]] | None
     """Ranges of K and of D to which the adaptation is limited; None without limits."""
 
 
 def gain_bounds(scenario: Scenario) -> GainBounds:
-    """Computes bounds of K and D by bisection on the one-period matrix of the blocks.
+    """Computes bounds of stiffness K and damping D by bisection.
+
+    Stability follows from the eigenvalues of the blocks' state matrix over one control
+    period.
 
     Args:
         scenario: Scenario whose robot follows a route.

@@ -40,7 +40,7 @@ class ChainLinks(NamedTuple):
     damping: float
     """Damping D to the target's velocity, N s/m."""
     feed_forward: float
-    """Share of the robot ahead's velocity in the target's velocity."""
+    """Target velocity over velocity of the robot ahead."""
     ahead: tuple[float, float] = (0.0, 0.0)
     """Stiffness, N/m, and damping, N s/m, of the contact with the robot ahead."""
     behind: tuple[float, float] = (0.0, 0.0)
@@ -51,14 +51,14 @@ class ChainLinks(NamedTuple):
 
 @dataclass(frozen=True)
 class ChainPeak:
-    """How much a chain amplifies the motion of its first robot.
+    """How much a line of robots (chain) amplifies the motion of its first robot.
 
     If the chain is unstable, all amplifications are infinite. P is a robot's control
     point ahead of the axle.
     """
 
     feed_forward: float
-    """Share of the robot ahead's velocity in the target's velocity."""
+    """Target velocity over velocity of the robot ahead."""
     spacing_m: float
     """Desired distance between the points P of neighbors, m."""
     peak: float
@@ -82,10 +82,11 @@ class ChainPeak:
 
 @dataclass(frozen=True)
 class RobotChain:
-    """Amplification in chains of robots that have a scenario's gains.
+    """Amplification of motions in lines of robots that follow one another (chains).
 
-    Spacing and feed-forward vary. A chain is "apart" if the robots are outside each
-    other's security zones, else "in contact".
+    All robots have the scenario's gains. Spacing and feed-forward differ between
+    chains. A chain is "apart" if the robots are outside each other's security zones.
+    Otherwise, the chain is "in contact".
     """
 
     stiffness_n_m: float
@@ -103,7 +104,7 @@ class RobotChain:
     The chain has no feed-forward. If no tried D suffices, the value is infinite.
     """
     most_feed_forward: float
-    """Largest share of velocity feed-forward without amplification at these gains.
+    """Largest ratio of velocity feed-forward that does not amplify motions.
 
     If motions are amplified even without feed-forward, the value is negative.
     """
@@ -249,15 +250,17 @@ def links_of(
 ) -> tuple[ChainLinks, ...]:
     """Computes the springs and dampers between the robots of a chain at rest.
 
+    A chain is a line of robots that follow one another.
+
     Args:
-        scenario: Scenario with the law, robot and latency of observed objects.
-        feed_forward: Share of the robot ahead's velocity in the target's velocity.
+        scenario: Scenario with the law, robot and latency of the object sensor.
+        feed_forward: Target velocity over velocity of the robot ahead.
         spacing_m: Desired distance between the control points P of neighbors, m.
         robots: Number of robots, including the first.
 
     Returns:
-        One entry per robot except the first. A contact has stiffness and damping only
-        if the neighbor's disc is in the security zone.
+        One entry per robot except the first. If a neighbor's disc is outside the
+        security zone, its contact has no stiffness and no damping.
     """
     own = route_law(scenario)
     gaps = resting_gaps(scenario, spacing_m, robots)
@@ -281,10 +284,10 @@ def links_of(
 def chain_response(
     scenario: Scenario, links: Sequence[ChainLinks], omega: ArrayLike
 ) -> NDArray[np.complex128]:
-    """Computes the response of all other robots' positions to that of the first robot.
+    """Computes the response of the following robots' positions to the first robot's.
 
     Each robot obeys M a = -K (p - p') - D (v - c v'), plus the forces of its contacts.
-    p' and v' are position and velocity of the robot ahead, and c is the share of
+    p' and v' are position and velocity of the robot ahead, and c is the ratio of
     velocity feed-forward. Wheel command and plant give p = G_p a and v = G_v a. The
     first robot's motion is given.
 
@@ -331,7 +334,7 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
     Args:
         scenario: Scenario with the law, mass, motors, control period and latency of
             observed objects.
-        feed_forward: Share of the robot ahead's velocity in the target's velocity.
+        feed_forward: Target velocity over velocity of the robot ahead.
         spacing_m: Desired distance between the control points P of neighbors, m.
 
     Returns:
@@ -467,17 +470,17 @@ def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
 def most_feed_forward(scenario: Scenario, stiffness: float, damping: float) -> float:
     """Computes the largest velocity feed-forward that does not amplify motions.
 
-    With feed-forward, a robot's target has this share of the velocity of the robot
-    ahead. The chain has no contacts.
+    Feed-forward is the ratio of a target's velocity to the velocity of the robot ahead.
+    The chain has no contacts.
 
     Args:
-        scenario: Scenario with the mass, motors, control period and latency of observed
-            objects.
+        scenario: Scenario with the mass, motors, control period and latency of the
+            object sensor.
         stiffness: Stiffness K, N/m.
         damping: Damping D, N s/m.
 
     Returns:
-        Share from 0 to 1, by bisection. If motions are amplified even without
+        Ratio from 0 to 1, by bisection. If motions are amplified even without
         feed-forward, the result is -1.
     """
     late = _late(scenario)
