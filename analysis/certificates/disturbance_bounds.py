@@ -1,18 +1,20 @@
 """Bounds for a moving source and for a moving obstacle, in the point-mass model.
 
-The point mass M at p is the robot's control point, with speed v. K_r and D_r are
-stiffness and damping of the attraction to the source at p_S. d_f is the follow
-distance.
+The robot is a mass M at its control point p, with velocity v. K_r and D_r are stiffness
+and damping of the attraction to the source at p_S. d_f is the follow distance.
 
 **Source.** Let x = |p - p_S| - d_f be the stretch, w = v - v_S the relative velocity,
-and n the unit vector from the source to p. Then
+and n the unit vector from the source to p. The Lyapunov function is
 
     W = M |w|^2 / 2 + K_r x^2 / 2 + e M x (n . w)
 
-decreases wherever z' Q z > d (|w| + e |x|), with z = (|x|, |w|) and d = D_r |v_S| + M
-|a_S|. The stretch is therefore input-to-state stable and ultimately bounded. The
-rotation of n adds at most e M |w_t|^2. The bound requires e |x| <= v_max - |v_S|: the
-clamp of |v| to v_max then does not increase W.
+With z = (|x|, |w|), W decreases wherever
+
+    z' Q z > d (|w| + e |x|),   d = D_r |v_S| + M |a_S|
+
+The stretch is therefore input-to-state stable and ultimately bounded. The rotation of n
+adds at most e M |w_t|^2. The bound requires e |x| <= v_max - |v_S|. The clamp of |v| to
+v_max then does not increase W.
 
 **Obstacle.** The obstacle moves at v_O, and the axes move with the obstacle. The
 velocity term of the law injects at most L |v|^2

@@ -160,7 +160,7 @@ def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
 def solve(
     solver: SolverInterface, program: MathematicalProgram
 ) -> MathematicalProgramResult | None:
-    """Solves a program.
+    """Solves a semidefinite program.
 
     Args:
         solver: Solver for semidefinite programs.

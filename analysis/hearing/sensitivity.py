@@ -1,7 +1,7 @@
 """Effects of array errors and of the speed of sound on bearing and range.
 
 - The prediction is of first order. An error changes the delays. The estimated position
-  then moves until the delays of the array as stated fit the changed delays.
+  then moves until its delays at the array as stated equal the changed delays.
 - The measurement simulates arrays with random errors. The estimator locates the sound
   as if the arrays had no errors.
 """

@@ -46,9 +46,9 @@ def tick_costs() -> list[TickCost]:
 
 
 def _tick_times(name: str, preset: str) -> NDArray[np.float64]:
-    """(ticks,) times of a compiled run of the guarded law, s.
+    """(ticks,) computing times per control period of the guarded law, s.
 
-    Each time is the least of three runs.
+    The law runs three times in the compiled engine. Each time is the least of three.
     """
     fields = ["hearing=ideal", "law=guarded", f"ultrasonic.preset={preset}"]
     scenario, times = load_scenario(name, fields), []

@@ -127,11 +127,11 @@ def _run_of(kept: dict[str, Any]) -> LongRun:
 
 
 def long_run(trial: Trial, swing: Swing | None = None) -> LongRun:
-    """Runs a trial.
+    """Runs a trial, and summarizes the result.
 
     Args:
         trial: Trial to run.
-        swing: Swing of the driver, to be recorded in the result.
+        swing: Swing of the driver, which is recorded in the result.
 
     Returns:
         The result.

@@ -79,10 +79,10 @@ class LyapunovRun:
 
 @dataclass(frozen=True)
 class Drift:
-    """Drift of the stiffness K under a constant push.
+    """Drift of the stiffness K under a constant push that the reference model ignores.
 
-    The reference model does not know the push. K is listed without limits of the gains,
-    and with the limits of the scenario ("limited").
+    K is computed twice: without limits of the gains, and with those of the scenario
+    ("limited").
     """
 
     push_n: float
@@ -113,13 +113,13 @@ class Jam:
     after_s: float
     """Simulated time after the jam, s."""
     end_n_m: tuple[float, float]
-    """K at the end of the jam, N/m.
+    """Stiffness K at the end of the jam, N/m.
 
     The first value is without limits of the gains. The second value is with the
     scenario's limits.
     """
     left_n_m: tuple[float, float]
-    """K at the end of the run, N/m, in the same order; infinite if K has run away."""
+    """Stiffness K at the end of the run, in the same order; infinite if K diverged."""
 
 
 @dataclass(frozen=True)

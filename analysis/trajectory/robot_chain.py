@@ -94,14 +94,16 @@ class RobotChain:
     peaks: dict[str, ChainPeak]
     """Largest amplification of each chain, by name of the chain."""
     least_damping_n_s_m: float
-    """Least D without amplification at this K: two robots apart, N s/m.
+    """Least damping D that does not amplify motions of two robots apart, N s/m.
 
-    The chain has no feed-forward. If no tried D suffices, the value is infinite.
+    The chain has no feed-forward and the stiffness ``stiffness_n_m``. If no tried D
+    suffices, the value is infinite.
     """
     least_damping_in_contact_n_s_m: float
-    """Least D without amplification at this K: eight robots in contact, N s/m.
+    """Least damping D that does not amplify motions of eight robots in contact, N s/m.
 
-    The chain has no feed-forward. If no tried D suffices, the value is infinite.
+    The chain has no feed-forward and the stiffness ``stiffness_n_m``. If no tried D
+    suffices, the value is infinite.
     """
     most_feed_forward: float
     """Largest ratio of velocity feed-forward that does not amplify motions.
@@ -123,15 +125,16 @@ class RobotChain:
 
 
 def robot_chain(scenario: Scenario) -> RobotChain:
-    """Computes frequency responses of chains of robots like the scenario's robot.
+    """Computes frequency responses of lines of robots that follow one another.
 
-    Each robot's target is a fixed distance behind the robot ahead, and has the velocity
-    of the robot ahead. The object sensor measures the position of the robot ahead. The
-    velocity is computed from the last two positions.
+    All robots are like the scenario's robot. Each robot's target is a fixed distance
+    behind the robot ahead, and has the velocity of the robot ahead. The object sensor
+    measures the position of the robot ahead. The velocity is computed from the last two
+    positions.
 
     Args:
-        scenario: Scenario with the law, mass, motors, control period and latency of
-            observed objects.
+        scenario: Scenario with the law, mass, motors, control period and latency of the
+            object sensor.
 
     Returns:
         Responses and bounds.
@@ -327,13 +330,13 @@ def chain_response(
 
 
 def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> ChainPeak:
-    """Computes how much a chain amplifies the motion of its first robot.
+    """Computes how much a line of robots (chain) amplifies the motion of its first robot.
 
     The frequencies range from 0.01 rad/s to the Nyquist frequency.
 
     Args:
-        scenario: Scenario with the law, mass, motors, control period and latency of
-            observed objects.
+        scenario: Scenario with the law, mass, motors, control period and latency of the
+            object sensor.
         feed_forward: Target velocity over velocity of the robot ahead.
         spacing_m: Desired distance between the control points P of neighbors, m.
 
