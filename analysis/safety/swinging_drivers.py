@@ -118,6 +118,8 @@ def swing_at_boxes(
 ) -> Trial:
     """Makes a driver that visits boxes, swings, and presses against the boxes again.
 
+    To swing means to oscillate in forward speed and yaw rate.
+
     Args:
         names: Names of layout, driver and setting.
         boxes: (x, y, theta, length, width) of each box, m and rad.
@@ -243,6 +245,8 @@ def odometry_error(result: RunResult) -> NDArray[np.float64]:
 def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
     """Searches by differential evolution for the swing with the largest odometry drift.
 
+    A swing is an oscillation in forward speed and yaw rate.
+
     Args:
         setting: Name of the robot's setting in ``SETTINGS``.
         runs: Approximate number of runs, of 48 s each.
@@ -296,7 +300,8 @@ def search_contact(
 ) -> None:
     """Searches by differential evolution for a run that ends in a contact.
 
-    The search varies the swing, the heading and the distance of four boxes.
+    The search varies the heading, the distance of four boxes, and the swing. A swing is
+    an oscillation in forward speed and yaw rate.
 
     Args:
         setting: Name of the robot's setting in ``SETTINGS``.

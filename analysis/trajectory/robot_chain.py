@@ -330,7 +330,7 @@ def chain_response(
 
 
 def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> ChainPeak:
-    """Computes how much a line of robots (chain) amplifies the motion of its first robot.
+    """Computes how much a line of robots (chain) amplifies its first robot's motion.
 
     The frequencies range from 0.01 rad/s to the Nyquist frequency.
 
