@@ -1,1 +1,1 @@
-"""Arrays that sounds calibrate: places of microphones and the speed of sound."""
+"""Calibrates microphone arrays from sounds: microphone positions and speed of sound."""

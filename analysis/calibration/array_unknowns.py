@@ -1,4 +1,4 @@
-"""The unknowns of an array, in deviations of what is stated of it."""
+"""The unknowns of an array, scaled by the uncertainties that the user stated."""
 
 from __future__ import annotations
 
@@ -12,35 +12,44 @@ from analysis.arrays.array_budget import ArrayBudget
 from analysis.calibration.wave_fronts import WaveFront, wave_front
 from systems.framework.input_error import InputError
 
-# Directions with less than this share of the largest variance are known exactly.
+# A direction whose variance is below this share of the largest is taken as exact.
 _EXACT = 1e-14
 
 
 @dataclass(frozen=True)
 class ArrayUnknowns:
-    """Places of n microphones, speed of sound and the channels' delays.
+    """The unknowns of an array: microphone positions, speed of sound, channel delays.
 
-    They are stacked as n d coordinates, the speed, and n delays. What all channels
-    are late by together has no meaning: the delays add up to 0.
+    For n microphones in d dimensions, the full vector holds n d coordinates, the speed
+    of sound, and n delays. A delay that all channels share has no effect. The n delays
+    therefore add up to 0.
     """
 
     places: NDArray[np.float64]
-    """(n, d) stated, m."""
+    """(n, d) stated microphone positions, m."""
     c: float
     """Stated speed of sound, m/s."""
     budget: ArrayBudget
+    """Stated standard deviations of positions, speed of sound and delays."""
 
     @cached_property
     def origin(self) -> NDArray[np.float64]:
-        """(d,) of the frame in which sources are looked for: the centroid, m."""
+        """(d,) centroid of the microphones, m. Source positions are relative to it."""
         return np.asarray(self.places.mean(axis=0))
 
     @cached_property
     def scale(self) -> NDArray[np.float64]:
-        """(n d + 1 + n, m) changes of all for one deviation of each unknown.
+        """Matrix that converts the m unknowns z to changes of the full vector.
+
+        The full vector holds n d microphone coordinates, the speed of sound and n
+        delays.
+
+        Returns:
+            (n d + 1 + n, m) matrix. Each column is the change of the full vector for
+            one standard deviation of one unknown.
 
         Raises:
-            InputError: All is stated to be exact.
+            InputError: All uncertainties are stated as 0.
         """
         count = len(self.places)
         variances, axes = np.linalg.eigh(self.budget.of_places)
@@ -66,12 +75,12 @@ class ArrayUnknowns:
 
     @cached_property
     def prior_covariance(self) -> NDArray[np.float64]:
-        """(n d + 1 + n, same) of all, as stated."""
+        """(n d + 1 + n, n d + 1 + n) covariance of the full vector, as stated."""
         return np.asarray(self.scale @ self.scale.T)
 
     @cached_property
     def stated(self) -> NDArray[np.float64]:
-        """(n d + 1 + n,) of all, as stated."""
+        """(n d + 1 + n,) stated values of the full vector."""
         return np.concatenate((self.places.ravel(), [self.c], self._no_delays))
 
     @property
@@ -81,13 +90,14 @@ class ArrayUnknowns:
     def values(
         self, z: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
-        """What unknowns stand for.
+        """Converts unknowns to positions, speed of sound and delays.
 
         Args:
-            z: (m,) deviations from what is stated.
+            z: (m,) deviations from the stated values, in standard deviations.
 
         Returns:
-            (n, d) places, m; the speed of sound, m/s; (n,) delays of channels, s.
+            (n, d) microphone positions, m; the speed of sound, m/s; (n,) delays of the
+            channels, s.
         """
         whole = self.stated + self.scale @ z
         size = self.places.size
@@ -97,15 +107,19 @@ class ArrayUnknowns:
     def front(
         self, z: NDArray[np.float64], h: NDArray[np.float64], w: float
     ) -> tuple[WaveFront, NDArray[np.float64]]:
-        """Delays at the array of a source, and their slopes along the unknowns.
+        """Computes the delays of one source, and their slopes along the unknowns.
+
+        The source is at h / w relative to ``origin``. If h is a position, w is 1. If h
+        is a unit vector, w is the inverse range.
 
         Args:
-            z: (m,) deviations from what is stated.
-            h: (d,) place from ``origin`` times w.
+            z: (m,) deviations from the stated values, in standard deviations.
+            h: (d,) position in m, or unit vector to the source, from ``origin``.
             w: 1, or the inverse range, 1/m.
 
         Returns:
-            The wave front, the channels' own delays added, and slopes (n - 1, m).
+            The wave front, whose delays include those of the channels; and the (n - 1,
+            m) slopes of the delays along z, s.
         """
         places, c, late = self.values(z)
         front = wave_front(places - self.origin, max(c, 0.1 * self.c), h, w)

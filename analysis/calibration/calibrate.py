@@ -1,4 +1,4 @@
-"""From recordings of known and unknown places to a calibrated array."""
+"""Calibrates an array from recordings of sounds at known and unknown positions."""
 
 from __future__ import annotations
 
@@ -28,49 +28,52 @@ from analysis.recordings.recording_search import Sighting
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 
-# A wave whose length is less than so many deviations of the microphones' places may
-# be taken for the one before or after it.
+# Shortest usable wavelength, in standard deviations of the microphone positions. With
+# a shorter wave, one period may be mistaken for the next.
 _DEVIATIONS_A_PERIOD = 5.0
 
-# Where a geometry names no band, sounds are heard up to here, Hz.
+# Highest frequency used if the geometry file states no band, Hz.
 _USUAL_TOP_HZ = 15_000.0
 
 
 @dataclass(frozen=True)
 class CalibrationRun:
-    """An array, what it was calibrated with, and what came of it."""
+    """The result of calibrating an array, with the array as stated."""
 
     geometry: ArrayGeometry
-    """As stated."""
+    """The array as stated, before calibration."""
     calibration: Calibration
     gains: list[CalibrationGain]
-    """What became better known, and what did not."""
+    """How much better each quantity of the array is known than before."""
     misfit: CalibrationMisfit | None
-    """What does not fit, if anything."""
+    """The likeliest cause if sounds and geometry disagree; None if they agree."""
     heard: list[HeardSound] = field(default_factory=list)
-    """By ``calibration.sounds``; empty where delays were given."""
+    """One entry per sound of ``calibration.sounds``; empty if delays were given."""
     remarks: list[str] = field(default_factory=list)
-    """What is worth knowing of the recordings."""
+    """Messages about recordings, such as a recording without detectable sound."""
 
     @property
     def gains_nothing(self) -> bool:
-        """Whether the array is known no better than before."""
+        """Whether the sounds made nothing about the array better known."""
         return gains_nothing(self.calibration)
 
 
 def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> CalibrationRun:
-    """Refines an array by recordings that it made.
+    """Calibrates an array from recordings that the array made.
+
+    A first pass uses only frequencies that the stated position errors allow. If the
+    first pass improves the array and fits, a second pass uses higher frequencies.
 
     Args:
-        sounds: Recordings, and where their sources are.
-        geometry: The array, and how well it is known.
+        sounds: Recordings, with source positions where these are known.
+        geometry: The array, with its stated uncertainties.
 
     Returns:
         The calibrated array.
 
     Raises:
-        InputError: A recording cannot be used, or a position makes no sense; or
-            nothing is heard in any of them.
+        InputError: A recording cannot be used, a source position is not plausible, or
+            no recording contains a detectable sound.
     """
     places = np.array(geometry.microphones)
     for k, listed in enumerate(sounds.sounds):
@@ -85,7 +88,7 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
     first = calibration_run(*_listened(sounds, geometry, geometry, top_hz))
     if first.misfit is not None or first.gains_nothing or math.isinf(top_hz):
         return first
-    # Where microphones are known better, higher frequencies tell more.
+    # Better known microphone positions allow higher frequencies, which say more.
     known = ArrayGeometry.model_validate(calibrated_fields(first.calibration, geometry))
     top_hz = _top_hz(geometry, _shape_std(first))
     return calibration_run(*_listened(sounds, geometry, known, top_hz))
@@ -97,7 +100,18 @@ def _listened(
     known: ArrayGeometry,
     top_hz: float,
 ) -> tuple[list[MeasuredSound], ArrayGeometry, list[HeardSound], list[str]]:
-    """What an array, as far as it is known by now, hears in all recordings."""
+    """Measures the delays in all recordings.
+
+    Args:
+        sounds: The recordings.
+        geometry: The array as stated.
+        known: The array as known so far, which is used to measure the delays.
+        top_hz: Highest frequency to use, Hz.
+
+    Returns:
+        Four values: the measured sounds; ``geometry``, unchanged; the results of the
+        recordings; messages about the recordings.
+    """
     measured: list[MeasuredSound] = []
     heard: list[HeardSound] = []
     remarks: list[str] = []
@@ -137,7 +151,11 @@ def _listened(
 def _sightings(
     sounds: CalibrationSounds, k: int, known: ArrayGeometry, top_hz: float
 ) -> tuple[list[Sighting], list[str]]:
-    """Stretches of one recording: of all frequencies, if the low ones are silent."""
+    """Finds the parts of one recording that contain sound.
+
+    The search uses frequencies below ``top_hz``. If the recording is silent there, the
+    search uses all frequencies.
+    """
     listed = sounds.sounds[k]
     path, part = sounds.path_of(listed), (listed.from_s, listed.to_s)
     try:
@@ -150,14 +168,14 @@ def _sightings(
 
 
 def _top_hz(geometry: ArrayGeometry, std: float) -> float:
-    """Up to where microphones that are off by so much, m, hear alike; or infinity."""
+    """Highest frequency usable with position errors of ``std`` m; inf for no limit."""
     highest = _USUAL_TOP_HZ if geometry.band is None else geometry.band[1]
     top = geometry.c / (_DEVIATIONS_A_PERIOD * max(std, 1e-9))
     return top if top < highest else math.inf
 
 
 def _shape_std(run: CalibrationRun) -> float:
-    """What is left of the places but shifts and turns of all together, m."""
+    """RMS position error without shifts, rotations and scaling of the array, m."""
     stds = {gain.name: gain.after for gain in run.gains}
     return stds.get("shape of the array", stds.get("places of microphones", 0.0))
 
@@ -168,19 +186,21 @@ def calibration_run(
     heard: list[HeardSound] | None = None,
     remarks: list[str] | None = None,
 ) -> CalibrationRun:
-    """Refines an array by delays.
+    """Calibrates an array from measured delays between microphones.
 
     Args:
-        sounds: The delays, and where their sources are.
-        geometry: The array, and how well it is known.
-        heard: What they were heard from, if from recordings.
-        remarks: Of the recordings.
+        sounds: The delays, with source positions where these are known.
+        geometry: The array, with its stated uncertainties.
+        heard: Results of the recordings, one per sound. None: the delays do not come
+            from recordings.
+        remarks: Messages about the recordings.
 
     Returns:
         The calibrated array.
 
     Raises:
-        InputError: The sounds are none for this array.
+        InputError: The sounds do not match the array, for example in their number of
+            delays.
     """
     calibration = calibrate_array(
         np.array(geometry.microphones),

@@ -1,4 +1,4 @@
-"""A calibrated array as a geometry file."""
+"""Writes a calibrated array as a geometry file."""
 
 from __future__ import annotations
 
@@ -30,23 +30,26 @@ _REPLACED = frozenset(
     }
 )
 
-# Digits of a covariance, and characters about each of its numbers.
+# _DIGITS: significant digits to try for a covariance, finest first.
+# _AROUND: characters of YAML that surround each number.
 _DIGITS, _AROUND = (17, 9), 8
 
 
 def calibrated_fields(
     calibration: Calibration, geometry: ArrayGeometry
 ) -> dict[str, Any]:
-    """Fields of a geometry file.
+    """Computes the fields of a geometry file for a calibrated array.
+
+    If the array is too large for a covariance in the file, the file holds one standard
+    deviation per microphone. If the calibrated microphones no longer lie in a plane or
+    line, the field ``side`` is left out.
 
     Args:
-        calibration: What was found.
-        geometry: The array as stated, of which all else is kept.
+        calibration: The calibration.
+        geometry: The array as stated. Fields that were not calibrated are copied.
 
     Returns:
-        Plain values by field. Of a large array that no file could hold, the
-        covariance becomes a deviation for each microphone; a side that microphones
-        off their plane do not have any more is left out.
+        Plain values by field name.
     """
     fields = {
         "microphones": calibration.places.tolist(),
@@ -62,11 +65,13 @@ def calibrated_fields(
 
 
 def write_calibration(document: dict[str, Any], folder: Path) -> None:
-    """Writes array.yaml, as ``load_geometry`` reads it, and calibration.json.
+    """Writes a calibration as ``array.yaml`` and ``calibration.json``.
+
+    ``load_geometry`` reads ``array.yaml``.
 
     Args:
-        document: Of a calibration.
-        folder: Where to.
+        document: The JSON document of a calibration, from ``calibration_document``.
+        folder: Existing folder for the two files.
     """
     write_json(document, folder / "calibration.json")
     text = dump_yaml(document["geometry"])

@@ -1,9 +1,10 @@
-"""Where microphones stand, from sounds: what fits best, and how well it is known.
+"""Estimates microphone positions from sounds, with their covariance.
 
-Maximum a posteriori by Levenberg's method. All that is stated of the array counts
-with its uncertainty, and so do stated positions of sounds; what is not known of a
-sound's place is worked out with it. The places of sounds are eliminated sound by
-sound, so that a hundred sounds cost a hundred times as much as one.
+The estimate is the maximum a posteriori, found by Levenberg's method. Stated properties
+of the array and stated positions of sounds count with their stated uncertainties. The
+unknown coordinates of a sound are estimated together with the array. Each sound's
+coordinates are eliminated separately. The computing time therefore grows only in
+proportion to the number of sounds.
 """
 
 from __future__ import annotations
@@ -23,25 +24,29 @@ from systems.sound.array_shape import ArrayShape
 
 _STEPS = 200
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-12, 1e9
-_SETTLED = 1e-5  # of the sum of squares, relative to it and to a single delay
+# The search ends if a step changes the sum of squares J by at most _SETTLED (1 + J).
+_SETTLED = 1e-5
 
-# Of the steepest: damps steps along what delays hardly change with, such as across
-# the plane of an array.
+# Least squared slope for damping, as a share of the largest. The floor damps steps that
+# hardly change the delays, such as those across the plane of an array.
 _LEAST_SLOPE = 0.1
 
 
 @dataclass(frozen=True)
 class Fit:
-    """One sound about the solution, in deviations of its measured delays."""
+    """Residuals and slopes of one sound, linearized about the solution.
+
+    All delays are in standard deviations of the measured delays.
+    """
 
     residual: NDArray[np.float64]
-    """(n - 1,) measured less expected."""
+    """(n - 1,) measured minus expected delays."""
     by_array: NDArray[np.float64]
-    """(n - 1, m) slopes of what is expected along the array's unknowns."""
+    """(n - 1, m) slopes of the expected delays along the array's unknowns."""
     by_place: NDArray[np.float64]
-    """(n - 1, d) the same along those of the sound's place."""
+    """(n - 1, d) slopes of the expected delays along the sound's coordinates."""
     root: NDArray[np.float64]
-    """(n - 1, n - 1) makes deviations of delays in s."""
+    """(n - 1, n - 1) matrix that converts delays in s to standard deviations."""
     place: SoundPlace
 
 
@@ -50,42 +55,45 @@ class Calibration:
     """A calibrated array of n microphones."""
 
     unknowns: ArrayUnknowns
-    """What was stated."""
+    """The array as stated."""
     places: NDArray[np.float64]
-    """(n, d) microphones in the geometry's frame, m."""
+    """(n, d) microphone positions in the geometry's frame, m."""
     c: float
     """Speed of sound, m/s."""
     channel_delays: NDArray[np.float64]
-    """(n,) by which channels are late, less their mean, s."""
+    """(n,) delays of the channels minus their mean, s."""
     covariance: NDArray[np.float64]
-    """(n d + 1 + n, same) joint, of places, speed of sound and channel delays."""
+    """(n d + 1 + n, n d + 1 + n) joint covariance.
+
+    The order is microphone coordinates, speed of sound, channel delays.
+    """
     information: NDArray[np.float64]
-    """(m, m) that the sounds have of the unknowns, those in deviations."""
+    """(m, m) Fisher information of the sounds on the scaled unknowns z."""
     z: NDArray[np.float64]
-    """(m,) the unknowns: by how many deviations all is off what was stated."""
+    """(m,) differences from the stated values, in stated standard deviations."""
     fits: tuple[Fit, ...]
-    """A sound each."""
+    """One fit per sound."""
     sounds: tuple[MeasuredSound, ...]
     chi_square: float
-    """Of delays, stated positions and stated geometry together."""
+    """Sum of squared residuals of delays, stated positions and stated geometry."""
     freedom: int
-    """What chi-square is expected to be."""
+    """Degrees of freedom: the expected value of ``chi_square``."""
     settled: bool
-    """Whether the search came to an end."""
+    """Whether the search converged."""
 
     @property
     def of_places(self) -> NDArray[np.float64]:
-        """(n d, n d) covariance of the places, m^2."""
+        """(n d, n d) covariance of the microphone positions, m^2."""
         return self.covariance[: self.places.size, : self.places.size]
 
     @property
     def speed_std(self) -> float:
-        """Of the speed of sound, m/s."""
+        """Standard deviation of the speed of sound, m/s."""
         return float(np.sqrt(self.covariance[self.places.size, self.places.size]))
 
     @property
     def source_positions(self) -> NDArray[np.float64]:
-        """(sounds, d) in the geometry's frame, m; infinite without a range."""
+        """(sounds, d) in the geometry's frame, m; infinite if the range is unknown."""
         positions = [fit.place.position for fit in self.fits]
         return np.array(positions) + self.unknowns.origin
 
@@ -97,23 +105,26 @@ def calibrate_array(
     sounds: Sequence[MeasuredSound],
     shape: ArrayShape | None = None,
 ) -> Calibration:
-    """Refines places of microphones, speed of sound and delays of channels.
+    """Estimates microphone positions, speed of sound and channel delays.
 
-    The frame is that of the stated positions of sounds, as far as the microphones'
-    stated places in it are uncertain; with no such sounds that of the places.
+    If sounds have stated positions, these and the stated microphone positions together
+    define the coordinate frame, weighted by their uncertainties. If no sound has a
+    stated position, the stated microphone positions define the frame.
 
     Args:
-        places: (n, d) stated, m.
-        c: Speed of sound as stated, m/s.
-        budget: What is not known of these.
-        sounds: What was heard.
-        shape: The same places, looking to the side of sources without positions.
+        places: (n, d) stated microphone positions, m.
+        c: Stated speed of sound, m/s.
+        budget: Stated uncertainties of positions, speed of sound and delays.
+        sounds: The measured sounds.
+        shape: Array of the same positions that faces the sources without stated
+            positions. None: built from ``places``.
 
     Returns:
-        The array, and how well it is known.
+        The calibrated array, with its covariance.
 
     Raises:
-        InputError: The sounds are none for this array, or all is stated as exact.
+        InputError: The sounds do not match the array, or all uncertainties are stated
+            as 0.
     """
     places = np.asarray(places, dtype=np.float64)
     check_sounds(places, sounds)
@@ -148,7 +159,7 @@ def calibrate_array(
 
 
 def place_weight(fit: Fit) -> NDArray[np.float64]:
-    """(n - 1, n - 1) weight of a sound's residuals, its place being worked out."""
+    """(n - 1, n - 1) weight of a sound's residuals with its position eliminated."""
     weight = _eliminated(fit, 0.0)[0]
     return (weight + weight.T) / 2.0
 
@@ -215,11 +226,15 @@ def _information(fits: Sequence[Fit], size: int) -> NDArray[np.float64]:
 def _eliminated(
     fit: Fit, damping: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """What a sound's place can explain, taken out of its delays.
+    """Eliminates the unknown coordinates of a sound from its delays.
 
     Returns:
-        (n - 1, n - 1) weight of residuals; (d, n - 1) the best step of the place for
-        a residual; and (d,) that by what was expected of the place alone.
+        Three arrays:
+
+        1. (n - 1, n - 1) weight of the residuals.
+        2. (d, n - 1) gain from the residuals to the best step of the sound's
+           coordinates.
+        3. (d,) step toward the expected coordinates.
     """
     within = fit.by_place.T @ fit.by_place
     along = np.diag(within)
@@ -235,7 +250,7 @@ def _eliminated(
 def _step(
     z: NDArray[np.float64], fits: Sequence[Fit], damping: float
 ) -> tuple[NDArray[np.float64], list[SoundPlace]]:
-    """A step of the array's unknowns, and the places that go with it."""
+    """Computes a step of the array's unknowns, and the moved sound positions."""
     hessian, slope = np.eye(z.size), -z
     parts = []
     for fit in fits:

@@ -1,4 +1,4 @@
-"""Whether sounds and geometry agree, and which of them is most to blame if not."""
+"""Checks whether sounds and geometry agree, and finds the likeliest fault if not."""
 
 from __future__ import annotations
 
@@ -13,44 +13,44 @@ from scipy.stats import chi2
 from analysis.calibration.calibration import Calibration, Fit, place_weight
 from analysis.calibration.wave_fronts import wave_front
 
-# A chi-square that chance exceeds less often does not fit.
+# The fit is rejected if chance exceeds its chi-square with less than this probability.
 _CHANCE = 1e-3
 
-# Of a matrix' largest eigenvalue: what is below is none.
+# Eigenvalues below this share of a matrix's largest eigenvalue count as 0.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class CalibrationMisfit:
-    """A chi-square that does not fit, and what it fits without."""
+    """The likeliest fault of a calibration that does not fit."""
 
     kind: Literal["sound", "microphone", "channel"]
-    """What is most to blame: a sound, the place of a microphone, or a channel's
-    delay."""
+    """What is at fault: a sound, a microphone's position or a channel's delay."""
     index: int
-    """Which one, from 0."""
+    """Index of the faulty sound, microphone or channel, from 0."""
     chi_square: float
-    """Without it."""
+    """Chi-square of the fit without the faulty part."""
     freedom: int
-    """What that is expected to be."""
+    """Degrees of freedom of the fit without the faulty part."""
 
     @property
     def explains(self) -> bool:
-        """Whether all else fits without it."""
+        """Whether the rest fits without the faulty part."""
         return bool(chi2.sf(self.chi_square, max(self.freedom, 1)) > _CHANCE)
 
 
 def calibration_misfit(calibration: Calibration) -> CalibrationMisfit | None:
-    """What does not fit.
+    """Finds the likeliest fault if measured sounds and stated geometry disagree.
 
-    To first order about the solution: by how much chi-square falls without a sound,
-    or with a microphone anywhere, or with a channel late by any time.
+    The function compares three kinds of candidates: one sound is left out, the position
+    of one microphone is free, or the delay of one channel is free. The change of
+    chi-square is computed to first order about the solution.
 
     Args:
         calibration: The calibration.
 
     Returns:
-        What is most to blame: that without which the rest fits best. None: all fits.
+        The candidate that fits best. None if everything fits without a change.
     """
     whole, freedom = calibration.chi_square, calibration.freedom
     if freedom < 1 or chi2.sf(whole, freedom) > _CHANCE:
@@ -71,7 +71,7 @@ def calibration_misfit(calibration: Calibration) -> CalibrationMisfit | None:
 def _by_channel(
     calibration: Calibration, covariance: NDArray[np.float64]
 ) -> list[CalibrationMisfit]:
-    """Without the place of each microphone, or without each channel's delay."""
+    """Frees the position of each microphone, and the delay of each channel, in turn."""
     count, dimension = calibration.places.shape
     late = np.eye(count)[1:] - np.eye(count)[0]
     found = []
@@ -89,19 +89,19 @@ def _by_channel(
 
 
 def _left(fit: Fit) -> NDArray[np.float64]:
-    """(n - 1,) residual about the place as it was expected, in deviations."""
+    """(n - 1,) residual about the expected source position, in standard deviations."""
     return fit.residual + fit.by_place @ (fit.place.weights * fit.place.off)
 
 
 def _moves(calibration: Calibration, fit: Fit) -> NDArray[np.float64]:
-    """(n - 1, n d) slopes along the microphones' coordinates, deviations a metre."""
+    """(n - 1, n d) slopes along microphone coordinates, standard deviations per m."""
     about = calibration.places - calibration.unknowns.origin
     front = wave_front(about, calibration.c, fit.place.h, fit.place.w)
     return fit.root @ front.by_places
 
 
 def _without_sound(fit: Fit, covariance: NDArray[np.float64]) -> tuple[float, int]:
-    """By how much chi-square falls without a sound, and of how many values that is."""
+    """Computes how much chi-square and its degrees of freedom fall without a sound."""
     rank = len(fit.residual) - (0 if fit.place.stated else fit.place.h.size)
     if rank <= 0:
         return 0.0, 0
@@ -118,7 +118,16 @@ def _drop_of(
     columns: Sequence[NDArray[np.float64]],
     covariance: NDArray[np.float64],
 ) -> float:
-    """By how much chi-square falls if more may be free: slopes (n - 1, f) a sound."""
+    """Computes how much chi-square falls if f more parameters are free.
+
+    Args:
+        fits: Fits of the sounds.
+        columns: (n - 1, f) slopes of each sound's delays along the parameters.
+        covariance: (m, m) covariance of the unknowns.
+
+    Returns:
+        The decrease of chi-square.
+    """
     free = columns[0].shape[1]
     pull, own = np.zeros(free), np.zeros((free, free))
     shared = np.zeros((free, len(covariance)))

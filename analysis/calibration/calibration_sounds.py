@@ -1,4 +1,4 @@
-"""The list of recordings that calibrate an array."""
+"""Reads the list of recordings that calibrate an array."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _Position = Annotated[
 
 
 class CalibrationSound(Parameters):
-    """A recording, or a part of one, in which a source rests."""
+    """A recording, or part of a recording, of one source at rest."""
 
     recording: str = Field(min_length=1)
     """WAV or FLAC; a relative path begins in the folder of the list."""
@@ -55,18 +55,22 @@ class CalibrationSounds(Parameters):
     """Where relative paths of recordings begin."""
 
     def path_of(self, sound: CalibrationSound) -> Path:
-        """The recording of one of the sounds."""
+        """Path of a sound's recording."""
         return Path(self.folder) / sound.recording
 
 
 def load_calibration_sounds(path: str | Path) -> CalibrationSounds:
-    """Reads a list of sounds.
+    """Reads a list of sounds from a YAML file.
 
     Args:
-        path: YAML with ``sounds``, each with the fields of ``CalibrationSound``.
+        path: YAML file with a list ``sounds``, whose entries have the fields of
+            ``CalibrationSound``.
+
+    Returns:
+        The list. If the file names no ``folder``, ``folder`` is that of the file.
 
     Raises:
-        InputError: The file is missing, not YAML, or names no sounds; the message
+        InputError: The file is missing, is not YAML, or lists no sounds. The message
             names the field and the remedy.
     """
     path = require_file(path, "sounds", "YAML")

@@ -1,4 +1,4 @@
-"""A calibration on a terminal, and as a document."""
+"""Formats a calibration as text for a terminal, and as a JSON document."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from analysis.calibration.calibrated_geometry import calibrated_fields
 from analysis.calibration.observability import CalibrationGain, gain_ratios
 from analysis.reporting.plain_values import plain
 
-# Independent directions that a document lists.
+# Most independent directions that a document lists.
 _MOST_DIRECTIONS = 32
 
 _UNITS = {
@@ -35,7 +35,7 @@ _NOTHING_KNOWN = (
 
 
 def calibration_text(run: CalibrationRun) -> str:
-    """The report, for a terminal."""
+    """Formats the report of a calibration for a terminal."""
     calibration = run.calibration
     count, dimension = calibration.places.shape
     known = sum(sound.position is not None for sound in calibration.sounds)
@@ -56,7 +56,7 @@ def calibration_text(run: CalibrationRun) -> str:
 
 
 def calibration_document(run: CalibrationRun) -> dict[str, Any]:
-    """The JSON document of the command line."""
+    """Builds the JSON document of ``phonotaxis calibrate``."""
     calibration = run.calibration
     ratios, directions = gain_ratios(calibration)
     told = min(len(ratios), _MOST_DIRECTIONS)
@@ -170,6 +170,6 @@ def _sound(run: CalibrationRun, j: int) -> dict[str, Any]:
 
 
 def _residual(run: CalibrationRun, j: int) -> NDArray[np.float64]:
-    """(n - 1,) measured less expected delays, s."""
+    """(n - 1,) measured minus expected delays, s."""
     fit = run.calibration.fits[j]
     return np.asarray(np.linalg.solve(fit.root, fit.residual), dtype=np.float64)

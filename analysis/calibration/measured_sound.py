@@ -1,4 +1,4 @@
-"""What is measured of a sound, and where it was made as far as that is known."""
+"""Measured delays of a sound, and the sound's position as far as known."""
 
 from __future__ import annotations
 
@@ -10,40 +10,41 @@ from numpy.typing import NDArray
 
 from systems.framework.input_error import InputError
 
-# Of a microphone: the wave front is then no longer that of a point.
+# Least distance of a source from a microphone, m. A nearer source is no point source.
 _NEAREST_M = 0.05
+# Largest distance of a source from a microphone, m.
 _FARTHEST_M = 1000.0
 
 
 @dataclass(frozen=True)
 class MeasuredSound:
-    """Delays of one resting sound at n microphones."""
+    """Delays of one sound, from a source at rest, at n microphones."""
 
     tau: NDArray[np.float64]
     """(n - 1,) delays t_k - t_0, s."""
     covariance: NDArray[np.float64]
-    """(n - 1, n - 1) of the delays, without errors of the array and the air, s^2."""
+    """(n - 1, n - 1) covariance of the delays, without array and air errors, s^2."""
     position: NDArray[np.float64] | None = None
-    """(d,) where it was made, in the microphones' frame, m. None: not known."""
+    """(d,) position of the source in the microphones' frame, m. None: not known."""
     position_std: float = 0.0
-    """Of each coordinate of the position, m."""
+    """Standard deviation of each coordinate of ``position``, m."""
     name: str = ""
-    """By which messages name it."""
+    """Name of the sound in messages."""
 
 
 def check_sounds(
     places: NDArray[np.float64], sounds: Sequence[MeasuredSound], field: str = "sounds"
 ) -> None:
-    """Refuses sounds that no array at these places can be calibrated with.
+    """Checks that measured sounds are suitable to calibrate an array.
 
     Args:
-        places: (n, d) microphones, m.
+        places: (n, d) microphone positions, m.
         sounds: The sounds.
-        field: Begins the message of an error.
+        field: Field name that begins the message of an error.
 
     Raises:
-        InputError: There are none, they have another number of delays or of
-            coordinates than the array, or a position is at a microphone or far out.
+        InputError: There are no sounds; a sound does not have n - 1 delays; or a source
+            position does not have d coordinates, or is too near or too far.
     """
     if not sounds:
         raise InputError(
@@ -65,16 +66,16 @@ def check_sounds(
 def check_position(
     places: NDArray[np.float64], position: NDArray[np.float64], field: str
 ) -> None:
-    """Refuses a position where no sound can have been made.
+    """Checks that a stated position of a sound is plausible.
 
     Args:
-        places: (n, d) microphones, m.
-        position: Coordinates in the same frame, m.
-        field: Begins the message of an error.
+        places: (n, d) microphone positions, m.
+        position: (d,) position of the source in the same frame, m.
+        field: Field name that begins the message of an error.
 
     Raises:
-        InputError: It has another number of coordinates than the microphones, or is
-            too near or too far.
+        InputError: The position does not have d coordinates, is less than 5 cm from a
+            microphone, or is more than 1 km from the nearest microphone.
     """
     dimension = places.shape[1]
     if position.shape != (dimension,):

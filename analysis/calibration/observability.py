@@ -1,4 +1,4 @@
-"""What of an array became better known by a calibration, and what did not."""
+"""Reports which properties of an array a calibration made better known."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from analysis.calibration.calibration import Calibration
 
-# Posterior over prior deviation: below the first observable, above the second not.
+# Ratios of posterior to prior standard deviation. A quantity at or below _OBSERVABLE
+# counts as observable. A quantity above _NOT counts as not observable.
 _OBSERVABLE, _NOT = 0.5, 0.9
 
-# Modes that move microphones by less than this share of the others are none, as the
-# turn of a row about itself.
+# A mode counts as a combination of the others if less than this share of the mode
+# differs from them. An example is the rotation of a straight array about its own line.
 _NO_MODE = 1e-6
 
 _Verdict = Literal["observable", "in part", "not observable"]
@@ -23,24 +24,24 @@ _Verdict = Literal["observable", "in part", "not observable"]
 
 @dataclass(frozen=True)
 class CalibrationGain:
-    """One thing that is not known of an array."""
+    """How well one quantity of an array is known before and after calibration."""
 
     name: str
     unit: str
-    """Of the deviations: m, rad, s, m/s, or 1 for a share."""
+    """Unit of the standard deviations: m, rad, s, m/s, or 1 for a share."""
     before: float
-    """Standard deviation as stated."""
+    """Standard deviation before the calibration, as stated."""
     after: float
     """Standard deviation after the calibration."""
 
     @property
     def ratio(self) -> float:
-        """Deviation after over before; 1 of what was exact."""
+        """Standard deviation after over before; 1 if the quantity was exact before."""
         return self.after / self.before if self.before > 0.0 else 1.0
 
     @property
     def verdict(self) -> _Verdict:
-        """Whether the sounds tell it."""
+        """Whether the sounds determine the quantity."""
         if self.ratio <= _OBSERVABLE:
             return "observable"
         return "in part" if self.ratio <= _NOT else "not observable"
@@ -49,14 +50,18 @@ class CalibrationGain:
 def gain_ratios(
     calibration: Calibration,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Independent directions of all unknowns, from what was gained most.
+    """Finds independent directions of the unknowns, ordered by improvement.
 
     Args:
         calibration: A calibration with m unknowns.
 
     Returns:
-        (m,) deviation after over before of each, rising; and (n d + 1 + n, m) the
-        change of all unknowns, as stacked there, for one deviation before.
+        Two arrays:
+
+        1. (m,) ratios, ascending. A ratio is the standard deviation after the
+           calibration over the standard deviation before.
+        2. (n d + 1 + n, m) directions as columns. A column is the change of positions,
+           speed of sound and delays for one standard deviation before.
     """
     seen, axes = np.linalg.eigh(calibration.information)
     ratios = 1.0 / np.sqrt(1.0 + np.maximum(seen[::-1], 0.0))
@@ -69,15 +74,21 @@ def gains_nothing(calibration: Calibration) -> bool:
 
 
 def calibration_gains(calibration: Calibration) -> list[CalibrationGain]:
-    """What is known of the array in plain terms, before and after.
+    """Lists how well each property of the array is known before and after calibration.
+
+    The properties are:
+
+    - the speed of sound;
+    - the microphone positions as a whole;
+    - shifts, rotations and size of the whole array;
+    - the remaining shape of the array;
+    - the delays of the channels.
 
     Args:
         calibration: The calibration.
 
     Returns:
-        Speed of sound, places on the whole and by what can happen to them: shifts
-        and turns of the whole array, its size, its shape beyond those; delays of
-        channels. What was exact is left out.
+        One entry per property. Properties that were exact before are left out.
     """
     before = calibration.unknowns.prior_covariance
     after = calibration.covariance
@@ -104,7 +115,7 @@ def calibration_gains(calibration: Calibration) -> list[CalibrationGain]:
 
 
 def _rms(rows: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
-    """Root mean square deviation of some linear functions."""
+    """Root mean square standard deviation of linear functions, given as rows."""
     variances = np.einsum("ij,jk,ik->i", rows, covariance, rows)
     return math.sqrt(max(float(variances.mean()), 0.0)) if len(rows) else 0.0
 
@@ -112,7 +123,12 @@ def _rms(rows: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
 def _modes(
     places: NDArray[np.float64],
 ) -> list[tuple[str, str, NDArray[np.float64]]]:
-    """Shifts, turns and size: (n d,) displacements for 1 m, 1 rad, and twice as big."""
+    """Lists the independent shifts, rotations and size changes of an array.
+
+    Each mode has a name, a unit and (n d,) displacements to first order. The
+    displacements belong to a shift by 1 m, to a rotation by 1 rad, or to doubling the
+    array's size.
+    """
     count, dimension = places.shape
     p = places - places.mean(axis=0)
     axes = "xyz"[:dimension]

@@ -1,4 +1,4 @@
-"""Where a sound was made: a place with its own uncertainty, or not known at all."""
+"""Where a sound was made: at a stated, uncertain position, or at an unknown one."""
 
 from __future__ import annotations
 
@@ -14,48 +14,52 @@ from analysis.calibration.wave_fronts import WaveFront
 from systems.hearing.multilateration import locate_source
 from systems.sound.array_shape import ArrayShape
 
-# An unknown source is rarely nearer than this share of the aperture: so weak that
-# it tells nothing, yet it keeps a range that cannot be heard from running away.
+# An unknown source is assumed to be rarely nearer than this many apertures. This weak
+# assumption hardly affects the estimate. It keeps an unobservable range finite.
 _NEAREST_APERTURES = 0.1
 
-# In the line or plane of an array delays do not change with the direction across it:
-# a search begins this far off, of a unit vector.
+# Least component of the initial unit vector across the array's line or plane. Within
+# the line or plane, delays have zero slope across it, and the search would not start.
 _LEAST_LIFT = 0.3
 
-# Directions that an array cannot hear are as uncertain, rad.
+# Prior standard deviation of directions, which are otherwise unknown, rad.
 _ANY_DIRECTION = 10.0
 
 
 @dataclass(frozen=True)
 class SoundPlace:
-    """A place h / w, its d unknowns, and what was known of them before.
+    """The position of a sound's source, with its d unknowns and their prior.
 
-    The unknowns are those of a step: metres over their deviation where a position is
-    stated, else directions across h, in rad, and the inverse range over its own.
+    The position is h / w. The unknowns depend on whether the position was stated:
+
+    - If stated, they are the d coordinates over their standard deviation.
+    - If not stated, they are d - 1 changes of direction, in rad, and the inverse range
+      over its standard deviation.
     """
 
     h: NDArray[np.float64]
-    """(d,) the place in m, or a unit vector to it, from the frame's origin."""
+    """(d,) position in m, or unit vector to the source, from the frame's origin."""
     w: float
-    """1 of a stated place, else the inverse range, 1/m."""
+    """1 for a stated position, else the inverse range, 1/m."""
     off: NDArray[np.float64]
-    """(d,) unknowns less what was expected of them, in deviations."""
+    """(d,) unknowns minus their expected values, in standard deviations."""
     weights: NDArray[np.float64]
-    """(d,) of ``off`` in the least squares: 1, or 0 where nothing was expected."""
+    """(d,) weights of ``off`` in the least squares: 1, or 0 without expectation."""
     deviation: float
-    """Of a stated place's coordinates, m, or of the inverse range, 1/m."""
+    """Prior standard deviation of the coordinates, m, or of the inverse range, 1/m."""
     stated: bool
+    """Whether the position was stated."""
 
     @classmethod
     def stated_at(cls, position: NDArray[np.float64], std: float) -> SoundPlace:
-        """A place that was measured.
+        """Makes a ``SoundPlace`` from a stated position.
 
         Args:
-            position: (d,) in the frame, m.
-            std: Of each coordinate, m.
+            position: (d,) position relative to the frame's origin, m.
+            std: Standard deviation of each coordinate, m.
 
         Returns:
-            The place as stated.
+            The place at the stated position.
         """
         return cls(
             h=position.copy(),
@@ -70,16 +74,16 @@ class SoundPlace:
     def heard(
         cls, sound: MeasuredSound, shape: ArrayShape, c: float, budget: ArrayBudget
     ) -> SoundPlace:
-        """A place of which nothing is known but what is heard.
+        """Makes the initial ``SoundPlace`` of a sound whose position is not stated.
 
         Args:
-            sound: Its delays.
+            sound: The measured delays.
             shape: The array as stated.
-            c: Speed of sound as stated, m/s.
-            budget: What is not known of both.
+            c: Stated speed of sound, m/s.
+            budget: Uncertainties of the array and of the speed of sound.
 
         Returns:
-            The place that the array as stated would report.
+            The place as located by the array as stated.
         """
         far = locate_far_source(sound.tau, sound.covariance, shape, c)
         whole = sound.covariance + budget.delay_covariance(far.p_AS, 0.0, shape, c)
@@ -103,16 +107,16 @@ class SoundPlace:
 
     @property
     def precision(self) -> NDArray[np.float64]:
-        """(d,) of the unknowns before anything was heard."""
+        """(d,) prior precisions of the unknowns."""
         return self.weights + (1.0 - self.weights) / _ANY_DIRECTION**2
 
     @property
     def position(self) -> NDArray[np.float64]:
-        """(d,) m from the origin; infinite where the range cannot be told."""
+        """(d,) position from the origin, m; infinite if the range is not observable."""
         return self.h / self.w if self.w > 0.0 else np.full(self.h.shape, np.inf)
 
     def slopes(self, front: WaveFront) -> NDArray[np.float64]:
-        """(n - 1, d) of the delays along the unknowns."""
+        """(n - 1, d) slopes of the delays along the place's unknowns, s."""
         if self.stated:
             return front.by_h * self.deviation
         return np.column_stack(
@@ -120,13 +124,13 @@ class SoundPlace:
         )
 
     def moved(self, step: NDArray[np.float64]) -> SoundPlace:
-        """The place after a step of its (d,) unknowns."""
+        """Moves the place by a (d,) step of its unknowns."""
         if self.stated:
             moved_to = self.h + self.deviation * step
             return replace(self, h=moved_to, off=self.off + step)
         h = self.h + _across(self.h) @ step[:-1]
         w = self.w + self.deviation * float(step[-1])
-        # An inverse range of little less than 0 is a wave that is not curved.
+        # An inverse range slightly below 0 stands for a plane wave.
         w = min(max(w, -0.1 * self.deviation), self.deviation)
         off = self.off.copy()
         off[-1] = w / self.deviation
@@ -134,6 +138,6 @@ class SoundPlace:
 
 
 def _across(h: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(d, d - 1) orthonormal vectors across a direction."""
+    """(d, d - 1) orthonormal vectors perpendicular to a direction."""
     basis: NDArray[np.float64] = np.linalg.svd(h[np.newaxis])[2][1:].T
     return basis

@@ -1,7 +1,7 @@
-"""Delays of a sound at microphones of any places, and how they turn with all of it.
+"""Delays of a sound at microphones, and the slopes of these delays.
 
-A source is a pair (h, w) that stands for the place h / w: with w = 1 the place
-itself, with a unit vector h a direction and an inverse range, which may be 0.
+A pair (h, w) describes a source at the position h / w. If w is 1, h is the position. If
+h is a unit vector, w is the inverse range, which may be 0.
 """
 
 from __future__ import annotations
@@ -14,33 +14,33 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class WaveFront:
-    """Delays after channel 0 and their slopes, to first order."""
+    """Delays relative to channel 0, and their slopes."""
 
     delays: NDArray[np.float64]
     """(n - 1,) t_k - t_0, s."""
     by_places: NDArray[np.float64]
-    """(n - 1, n d) along the microphones' coordinates, s/m."""
+    """(n - 1, n d) slopes along the microphones' coordinates, s/m."""
     by_speed: NDArray[np.float64]
-    """(n - 1,) along the speed of sound, s/(m/s)."""
+    """(n - 1,) slopes along the speed of sound, s/(m/s)."""
     by_h: NDArray[np.float64]
-    """(n - 1, d) along h."""
+    """(n - 1, d) slopes along h."""
     by_w: NDArray[np.float64]
-    """(n - 1,) along w."""
+    """(n - 1,) slopes along w."""
 
 
 def wave_front(
     p: NDArray[np.float64], c: float, h: NDArray[np.float64], w: float
 ) -> WaveFront:
-    """Delays of sound from h / w.
+    """Computes the delays of sound from a source at h / w.
 
-    A microphone at m is farther from it than the origin by
-    D = (|h - w m| - |h|) / w, written so that w may be 0.
+    For a microphone at m, the path from the source is longer than the path to the
+    origin by D = (|h - w m| - |h|) / w. The code uses a form of D that allows w = 0.
 
     Args:
-        p: (n, d) microphones, m.
+        p: (n, d) microphone positions, m.
         c: Speed of sound, m/s.
-        h: (d,) the source's place times w, in the microphones' frame.
-        w: 1 for a place in m, or the inverse range, 1/m.
+        h: (d,) position in m, or unit vector to the source, in the microphones' frame.
+        w: 1 if h is a position, or the inverse range, 1/m.
 
     Returns:
         The delays and their slopes.

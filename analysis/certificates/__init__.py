@@ -1,1 +1,1 @@
-"""Starts from which no collision happens, with proofs."""
+"""Proves for sets of initial states that no collision follows."""

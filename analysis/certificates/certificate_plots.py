@@ -1,4 +1,4 @@
-"""Pictures of what is certified, beside what simulation says."""
+"""Plots certified sets and simulated trials."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from systems.world.geometry import rectangle_corners
 
 
 def draw_bodies(axes: Axes, model: PointMass) -> None:
-    """Obstacles, the source's body, the follow distance and P at the start.
+    """Draws obstacles, the source's body, the follow distance and control point P.
 
     Args:
-        axes: Where to draw; gets labels, and one scale for x and y.
-        model: Bodies, source and start, in W.
+        axes: Axes to draw in. The function sets their labels and an equal scale.
+        model: Point-mass model with bodies, source and start, in the world frame W.
     """
     for k, rectangle in enumerate(model.rectangles):
         is_source = k == len(model.rectangles) - 1
@@ -47,10 +47,10 @@ def draw_bodies(axes: Axes, model: PointMass) -> None:
 
 
 def plot_energy_certificate(certificate: EnergyCertificate) -> Figure:
-    """Map of the largest certified speed over the floor.
+    """Plots a map of the largest speed from which the robot provably never collides.
 
-    White: not even rest is certified. The dotted ring is the follow distance,
-    the cross P at the scenario's start.
+    In white areas, not even a robot at rest is certified. The dotted ring is the follow
+    distance. The cross is the robot's control point at the start of the scenario.
     """
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     axes = figure.subplots()
@@ -79,7 +79,7 @@ def plot_energy_certificate(certificate: EnergyCertificate) -> Figure:
 
 
 def plot_certificate_trials(trials: CertificateTrials) -> Figure:
-    """Starts by outcome, over the region that is certified at rest."""
+    """Plots starts by outcome, over the region that is certified at rest."""
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     axes = figure.subplots()
     certificate = trials.certificate
@@ -120,7 +120,7 @@ def plot_certificate_trials(trials: CertificateTrials) -> Figure:
 
 
 def plot_energy_balance(balance: EnergyBalance) -> Figure:
-    """Energy, work of the velocity term and of D_r along one run."""
+    """Plots energy, and work of the velocity term and of D_r, along one run."""
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
     for energies, colour, label in (
@@ -148,7 +148,7 @@ def plot_energy_balance(balance: EnergyBalance) -> Figure:
 
 
 def plot_sos_region(region: SosRegion) -> Figure:
-    """The slice w = v of the region, beside what the energy certifies without lag."""
+    """Plots the region's slice w = v, and the region from energy without motor lag."""
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     axes = figure.subplots()
     model = region.model
@@ -184,7 +184,7 @@ def plot_sos_region(region: SosRegion) -> Figure:
 
 
 def plot_disturbance_bounds(bounds: DisturbanceBounds) -> Figure:
-    """Left: stretch by the source's speed. Right: certified time of an encounter."""
+    """Plots the stretch over the source's speed, and the certified encounter time."""
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
     source, obstacle = figure.subplots(1, 2)
     straight = [row for row in bounds.source if row.acceleration_m_s2 == 0.0]
@@ -219,6 +219,6 @@ def plot_disturbance_bounds(bounds: DisturbanceBounds) -> Figure:
 def _points(
     rows: Sequence[SourceBound | ObstacleBound], name: str
 ) -> tuple[list[float], list[float]]:
-    """Speeds and a field, of the rows that have it."""
+    """Speeds and values of a field, from the rows in which the field is not None."""
     found = [row for row in rows if getattr(row, name) is not None]
     return [row.speed_m_s for row in found], [getattr(row, name) for row in found]

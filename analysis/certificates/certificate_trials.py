@@ -1,4 +1,4 @@
-"""Simulated starts inside and outside a certified set."""
+"""Simulates starts inside and outside a certified set."""
 
 from __future__ import annotations
 
@@ -12,36 +12,35 @@ from analysis.certificates.energy_certificate import EnergyCertificate
 from analysis.models.point_mass import PointMassRuns
 from systems.framework.input_error import InputError
 
-#: Starts drawn at a time: the first batch depends on the seed alone.
+#: Number of starts per batch. The first batch depends only on the seed.
 BATCH = 20_000
-#: Batches at most: where hardly any start lies outside, not all that were asked
-#: for are found.
+#: Most batches. If hardly any start is outside, fewer starts than wanted are found.
 _MOST_BATCHES = 100
 
 
 @dataclass(frozen=True, eq=False)
 class CertificateTrials:
-    """Runs of the certificate's own model from random starts."""
+    """Simulations of the certificate's own model from random starts."""
 
     certificate: EnergyCertificate
-    """What is tried."""
+    """The tested certificate."""
     inside: PointMassRuns
     """Runs from certified starts."""
     outside: PointMassRuns
     """Runs from starts that are not certified."""
     certified_share: float
-    """Share of the drawn starts that is certified."""
+    """Share of the drawn starts that are certified."""
     energy_share: float
-    """Share that the energy alone certifies, without the clamp."""
+    """Share of the drawn starts that the energy alone certifies, without the clamp."""
 
     @property
     def inside_collisions(self) -> int:
-        """Must be 0."""
+        """Number of collisions from certified starts; must be 0."""
         return int(np.count_nonzero(self.inside.collided))
 
     @property
     def outside_collisions(self) -> int:
-        """Above 0 the certificate says something."""
+        """Number of collisions from starts that are not certified."""
         return int(np.count_nonzero(self.outside.collided))
 
     @property
@@ -53,17 +52,17 @@ class CertificateTrials:
 
     @property
     def ratio(self) -> float:
-        """Certified starts by starts that do not collide."""
+        """Share of certified starts over share of starts that do not collide."""
         return self.certified_share / self.safe_share
 
     @property
     def example(self) -> NDArray[np.float64] | None:
-        """(4,) the slowest start that collides, m and m/s; none: none does."""
+        """(4,) slowest start that collides, m and m/s; None if no start collides."""
         hit = self.outside.starts[self.outside.collided]
         return hit[np.argmin(np.hypot(*hit[:, 2:].T))] if len(hit) else None
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Converts the result to plain values for the JSON document."""
         rises = np.append(self.inside.energy_rises_j, self.outside.energy_rises_j)
         return {
             "inside_starts": len(self.inside.starts),
@@ -83,12 +82,15 @@ class CertificateTrials:
 def draw_starts(
     certificate: EnergyCertificate, count: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Starts at random: places uniform on the free floor, velocities in the disc.
+    """Draws random starts on the free floor.
+
+    Positions are uniform on the free floor. Velocities are uniform in the disc up to
+    the top speed.
 
     Args:
-        certificate: Gives the floor and the top speed.
-        count: Places drawn; those in contact are dropped.
-        rng: Source of random numbers.
+        certificate: Certificate with the floor and the top speed.
+        count: Number of drawn positions. Positions in contact are dropped.
+        rng: Generator of the random numbers.
 
     Returns:
         (n, 4) x, y, vx, vy, m and m/s; n is at most ``count``.
@@ -108,18 +110,19 @@ def draw_starts(
 def try_certificate(
     certificate: EnergyCertificate, *, starts: int = 300, duration_s: float = 40.0
 ) -> CertificateTrials:
-    """Simulates starts inside the certified set, and as many outside of it.
+    """Simulates certified initial states, and as many that are not certified.
 
     Args:
-        certificate: What to try.
-        starts: Starts inside, and outside as far as some are found.
-        duration_s: Simulated time of each, s.
+        certificate: Certificate to test.
+        starts: Number of certified states, and number of states that are not certified.
+            The second number may be smaller if hardly any such states exist.
+        duration_s: Simulated time per state, s.
 
     Returns:
-        How the runs ended, and which shares of the drawn starts are certified.
+        Results of the runs, and the certified shares of the drawn states.
 
     Raises:
-        InputError: There is nothing to try.
+        InputError: ``starts`` is below 1.
     """
     if starts < 1:
         raise InputError("starts", f"{starts} must be at least 1")

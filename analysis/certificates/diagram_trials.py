@@ -1,7 +1,8 @@
-"""Certified starts in the full diagram, which the certificate is not about.
+"""Simulates certified starts in the full diagram.
 
-The robot there is a rectangle 0.82 m wide that sees by cones, hears in bursts,
-ticks each 25 ms and has motor lag.
+The certificate does not apply to the full diagram. There, the robot is a rectangle 0.82
+m wide. Its sensors have conical beams, it hears bursts of sound, it has a control
+period of 25 ms, and its motors have a lag.
 """
 
 from __future__ import annotations
@@ -36,29 +37,32 @@ from systems.world.geometry import control_point, rectangle_clearance, rotate
 
 @dataclass(frozen=True, eq=False)
 class DiagramTrials:
-    """What the full diagram does from certified starts."""
+    """Results of the full diagram from certified starts."""
 
     starts: NDArray[np.float64]
-    """(n, 4) x, y of P in m, vx, vy in m/s; the robot looks along its velocity."""
+    """(n, 4) x, y of control point P, m, and vx, vy, m/s.
+
+    The robot faces along its velocity.
+    """
     causes: tuple[str, ...]
-    """How each run ended."""
+    """Cause of the end of each run."""
     mechanisms: tuple[str, ...]
-    """Where a collision came from: ahead, beside or behind; empty without."""
+    """Side of each collision: ahead, beside or behind; empty without a collision."""
     skipped: int
-    """Certified starts at which the rectangle stands on a body already."""
+    """Number of certified starts at which the rectangle already overlaps a body."""
 
     @property
     def collisions(self) -> int:
-        """Runs that ended in a collision."""
+        """Number of runs that ended in a collision."""
         return self.causes.count("collision")
 
     @property
     def interval(self) -> Interval:
-        """Of the collision rate, 95 %."""
+        """95 % interval of the collision rate."""
         return wilson_interval(self.collisions, len(self.causes))
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Converts the result to plain values for the JSON document."""
         rate = {"estimate": self.collisions / len(self.causes)}
         return {
             "runs": len(self.causes),
@@ -78,22 +82,22 @@ def try_diagram(
 ) -> DiagramTrials:
     """Runs the scenario's diagram from random certified starts.
 
-    Source and obstacles rest where they are at 0 s, as in the certificate. The
-    same random starts as of ``try_certificate``, less those at which the
-    rectangle stands on a body.
+    As in the certificate, source and obstacles rest where they are at 0 s. The starts
+    are those of ``try_certificate``, without starts at which the rectangle overlaps a
+    body.
 
     Args:
-        certificate: Where to start from.
-        starts: Runs.
-        hearing: ``ideal`` (bursts of exact positions), or ``audio`` at about a
-            second a run.
+        certificate: Certificate whose starts are used.
+        starts: Number of runs.
+        hearing: ``ideal`` for bursts of exact positions, or ``audio``. A run with
+            ``audio`` takes about a second.
 
     Returns:
-        Starts of P, and how each run ended.
+        Starts of control point P, and how each run ended.
 
     Raises:
-        InputError: No start is certified, the wheels can slip, or ``starts`` is
-            wrong.
+        InputError: Too few starts are certified, the wheels can slip, or ``starts`` is
+            below 1.
     """
     require_rolling(certificate.scenario.only.plant)
     if starts < 1:
@@ -110,7 +114,7 @@ def try_diagram(
 def _certified_starts(
     certificate: EnergyCertificate, scenario: Scenario, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """(n, 4) starts, (n, 3) poses, and how many were skipped."""
+    """Draws (n, 4) starts and their (n, 3) poses, and counts skipped starts."""
     rng = np.random.default_rng(scenario.seed)
     states = draw_starts(certificate, BATCH, rng)
     states = states[certificate.certified(states)]
@@ -136,7 +140,7 @@ def _certified_starts(
 
 
 def _pose(state: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
-    """Pose of a robot whose P is at the start and which looks along its velocity."""
+    """Pose of a robot with P at the start, facing along its velocity."""
     theta = math.atan2(state[3], state[2])
     offset = scenario.only.robot.control_point_m
     x, y = state[:2] - offset * np.array([math.cos(theta), math.sin(theta)])
@@ -146,7 +150,7 @@ def _pose(state: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]
 def _run(
     follower: SoundFollower, state: NDArray[np.float64], pose: NDArray[np.float64]
 ) -> tuple[str, str]:
-    """Cause, and the mechanism of a collision."""
+    """Runs one start, and returns the cause of its end and the side of a collision."""
     scenario, robot = follower.scenario, follower.scenario.only.robot
     simulator = make_simulator(follower)
     monitor = Monitor(follower)
@@ -176,7 +180,7 @@ def _run(
 def _mechanism(
     scenario: Scenario, pose: NDArray[np.float64], collision: Collision
 ) -> str:
-    """Where the contact lies: in the cones' fan before P, beside it, or behind."""
+    """Side of a contact: in the beams ahead of P, beside the robot, or behind."""
     body = scenario.bodies()[collision.object].rectangle(collision.time)
     point = touching_point(robot_rectangle(pose, scenario.only.robot), body)
     p_WP = control_point(pose, scenario.only.robot.control_point_m)

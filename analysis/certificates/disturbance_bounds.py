@@ -1,20 +1,29 @@
-"""Bounds for a moving source and a moving obstacle, in the point-mass model.
+"""Bounds for a moving source and for a moving obstacle, in the point-mass model.
 
-**Source.** With stretch x = |p - p_S| - d_f, relative velocity w = v - v_S and n
-from the source to P,
+The robot is a mass M at its control point p, with velocity v. K_r and D_r are stiffness
+and damping of the attraction to the source at p_S. d_f is the follow distance.
+
+**Source.** Let x = |p - p_S| - d_f be the stretch, w = v - v_S the relative velocity,
+and n the unit vector from the source to p. The Lyapunov function is
 
     W = M |w|^2 / 2 + K_r x^2 / 2 + e M x (n . w)
 
-falls wherever z' Q z > d (|w| + e |x|), z = (|x|, |w|), with d = D_r |v_S| + M
-|a_S|: input-to-state stability, and an ultimate bound of x. The turning of n adds
-at most e M |w_t|^2. The clamp on |v| only helps while e |x| <= v_max - |v_S|.
+With z = (|x|, |w|), W decreases wherever
 
-**Obstacle.** In the axes of an obstacle that moves at v_O, with L the velocity
-term's injection (``analysis.nonlinear.velocity_passivity``), the energy V obeys
+    z' Q z > d (|w| + e |x|),   d = D_r |v_S| + M |a_S|
+
+The stretch is therefore input-to-state stable and ultimately bounded. The rotation of n
+adds at most e M |w_t|^2. The bound requires e |x| <= v_max - |v_S|. The clamp of |v| to
+v_max then does not increase W.
+
+**Obstacle.** The obstacle moves at v_O, and the axes move with the obstacle. The
+velocity term of the law injects at most L |v|^2
+(``analysis.nonlinear.velocity_passivity``). The energy V then obeys
 
     V' <= sqrt(2 K_r V) v_O + D_r^2 v_O^2 / (4 (D_r - L))
 
-as long as v_O <= v_max. An encounter is certified until V may reach U(contact).
+as long as v_O <= v_max. An encounter is certified up to the time at which V may reach
+U(contact), the energy of the repulsion at contact.
 """
 
 from __future__ import annotations
@@ -33,78 +42,87 @@ from systems.world.geometry import beyond_each
 
 #: Speeds of the tables, m/s.
 SPEEDS_M_S = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-#: Step and length of the simulated runs, s.
+# Step, and length of the runs behind a source, s.
 _STEP_S, _FOLLOW_S = 0.02, 60.0
-#: Side of the obstacle of the encounters, m.
+# Side of the square obstacle in the encounters, m.
 _SIDE_M = 0.1
 
 
 @dataclass(frozen=True)
 class SourceBound:
-    """Following a source of bounded speed and acceleration."""
+    """Bounds of the stretch x while the robot follows a source.
+
+    The stretch is the distance from the source to the robot's control point minus the
+    follow distance.
+    """
 
     speed_m_s: float
-    """Largest |v_S|, m/s."""
+    """Largest speed |v_S| of the source, m/s."""
     acceleration_m_s2: float
-    """Largest |a_S|, m/s^2."""
+    """Largest acceleration |a_S| of the source, m/s^2."""
     bound_m: float | None
-    """|x| from rest at the follow point on, m; none: no W of this form bounds it."""
+    """Proved bound of the stretch |x|, m; None if no bound can be proved.
+
+    The robot starts at rest at the follow distance.
+    """
     steady_m: float
-    """D_r v_S / K_r: the offset at constant speed, m."""
+    """Stretch D_r v_S / K_r at constant speed, m."""
     linear_peak_m: float
-    """Largest |x| along a line for any force up to d, without the clamp, m."""
+    """Largest |x| along a line for any force up to d, without the speed clamp, m."""
     simulated_m: float | None
-    """Largest |x| after a source that moves off at constant speed, m; none:
-    the robot cannot keep up."""
+    """Largest simulated stretch |x| after the source starts at constant speed, m.
+
+    None means that the robot cannot keep up with the source.
+    """
 
 
 @dataclass(frozen=True)
 class ObstacleBound:
-    """An obstacle that comes at a robot resting at its follow point."""
+    """Bound for an obstacle that moves toward a robot at rest at its follow point."""
 
     speed_m_s: float
-    """v_O, m/s."""
+    """Speed v_O of the obstacle, m/s."""
     certified_s: float
-    """No contact for so long after it comes within reach, s."""
+    """Time without contact after the obstacle comes within reach, s."""
     encounter_s: float
-    """What it takes to pass through the reach, s."""
+    """Time that the obstacle takes to pass through the reach, s."""
     simulated_contact_s: float | None
-    """Earliest contact of the simulated encounters, s; none: no contact."""
+    """Earliest contact in the simulated encounters, s; None without contact."""
     runs: int
-    """Simulated encounters."""
+    """Number of simulated encounters."""
 
     @property
     def certified(self) -> bool:
-        """Whether the whole encounter is."""
+        """Whether the whole encounter is certified."""
         return self.certified_s >= self.encounter_s
 
 
 @dataclass(frozen=True)
 class DisturbanceBounds:
-    """Both tables."""
+    """Bounds for a moving source and for a moving obstacle."""
 
     law: str
-    """The scenario's law."""
+    """Name of the scenario's law."""
     source: tuple[SourceBound, ...]
-    """By speed, straight and through the scenario's corners."""
+    """Two rows per speed: along a straight line, and in the scenario's corners."""
     obstacle: tuple[ObstacleBound, ...]
-    """By speed; empty where the velocity term takes all of D_r."""
+    """One row per speed; empty if the velocity term uses up all of D_r."""
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Converts the bounds to plain values for the JSON document."""
         rows = [vars(row) | {"certified": row.certified} for row in self.obstacle]
         return vars(self) | {"obstacle": rows}
 
 
 def disturbance_bounds(scenario: Scenario, *, runs: int = 200) -> DisturbanceBounds:
-    """Bounds beside simulation.
+    """Computes bounds for a moving source and a moving obstacle, and simulates both.
 
     Args:
-        scenario: Gains, law and the source's corner radius.
-        runs: Simulated encounters a speed.
+        scenario: Scenario with the gains, the law and the source's corner radius.
+        runs: Number of simulated encounters with an obstacle per speed.
 
     Returns:
-        A row a speed below the top speed, for the source and for the obstacle.
+        Bounds and simulation results, for several speeds below the top speed.
 
     Raises:
         InputError: The law is not known.
@@ -136,16 +154,19 @@ def source_bound(
     *,
     simulate: bool = True,
 ) -> SourceBound:
-    """The bound of the stretch, by the best weight e of a list.
+    """Computes a bound of the stretch while the robot follows a source.
+
+    The stretch is the distance to the source minus the follow distance. The bound uses
+    the best weight e from a list (see the module docstring).
 
     Args:
-        model: Gains.
-        speed: Largest |v_S|, m/s.
-        acceleration: Largest |a_S|, m/s^2.
-        simulate: Whether to add a run at constant speed.
+        model: Point-mass model with the gains.
+        speed: Largest speed |v_S| of the source, m/s.
+        acceleration: Largest acceleration |a_S| of the source, m/s^2.
+        simulate: Whether to simulate a source at constant speed, too.
 
     Returns:
-        Bound, offsets and peaks of the stretch, m.
+        Bounds and simulated peak of the stretch, m.
     """
     disturbance = model.damping_n_s_m * speed + model.mass_kg * acceleration
     bounds = [
@@ -164,24 +185,24 @@ def source_bound(
 
 
 def _largest_weight(model: PointMass) -> float:
-    """Below it both W and its decrease are definite."""
+    """Largest weight e for which W and its decrease are positive definite."""
     M, K, D = model.mass_kg, model.stiffness_n_m, model.damping_n_s_m
     # (D - e M) e K > (e D / 2)^2, and e^2 M < K.
     return min(D * K / (M * K + 0.25 * D * D), math.sqrt(K / M))
 
 
 def _ultimate_bound(model: PointMass, speed: float, d: float, e: float) -> float:
-    """Bound of |x| from rest at the follow point on, m; infinite: e proves none."""
+    """Bound of |x| from rest at the follow point, m; inf if e proves no bound."""
     M, K, D = model.mass_kg, model.stiffness_n_m, model.damping_n_s_m
     Q = np.array([[e * K, -0.5 * e * D], [-0.5 * e * D, D - e * M]])
     b = d * np.array([e, 1.0])
-    # z' Q z = b' z is an ellipse about Q^-1 b / 2 through 0; W is greatest on it.
+    # z' Q z = b' z is an ellipse through 0 with center Q^-1 b / 2. W is largest on it.
     centre = 0.5 * np.linalg.solve(Q, b)
     radius = math.sqrt(max(float(centre @ Q @ centre), 0.0))
     root = np.linalg.cholesky(np.linalg.inv(Q))
     angle = np.linspace(0.0, 2.0 * np.pi, 721)
     ring = centre[:, None] + radius * root @ np.array([np.cos(angle), np.sin(angle)])
-    # Chords between neighbours cut the ellipse short by at most this factor.
+    # Chords between neighboring points shorten the ellipse by at most this factor.
     x, w = np.maximum(ring, 0.0) / math.cos(math.pi / 720.0)
     level = float(np.max(0.5 * K * x**2 + 0.5 * M * w**2 + e * M * x * w))
     level = max(level, 0.5 * M * speed**2)
@@ -190,7 +211,7 @@ def _ultimate_bound(model: PointMass, speed: float, d: float, e: float) -> float
 
 
 def _peak_gain(model: PointMass) -> float:
-    """Integral of |impulse response| of 1/(M s^2 + D_r s + K_r), m/N."""
+    """Integral of |impulse response| of 1/(M s^2 + D_r s + K_r) over time, m/N."""
     M, K, D = model.mass_kg, model.stiffness_n_m, model.damping_n_s_m
     ratio = D / (2.0 * math.sqrt(K * M))
     if ratio >= 1.0:
@@ -200,7 +221,7 @@ def _peak_gain(model: PointMass) -> float:
 
 
 def _simulated_stretch(model: PointMass, speed: float) -> float | None:
-    """Largest |x| of a run behind a source that moves off, without obstacles."""
+    """Largest |x| in a run behind a source that starts to move, without obstacles."""
     M, K, D = model.mass_kg, model.stiffness_n_m, model.damping_n_s_m
     x = v = largest = 0.0
     for _ in range(round(_FOLLOW_S / _STEP_S)):
@@ -235,7 +256,7 @@ def _obstacle_bound(
 
 
 def _reach(model: PointMass) -> float:
-    """Distance beyond which the repulsion at rest has 1 % of its energy left, m."""
+    """Distance up to which the repulsion at rest has over 1 % of its energy, m."""
     energies = model.law.energies_j
     far = np.flatnonzero(energies > 0.01 * energies[0])
     return float(model.law.distances_m[far[-1]]) if len(far) else model.law.range_m
@@ -244,13 +265,13 @@ def _reach(model: PointMass) -> float:
 def _certified_time(
     model: PointMass, speed: float, spare: float, contact: float
 ) -> float:
-    """How long V, from rest at the follow point, stays below U(contact), s."""
+    """Time for which V stays below U(contact), from rest at the follow point, s."""
     barrier = float(model.law.energy(contact))
     K, D = model.stiffness_n_m, model.damping_n_s_m
     start = 0.5 * model.mass_kg * speed**2 + float(model.law.energy(_reach(model)))
     if start >= barrier:
         return 0.0
-    # Time along V' = its bound, by the midpoint rule over sqrt(V).
+    # Integrates the time with V' at its bound, by the midpoint rule over sqrt(V).
     y = np.linspace(math.sqrt(start), math.sqrt(barrier), 4001)
     middle = 0.5 * (y[1:] + y[:-1])
     rate = math.sqrt(0.5 * K) * speed + D * D * speed**2 / (8.0 * spare * middle)
@@ -265,21 +286,23 @@ def encounter_contact_time(
     reach_m: float,
     duration_s: float,
 ) -> NDArray[np.float64]:
-    """Times of contact with a box that comes from ahead.
+    """Simulates boxes that approach a robot, and returns the times of contact.
 
-    P rests at its follow point, the source behind it; the box moves towards P
-    and on, its centre off the line by the given distances.
+    The robot's control point P starts at rest at the follow distance from the source,
+    which is behind the robot. The box moves toward P at constant speed. The path of the
+    box passes P at the given lateral offset.
 
     Args:
-        model: Gains and law; s is left out.
-        speed: Of the box, m/s.
-        contact_m: P nearer to the box is contact, m.
-        offsets_m: (n,) distances of the box's path from P, m.
+        model: Point-mass model with the gains and the law. The law's force is that at
+            rest.
+        speed: Speed of the box, m/s.
+        contact_m: Distance from P to the box that counts as contact, m.
+        offsets_m: (n,) lateral offsets of the box's path from P, m.
         reach_m: Distance of the box from P at the start, m.
         duration_s: Simulated time, s.
 
     Returns:
-        (n,) s from the start; infinity: none.
+        (n,) times of contact since the start, s; infinite without contact.
     """
     count = len(offsets_m)
     p = np.zeros((count, 2))

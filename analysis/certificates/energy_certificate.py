@@ -1,20 +1,28 @@
-"""Starts that provably never collide: the energy certificate.
+"""The energy certificate: initial states that provably never collide.
 
-In the point-mass model (``analysis.models.point_mass``)
+In the point-mass model (``analysis.models.point_mass``), the robot is a mass M at the
+control point p with velocity v. Its energy is
 
     V = M |v|^2 / 2 + K_r (|p_S - p| - d_f)^2 / 2 + U(c)
 
-cannot grow while the velocity term is covered by D_r
-(``analysis.nonlinear.velocity_passivity``); the clamp on |v| only takes energy. For
-each body let E(p) be the lowest level over which any path from p to contact with it
-must climb. A start with V < E(p) never touches it. Nor does one whose every
-path to contact crosses places where even the top speed is too little, M
-v_max^2 / 2 < E - W, W the potential energy there: the clamp keeps the kinetic
-energy below that. A start is certified if this holds for every body.
+The second term is the attraction to the follow distance d_f from the source at p_S.
+U(c) is the energy of the repulsion at distance c from the bodies. V cannot grow if the
+damping D_r covers the velocity term of the law
+(``analysis.nonlinear.velocity_passivity``). The clamp of |v| to v_max only removes
+energy.
 
-E is found on a grid, from bounds of W over whole cells: distances from a
-source and from a body change by no more than P moves, and U falls with c. So
-the result holds between the grid's points as well.
+For each body, E(p) is the lowest energy level over which any path from p to contact
+with the body must climb. Each of two conditions excludes contact with a body:
+
+- The energy is too low: V < E(p).
+- Every path to contact crosses a place where even the top speed does not suffice. There
+  M v_max^2 / 2 < E - W, with W the potential energy at that place.
+
+An initial state is certified if one of the conditions holds for each body.
+
+E is computed on a grid, from bounds of W over whole cells. The distances from the
+source and from a body change by no more than p moves, and U decreases with c. The
+result therefore also holds between the grid points.
 """
 
 from __future__ import annotations
@@ -37,63 +45,67 @@ from analysis.nonlinear.velocity_passivity import (
 from diagrams import Scenario
 from systems.framework.input_error import InputError
 
-#: Floor round start, source and obstacles that is looked at, m.
+#: Width of the analyzed floor around start, source and obstacles, m.
 MARGIN_M = 1.5
-#: Cells of the grid at most; more take minutes.
+#: Most cells of the grid. More cells take minutes.
 MOST_CELLS = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class EnergyCertificate:
-    """Levels on a grid of cells, and what follows from them."""
+    """Result of the energy certificate: escape energies and certified cells on a grid.
+
+    The escape energy E of a cell and a body is the least energy that a path from the
+    cell to contact with the body needs. P is the robot's control point.
+    """
 
     scenario: Scenario
-    """Whose start, world and law are meant."""
+    """Scenario with the start, the world and the law."""
     model: PointMass
-    """What the certificate is about."""
+    """Point-mass model that the certificate applies to."""
     passivity: VelocityTermPassivity
-    """Whether the velocity term is covered."""
+    """Whether damping covers the velocity term."""
     contact_m: float
-    """P nearer than this to a body is contact, m."""
+    """Distance from P to a body below which P is in contact, m."""
     cell_m: float
     """Side of a cell, m."""
     x_m: NDArray[np.float64]
-    """(nx,) centres of the cells, m."""
+    """(nx,) x of the cell centers, m."""
     y_m: NDArray[np.float64]
-    """(ny,) centres of the cells, m."""
+    """(ny,) y of the cell centers, m."""
     potential_j: NDArray[np.float64]
     """(nx, ny) upper bound of the potential energy in each cell, J."""
     free: NDArray[np.bool_]
-    """(nx, ny) cells that are not wholly in contact."""
+    """(nx, ny) whether a cell is not completely in contact."""
     escape_j: NDArray[np.float64]
-    """(bodies, nx, ny) lower bound of E, J; what it is in contact means nothing."""
+    """(bodies, nx, ny) lower bound of E, J; meaningless for cells in contact."""
     any_speed: NDArray[np.bool_]
-    """(bodies, nx, ny) cells from which no allowed speed leads to contact."""
+    """(bodies, nx, ny) whether no allowed speed leads from a cell to contact."""
 
     @property
     def term(self) -> VelocityTermModel:
-        """The velocity term that the certificate covers."""
+        """Name of the velocity term that the certificate covers."""
         if not self.passivity.covered:
             return "none"
         return "printed" if self.passivity.velocity_term == "printed" else "closing"
 
     @property
     def contact_energy_j(self) -> float:
-        """Least energy at contact, J: below it no start collides."""
+        """Least energy at contact, J. States with less energy never collide."""
         return float(self.escape_j[:, self.free].min())
 
     @property
     def rest_share(self) -> float:
-        """Share of the free floor from which rest is certified."""
+        """Share of the free floor with starts certified at rest."""
         return float(np.mean(np.isfinite(self.largest_speed()[self.free])))
 
     @property
     def any_speed_share(self) -> float:
-        """Share of the free floor certified up to the top speed."""
+        """Share of the free floor with starts certified at any allowed speed."""
         return float(np.mean(np.all(self.any_speed[:, self.free], axis=0)))
 
     def largest_speed(self) -> NDArray[np.float64]:
-        """(nx, ny) largest certified speed, m/s; NaN: not even rest."""
+        """(nx, ny) largest certified speed, m/s; NaN if not even rest is certified."""
         top = self.model.top_speed_m_s
         spare = self.escape_j - self.potential_j
         speed = np.sqrt(2.0 * np.maximum(spare, 0.0) / self.model.mass_kg)
@@ -103,14 +115,16 @@ class EnergyCertificate:
         return np.minimum(slowest, top)
 
     def certified(self, states: ArrayLike, *, clamp: bool = True) -> NDArray[np.bool_]:
-        """Whether starts never collide, on the grid or not at all.
+        """Checks whether initial states are certified never to collide.
+
+        States outside the grid, in contact, or above the top speed are not certified.
 
         Args:
-            states: (n, 4) x, y, vx, vy, m and m/s.
-            clamp: Whether the limit on |v| may be used as well as the energy.
+            states: (n, 4) x, y, vx, vy of the robot's control point, m and m/s.
+            clamp: Whether the proof may use the speed limit as well as the energy.
 
         Returns:
-            (n,) False off the grid, in contact, and above the top speed.
+            (n,) True for certified states.
         """
         states = np.asarray(states, dtype=float)
         i = np.floor((states[:, 0] - self.x_m[0]) / self.cell_m + 0.5).astype(int)
@@ -127,13 +141,13 @@ class EnergyCertificate:
 
     @property
     def start_certified(self) -> bool | None:
-        """Whether the scenario's own start is; None where bodies move."""
+        """Whether the scenario's own start is certified; None if bodies move."""
         if moving_bodies(self.scenario):
             return None
         return bool(self.certified([[*self.model.p_WP, 0.0, 0.0]])[0])
 
     def to_dict(self) -> dict[str, Any]:
-        """An entry of ``certificates`` in the JSON document."""
+        """Converts the result to an entry of ``certificates`` in the JSON document."""
         return {
             "kind": "energy",
             "law": self.model.law.name,
@@ -159,22 +173,23 @@ def certify_energy(
     contact_m: float | None = None,
     velocity_term: str | None = None,
 ) -> EnergyCertificate:
-    """Finds the certified set of a scenario's point-mass model.
+    """Computes the set of initial states that provably never collide.
+
+    The proof applies to the point-mass model of the scenario.
 
     Args:
-        scenario: Bodies are taken to rest where they are at 0 s.
-        cell_m: Side of a cell, m; finer cells certify more.
-        contact_m: Contact distance of P, m; none: the sensors' least range.
-        velocity_term: Another term than the scenario's.
+        scenario: Scenario. All bodies are assumed to rest where they are at 0 s.
+        cell_m: Side of a grid cell, m. Finer cells certify more states.
+        contact_m: Distance of the robot's control point from a body that counts as
+            contact, m. None: the least range of the sensors.
+        velocity_term: Velocity term of the law. None: that of the scenario.
 
     Returns:
-        Levels on a grid of cells, J, and the cells from which no speed leads to
-        contact.
+        The certificate.
 
     Raises:
-        InputError: The law is not known.
-        InputError: The law has no radial force, it pulls somewhere, or an
-            argument is wrong.
+        InputError: The law is not known, has no radial force, or attracts at some
+            distance; or an argument is wrong.
     """
     model = point_mass(scenario)
     if contact_m is None:
@@ -199,7 +214,7 @@ def certify_energy(
     )
     border = border_cells(blocked)
     lower[border] = 0.0
-    # A margin for the tables of the law and for rounding.
+    # The 1e-6 J are a margin for the tables of the law and for rounding.
     escape = np.array([climb(lower, seed, blocked) for seed in seeds]) - 1e-6
     strong = (escape - upper > model.top_kinetic_energy_j) & ~border
     reached = [
@@ -239,6 +254,6 @@ def _check(model: PointMass, cell_m: float, contact_m: float) -> None:
 
 
 def _workspace(model: PointMass) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower left and upper right corner of the floor that is looked at, m."""
+    """Lower left and upper right corner of the analyzed floor, m."""
     points = np.concatenate([model.rectangles[:, :2], [model.p_WP]])
     return points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M

@@ -1,6 +1,6 @@
-"""Levels over which paths to contact must climb, on a grid of cells.
+"""Computes the energy levels that paths to contact must reach, on a grid of cells.
 
-``analysis.certificates.energy_certificate`` says what they prove.
+``analysis.certificates.energy_certificate`` explains what these levels prove.
 """
 
 from __future__ import annotations
@@ -19,26 +19,29 @@ from systems.framework.compiling import njit
 def cell_bounds(
     model: PointMass, points: NDArray[np.float64], cell_m: float, contact_m: float
 ) -> tuple[NDArray[Any], ...]:
-    """Per cell: least and largest potential, energy at contact, inside contact.
-
-    The third has a row a body; it is infinite where the cell holds no point of
-    contact with it.
+    """Computes bounds of the potential energy in grid cells, and cells in contact.
 
     Args:
-        model: Bodies and potential.
-        points: (n, 2) centres of square cells, m.
+        model: Point-mass model with the bodies and the potential.
+        points: (n, 2) centers of square cells, m.
         cell_m: Side of the cells, m.
-        contact_m: P nearer to a body than this is in contact, m.
+        contact_m: Distance from the robot's control point to a body that counts as
+            contact, m.
 
     Returns:
-        Least and largest potential (n,), J, energy at contact (bodies, n), J, and (n,)
-        whether all of the cell is in contact.
+        Four arrays:
+
+        1. (n,) least potential in each cell, J.
+        2. (n,) largest potential in each cell, J.
+        3. (bodies, n) least energy at contact with each body, J. If a cell contains no
+           point of contact with the body, the energy is infinite.
+        4. (n,) whether the whole cell is in contact.
     """
     radius = cell_m / math.sqrt(2.0)
     r = np.hypot(*(points - model.p_WS).T)
     distances = model.distances(points)
     stretch = np.abs(r - model.follow_distance_m)
-    # At the source itself |p_S - p| cannot shrink by the whole radius.
+    # Near the source, |p_S - p| cannot decrease by the whole radius.
     nearest = model.follow_distance_m + np.maximum(stretch - radius, 0.0)
     farthest = model.follow_distance_m + stretch + radius
     pull_low = model.attraction_energy(nearest)
@@ -56,7 +59,7 @@ def cell_bounds(
 
 
 def border_cells(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The cells along the border: a path may leave the grid and return."""
+    """Marks the cells along the border, where paths may leave the grid and return."""
     border = np.ones(cells.shape, dtype=bool)
     border[1:-1, 1:-1] = False
     return border
@@ -66,19 +69,19 @@ def border_cells(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def climb(
     lower: NDArray[np.float64], seeds: NDArray[np.float64], blocked: NDArray[np.bool_]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Lowest level over which a path from each cell to contact must climb.
+    """Computes the lowest energy over which paths from each cell to contact must climb.
 
-    Dijkstra's algorithm with the largest instead of the sum: cells are settled
-    in the order of their levels; paths go to all eight neighbours.
+    The algorithm is Dijkstra's, with the largest energy along a path instead of the
+    sum. Cells are settled in ascending order of their levels. Paths may go to all eight
+    neighbors of a cell.
 
     Args:
         lower: (nx, ny) least potential in each cell, J.
-        seeds: (nx, ny) energy at contact within the cell, J; infinite where there is
-            none.
-        blocked: (nx, ny) cells wholly in contact, which no path crosses.
+        seeds: (nx, ny) energy at contact within the cell, J; infinite without contact.
+        blocked: (nx, ny) cells that are completely in contact. No path crosses them.
 
     Returns:
-        (nx, ny) J; infinite where no path leads to contact.
+        (nx, ny) levels, J; infinite if no path leads to contact.
     """
     nx, ny = lower.shape
     level = np.full((nx, ny), np.inf)

@@ -1,7 +1,7 @@
 """Polynomials and quadratic forms in rational arithmetic.
 
-Enough to check a sum of squares without trusting any solver or rounding: a
-float is a rational number, and sums and products of those are exact.
+The module checks sums of squares without trusting a solver or rounded arithmetic. A
+float is a rational number, and sums and products of rational numbers are exact.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
-#: Exponents of the variables.
+#: Exponents of the variables in a monomial.
 Exponents = tuple[int, ...]
 
 
@@ -17,7 +17,8 @@ class Polynomial:
     """A polynomial with rational coefficients.
 
     Args:
-        terms: Coefficient by exponents; floats are taken as they are stored.
+        terms: Coefficients by exponents of the variables. Floats keep their exact
+            value.
     """
 
     def __init__(self, terms: dict[Exponents, Fraction | float | int]) -> None:
@@ -46,7 +47,7 @@ class Polynomial:
         return Polynomial(out)
 
     def derivative(self, variable: int) -> Polynomial:
-        """With respect to a variable, counted from 0."""
+        """Derivative with respect to a variable, counted from 0."""
         out: dict[Exponents, Fraction | float | int] = {}
         for m, c in self.terms.items():
             if m[variable]:
@@ -68,14 +69,14 @@ class Polynomial:
 def gram_polynomial(
     basis: Sequence[Exponents], gram: Sequence[Sequence[Fraction]]
 ) -> Polynomial:
-    """z' G z of monomials z.
+    """Computes the polynomial z' G z for monomials z and a matrix G.
 
     Args:
         basis: The k monomials z, as exponents of the variables.
-        gram: k rows of k rational numbers, G.
+        gram: The matrix G, as k rows of k rational numbers.
 
     Returns:
-        The sum of all products, as a polynomial with rational coefficients.
+        The polynomial, with rational coefficients.
     """
     out: dict[Exponents, Fraction | float | int] = {}
     for i, m in enumerate(basis):
@@ -88,18 +89,19 @@ def gram_polynomial(
 def match_gram(
     target: Polynomial, basis: Sequence[Exponents], gram: Iterable[Iterable[float]]
 ) -> list[list[Fraction]] | None:
-    """The Gram matrix near ``gram`` whose z' G z is exactly the target.
+    """Corrects a Gram matrix G so that z' G z equals a target exactly.
 
-    What is missing in a coefficient is spread evenly over the entries that make
-    it.
+    The error of each coefficient is spread evenly over the entries of G that contribute
+    to the coefficient.
 
     Args:
-        target: The polynomial to be made.
+        target: The polynomial to represent.
         basis: The k monomials z, as exponents of the variables.
-        gram: k rows of k floats; only their symmetric part counts.
+        gram: Approximate G, as k rows of k floats. Only the symmetric part counts.
 
     Returns:
-        Symmetric rows, or None where the basis cannot make the target.
+        Rows of the corrected symmetric matrix. None if the basis cannot represent the
+        target.
     """
     rows = [[Fraction(value) for value in row] for row in gram]
     size = len(basis)
@@ -120,7 +122,7 @@ def match_gram(
 
 
 def is_positive_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
-    """Whether a symmetric rational matrix is, by exact elimination."""
+    """Whether a symmetric rational matrix is positive definite, by elimination."""
     work = [list(row) for row in rows]
     size = len(work)
     for k in range(size):

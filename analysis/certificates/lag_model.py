@@ -1,11 +1,12 @@
-"""Head-on approach with motor lag, as a polynomial model.
+"""Polynomial model of a robot with motor lag that approaches an obstacle head-on.
 
-With x = c - c_eq, v of the virtual mass and w of P:
+The states are the distance error x = c - c_eq from the equilibrium distance, the
+velocity v of the virtual mass M, and the velocity w of the robot's control point:
 
     x' = w,   M v' = -h(x) x - D_r v,   lag w' = v - w
 
-h is the law's secant stiffness at rest: a polynomial that stays within an error
-of the law on a domain of x.
+h is a polynomial that approximates the law's secant stiffness at rest. The error of h
+is bounded on a domain of x.
 """
 
 from __future__ import annotations
@@ -20,35 +21,39 @@ from analysis.certificates.exact_polynomials import Exponents, Polynomial
 from analysis.laws.head_on import HeadOn, head_on
 from diagrams import Scenario
 
-#: Degree of h, and how far it may be off, as a share of h(0).
+# Degree of the polynomial h, and largest error of h as a share of h(0).
 _DEGREE, _TOLERANCE = 4, 0.01
-#: Farthest that the domain reaches beyond the equilibrium, m.
+# Largest extent of the domain beyond the equilibrium, m.
 _FARTHEST_M = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class LagModel:
-    """The polynomial model and its domain."""
+    """Polynomial model of a head-on approach, valid on a domain of x.
+
+    The states are the distance error x = c - c_eq, the velocity v of the virtual mass,
+    and the velocity w of the robot's control point. h(x) is the stiffness.
+    """
 
     contact: HeadOn
-    """The approach."""
+    """The head-on approach without motor lag."""
     lag_s: float
     """Time constant of the motors, s."""
     domain_m: tuple[float, float]
     """Least and largest x = c - c_eq, m."""
     coefficients: NDArray[np.float64]
-    """(degree + 1,) of h in x / scale, N/m."""
+    """(degree + 1,) coefficients of h as a polynomial of x / scale, N/m."""
     error_n_m: float
-    """Largest |h of the law - h| on the domain, N/m."""
+    """Largest error of h on the domain, N/m."""
 
     @property
     def scales(self) -> NDArray[np.float64]:
-        """(3,) y = (x, v, w) / scales, m and m/s."""
+        """(3,) scales of the scaled state y = (x, v, w) / scales, m and m/s."""
         top = self.contact.scenario.only.robot.top_speed_m_s
         return np.array([max(map(abs, self.domain_m)), top, top])
 
     def rates(self, sign: float) -> list[Polynomial]:
-        """y' as polynomials of y, with h off by ``sign`` times its error."""
+        """Polynomials y' of y, with ``sign`` times the error of h added to h."""
         scenario = self.contact.scenario
         mass, damping = (
             scenario.only.robot.mass_kg,
@@ -70,17 +75,19 @@ class LagModel:
     def simulate(
         self, starts: NDArray[np.float64], *, contact_m: float, duration_s: float = 40.0
     ) -> NDArray[np.bool_]:
-        """Whether starts touch, by the law itself.
+        """Simulates head-on approaches with the original law, and detects contacts.
 
-        Runge-Kutta with a tenth of the lag; the clamp acts on v.
+        The Runge-Kutta step is 0.4 times the motor lag, but at most 20 ms. The velocity
+        v of the virtual mass is limited to the top speed.
 
         Args:
-            starts: (n, 3) x = c - c_eq, m, v and w, m/s.
-            contact_m: P nearer to the face is contact, m.
+            starts: (n, 3) distance error x, m, velocity v of the virtual mass, m/s, and
+                velocity w of the control point, m/s.
+            contact_m: Distance from the obstacle that counts as contact, m.
             duration_s: Simulated time, s.
 
         Returns:
-            (n,) True where contact was made within that time.
+            (n,) True if contact was made within that time.
         """
         scenario, law = self.contact.scenario, self.contact.law
         mass, damping = (
@@ -116,14 +123,15 @@ class LagModel:
 
 
 def lag_model(scenario: Scenario, *, to_go_m: float | None = None) -> LagModel:
-    """The polynomial model on the widest domain that it fits.
+    """Computes the polynomial model of a head-on approach on the largest domain.
 
     Args:
-        scenario: Law, gains and motor lag.
-        to_go_m: See ``head_on``, m.
+        scenario: Scenario with the law, gains and motor lag.
+        to_go_m: Distance from the obstacle's face to the follow point behind it, m.
+            None: chosen by ``head_on``.
 
     Returns:
-        The model; its h is off by at most 1 % of h at the equilibrium.
+        The model. The error of its stiffness h is at most 1 % of h at the equilibrium.
 
     Raises:
         InputError: The law is not known.
@@ -136,7 +144,7 @@ def lag_model(scenario: Scenario, *, to_go_m: float | None = None) -> LagModel:
         coefficients, error = _fit(contact, (near, far))
         if error <= _TOLERANCE * abs(coefficients[0]):
             break
-        # The side where the law is farther off gives way.
+        # Shortens the domain on the side with the larger error.
         _, far_error = _fit(contact, (0.5 * near, far))
         _, near_error = _fit(contact, (near, 0.5 * far))
         if far_error >= near_error:
@@ -151,7 +159,7 @@ def lag_model(scenario: Scenario, *, to_go_m: float | None = None) -> LagModel:
 def _fit(
     contact: HeadOn, domain: tuple[float, float]
 ) -> tuple[NDArray[np.float64], float]:
-    """Coefficients of h in x / scale, and how far the law is off, N/m."""
+    """Fits the coefficients of h in x / scale, and bounds the error of h, N/m."""
     x = np.arange(domain[0], domain[1], 2e-4)
     x = x[np.abs(x) > 1e-3]
     c = contact.equilibrium_m + x
@@ -163,7 +171,7 @@ def _fit(
         x / scale, h, _DEGREE, domain=[-1.0, 1.0], window=[-1.0, 1.0]
     )
     miss = h - fitted(x / scale)
-    # Centred, and with a margin for what lies between the points.
+    # Centers the error, and adds a margin for values between the points.
     middle = 0.5 * (miss.max() + miss.min())
     coefficients = np.array(fitted.coef, dtype=float)
     coefficients[0] += middle

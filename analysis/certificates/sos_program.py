@@ -1,8 +1,10 @@
-"""The sum-of-squares programs of ``analysis.certificates.sos_region``, and their proof.
+"""Sum-of-squares programs that find and prove a region of attraction.
 
-For both signs of the error of h, with y the scaled state and V = y' P y,
+``analysis.certificates.sos_region`` uses the programs. The candidate Lyapunov function
+is V = y' P y, with the scaled state y. The stiffness h of the model has a bounded
+error. For both signs of the error, the programs require a multiplier sigma such that
 
-    -V' - sigma (1 - V) is a sum of squares, sigma a sum of squares.
+    -V' - sigma (1 - V) is a sum of squares, and sigma is a sum of squares.
 """
 
 from __future__ import annotations
@@ -33,27 +35,31 @@ from analysis.certificates.exact_polynomials import (
 from analysis.certificates.lag_model import LagModel
 from systems.framework.input_error import InputError
 
-#: The first region is the largest of the linear model's, shrunk by the least of
-#: these that has multipliers.
+# Factors that shrink the largest region of the linear model. The first region uses the
+# least factor for which multipliers exist.
 _SHRINKINGS = (4.0, 16.0, 64.0, 256.0, 1024.0)
-#: V' is to fall at least by this share of |y|^2, 1/s.
+# Least rate of decrease of V, as a multiple of |y|^2, 1/s.
 _DECAY = 1e-4
-#: The multipliers' monomials, degrees 1 and 2; those of V; those of the sum, 1 to 3.
+# Monomials of the multipliers, of degrees 1 and 2.
 _MULTIPLIER_BASIS = [m for m in product(range(3), repeat=3) if 1 <= sum(m) <= 2]
+# Monomials of V, of degree 1.
 _UNIT: list[Exponents] = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+# Monomials of the sum of squares, of degrees 1 to 3.
 _SUM_BASIS = [m for m in product(range(4), repeat=3) if 1 <= sum(m) <= 3]
 
 
 def box(model: LagModel) -> list[tuple[float, float]]:
-    """Bounds of y: the domain, the clamp of v, and the top speed of w."""
+    """Bounds of the scaled state y: domain of x, clamp of v, and top speed for w."""
     a = model.scales[0]
     return [(model.domain_m[0] / a, model.domain_m[1] / a), (-1.0, 1.0), (-1.0, 1.0)]
 
 
 def faces(model: LagModel) -> list[NDArray[np.float64]]:
-    """n with n . y <= 1 where the model holds: on the domain, below the clamp.
+    """Vectors n such that the polynomial model holds for n . y <= 1.
 
-    w follows v, and needs no bound.
+    The scaled state y contains the distance error x, the velocity v of the virtual
+    mass, and the velocity w of the control point. The vectors bound x to the domain of
+    the model, and v to the top speed. w follows v and needs no bound.
     """
     (low, high), *_ = box(model)
     eye = np.eye(3)
@@ -63,7 +69,11 @@ def faces(model: LagModel) -> list[NDArray[np.float64]]:
 def first_region(
     model: LagModel,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """P of the linear model, scaled until a region is found, and its multipliers."""
+    """Finds a first region of attraction, and the multipliers that prove it.
+
+    The matrix P of the region is a Lyapunov matrix of the linear model. P is scaled
+    until multipliers exist.
+    """
     A = np.zeros((3, 3))
     for i, rate in enumerate(model.rates(0.0)):
         for monomial, value in rate.terms.items():
@@ -87,7 +97,7 @@ def first_region(
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
-    """A program in the multipliers for a fixed P, and its Gram matrices."""
+    """A program that searches multipliers for a fixed P, with its Gram matrices."""
 
     program: MathematicalProgram
     multipliers: list[Any]
@@ -105,7 +115,10 @@ def _basis(exponents: list[Exponents], y: NDArray[Any]) -> NDArray[Any]:
 
 
 def _form(matrix: Any, basis: NDArray[Any], y: NDArray[Any]) -> SymbolicPolynomial:
-    """z' G z of monomials z, of y alone where G has decision variables."""
+    """Builds the polynomial z' G z of y, for monomials z and a matrix G.
+
+    G may contain decision variables.
+    """
     z = [monomial.ToExpression() for monomial in basis]
     size = range(len(z))
     total = sum(matrix[i, j] * z[i] * z[j] for i in size for j in size)
@@ -115,7 +128,7 @@ def _form(matrix: Any, basis: NDArray[Any], y: NDArray[Any]) -> SymbolicPolynomi
 def _gap(
     model: LagModel, P: NDArray[Any], sigma: Any, y: NDArray[Any], sign: float
 ) -> SymbolicPolynomial:
-    """-V' - decay |y|^2 - sigma (1 - V), which is to be a sum of squares."""
+    """-V' - decay |y|^2 - sigma (1 - V), which must be a sum of squares."""
     V = _form(P, _basis(_UNIT, y), y)
     gap = SymbolicPolynomial(-_DECAY * sum(v * v for v in y), y)
     for variable, rate in zip(y, model.rates(sign), strict=True):
@@ -124,14 +137,14 @@ def _gap(
 
 
 def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
-    """The program that looks for multipliers of the region of P.
+    """Builds the program that finds multipliers for a given region.
 
     Args:
-        model: Polynomial rates of the state.
-        P: (3, 3) symmetric; the region is y' P y <= 1, y the scaled state.
+        model: Model with the polynomial rates of the state.
+        P: (3, 3) symmetric. The region is y' P y <= 1, with the scaled state y.
 
     Returns:
-        The program, and its Gram matrices, one for either sign of the error of h.
+        The program, with its Gram matrices for both signs of the stiffness error.
     """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
@@ -147,14 +160,14 @@ def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
 def solve(
     solver: SolverInterface, program: MathematicalProgram
 ) -> MathematicalProgramResult | None:
-    """What the solver finds; none: it says that there is no solution.
+    """Solves a semidefinite program.
 
     Args:
-        solver: What solves semidefinite programs.
-        program: What is to be solved.
+        solver: Solver for semidefinite programs.
+        program: The program.
 
     Returns:
-        The solution, or None.
+        The solution. None if the solver finds no solution.
     """
     result = solver.Solve(program)
     return result if result.is_success() else None
@@ -163,14 +176,15 @@ def solve(
 def find_multipliers(
     model: LagModel, P: NDArray[np.float64]
 ) -> list[NDArray[np.float64]] | None:
-    """Multipliers for the region as it is; none: V does not fall all over it.
+    """Finds multipliers that prove that V = y' P y decreases on a region.
 
     Args:
-        model: Polynomial rates of the state.
-        P: (3, 3) symmetric; the region is y' P y <= 1, y the scaled state.
+        model: Model with the polynomial rates of the state.
+        P: (3, 3) symmetric. The region is V <= 1, with the scaled state y.
 
     Returns:
-        Their Gram matrices, one for either sign of the error of h, or None.
+        Gram matrices of the multipliers, one for each sign of the stiffness error. None
+        if no multipliers are found.
     """
     problem = feasibility(model, P)
     result = solve(ClarabelSolver(), problem.program)
@@ -182,15 +196,16 @@ def find_multipliers(
 def larger_region(
     model: LagModel, P: NDArray[np.float64], multipliers: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """P of a larger region inside the box, the multipliers held.
+    """Finds a larger region of attraction, with fixed multipliers.
 
     Args:
-        model: Polynomial rates, and the box of the domain.
-        P: (3, 3) of the region that is to grow.
-        multipliers: Gram matrices, from ``find_multipliers``.
+        model: Model with the polynomial rates. The region stays in the model's domain.
+        P: (3, 3) matrix of the present region y' P y <= 1.
+        multipliers: Gram matrices from ``find_multipliers``.
 
     Returns:
-        (3, 3) symmetric; P itself where the solver finds none.
+        (3, 3) symmetric matrix of the larger region. If the solver finds none, P
+        itself.
     """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
@@ -205,7 +220,7 @@ def larger_region(
         program.AddPositiveSemidefiniteConstraint(
             np.array([[Expression(v) for v in row] for row in block])
         )
-    # The volume falls with log det P, here linearised about the last P.
+    # The volume decreases with log det P. The cost is log det P, linearized about P.
     slope = np.linalg.inv(P)
     program.AddLinearCost(
         sum(slope[i, j] * new[i, j] for i in range(3) for j in range(3))
@@ -218,7 +233,7 @@ def larger_region(
 
 
 def _rational(matrix: Any) -> list[list[Fraction]]:
-    """The symmetric part, as the rational numbers that its floats are."""
+    """Symmetric part of a matrix, as exact rational numbers."""
     return [[Fraction(float(v)) for v in row] for row in 0.5 * (matrix + matrix.T)]
 
 
@@ -228,20 +243,22 @@ def is_proved(
     problem: Feasibility,
     result: MathematicalProgramResult | None,
 ) -> bool:
-    """Proves the region in rational arithmetic, from the solver's numbers.
+    """Proves a region of attraction in rational arithmetic, from the solver's result.
 
-    The multipliers are what the solver found, as rationals; the sum's Gram
-    matrix is moved until it makes -V' - sigma (1 - V) exactly, and then must be
-    positive definite. So must P and its blocks with the faces of the box.
+    The proof checks that these matrices are positive definite:
+
+    - the Gram matrices of the multipliers sigma;
+    - the Gram matrix of -V' - sigma (1 - V), corrected so that it is exact;
+    - P bordered by each face of the model's domain.
 
     Args:
-        model: Polynomial rates, and the box of the domain.
-        P: (3, 3) of the region.
-        problem: What was solved for P.
-        result: What the solver found; None: nothing.
+        model: Model with the polynomial rates, and its domain.
+        P: (3, 3) matrix of the region y' P y <= 1.
+        problem: The program that was solved for P.
+        result: The solution. None: the solver found no solution.
 
     Returns:
-        True only where every step holds exactly.
+        True only if every step holds exactly.
     """
     if result is None:
         return False

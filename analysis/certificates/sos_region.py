@@ -1,20 +1,22 @@
-"""A sum-of-squares region of attraction, with the motor lag that energy cannot hold.
+"""Computes a region of attraction with motor lag, by sums of squares.
 
-Head-on before an obstacle, with x = c - c_eq, v of the virtual mass, w of P:
+The energy certificate cannot cover motor lag. The model is a head-on approach to an
+obstacle. The states are the distance error x = c - c_eq, the velocity v of the virtual
+mass M, and the velocity w of the robot's control point:
 
     x' = w,   M v' = -h(x) x - D_r v,   lag w' = v - w
 
-h is the law's secant stiffness at rest, a polynomial within +-e of the law on
-the domain. A quadratic V = y' P y of the scaled state y falls on V <= 1, and that
-set lies clear of contact and of the clamp: starts inside never touch. For both
-signs of e
+h is a polynomial. On the domain of x, h is within +-e of the law's secant stiffness at
+rest. V = y' P y is a quadratic function of the scaled state y. V decreases on the
+region V <= 1, which excludes contact and speeds v beyond the limit. Starts in the
+region therefore never collide. The conditions for both signs of e are:
 
-    -V' - sigma (1 - V) is a sum of squares, sigma a sum of squares.
+    -V' - sigma (1 - V) is a sum of squares, and sigma is a sum of squares.
 
-Clarabel finds P and the multipliers in turn; CSDP repeats the last step, and
-rational arithmetic checks it without either
-(``analysis.certificates.exact_polynomials``).
-SCS is not used: its tolerance is too loose for a proof.
+The solver Clarabel alternately finds P and the multipliers sigma. The solver CSDP
+repeats the last step. Rational arithmetic then checks the result exactly
+(``analysis.certificates.exact_polynomials``). The solver SCS is not used, because its
+tolerance is too large for a proof.
 """
 
 from __future__ import annotations
@@ -39,48 +41,51 @@ from analysis.certificates.sos_program import (
 from analysis.nonlinear.phase_portrait import certified_speeds, head_on_model
 from diagrams import Scenario
 
-#: Rounds of finding P and multipliers in turn.
+#: Number of alternations between finding P and finding multipliers.
 _ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class SosRegion:
-    """The region, its checks and its trials."""
+    """A region of attraction, with its checks and simulated trials."""
 
     model: LagModel
-    """What it is about."""
+    """Polynomial model that the region applies to."""
     contact_m: float
-    """P nearer to the face is contact, m."""
+    """Distance from control point P to the face that counts as contact, m."""
     P: NDArray[np.float64]
-    """(3, 3) V = y' P y; V <= 1 is the region."""
+    """(3, 3) matrix of V = y' P y. The region is V <= 1."""
     solvers: dict[str, bool]
     """Whether each solver finds the last step feasible."""
     exact: bool
-    """Whether rational arithmetic confirms it."""
+    """Whether rational arithmetic confirms the region."""
     region_share: float
-    """Share of the domain, |v| and |w| up to the top speed, that the region holds."""
+    """Share of the model's state box that the region of attraction covers.
+
+    The box is the domain of x, with |v| and |w| up to the top speed.
+    """
     safe_share: float
-    """Share of the domain's starts that do not touch, by simulation."""
+    """Share of simulated starts in the box that do not collide."""
     starts: int
-    """Simulated starts inside the region."""
+    """Number of simulated starts in the region."""
     collisions: int
-    """Those that touch; must be 0."""
+    """Number of starts in the region that collide; must be 0."""
     energy_starts: int
-    """Starts (w = v) that the energy certifies without motor lag."""
+    """Number of starts, with w = v, that the energy certifies without motor lag."""
     energy_collisions: int
-    """Those of them that touch with the lag: what energy does not see."""
+    """Number of these starts that collide with motor lag."""
 
     @property
     def certified(self) -> bool:
-        """Whether solvers and rational arithmetic agree."""
+        """Whether both solvers and rational arithmetic confirm the region."""
         return self.exact and all(self.solvers.values())
 
     def extent(self) -> NDArray[np.float64]:
-        """(3,) half extents of the region in x, v, w, m and m/s."""
+        """(3,) half extents of the region in x, v and w, m and m/s."""
         return self.model.scales * np.sqrt(np.diag(np.linalg.inv(self.P)))
 
     def to_dict(self) -> dict[str, Any]:
-        """An entry of ``certificates`` in the JSON document."""
+        """Converts the result to an entry of ``certificates`` in the JSON document."""
         return {
             "kind": "sum_of_squares",
             "law": self.model.contact.law.name,
@@ -108,20 +113,21 @@ class SosRegion:
 def sos_region(
     scenario: Scenario, *, to_go_m: float | None = None, starts: int = 1000
 ) -> SosRegion:
-    """Finds, checks and tries the region.
+    """Computes, proves and tests a region of attraction of a head-on approach.
 
     Args:
-        scenario: Law, gains and motor lag.
-        to_go_m: See ``head_on``.
-        starts: Simulated starts, inside the region and in the domain.
+        scenario: Scenario with the law, gains and motor lag.
+        to_go_m: Distance from the obstacle's face to the follow point behind it, m.
+            None: chosen by ``head_on``.
+        starts: Number of simulated starts in the region, and in the whole domain.
 
     Returns:
-        P of the region, whether it is proved, and how its starts fared.
+        The region, whether it is proved, and the results of its simulated starts.
 
     Raises:
         InputError: The law is not known.
-        ValueError: There is no contact equilibrium, or it is unstable with the
-            motor lag.
+        ValueError: There is no contact equilibrium, or the motor lag makes the
+            equilibrium unstable.
     """
     model = lag_model(scenario, to_go_m=to_go_m)
     P, multipliers = first_region(model)
@@ -129,7 +135,7 @@ def sos_region(
         P = larger_region(model, P, multipliers)
         if k < _ROUNDS - 1:
             multipliers = find_multipliers(model, P) or multipliers
-    # A step back from the rim leaves room for the exact check.
+    # A slightly smaller region leaves a margin for the exact check.
     P = 1.02 * P
     solved = feasibility(model, P)
     results = {
@@ -160,7 +166,7 @@ def sos_region(
 def _energy_starts(
     model: LagModel, contact_m: float, count: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """(n, 3) random starts of the domain that the energy certifies, w = v."""
+    """(n, 3) random starts in the domain with w = v that the energy certifies."""
     rest, top = model.contact.equilibrium_m, model.scales[1]
     x = rng.uniform(*model.domain_m, count)
     v = rng.uniform(-top, top, count)
@@ -174,7 +180,7 @@ def _energy_starts(
 def _inside(
     model: LagModel, P: NDArray[np.float64], states: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """(n,) whether V <= 1 at states (n, 3)."""
+    """(n,) whether V <= 1 at the (n, 3) states."""
     y = states / model.scales
     return np.einsum("ni,ij,nj->n", y, P, y) <= 1.0
 
@@ -182,8 +188,8 @@ def _inside(
 def _draw_inside(
     model: LagModel, P: NDArray[np.float64], count: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """(n, 3) x, v, w uniform in the region, w no faster than the top speed."""
-    # P = R R', so y = R^-T ball has y' P y = |ball|^2.
+    """(n, 3) x, v, w, uniform in the region, with |w| up to the top speed."""
+    # With P = R R', the state y = R^-T ball has y' P y = |ball|^2.
     root = np.linalg.cholesky(P).T
     kept = np.zeros((0, 3))
     while len(kept) < count:

@@ -1,1 +1,1 @@
-"""How well sounds are located: bounds, trials, tables, and recordings."""
+"""Measures how well sounds are located: bounds, trials, tables and recordings."""

@@ -1,19 +1,23 @@
-"""The Cramer-Rao bound: how well a frame of sound can be located at best.
+"""The Cramer-Rao bound: the least possible localization error from a frame of sound.
 
-Model: microphone m records a_m s(t - R_m / c) in white Gaussian noise. The
-waveform s is deterministic and unknown, the gains a_m = 1 / R_m are known, and
-what levels tell about the position is left out: channels equal to a few
-thousandths would add a tenth of the information on range at 60 deg, and next to
-nothing ahead, but real ones differ by more. With the slope s' of the sound, a
-stretch that all microphones of a set heard informs about their times
-of arrival by
+Model: microphone m at distance R_m records a_m s(t - R_m / c) in white Gaussian noise
+of RMS sigma_m. The waveform s is deterministic and unknown. The gains a_m = 1 / R_m are
+known.
+
+The bound ignores the information in the sound levels. With channels that are equal to
+within a few thousandths, levels would add a tenth of the information on range at 60
+deg, and next to nothing straight ahead. Real channels differ by more.
+
+A stretch of sound that a set of microphones records carries this Fisher information on
+the arrival times at the set:
 
     rate * integral of s'^2 dt * (diag(g) - g g^T / sum g),   g_m = (a_m / sigma_m)^2
 
-where the second term is what the unknown waveform takes away. Microphones cut
-different stretches from the sound: each stretch counts for those that heard
-it, and what one alone heard counts nothing. For two microphones and much
-signal this is the bound of Knapp and Carter (1976).
+Here, s' is the slope of the sound, and ``rate`` is the sample rate. The second term is
+the loss due to the unknown waveform. A frame contains a different stretch of the sound
+at each microphone. Each stretch counts only for the microphones that recorded it. A
+stretch that only one microphone recorded has no information. For two microphones and a
+strong signal, the bound equals that of Knapp and Carter (1976).
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
-# Beyond this condition number a position cannot be told from the delays.
+# Beyond this condition number, the delays do not determine a position.
 _LARGEST_CONDITION = 1e14
 
 
@@ -45,15 +49,15 @@ class SlopeEnergy:
     def of(
         cls, samples: ArrayLike, sample_rate_hz: float, start_time: float = 0.0
     ) -> SlopeEnergy:
-        """Of samples of the sound pressure at 1 m.
+        """Integrates the squared slope of a sound, from its samples.
 
-        The slope is that of the band-limited signal through the samples, which
-        should begin and end near zero or fit together as a period.
+        The slope is that of the band-limited signal through the samples. The samples
+        should begin and end near zero, or form a full period.
 
         Args:
-            samples: (n,) Pa.
-            sample_rate_hz: Their rate, Hz.
-            start_time: Time at which the first one left the source, s.
+            samples: (n,) sound pressure at 1 m, Pa.
+            sample_rate_hz: Sample rate, Hz.
+            start_time: Time at which the first sample left the source, s.
 
         Returns:
             Integral of the squared slope up to each sample, Pa^2/s.
@@ -65,11 +69,11 @@ class SlopeEnergy:
         return cls(integral, start_time, sample_rate_hz)
 
     def before(self, times: ArrayLike) -> NDArray[np.float64]:
-        """What had left the source before times in s."""
+        """Integral of the squared slope that left the source before ``times`` in s."""
         last = len(self.integral) - 1
         place = (np.asarray(times) - self.start_time) * self.sample_rate_hz
         place = np.clip(place, 0.0, last)
-        # numpy.interp would look at all samples of the sound each time.
+        # numpy.interp would read all samples of the sound at each call.
         sample = np.minimum(place.astype(int), last - 1)
         step = self.integral[sample + 1] - self.integral[sample]
         return self.integral[sample] + (place - sample) * step
@@ -77,25 +81,25 @@ class SlopeEnergy:
 
 @dataclass(frozen=True)
 class LocalizationBound:
-    """Least standard deviations of an unbiased estimate from one frame.
+    """Least standard deviations of an unbiased position estimate from a frame of sound.
 
-    Infinite where the frame holds no information.
+    If the frame has no information on a quantity, its standard deviation is infinite.
     """
 
     delays: NDArray[np.float64]
-    """(n - 1, n - 1) covariance of t_k - t_0, s^2."""
+    """(n - 1, n - 1) covariance of the delays t_k - t_0, s^2."""
     covariance: NDArray[np.float64]
-    """(d, d) of the position, m^2."""
+    """(d, d) covariance of the position, m^2."""
     bearing_std: float
-    """rad."""
+    """Standard deviation of the bearing, rad."""
     elevation_std: float | None
-    """rad; None in the plane."""
+    """Standard deviation of the elevation, rad; None in the plane."""
     range_std: float
-    """m."""
+    """Standard deviation of the range, m."""
 
     @classmethod
     def mean(cls, bounds: Sequence[LocalizationBound]) -> LocalizationBound:
-        """Of errors over many frames: variances and covariances averaged."""
+        """Averages the variances and covariances of the bounds of many frames."""
         elevations = [b.elevation_std for b in bounds if b.elevation_std is not None]
         return cls(
             delays=np.mean([b.delays for b in bounds], axis=0),
@@ -109,18 +113,19 @@ class LocalizationBound:
 def arrival_information(
     energy: SlopeEnergy, begin: float, end: float, travel: ArrayLike, weights: ArrayLike
 ) -> NDArray[np.float64]:
-    """Fisher information of a frame on the times of arrival.
+    """Computes the Fisher information of a frame on the arrival times of its sound.
 
     Args:
-        energy: Of the sound.
+        energy: Slope energy of the sound.
         begin: Time of the frame's first sample, s.
-        end: Time one sample past its last one, s.
-        travel: (n,) travelling times to the microphones, s.
-        weights: (n,) g_m of the module's text times the sample rate, in
+        end: Time one sample after the frame's last sample, s.
+        travel: (n,) travel times from the source to the microphones, s.
+        weights: (n,) sample rate times g_m, with g_m as in the module docstring,
             1/(Pa^2 s).
 
     Returns:
-        (n, n), 1/s^2; a shift of all times together is not informed about.
+        (n, n) Fisher information, 1/s^2. A common shift of all times has no
+        information.
     """
     travel, weights = np.asarray(travel), np.asarray(weights)
     edges = np.sort(np.concatenate((begin - travel, end - travel)))
@@ -146,22 +151,25 @@ def position_bound(
     sample_rate_hz: float,
     c: float,
 ) -> LocalizationBound:
-    """The bound for a resting source and resting microphones.
+    """Computes the Cramer-Rao bound of a source's position from one frame.
+
+    Source and microphones are at rest. Bearing and range are seen from the origin,
+    which should be the microphones' centroid.
 
     Args:
-        energy: Of the sound.
+        energy: Slope energy of the sound.
         begin: Time of the frame's first sample, s.
-        end: Time one sample past its last one, s.
-        p_AS: (d,) source, m; bearing and range are seen from the origin, which
-            should be the microphones' centroid.
-        p_AM: (n, d) microphones, m.
-        noise_pa: RMS of the noise, from 0 to half the sample rate, in every
-            channel or one for all, Pa.
-        sample_rate_hz: Of the microphones, Hz.
+        end: Time one sample after the frame's last sample, s.
+        p_AS: (d,) position of the source, m.
+        p_AM: (n, d) positions of the microphones, m.
+        noise_pa: RMS of the noise from 0 to half the sample rate, Pa. Either (n,), or
+            one value for all channels.
+        sample_rate_hz: Sample rate of the microphones, Hz.
         c: Speed of sound, m/s.
 
     Returns:
-        Least covariances and standard deviations; infinite where nothing is known.
+        Least covariances and standard deviations. If the frame does not determine the
+        position, they are infinite.
     """
     p_AS, p_AM = np.asarray(p_AS, dtype=float), np.asarray(p_AM, dtype=float)
     rays = p_AS - p_AM
@@ -185,28 +193,28 @@ def _rms(values: Sequence[float]) -> float:
 
 
 def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The inverse; infinite where there is none."""
+    """Inverse of a matrix; infinite if the matrix is nearly singular."""
     if np.linalg.cond(information) > _LARGEST_CONDITION:
         return np.full(information.shape, math.inf)
     return np.asarray(np.linalg.inv(information))
 
 
 def polar_point(range_m: float, bearing_deg: float) -> NDArray[np.float64]:
-    """A place in the plane.
+    """Converts range and bearing to a point in the plane.
 
     Args:
-        range_m: From the origin, m.
-        bearing_deg: Azimuth, deg.
+        range_m: Distance from the origin, m.
+        bearing_deg: Angle from the x axis, deg.
 
     Returns:
-        (2,) m.
+        (2,) coordinates, m.
     """
     angle = math.radians(bearing_deg)
     return range_m * np.array([math.cos(angle), math.sin(angle)])
 
 
 def polar_gradients(p: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Gradients of azimuth, range and, in space, elevation."""
+    """Gradients of azimuth, range and, in 3D, elevation along the position."""
     distance = float(np.linalg.norm(p))
     flat = math.hypot(p[0], p[1])
     around = np.zeros(len(p))

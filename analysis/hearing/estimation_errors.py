@@ -1,4 +1,4 @@
-"""Whether errors are as small as they can be, and as large as they were stated."""
+"""Compares estimation errors with their bounds and with their stated uncertainties."""
 
 from __future__ import annotations
 
@@ -10,36 +10,36 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.intervals import Estimate
 
-#: Of all intervals.
+#: Confidence level of all intervals.
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
 class Consistency:
-    """Mean normalised estimation error squared (NEES) beside what it should be."""
+    """Mean normalized estimation error squared (NEES), with its 95 % interval."""
 
     mean: float
-    """Mean of e^T C^-1 e."""
+    """Mean of e^T C^-1 e over the errors e with stated covariances C."""
     low: float
-    """Lower end of what holds the mean with 95 % where C is right."""
+    """Lower end of the 95 % interval of the mean for correct covariances."""
     high: float
-    """Upper end."""
+    """Upper end of the 95 % interval of the mean for correct covariances."""
 
     @property
     def holds(self) -> bool:
-        """Whether the mean lies within."""
+        """Whether the mean lies within the interval."""
         return self.low <= self.mean <= self.high
 
 
 def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> Estimate:
-    """RMS of errors over the RMS of their standard deviations.
+    """Computes the RMS of errors over the RMS of standard deviations.
 
-    The interval is that of a Gaussian's variance; without any error the ratio
-    is infinite and nothing is known about it.
+    The interval assumes Gaussian errors. Without any error, the ratio is infinite and
+    its interval unbounded.
 
     Args:
-        errors: (k,) in any unit.
-        stds: (k,) in the same one, or one for all.
+        errors: (k,) errors in any unit.
+        stds: (k,) standard deviations in the same unit, or one for all errors.
 
     Returns:
         The ratio, with a 95 % interval.
@@ -57,14 +57,16 @@ def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> Estimate:
 
 
 def stated_ratio(stds: ArrayLike, errors: ArrayLike) -> float:
-    """RMS of stated standard deviations over that of the errors; 1 is honest.
+    """Computes the RMS of stated standard deviations over the RMS of the errors.
+
+    A ratio of 1 means that the stated standard deviations are correct.
 
     Args:
-        stds: (k,) in any unit.
-        errors: (k,) in the same one.
+        stds: (k,) standard deviations in any unit.
+        errors: (k,) errors in the same unit.
 
     Returns:
-        The ratio; infinite where there is no error.
+        The ratio; infinite if all errors are 0.
     """
     rmse = float(np.sqrt(np.mean(np.square(errors))))
     return float(np.sqrt(np.mean(np.square(stds)))) / rmse if rmse else math.inf
@@ -73,14 +75,15 @@ def stated_ratio(stds: ArrayLike, errors: ArrayLike) -> float:
 def consistency(
     errors: NDArray[np.float64], covariances: NDArray[np.float64]
 ) -> Consistency:
-    """Normalised errors squared, with the covariances that were stated of them.
+    """Computes the mean normalized squared error for stated covariances.
 
     Args:
-        errors: (k, d) in any unit.
-        covariances: (k, d, d) in that unit squared.
+        errors: (k, d) errors in any unit.
+        covariances: (k, d, d) stated covariances, in that unit squared.
 
     Returns:
-        Their mean, d where the covariances are right, and the 95 % interval of that.
+        The mean with its 95 % interval. If the covariances are correct, the expected
+        value is d.
     """
     from scipy.stats import chi2
 

@@ -1,8 +1,9 @@
-"""How near estimators come to the Cramer-Rao bound in the free field.
+"""Measures how near estimators come to the Cramer-Rao bound in the free field.
 
-A resting source and resting microphones, one frame a trial, noise of a given
-level at the array. Sound travels and is converted by the blocks' own functions;
-no diagram is built, so that a trial costs little more than the estimate.
+Source and microphones are at rest. Each trial is one frame (25 ms of audio), with noise
+of a given level at the array. The trials call the functions of the blocks for sound
+propagation and analog-to-digital conversion, without building a diagram. A trial
+therefore takes little more time than the estimate.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ from systems.sound.parameters import EDGE_S, MicArrayParameters, SoundParameters
 from systems.sound.propagation import propagate
 from systems.sound.waveforms import make_waveform
 
-#: Full scale of the converter over the largest sample.
+#: Ratio of the converter's full scale to the largest sample.
 _HEADROOM = 1.2
 
-#: An error beyond so many bounds is an outlier.
+#: An error of more than this many bounds is an outlier.
 _OUTLIER = 8.0
 
-#: From the loudspeaker's first sample to the first frame, at least, s; also the
-#: farthest that sound may have travelled.
+#: Least time between the loudspeaker's first sample and a frame, s. Sound may travel
+#: for at most this time.
 _LEAD_S = 0.1
 
 Estimator = Callable[[NDArray[np.float32]], SourceFix | None]
@@ -53,16 +54,19 @@ Estimator = Callable[[NDArray[np.float32]], SourceFix | None]
 def frame_estimator(
     parameters: TDOAParameters, shape: ArrayShape, c: float, *, limited: bool = True
 ) -> Estimator:
-    """What ``TDOAEstimator`` does to a (n, samples) frame, the first that it hears.
+    """Makes a function that locates the source in a single frame.
+
+    The function does what ``TDOAEstimator`` does in the first frame that it receives.
 
     Args:
-        parameters: Of the estimator.
-        shape: The n microphones.
+        parameters: Settings of the estimator.
+        shape: The array of n microphones.
         c: Speed of sound, m/s.
-        limited: See ``Localiser``.
+        limited: Whether to reject unreliable estimates, as in ``Localiser``.
 
     Returns:
-        From a frame to a fix, or None where nothing is heard.
+        A function from an (n, samples) frame to a position estimate. The function
+        returns None if the frame has no detectable sound.
     """
     localiser = Localiser(parameters, shape, c, limited=limited)
     return lambda frame: localiser.localise(frame, localiser.blank())[0]
@@ -70,21 +74,21 @@ def frame_estimator(
 
 @dataclass(frozen=True)
 class Loudspeaker:
-    """A sound that goes on for all trials, and the energy of its slope."""
+    """A continuous sound for all trials, with the energy of its slope."""
 
     samples: NDArray[np.float32]
-    """(n,) Pa at 1 m."""
+    """(n,) sound pressure at 1 m, Pa."""
     energy: SlopeEnergy
     level_pa: float
     """RMS of the samples, Pa at 1 m."""
 
     @classmethod
     def of(cls, kind: str, seed: int, seconds: float = 2.0) -> Loudspeaker:
-        """Chirp or band noise of 0.5-8 kHz.
+        """Makes a chirp or a band noise of 0.5-8 kHz.
 
         Args:
             kind: ``chirp`` or ``band_noise``.
-            seed: Of the noise.
+            seed: Seed of the noise.
             seconds: Length of the sound, s.
 
         Returns:
@@ -100,7 +104,7 @@ class Loudspeaker:
 
     @property
     def seconds(self) -> float:
-        """Its length, s."""
+        """Length of the sound, s."""
         return len(self.samples) / SAMPLE_RATE_HZ
 
     def pressure(
@@ -110,17 +114,17 @@ class Loudspeaker:
         p_AM: NDArray[np.float64],
         c: float,
     ) -> NDArray[np.float32]:
-        """A frame, source and microphones at rest.
+        """Computes the sound pressure at microphones at rest for one frame.
 
         Args:
-            begin: Time of the frame's first sample, (n,) of every channel or one
-                for all, s.
-            p_AS: (2,) source, m.
-            p_AM: (n, 2) microphones, m.
+            begin: Time of the frame's first sample, s. Either (n,), or one time for all
+                channels.
+            p_AS: (2,) position of the source, m.
+            p_AM: (n, 2) positions of the microphones, m.
             c: Speed of sound, m/s.
 
         Returns:
-            (n, samples) Pa.
+            (n, samples) sound pressure, Pa.
         """
         emission = Emission(
             samples=self.samples,
@@ -140,35 +144,38 @@ class Loudspeaker:
 
 @dataclass(frozen=True)
 class FreeFieldCell:
-    """The trials of one place: errors, what was stated of them, and the bound."""
+    """Trials with the source at one position: errors, stated uncertainties and bounds.
+
+    The arrays cover the k trials that gave a range.
+    """
 
     range_m: float
     bearing_deg: float
     trials: int
     unheard: int
-    """Trials in which nothing was heard."""
+    """Number of trials without detectable sound."""
     rangeless: int
-    """Trials with a bearing but no range."""
+    """Number of trials with a bearing but no range."""
     bearing_errors: NDArray[np.float64]
-    """(k,) of the trials with a range, rad."""
+    """(k,) errors of the bearing, rad."""
     range_errors: NDArray[np.float64]
-    """(k,) m."""
+    """(k,) errors of the range, m."""
     position_errors: NDArray[np.float64]
-    """(k, 2) m."""
+    """(k, 2) errors of the position, m."""
     bearing_stds: NDArray[np.float64]
-    """(k,) stated, rad."""
+    """(k,) stated standard deviations of the bearing, rad."""
     range_stds: NDArray[np.float64]
-    """(k,) stated, m."""
+    """(k,) stated standard deviations of the range, m."""
     covariances: NDArray[np.float64]
-    """(k, 2, 2) stated, of the position, m^2."""
+    """(k, 2, 2) stated covariances of the position, m^2."""
     bearing_bounds: NDArray[np.float64]
-    """(k,) rad; the sound differs from frame to frame."""
+    """(k,) bounds of the bearing, rad. The bounds vary, as the sound does."""
     range_bounds: NDArray[np.float64]
-    """(k,) m."""
+    """(k,) bounds of the range, m."""
 
     @property
     def outliers(self) -> int:
-        """Trials without a range, or in error by more than eight bounds."""
+        """Number of trials without a range, or with an error above eight bounds."""
         wild = (np.abs(self.bearing_errors) > _OUTLIER * self.bearing_bounds) | (
             np.abs(self.range_errors) > _OUTLIER * self.range_bounds
         )
@@ -176,32 +183,32 @@ class FreeFieldCell:
 
     @property
     def bearing_ratio(self) -> Estimate:
-        """RMSE of the bearing over its bound."""
+        """RMS error of the bearing over its bound."""
         return rms_ratio(self.bearing_errors, self.bearing_bounds)
 
     @property
     def range_ratio(self) -> Estimate:
-        """RMSE of the range over its bound."""
+        """RMS error of the range over its bound."""
         return rms_ratio(self.range_errors, self.range_bounds)
 
     @property
     def stated_bearing_ratio(self) -> float:
-        """Stated standard deviation over RMSE."""
+        """Stated standard deviation of the bearing over its RMS error."""
         return stated_ratio(self.bearing_stds, self.bearing_errors)
 
     @property
     def stated_range_ratio(self) -> float:
-        """Stated standard deviation over RMSE."""
+        """Stated standard deviation of the range over its RMS error."""
         return stated_ratio(self.range_stds, self.range_errors)
 
     @property
     def consistency(self) -> Consistency:
-        """Of the position with its stated covariance."""
+        """Consistency of the position errors with their stated covariances."""
         return consistency(self.position_errors, self.covariances)
 
 
 def total_consistency(cells: Iterable[FreeFieldCell]) -> Consistency:
-    """Over all trials of some cells."""
+    """Consistency of the position errors over all trials of several cells."""
     cells = list(cells)
     return consistency(
         np.concatenate([cell.position_errors for cell in cells]),
@@ -221,26 +228,26 @@ def run_cell(
     trials: int,
     seed: int,
 ) -> dict[str, FreeFieldCell]:
-    """Runs the trials of one cell.
+    """Runs the trials for one position of the source.
 
-    Each trial takes a stretch of the sound at random, and fresh noise; the
-    converter has 10 bits and a full scale of 1.2 times the largest sample. All
+    Each trial takes a random part of the sound, with new noise. The analog-to-digital
+    converter has 10 bits, and a full scale of 1.2 times the largest sample. All
     estimators get the same frames.
 
     Args:
-        loudspeaker: What sounds.
-        estimators: By name, as ``frame_estimator`` makes them.
-        range_m: Of the source, from the microphones' centroid, m.
-        bearing_deg: Of the source, deg.
+        loudspeaker: The sound of the source.
+        estimators: Estimators by name, as made by ``frame_estimator``.
+        range_m: Distance of the source from the microphones' centroid, m.
+        bearing_deg: Bearing of the source, deg.
         shape: The microphones, in the plane.
-        snr_db: Level of the sound at the centroid over the noise from 0 to
-            50 kHz, dB.
+        snr_db: Level of the sound at the centroid, relative to the noise from 0 to 50
+            kHz, dB.
         c: Speed of sound, m/s.
         trials: Number of frames.
-        seed: Of stretches and noise.
+        seed: Seed of the parts of the sound and of the noise.
 
     Returns:
-        A cell for each estimator.
+        Results of the trials by name of the estimator.
     """
     rng = np.random.default_rng(seed)
     p_AS = polar_point(range_m, bearing_deg)
@@ -276,7 +283,7 @@ def run_cell(
 
 
 def _fitted_converter(peak_pa: float) -> MicArrayParameters:
-    """The default converter with a full scale of 1.2 times a peak in Pa."""
+    """Default converter with a full scale of 1.2 times a peak pressure in Pa."""
     return MicArrayParameters(full_scale_pa=_HEADROOM * peak_pa)
 
 

@@ -1,4 +1,4 @@
-"""A resting robot that listens to a resting source, through the whole diagram."""
+"""Simulates a robot at rest that locates a source at rest, in the full diagram."""
 
 from __future__ import annotations
 
@@ -21,36 +21,41 @@ from systems.sound.array_tolerances import draw_tolerances
 from systems.sound.sound_emitter import emitted_samples
 from systems.sound.waveforms import make_waveform
 
-# Ticks from the start to the first frame that counts: sound arrives meanwhile
-# (from 8 m at most), and every block has a past.
+# Number of frames before the first frame that counts. In this time, sound arrives from
+# up to 8 m, and every block fills its memory of earlier frames.
 _LEAD = 2
 
 
 @dataclass(frozen=True)
 class Heard:
-    """What the estimator made of the frames."""
+    """The estimates from all frames of one session, with their bound."""
 
     p_AS: NDArray[np.float64]
-    """(2,) the source from the microphones' centroid, in B axes, m."""
+    """(2,) true position of the source from the microphones' centroid, in B axes, m."""
     bearings: NDArray[np.float64]
-    """(k,) of the frames in which something was heard, rad."""
+    """(k,) bearings from the frames with detected sound, rad."""
     ranges: NDArray[np.float64]
-    """(l,) of those with a range, m."""
+    """(l,) ranges from the frames with a valid range, m."""
     positions: NDArray[np.float64]
-    """(l, 2) of the same, from the microphones' centroid, in B axes, m."""
+    """(l, 2) estimated positions from the frames with a valid range, m.
+
+    The origin is the microphones' centroid, and the axes are those of the robot frame
+    B.
+    """
     bound: LocalizationBound
-    """From noise and rounding, over all frames."""
+    """Bound due to noise and rounding, averaged over all frames."""
 
 
 class Listener:
-    """One diagram, used for any number of places.
+    """Measures a source at any number of positions relative to a robot, in one diagram.
 
-    Drake never frees blocks that are written in Python, hence the robot is put
-    where it has the source as wanted, rather than a diagram built for it.
+    Drake never frees blocks that are written in Python. One diagram therefore serves
+    all measurements. For each relative position, the robot is moved, and the source
+    stays.
 
     Args:
-        scenario: A source at rest whose sound goes on, and a robot that no
-            force moves.
+        scenario: Scenario with a continuously sounding source at rest, and a robot that
+            no force moves.
 
     Raises:
         ValueError: The sound cannot be played.
@@ -62,7 +67,7 @@ class Listener:
         self._follower = build_sound_follower(scenario)
         seed = block_seed(scenario.seed, "sound_emitter")
         self._waveform = make_waveform(scenario.source.sound, seed)
-        #: The microphones as stated.
+        #: Array of the microphones as stated.
         self.shape = ArrayShape.of(scenario.only.robot.microphones_m)
 
     def listen(
@@ -74,19 +79,21 @@ class Listener:
         *,
         session: int = 0,
     ) -> Heard:
-        """Takes one measurement a frame.
+        """Takes measurements of the source at one relative position.
+
+        Each frame (25 ms of audio) gives one measurement.
 
         Args:
-            distance: Of the source from the microphones' centroid, m.
-            bearing: Of the source, rad.
+            distance: Distance of the source from the microphones' centroid, m.
+            bearing: Bearing of the source, rad.
             trials: Number of frames.
-            sound_speed_tolerance: Largest error of the speed of sound.
-            session: Sessions are at different times, and so have noises and
-                errors of their own.
+            sound_speed_tolerance: Largest error of the speed of sound, as a share of
+                the speed.
+            session: Number of the session. Sessions run at different times. Each
+                session therefore has its own noise and errors.
 
         Returns:
-            Bearings, rad, ranges, m, and places, m, of the frames in which something
-            was heard.
+            The estimates, with their bound.
         """
         p_AS = distance * np.array([math.cos(bearing), math.sin(bearing)])
         start = session * (trials + 4 * _LEAD)
@@ -98,7 +105,7 @@ class Listener:
         rows = []
         for frame in range(start, start + _LEAD + trials):
             self._redraw_errors(root, frame, sound_speed_tolerance)
-            # The update at this instant, of the frame that ends now, comes first.
+            # AdvanceTo ends with the update at this time, which processes the frame.
             simulator.AdvanceTo((frame + 1) * self._frame_s)
             rows.append(self._read(root))
         heard, ranged, bearings, ranges = np.asarray(rows[_LEAD:]).T
@@ -114,7 +121,7 @@ class Listener:
         )
 
     def _place_robot(self, root: Any, p_AS: NDArray[np.float64]) -> None:
-        """Puts the robot, facing along x, where the source is at p_AS."""
+        """Places the robot facing along x so that the source is at p_AS."""
         p_WS = self._scenario.source.path().pose(0.0)[:2]
         p_BA = microphones_B(self._scenario.only.robot).mean(axis=0)
         p_WB = p_WS - p_AS - p_BA
@@ -138,7 +145,7 @@ class Listener:
             context.get_mutable_numeric_parameter(index).SetFromVector(values)
 
     def _read(self, root: Any) -> tuple[float, ...]:
-        """(detected, range_valid, bearing, range) of the last frame."""
+        """Reads (detected, range_valid, bearing, range) of the last frame."""
         block = self._follower.blocks["hearing"]
         context = block.GetMyContextFromRoot(root)
         names = ("detected", "range_valid", "source_bearing", "source_range")
@@ -149,7 +156,7 @@ class Listener:
     def _bound(
         self, p_AS: NDArray[np.float64], ends: NDArray[np.float64]
     ) -> LocalizationBound:
-        """Of the frames that end then, rms."""
+        """Averages the bounds of the frames that end at ``ends`` in s."""
         scenario = self._scenario
         microphones = scenario.follower.microphones
         first = round((ends[0] - 3 * self._frame_s) * SAMPLE_RATE_HZ)

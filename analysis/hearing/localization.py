@@ -1,9 +1,9 @@
-"""The papers' localisation experiment, beside its bound and its tolerances.
+"""Repeats the localization experiment of the papers, with bounds and tolerances.
 
-Han 2019, tables 1 and 2: a resting source 1-4 m away at 0, 30 and 60 deg, 100
-measurements a cell, on a robot at rest. Here a measurement is one frame, heard
-through the whole diagram. The papers' own estimator runs beside ours, on the
-same sound and noise.
+In tables 1 and 2 of Han 2019, a robot at rest locates a source at rest. The source is
+1-4 m away at 0, 30 and 60 deg. Each position has 100 measurements. In this module, a
+measurement is one frame (25 ms of audio) in the full diagram. The papers' estimator and
+the project's estimators get the same sound and noise.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from diagrams import Scenario, load_scenario
 from systems.hearing.tdoa_estimator import TDOAEstimator
 from systems.sound.array_shape import ArrayShape
 
-#: What the experiment changes in the default scenario: nothing moves the
-#: robot, and the sound goes on, so that every frame is a measurement.
+#: Changes to the default scenario. No force moves the robot. The sound is continuous.
+#: Every frame is therefore a measurement.
 _SETTING = (
     "name=localization",
     "description=A resting source heard by a resting robot",
@@ -36,20 +36,24 @@ _SETTING = (
     "sound.period_s=0.5",
 )
 
-#: An array built with care; redrawn for every measurement, within these limits.
+#: Tolerances of a carefully built array. The errors within them are redrawn for every
+#: measurement.
 REALISTIC_TOLERANCES = (
     "microphones.position_tolerance_m=0.0002",
     "microphones.delay_tolerance_s=2.0e-7",
 )
-#: The same of the speed of sound, as a share of it: 1 deg C.
+#: Tolerance of the speed of sound, as a share of the speed. Corresponds to 1 deg C.
 SOUND_SPEED_TOLERANCE = 0.002
 
-#: Methods of ``tdoa`` by the estimators' names.
+#: Values of the field ``tdoa.method`` by name of the estimator.
 ESTIMATORS = {"paper": "amdf", "fast": "gcc", "ml": "ml"}
 
 
 class PaperEstimator(TDOAEstimator):
-    """The papers' estimator: delays in whole samples, and no limit of anything."""
+    """The papers' estimator, with delays in whole samples.
+
+    The estimator rejects no estimate and does not suppress echoes.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(
@@ -65,21 +69,21 @@ class PaperEstimator(TDOAEstimator):
 
 @dataclass(frozen=True)
 class LocalizationCell:
-    """The measurements of one estimator in one place."""
+    """The measurements of one estimator with the source at one position."""
 
     paper: PaperCell
-    """The place, and what the paper found there."""
+    """The position, and the paper's results at this position."""
     estimator: str
-    """A key of ESTIMATORS."""
+    """Name of the estimator: a key of ``ESTIMATORS``."""
     trials: int
     """Number of frames."""
     heard: Heard
-    """What was measured, and its bound."""
+    """The estimates, with their bound."""
     tolerance: PolarStd
-    """What the array's tolerances cost, predicted to first order."""
+    """Standard deviations due to the array's tolerances, predicted to first order."""
 
     def to_dict(self) -> dict[str, Any]:
-        """A cell of the JSON document; null where nothing was measured."""
+        """Converts the cell to plain values for JSON; None if nothing was measured."""
         paper = self.paper
         heard, bound = self.heard, self.heard.bound
         bearings_deg = np.degrees(heard.bearings)
@@ -108,7 +112,7 @@ class LocalizationCell:
 def _moments(
     name: str, unit: str, values: NDArray[np.float64], truth: float
 ) -> dict[str, float | None]:
-    """Mean, standard deviation and RMSE, as far as there are values for it."""
+    """Computes mean, standard deviation and RMS error; None for too few values."""
     some, several = len(values) > 0, len(values) > 1
     return {
         f"{name}_mean_{unit}": float(values.mean()) if some else None,
@@ -121,27 +125,27 @@ def _moments(
 
 @dataclass(frozen=True)
 class LocalizationExperiment:
-    """What is measured; see ``prepare_localization``."""
+    """Settings of a localization experiment, as made by ``prepare_localization``."""
 
     scenario: Scenario
-    """A source at rest that sounds on, and a robot that no force moves."""
+    """Scenario with a continuously sounding source at rest, and a robot at rest."""
     trials: int
-    """Measurements a cell."""
+    """Number of measurements per position and estimator."""
     sound_speed_tolerance: float
-    """Largest error of the speed of sound, as a share of it."""
+    """Largest error of the speed of sound, as a share of the speed."""
     estimators: tuple[str, ...] = tuple(ESTIMATORS)
-    """Keys of ESTIMATORS."""
+    """Names of the estimators: keys of ``ESTIMATORS``."""
     places: tuple[PaperCell, ...] = PAPER_CELLS
-    """Where the source is put."""
+    """Positions of the source."""
 
     @property
     def measurements(self) -> int:
-        """Number of measurements in all."""
+        """Total number of measurements."""
         return self.trials * len(self.places) * len(self.estimators)
 
     @property
     def shape(self) -> ArrayShape:
-        """The microphones as stated."""
+        """Array of the microphones as stated."""
         return ArrayShape.of(self.scenario.only.robot.microphones_m)
 
     @property
@@ -158,16 +162,16 @@ class LocalizationExperiment:
     def run(
         self, progress: Callable[[float], None] | None = None
     ) -> list[LocalizationCell]:
-        """Measures in every place with every estimator.
+        """Runs the experiment: all positions of the source, with every estimator.
 
-        Errors within the tolerances are redrawn for every measurement, and are
-        the same for all estimators, as sound and noise are.
+        The errors of the array are redrawn within their tolerances for every
+        measurement. All estimators get the same errors, sound and noise.
 
         Args:
             progress: Called with the number of measurements so far.
 
         Returns:
-            Cells by place, then by estimator.
+            Results sorted by position, then by estimator.
 
         Raises:
             InputError: The sound cannot be played.
@@ -203,15 +207,15 @@ class LocalizationExperiment:
 def prepare_localization(
     overrides: Iterable[str] = (), *, trials: int = 100, tolerances: bool = False
 ) -> LocalizationExperiment:
-    """The experiment in the default scenario.
+    """Prepares the localization experiment in the default scenario.
 
     Args:
-        overrides: Changes of the scenario, as of ``load_scenario``.
-        trials: Measurements a cell.
-        tolerances: Whether the array has errors within REALISTIC_TOLERANCES.
+        overrides: Changes of the scenario, as for ``load_scenario``.
+        trials: Number of measurements per position of the source and estimator.
+        tolerances: Whether the array has errors within ``REALISTIC_TOLERANCES``.
 
     Returns:
-        Scenario, places and estimators, to be measured.
+        The experiment, ready to run.
 
     Raises:
         InputError: An override, or the number of trials, is wrong.

@@ -1,4 +1,4 @@
-"""Picture of the localisation experiment: estimates and errors over the plane."""
+"""Plots estimates and errors of the localization experiment over the plane."""
 
 from __future__ import annotations
 
@@ -15,32 +15,34 @@ from analysis.hearing.cramer_rao import polar_point
 from analysis.hearing.localization import LocalizationCell
 from analysis.reporting.palette import COLOURS
 
-#: How the estimators are drawn.
+#: Color and label of each estimator.
 _STYLES = {
     "paper": (COLOURS["obstacle"], "the papers' estimator"),
     "fast": (COLOURS["left"], "fast"),
     "ml": (COLOURS["robot"], "maximum likelihood"),
 }
-#: Ellipses have so many standard deviations as half axes.
+#: Half axes of ellipses, in standard deviations.
 _SIGMAS = 2.0
-#: Along and across the line of sight, the exaggerated half axes of each distance
-#: are no longer than this, m.
+#: Longest exaggerated half axes along and across the line of sight, m.
 _ROOM_M = (0.45, 0.2)
-#: Where the factors stand, m.
+#: y of the labels with the exaggeration factors, m.
 _LABELS_Y_M = -0.5
-#: Floor that is shown: from behind the robot to beyond the farthest cell, m.
+#: Limits of the axes x and y, m. They include the robot and all positions.
 _X_M, _Y_M = (-0.35, 5.05), (-0.95, 4.3)
 
 
 def plot_localization(cells: Sequence[LocalizationCell]) -> Figure:
-    """Two maps in B axes, seen from the microphones' centroid, m.
+    """Plots two maps of the estimates, in axes of the robot frame B, m.
 
-    Left, to scale: where Han 2019 found the source (mean, and two standard
-    deviations of range and bearing), and where each estimator puts it. Right:
-    ellipses of two standard deviations about each estimator's mean, and those of
-    the Cramer-Rao bound, exaggerated along and across the line of sight by
-    factors that stand beside each distance. The papers' estimator, whose errors
-    are no ellipses, is left out there.
+    The origin of both maps is the microphones' centroid.
+
+    - The left map is to scale. It shows the estimates of Han 2019, as means with two
+      standard deviations of range and bearing. The left map also shows each estimator's
+      estimates.
+    - The right map shows ellipses of two standard deviations about each estimator's
+      mean, and those of the Cramer-Rao bound. The ellipses are exaggerated along and
+      across the line of sight. The exaggeration factors are written at each distance.
+      The right map leaves out the papers' estimator, whose errors do not form ellipses.
     """
     figure = Figure(figsize=(13.0, 7.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
@@ -57,7 +59,7 @@ def plot_localization(cells: Sequence[LocalizationCell]) -> Figure:
 
 
 def _floor(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
-    """Microphones, true places, and arcs of equal range."""
+    """Draws the microphones, the true positions, and arcs of equal range."""
     axes.set(aspect="equal", xlim=_X_M, ylim=_Y_M, xlabel="x in B, ahead (m)")
     arc = np.radians(np.linspace(-5.0, 75.0, 80))
     for distance in sorted({cell.paper.range_m for cell in cells}):
@@ -122,7 +124,7 @@ def _exaggerated(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
 
 
 def _spread(axes: Axes, cell: LocalizationCell, factors: NDArray[np.float64]) -> None:
-    """Estimates about their mean, with their ellipse and that of the bound."""
+    """Draws estimates about their mean, their ellipse, and the bound's ellipse."""
     colour = _STYLES[cell.estimator][0]
     truth, turn = _truth(cell), _along_and_across(cell)
     stretch = turn.T @ np.diag(factors) @ turn
@@ -146,14 +148,18 @@ def _along_and_across(cell: LocalizationCell) -> NDArray[np.float64]:
 
 
 def _factors(cells: Sequence[LocalizationCell]) -> NDArray[np.float64]:
-    """(2,) along and across: the largest spread of a ring fits its room."""
+    """(2,) exaggeration factors of the ellipses, along and across the line of sight.
+
+    The factors are chosen such that the largest ellipse at one distance has the half
+    axes ``_ROOM_M``, or slightly shorter ones.
+    """
     stds = [(c.heard.positions @ _along_and_across(c).T).std(axis=0) for c in cells]
     wanted = np.array(_ROOM_M) / np.maximum(_SIGMAS * np.max(stds, axis=0), 1e-9)
     return np.array([_nice(value) for value in wanted])
 
 
 def _nice(value: float) -> float:
-    """The next smaller of 1, 2 and 5 times a power of ten."""
+    """Largest of 1, 2 and 5 times a power of ten that does not exceed ``value``."""
     power = 10.0 ** math.floor(math.log10(value))
     return next(k * power for k in (5.0, 2.0, 1.0) if k * power <= value)
 

@@ -1,4 +1,4 @@
-"""The localisation experiment as a JSON document, as tables and as files."""
+"""Writes the localization experiment as a JSON document, as tables and as files."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ def localization_summary(
     cells: Sequence[LocalizationCell],
     out: Path | None,
 ) -> dict[str, Any]:
-    """The JSON document of the experiment.
+    """Builds the JSON document of the localization experiment.
 
     Args:
-        experiment: What was measured.
-        cells: What came out, one a place and estimator.
-        out: The result directory, to be named; None: there is none.
+        experiment: The experiment.
+        cells: Results, one per position of the source and estimator.
+        out: Name of the result directory in the document. None: no directory.
 
     Returns:
-        Plain values, to be written as JSON.
+        Plain values for JSON.
     """
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.follower.microphones, scenario.sound_speed_m_s
-    # Whatever the errors of the array do to a range is to be seen.
+    # Without limits, the table also shows large range errors due to array errors.
     estimate = frame_estimator(scenario.follower.tdoa, shape, c, limited=False)
     return {
         "schema_version": SCHEMA_VERSION,
@@ -75,10 +75,10 @@ def write_localization(
     """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``.
 
     Args:
-        experiment: What was measured.
-        cells: What came out, one a place and estimator.
-        summary: From ``localization_summary``.
-        directory: Exists.
+        experiment: The localization experiment.
+        cells: Results, one per position of the source and estimator.
+        summary: The document from ``localization_summary``.
+        directory: Existing directory for the files.
     """
     from analysis.hearing.localization_plots import plot_localization
 
@@ -88,7 +88,7 @@ def write_localization(
 
 
 def localization_text(summary: dict[str, Any]) -> str:
-    """The tables on a terminal."""
+    """Formats the tables for a terminal."""
     tolerances = summary["tolerances"]
     drawn = any(tolerances.values())
     cells = summary["cells"]
@@ -115,7 +115,7 @@ def _tolerances_text(tolerances: dict[str, float]) -> str:
 
 
 def _table(cells: list[dict[str, Any]], name: str, unit: str) -> list[str]:
-    """Mean and standard deviation by place, an estimator a column."""
+    """Formats mean and standard deviation by position, in one column per estimator."""
     places = _by_place(cells)
     titles = "".join(f"{cell['estimator']:>18}" for cell in places[0])
     heading = f"{name} in {unit}"
@@ -137,7 +137,7 @@ def _table(cells: list[dict[str, Any]], name: str, unit: str) -> list[str]:
 
 
 def _by_place(rows: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
-    """Rows of one place together."""
+    """Groups rows by the position of the source."""
     groups = groupby(rows, lambda row: (row["range_m"], row["bearing_deg"]))
     return [list(group) for _, group in groups]
 
@@ -147,7 +147,7 @@ def _place(row: dict[str, Any]) -> str:
 
 
 def _pair(mean: float | None, std: float | None, lost: int) -> str:
-    """Mean and standard deviation; how many frames gave nothing in brackets."""
+    """Formats mean and standard deviation, with the lost frames' number in brackets."""
     missing = f" ({lost})" if lost else ""
     if mean is None:
         return f"none{missing}"
@@ -156,7 +156,7 @@ def _pair(mean: float | None, std: float | None, lost: int) -> str:
 
 
 def _sensitivity_lines(rows: list[dict[str, Any]]) -> list[str]:
-    """What each unit error costs: predicted, and measured in brackets."""
+    """Formats the effect of each unit error: predicted, with measured in brackets."""
     places = _by_place(rows)
     lines = ["What errors of the array cost: predicted (measured)"]
     for name, unit in (("range", "m"), ("bearing", "deg")):

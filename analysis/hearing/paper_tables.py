@@ -1,4 +1,4 @@
-"""What the papers measured of localisation."""
+"""Localization results that the papers report."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from typing import NamedTuple
 
 
 class PaperCell(NamedTuple):
-    """One place of Han 2019, tables 1 and 2: real hardware, 100 measurements."""
+    """Result for one source position in tables 1 and 2 of Han 2019.
+
+    Han measured on hardware, with 100 measurements per position.
+    """
 
     range_m: float
-    """True range from M2, m."""
+    """True range from microphone M2, m."""
     bearing_deg: float
-    """True bearing from M2, deg."""
+    """True bearing from microphone M2, deg."""
     bearing_mean_deg: float
     range_mean_m: float
     bearing_std_deg: float

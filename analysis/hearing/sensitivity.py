@@ -1,8 +1,9 @@
-"""What errors of the array and of the air cost in bearing and range.
+"""Effects of array errors and of the speed of sound on bearing and range.
 
-Predicted to first order: an error moves the delays, and the position moves so
-that the delays of the array as stated fit them again. Measured: sound recorded
-by arrays with random errors, located as if there were none.
+- The prediction is of first order. An error changes the delays. The estimated position
+  then moves until its delays at the array as stated equal the changed delays.
+- The measurement simulates arrays with random errors. The estimator locates the sound
+  as if the arrays had no errors.
 """
 
 from __future__ import annotations
@@ -21,35 +22,35 @@ from analysis.hearing.paper_tables import PaperCell
 from systems.framework.signals import TICK_S
 from systems.sound.array_shape import ArrayShape
 
-#: Shares of a Gaussian within one standard deviation.
+#: Quantiles of a Gaussian at one standard deviation below and above the mean.
 _ONE_SIGMA = (0.158655, 0.841345)
 
 
 @dataclass(frozen=True)
 class ArrayErrors:
-    """Standard deviations of independent errors."""
+    """Standard deviations of independent errors of the array and the speed of sound."""
 
     position_m: float = 0.0
-    """Of every coordinate of every microphone, m."""
+    """Error of each coordinate of each microphone, m."""
     delay_s: float = 0.0
-    """Of every channel, s."""
+    """Delay error of each channel, s."""
     sound_speed_share: float = 0.0
-    """Of the speed of sound over its stated value."""
+    """Error of the speed of sound over its stated value."""
     gain_db: float = 0.0
-    """Of every channel, dB."""
+    """Gain error of each channel, dB."""
 
 
 @dataclass(frozen=True)
 class PolarStd:
-    """Standard deviations of a source's place."""
+    """Standard deviations of a source's bearing and range."""
 
     bearing: float
-    """rad."""
+    """Standard deviation of the bearing, rad."""
     range: float
-    """m."""
+    """Standard deviation of the range, m."""
 
 
-#: Errors of the sensitivity table: 1 mm, 1 us, 1 % and 1 dB.
+#: Errors in the sensitivity table: 1 mm, 1 us, 1 % and 1 dB.
 UNIT_ERRORS = (
     ArrayErrors(position_m=1e-3),
     ArrayErrors(delay_s=1e-6),
@@ -61,13 +62,14 @@ UNIT_ERRORS = (
 def predicted_std(
     errors: ArrayErrors, p_AS: NDArray[np.float64], shape: ArrayShape, c: float
 ) -> PolarStd:
-    """What errors cost, to first order.
+    """Predicts the standard deviations due to errors, to first order.
 
     Args:
-        errors: Of the array and of the air; gains do not change delays.
-        p_AS: (2,) source from the microphones' centroid, m.
+        errors: Errors of the array and of the speed of sound. Gain errors have no
+            effect, because they do not change delays.
+        p_AS: (2,) position of the source from the microphones' centroid, m.
         shape: The microphones as stated, in the plane.
-        c: Speed of sound as stated, m/s.
+        c: Stated speed of sound, m/s.
 
     Returns:
         Standard deviations of bearing, rad, and of range, m.
@@ -102,27 +104,29 @@ def measured_std(
     trials: int,
     seed: int,
 ) -> PolarStd:
-    """What Gaussian errors cost in noise-free frames.
+    """Measures the standard deviations due to Gaussian errors in noise-free frames.
 
-    Large errors bend range, and its tail is long: taken is half the width of
-    what holds the central 68 % of the estimates, a Gaussian's standard
-    deviation. A frame without a finite range counts as infinitely far.
+    Large errors give the distribution of the range a long tail. The result is therefore
+    half the width of the central 68 % of the estimates. For a Gaussian distribution,
+    this half width equals the standard deviation. A frame without a valid range counts
+    as infinitely far.
 
     Args:
-        errors: Of the array and of the air.
-        p_AS: (2,) source from the microphones' centroid, m.
+        errors: Errors of the array and of the speed of sound.
+        p_AS: (2,) position of the source from the microphones' centroid, m.
         shape: The microphones as stated, in the plane.
-        c: Speed of sound as stated, m/s.
-        loudspeaker: What sounds.
-        estimate: From a frame to a fix.
+        c: Stated speed of sound, m/s.
+        loudspeaker: The sound of the source.
+        estimate: Function from a frame to a position estimate.
         trials: Number of frames.
-        seed: Of the errors.
+        seed: Seed of the errors.
 
     Returns:
-        Of bearing, rad, and of range, m, infinite where too many frames have none.
+        Standard deviations of bearing, rad, and of range, m. If too many frames have no
+        valid range, the standard deviation of the range is infinite.
 
     Raises:
-        ValueError: In some frame nothing was heard.
+        ValueError: A frame has no detectable sound.
     """
     rng = np.random.default_rng(seed)
     bearings, ranges = np.empty(trials), np.empty(trials)
@@ -155,18 +159,21 @@ def sensitivity_table(
     trials: int,
     seed: int,
 ) -> list[dict[str, Any]]:
-    """Rows of the JSON document: each unit error in each place.
+    """Computes the effect of each unit error for each position of the source.
+
+    The unit errors are 1 mm, 1 us, 1 % of the speed of sound, and 1 dB.
 
     Args:
-        places: Of the source.
+        places: Positions of the source.
         shape: The microphones, in the plane.
         c: Speed of sound, m/s.
-        estimate: From a frame to a fix.
-        trials: Frames a row.
-        seed: Of all random numbers.
+        estimate: Function from a frame to a position estimate.
+        trials: Number of frames per row.
+        seed: Seed of all random numbers.
 
     Returns:
-        Ranges in m, bearings in deg; None where a range is infinite.
+        Rows of the JSON document, with ranges in m and bearings in deg. An infinite
+        range becomes None.
     """
     loudspeaker = Loudspeaker.of("chirp", seed)
     rows = []

@@ -1,40 +1,43 @@
-"""Sound that is as sparse in time and frequency as speech, made from a seed."""
+"""Makes random sound that is as sparse in time and frequency as speech."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Of adults: pitch in Hz, first three formants of a neutral vowel in Hz and their
-# bandwidths, and by how much a vowel's lie off them and a talker's throat scales them.
+# Range of the pitch of adults, Hz.
 _PITCH_HZ = (90.0, 240.0)
+# First three formants of a neutral vowel, Hz.
 _FORMANTS_HZ = np.array([500.0, 1500.0, 2600.0])
+# Bandwidths of these formants, Hz.
 _WIDTHS_HZ = np.array([80.0, 110.0, 170.0])
+# Largest relative change of formants: between vowels, and between talkers.
 _VOWEL, _THROAT = 0.35, 0.12
 
 _SYLLABLE_S = (0.12, 0.30)
 _GAP_S = (0.02, 0.10)
 _PAUSE_S = (0.15, 0.40)
 _PAUSE_CHANCE = 0.2
-# Consonants of noise, before half of the syllables.
+# Consonants of noise: duration in s, level, and probability before a syllable.
 _HISS_S, _HISS_LEVEL, _HISS_CHANCE = 0.07, 0.08, 0.5
 
 
 def speech_like(
     rng: np.random.Generator, seconds: float, sample_rate_hz: float
 ) -> NDArray[np.float64]:
-    """Syllables of gliding harmonics under formants, hisses and pauses.
+    """Makes syllables of gliding harmonics with formants, noise consonants and pauses.
 
-    It is no language, but has of speech what tells several talkers apart: at most
-    times and frequencies one of them is far louder than the others.
+    The sound is not real speech. As in real speech, one of several talkers is far
+    louder than the others at most times and frequencies. Talkers can therefore be
+    separated.
 
     Args:
-        rng: Draws the talker's pitch and throat, and the syllables.
-        seconds: How long.
-        sample_rate_hz: Of the samples, Hz.
+        rng: Generator that draws the talker's pitch and formants, and the syllables.
+        seconds: Length of the sound, s.
+        sample_rate_hz: Sample rate, Hz.
 
     Returns:
-        (samples,) of RMS 1.
+        (samples,) sound with an RMS of 1.
     """
     total = round(seconds * sample_rate_hz)
     sound = np.zeros(total)
@@ -58,7 +61,7 @@ def _add(
     start: float,
     sample_rate_hz: float,
 ) -> float:
-    """Adds a part as far as there is room; when it ends, s."""
+    """Adds a part to a sound as far as there is room, and returns the part's end, s."""
     first = round(start * sample_rate_hz)
     end = min(first + len(part), len(sound))
     sound[first:end] += part[: max(0, end - first)]
@@ -78,7 +81,7 @@ def _syllable(
     wave = np.zeros(len(share))
     for h in range(1, int(0.5 * sample_rate_hz / f.max()) + 1):
         off = (h * f - formants) / (0.5 * _WIDTHS_HZ[:, np.newaxis])
-        # Resonances above a floor, and a voice's -6 dB an octave.
+        # Resonances above a floor, with the -6 dB per octave of a voice.
         strength = (0.03 + np.sum(1.0 / (1.0 + off**2), axis=0)) / h
         wave += strength * np.sin(h * phase + rng.uniform(0.0, 2.0 * np.pi))
     loudness = rng.uniform(0.4, 1.0) * np.sin(np.pi * share) ** 0.7

@@ -1,21 +1,21 @@
-"""How many measurements a cell of the localisation experiment may have."""
+"""Limits the number of measurements in the localization experiment."""
 
 from __future__ import annotations
 
 from systems.framework.input_error import InputError
 
-#: Emission and bound of a cell are held in memory.
+#: Most measurements per cell. The sound and the bounds of a cell are held in memory.
 _MOST_TRIALS = 100_000
 
 
 def check_trials(trials: int) -> None:
-    """Refuses too many, or too few for a standard deviation.
+    """Checks the number of measurements per position of the source.
 
     Args:
-        trials: Measurements a cell.
+        trials: Number of measurements.
 
     Raises:
-        InputError: They are.
+        InputError: The number is too large, or too small for a standard deviation.
     """
     if not 2 <= trials <= _MOST_TRIALS:
         raise InputError("trials", f"{trials} must lie between 2 and {_MOST_TRIALS}")

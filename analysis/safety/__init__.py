@@ -1,1 +1,1 @@
-"""Attempts to make a guarded robot collide."""
+"""Tries to make a guarded robot collide."""

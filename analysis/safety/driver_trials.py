@@ -17,69 +17,75 @@ from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.world.geometry import beyond_rectangle, rectangle_clearance
 
-#: How long a run lasts, s.
+#: Duration of a run, s.
 DURATION_S = 10.0
-#: A body nearer than this at the start is refused, m.
+#: Radius of the circle about the start that contains no body, m.
 BUBBLE_M = 1.0
-#: Bodies of every layout; those that it has no use for stand far away.
+#: Number of bodies in every layout. Bodies that a layout does not need are far away.
 _BODIES = 6
 #: Modes of a row of a driver's table.
 TWIST, AHEAD, BACK, AIM = range(4)
 
 
 class Row(NamedTuple):
-    """A row of a driver's table: what the driver does until a given time.
+    """A row of a driver's table: the driver's command until a given time.
 
-    The command is the sum of a mode and a swing. The forward speed swings with
-    ``swing_v * wave(rate * t)``, the yaw rate with
+    The command is the sum of two parts: that of the mode, and a swing. The forward
+    speed swings with ``swing_v * wave(rate * t)``. The yaw rate swings with
     ``swing_omega * wave(rate * t + phase)``.
     """
 
     end_s: float
-    """End of the row, s; ``make_trial`` converts it to ticks."""
+    """End of the row, s. ``make_trial`` converts the time to control periods."""
     mode: float = TWIST
-    """``TWIST``: command ``v`` and ``omega``. ``AHEAD``: drive to the goal with ``v``,
-    and turn by ``omega`` in addition. ``BACK``: the same in reverse. ``AIM``: turn in
-    place until the goal is at the bearing ``omega``."""
+    """Mode of the driver.
+
+    - ``TWIST``: Command ``v`` and ``omega``.
+    - ``AHEAD``: Drive forward to the goal with ``v``, and add the yaw rate ``omega``.
+    - ``BACK``: Drive backward to the goal with ``v``, and add the yaw rate ``omega``.
+    - ``AIM``: Turn in place until the goal is at the bearing ``omega``.
+    """
     v: float = 0.0
     """Forward speed, m/s."""
     omega: float = 0.0
-    """Yaw rate, rad/s; in the mode ``AIM`` a bearing, rad."""
+    """Yaw rate, rad/s. In the mode ``AIM``: a bearing, rad."""
     x: float = 0.0
     """x of the goal, m."""
     y: float = 0.0
     """y of the goal, m."""
     by_truth: float = 0.0
-    """1: the driver steers by the true pose; 0: by the pose of the odometry."""
+    """1: the driver steers by the true pose. 0: the driver steers by the odometry."""
     swing_v: float = 0.0
     """Amplitude of the forward speed, m/s."""
     swing_omega: float = 0.0
     """Amplitude of the yaw rate, rad/s."""
     rate: float = 0.0
-    """Angular frequency of the swing, rad/s; ``make_trial`` converts it to rad per
-    tick."""
+    """Angular frequency of the swing, rad/s.
+
+    ``make_trial`` converts the frequency to rad per control period.
+    """
     phase: float = 0.0
-    """Phase by which the turn leads the forward speed, rad."""
+    """Phase by which the yaw rate leads the forward speed, rad."""
     edge: float = 1.0
-    """Shape of the swing, see ``wave``."""
+    """Shape of the swing: argument ``edge`` of ``wave``."""
     skew: float = 0.0
-    """Shape of the swing, see ``wave``."""
+    """Shape of the swing: argument ``skew`` of ``wave``."""
 
 
 _FIELDS = len(Row._fields)
-#: The table of the run that is made next.
+#: The table of the next run.
 _NEXT: list[NDArray[np.float64]] = [np.array(Row(0.0))]
 
 
 @register_jitable
 def wave(angle: float, edge: float, skew: float) -> float:
-    """A periodic function between -1 and 1: a sine, a square wave or a sawtooth.
+    """Computes a periodic function between -1 and 1: a sine, square wave or sawtooth.
 
     Args:
         angle: Phase angle, rad.
-        edge: Gain before the value is clipped to [-1, 1]; 1 keeps the sine, a large
-            gain makes a square wave.
-        skew: 0 keeps the sine; values towards 1 or -1 make it a sawtooth.
+        edge: Gain before the value is limited to [-1, 1]. A gain of 1 keeps the sine,
+            and a large gain makes a square wave.
+        skew: 0 keeps the sine. Values near 1 or -1 make a sawtooth.
 
     Returns:
         The value at this angle.
@@ -89,7 +95,7 @@ def wave(angle: float, edge: float, skew: float) -> float:
 
 
 def drive_step(tick: int, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Obeys a table of ``Row``: the rows one after the other."""
+    """Executes the rows of a driver's table, one after another."""
     (believed, true), (twist,), (table,) = inputs, outputs, numbers
     row = 0
     while row + _FIELDS < len(table) and tick > table[row]:
@@ -112,9 +118,10 @@ def drive_step(tick: int, state: Any, inputs: Any, outputs: Any, numbers: Any) -
 
 
 class Driver(Block):
-    """Drives by a table and does not react to obstacles.
+    """A block that drives by a table and does not react to obstacles.
 
-    Unlike a law, it may know the true pose: rows with ``by_truth`` steer by it.
+    Unlike a control law, the block may use the true pose. Rows with ``by_truth`` steer
+    by the true pose.
     """
 
     part = "controller"
@@ -130,30 +137,30 @@ class Driver(Block):
         self.declare(Step(drive_step, (_NEXT[0],)), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
-        """The step, with the table of the run."""
+        """Step function with the table of the run."""
         return Step(drive_step, (_NEXT[0],))
 
 
 class Trial(NamedTuple):
-    """A run that may go wrong."""
+    """A run that may end in a collision."""
 
     layout: str
     driver: str
     variant: str
     fields: dict[str, Any]
-    """Of the scenario."""
+    """Fields of the scenario."""
     table: NDArray[np.float64]
-    """Of the driver; unused by laws."""
+    """Flat table of the driver. If a law drives, the table is not used."""
 
 
 class Outcome(NamedTuple):
-    """How it went."""
+    """Result of a trial."""
 
     collided: bool
     clearance_m: float
-    """Least one of the body."""
+    """Least clearance of the body, m."""
     disc_m: float
-    """Least one of the disc about the axle that holds the body."""
+    """Least clearance of the disc about the axle that encloses the body, m."""
 
 
 #: Settings of the robot, by name.
@@ -182,7 +189,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     },
     "cells of 2 cm": {"guard": {"cell_m": 0.02}},
 }
-#: All settings. ``draw_trial`` chooses the added ones only when it is asked to.
+#: All settings. Unless ``draw_trial`` gets a setting, it uses only ``VARIANTS``.
 SETTINGS = {
     **VARIANTS,
     "encoders not rounded": {"odometry": {"rounding": False}},
@@ -242,7 +249,7 @@ def _walls(draw: np.random.Generator) -> list[tuple[float, ...]]:
 
 
 def _bubble(draw: np.random.Generator) -> list[tuple[float, ...]]:
-    """Boxes against the bubble's edge, corners or faces first."""
+    """Boxes near the edge of the free circle, with corners or faces toward it."""
     boxes = []
     for angle in draw.uniform(-math.pi, math.pi, _BODIES):
         length, width = draw.uniform(0.02, 0.3, 2)
@@ -259,7 +266,7 @@ def _bubble(draw: np.random.Generator) -> list[tuple[float, ...]]:
 
 
 def _corner(draw: np.random.Generator) -> list[tuple[float, ...]]:
-    """Two walls that meet ahead of a way past them."""
+    """Two walls that meet at a random point and are perpendicular."""
     angle, far = draw.uniform(-math.pi, math.pi), BUBBLE_M + draw.uniform(0.05, 0.6)
     turn = draw.uniform(-math.pi, math.pi)
     x, y = far * math.cos(angle), far * math.sin(angle)
@@ -280,7 +287,7 @@ LAYOUTS = {
 
 
 def _random(draw: np.random.Generator, boxes: Any, seconds: float) -> list[list[float]]:
-    """Commands held for random times."""
+    """Commands that last for random times."""
     rows, end = [], 0.0
     while end < seconds:
         end += draw.exponential(1.5)
@@ -292,7 +299,7 @@ def _random(draw: np.random.Generator, boxes: Any, seconds: float) -> list[list[
 def _pressing(
     draw: np.random.Generator, boxes: Any, seconds: float
 ) -> list[list[float]]:
-    """At a body or past it, ahead or back, for 5 s and more."""
+    """Drives at a body or near it, forward or backward, for 5 s and longer."""
     rows, end = [], 0.0
     while end < seconds:
         x, y = boxes[int(draw.integers(len(boxes)))][:2]
@@ -307,7 +314,7 @@ def _pressing(
 def _looking(
     draw: np.random.Generator, boxes: Any, seconds: float
 ) -> list[list[float]]:
-    """Turns first, so that much is known, and then presses."""
+    """Turns first, so that the robot knows its surroundings, and then presses."""
     turn = draw.choice([-1.0, 1.0]) * draw.uniform(1.0, 3.0)
     rows = [[draw.uniform(1.0, 4.0), TWIST, 0.0, turn, 0.0, 0.0]]
     return [*rows, *_pressing(draw, boxes, seconds)]
@@ -318,13 +325,13 @@ _LAWS = ("active", "conventional")
 
 
 def outside(boxes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
-    """Boxes, moved outwards until none stands in the bubble.
+    """Moves boxes outward until no box overlaps a circle of 1 m about the start.
 
     Args:
-        boxes: (x, y, theta, length, width) each, m and rad.
+        boxes: (x, y, theta, length, width) of each box, m and rad.
 
     Returns:
-        As many, each beyond the bubble by 0.1 mm or more.
+        The moved boxes. Each box is outside the circle by 0.1 mm or more.
     """
     moved = []
     for x, y, *rest in boxes:
@@ -356,15 +363,16 @@ def make_trial(
     seed: int,
     duration_s: float = DURATION_S,
 ) -> Trial:
-    """A trial of given boxes and commands.
+    """Makes a trial from boxes and commands.
 
     Args:
-        names: Of layout, driver and variant.
-        boxes: (x, y, theta, length, width) each, m and rad.
-        rows: Of the driver, fields of ``Row``; none: the driver is a law.
-        heading: Of the robot at the start, rad.
-        source: Where the source stands, m.
-        seed: Of the noise.
+        names: Names of layout, driver and setting.
+        boxes: (x, y, theta, length, width) of each box, m and rad.
+        rows: Rows of the driver's table, as fields of ``Row``. If empty, the driver is
+            a law.
+        heading: Heading of the robot at the start, rad.
+        source: Position of the source, m.
+        seed: Seed of the noise.
         duration_s: Duration of the run, s.
 
     Returns:
@@ -406,7 +414,7 @@ def make_trial(
     return Trial(layout, driver, variant, fields, table.ravel())
 
 
-#: What drives, and how often: those by a table twice as often as a law.
+#: Drivers to draw from. Drivers with a table appear twice, laws once.
 USUAL = (*DRIVERS, *DRIVERS, *_LAWS)
 
 
@@ -417,23 +425,24 @@ def draw_trial(
     setting: str | None = None,
     duration_s: float = DURATION_S,
 ) -> Trial:
-    """A trial by chance.
+    """Draws a random trial.
 
     Args:
         seed: Seed of all trials.
-        number: Of this one.
-        drivers: Names of ``DRIVERS``, or laws, of which one is drawn.
-        setting: Name of the robot's settings in ``SETTINGS``; with None, the number
-            chooses one of ``VARIANTS``.
+        number: Number of the trial.
+        drivers: Names of ``DRIVERS``, or of laws, from which one is drawn.
+        setting: Name of the robot's setting in ``SETTINGS``. None: the number of the
+            trial selects one of ``VARIANTS``.
         duration_s: Duration of the run, s.
 
     Returns:
-        The same trial for the same numbers.
+        The trial. The same arguments give the same trial.
     """
     draw = np.random.default_rng([seed, number])
     layout = str(draw.choice([*LAYOUTS]))
     driver = str(draw.choice([*drivers]))
-    # Few settings at a time: each takes blocks of its own, which Drake never frees.
+    # Successive numbers share a setting, because each setting needs its own blocks, and
+    # Drake never frees blocks.
     variant = setting or [*VARIANTS][number // 200 % len(VARIANTS)]
     boxes = LAYOUTS[layout](draw)
     angle = math.atan2(boxes[0][1], boxes[0][0]) + draw.normal(0.0, 0.3)
@@ -447,16 +456,16 @@ def draw_trial(
 
 
 def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
-    """A trial by chance with bodies that cross near the start.
+    """Draws a random trial with obstacles that cross near the robot's start.
 
     Args:
         seed: Seed of all trials.
-        number: Of this one.
-        bodies: How many move; six at most.
-        speed: Of theirs, m/s.
+        number: Number of the trial.
+        bodies: Number of moving obstacles, at most six.
+        speed: Speed of the moving obstacles, m/s.
 
     Returns:
-        The same trial for the same arguments.
+        The trial. The same arguments give the same trial.
     """
     draw = np.random.default_rng([seed, number])
     angle = draw.uniform(-math.pi, math.pi, bodies)
@@ -470,7 +479,7 @@ def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
     rows = DRIVERS[driver](draw, boxes, DURATION_S)
     heading = draw.uniform(-math.pi, math.pi)
     trial = make_trial(names, boxes, rows, heading, (8.0, 0.0), number)
-    # The others stand far away.
+    # The other bodies are far away.
     moving = trial.fields["obstacles"][:bodies]
     for body, goal in zip(moving, goals, strict=True):
         begin = np.array(body["waypoints_m"][0])
@@ -481,14 +490,14 @@ def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
 
 
 def drive_at_a_wall(speed: float, body_speed: float) -> tuple[RunResult, float]:
-    """Drives at a wall straight ahead.
+    """Simulates a robot that drives at a wall straight ahead.
 
     Args:
-        speed: That is commanded, m/s.
-        body_speed: Up to which the robot is guarded against bodies, m/s.
+        speed: Commanded speed, m/s.
+        body_speed: Largest obstacle speed that the robot's guard allows for, m/s.
 
     Returns:
-        The run, and where the wall's face is, x in m.
+        The run, and the x coordinate of the wall's face, m.
     """
     names, rows = ("wall", "straight", "no noise"), [[1e3, TWIST, speed, 0.0, 0, 0]]
     wall_m = 2.9
@@ -499,15 +508,16 @@ def drive_at_a_wall(speed: float, body_speed: float) -> tuple[RunResult, float]:
 
 
 def contact_speeds(trial: Trial, changes: dict[str, Any]) -> tuple[float, float] | None:
-    """How fast a robot is when it touches something.
+    """Measures how fast a robot moves when it touches something.
+
+    Both speeds are the larger of the values at the last two control periods.
 
     Args:
-        trial: What to run.
-        changes: As of ``run_trial``.
+        trial: Trial to run.
+        changes: Fields of the scenario, as for ``run_trial``.
 
     Returns:
-        Speed of the axle, m/s, and of the turn, rad/s, the larger of the last two
-        ticks; none without a contact.
+        Speed of the axle, m/s, and yaw rate, rad/s. None without a contact.
     """
     result = run_result(trial, changes)
     if result.collision is None:
@@ -518,24 +528,24 @@ def contact_speeds(trial: Trial, changes: dict[str, Any]) -> tuple[float, float]
 
 
 def run_trial(trial: Trial, changes: dict[str, Any] | None = None) -> Outcome:
-    """Runs a trial.
+    """Runs a trial, and returns its outcome.
 
     Args:
-        trial: What to run.
-        changes: Fields of the scenario that are other than the trial's.
+        trial: Trial to run.
+        changes: Fields of the scenario that replace those of the trial.
 
     Returns:
-        How it went.
+        Whether the robot collided, and the least clearances.
     """
     result = run_result(trial, changes)
     return Outcome(result.collision is not None, *least_clearances(result))
 
 
 def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult:
-    """Runs a trial and returns the whole run.
+    """Runs a trial, and returns the complete run.
 
     Args:
-        trial: The trial to run.
+        trial: Trial to run.
         changes: Fields of the scenario that replace those of the trial.
 
     Returns:
@@ -547,13 +557,16 @@ def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult
 
 
 def least_clearances(result: RunResult) -> tuple[float, float]:
-    """Least clearance of the body, and of its disc, from bodies that rest.
+    """Computes the least distance of a robot from obstacles at rest.
+
+    The true poses are evaluated at the control periods and halfway between them. A
+    negative distance means an overlap.
 
     Args:
         result: A run.
 
     Returns:
-        m each, by true poses, at ticks and half-way between; below 0 they overlap.
+        Distance of the body, and distance of the disc that encloses the body, m.
     """
     robot = result.scenario.only.robot
     others = result.surroundings.bodies.values()

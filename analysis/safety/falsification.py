@@ -1,8 +1,9 @@
-"""Tries to make a guarded robot hit obstacles at rest, at random and by a search.
+"""Tries to make a guarded robot hit obstacles at rest, by random trials and by search.
 
-Runs of 10 s by compiled loops: layouts and drivers of ``driver_trials``, then SciPy's
-differential evolution over places of posts and commands, which lessens the clearance
-of the disc that holds the body.
+Runs last 10 s and use the compiled engine. Random trials draw layouts and drivers of
+``driver_trials``. The search is SciPy's differential evolution over the positions of
+posts and the commands. The search minimizes the clearance of the disc that encloses the
+body.
 """
 
 from __future__ import annotations
@@ -27,40 +28,41 @@ from analysis.safety.driver_trials import (
 )
 from analysis.safety.job_pool import run_jobs
 
-#: Runs that a worker gets at once; a multiple shares one setting of the robot.
+# Number of trials per job. A multiple of this has the same setting of the robot.
 _CHUNK = 50
-#: Chunks that a worker does.
+# Number of jobs after which a worker process is replaced.
 _CHUNKS_A_WORKER = 200
-#: Of the search: posts, commands held, and members of a generation for each number.
+# The search: number of posts, number of commands, and members of a generation per
+# searched number.
 _POSTS, _COMMANDS, _MEMBERS = 3, 4, 4
 
 
 class Found(NamedTuple):
-    """What a run came to."""
+    """Result of a run."""
 
     number: int
-    """Of the trial; of a search that of its seed."""
+    """Number of a random trial, or seed of the search."""
     kinds: tuple[str, str, str]
     """Names of layout, driver and setting."""
     collided: bool
     clearance_m: float
-    """Least one of the body."""
+    """Least clearance of the body, m."""
     disc_m: float
-    """Least one of the disc that holds the body."""
+    """Least clearance of the disc that encloses the body, m."""
 
 
 def by_chance(
     seed: int, numbers: Iterable[int], drivers: Sequence[str] = USUAL
 ) -> list[Found]:
-    """Runs trials drawn by chance.
+    """Runs random trials.
 
     Args:
         seed: Seed of all trials.
-        numbers: Of these.
-        drivers: As of ``draw_trial``.
+        numbers: Numbers of the trials to run.
+        drivers: Names of drivers, as for ``draw_trial``.
 
     Returns:
-        What each came to.
+        One result per trial.
     """
     found = []
     for number in numbers:
@@ -71,11 +73,12 @@ def by_chance(
 
 
 def searched_trial(x: NDArray[np.float64]) -> Trial:
-    """The trial that a point of the search stands for.
+    """Converts a point of the search space to a trial.
 
     Args:
-        x: Heading, rad; of each post its direction, rad, and distance, m; of each
-            command its duration, s, forward speed, m/s, and yaw rate, rad/s.
+        x: Numbers in this order: the heading, rad; for each post, direction, rad, and
+            distance, m; for each command, duration, s, forward speed, m/s, and yaw
+            rate, rad/s.
 
     Returns:
         The trial.
@@ -91,14 +94,16 @@ def searched_trial(x: NDArray[np.float64]) -> Trial:
 
 
 def by_search(runs: int, seed: int) -> list[Found]:
-    """Differential evolution towards the least clearance of the disc.
+    """Searches by differential evolution for a run in which the robot nearly collides.
+
+    The search minimizes the clearance of the disc that encloses the robot's body.
 
     Args:
-        runs: About how many runs it may take.
+        runs: Approximate number of runs.
         seed: Seed of the search.
 
     Returns:
-        What each run came to.
+        One result per run.
     """
     bounds = [(-math.pi, math.pi)]
     bounds += [(-math.pi, math.pi), (BUBBLE_M + 0.012, 2.5)] * _POSTS
@@ -109,7 +114,7 @@ def by_search(runs: int, seed: int) -> list[Found]:
         trial = searched_trial(x)
         kinds = trial.layout, trial.driver, trial.variant
         found.append(Found(seed, kinds, *run_trial(trial)))
-        # Where nothing was near, anything is better.
+        # If no body was near, the clearance is infinite.
         return min(found[-1].disc_m, 10.0)
 
     generations = max(1, runs // (_MEMBERS * len(bounds)) - 1)
@@ -121,14 +126,15 @@ def by_search(runs: int, seed: int) -> list[Found]:
 
 
 def largest_rate(collisions: int, runs: int) -> float:
-    """Upper end of the 95 % interval of a rate.
+    """Computes the upper end of the 95 % interval of a collision rate.
 
     Args:
-        collisions: How often it happened.
-        runs: Of how many.
+        collisions: Number of collisions.
+        runs: Number of runs.
 
     Returns:
-        Three in so many runs where it never did, else Wilson's.
+        The rate. Without collisions, about three divided by ``runs``. With collisions,
+        the upper end of Wilson's interval.
     """
     if collisions == 0:
         return 1.0 - 0.05 ** (1.0 / runs)
@@ -146,18 +152,18 @@ def falsify(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> list[Found]:
-    """Trials by chance, then a search in each worker process.
+    """Runs random trials, followed by one search per worker process.
 
     Args:
-        runs: Trials by chance.
-        search: About how many runs the searches may take together.
+        runs: Number of random trials.
+        search: Approximate total number of runs of the searches.
         seed: Seed of all random numbers.
         workers: Number of processes.
-        drivers: As of ``draw_trial``.
-        progress: Called with the number of runs that are done.
+        drivers: Names of drivers, as for ``draw_trial``.
+        progress: Called with the number of finished runs.
 
     Returns:
-        What each run came to.
+        One result per run.
     """
     edges = [*range(0, runs, _CHUNK), runs]
     jobs = [partial(by_chance, seed, range(a, b), drivers) for a, b in pairwise(edges)]

@@ -1,4 +1,4 @@
-"""What a falsification found, as a document and as text."""
+"""Formats the results of falsification as JSON documents and as text."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ _KINDS = ("layout", "driver", "setting")
 
 
 def falsification_summary(found: Sequence[Found], seed: int) -> dict[str, Any]:
-    """The JSON document of runs: numbers of collisions, nearest runs.
+    """Builds the JSON document of short runs.
 
     Args:
-        found: What each run came to.
-        seed: Of all that was drawn.
+        found: Results of the runs.
+        seed: Seed of all random numbers.
 
     Returns:
-        Plain values; clearances in m.
+        Plain values: numbers of collisions by group, the nearest runs, and all
+        collisions. Clearances are in m.
     """
     groups = {
         kind: {
@@ -61,7 +62,7 @@ def _counts(found: Sequence[Found]) -> dict[str, Any]:
 
 
 def falsification_text(summary: dict[str, Any]) -> str:
-    """The summary for a terminal."""
+    """Formats the document of short runs for a terminal."""
     lines = []
     for kind, groups in summary["groups"].items():
         lines.append(f"by {kind}:")
@@ -90,15 +91,15 @@ def _run_text(run: dict[str, Any]) -> str:
 
 
 def trial_summary(trial: Trial, outcome: Outcome, seed: int) -> dict[str, Any]:
-    """The JSON document of one trial.
+    """Builds the JSON document of one trial.
 
     Args:
-        trial: The trial that was run again.
-        outcome: What it came to.
+        trial: The repeated trial.
+        outcome: Result of the trial.
         seed: Seed of all trials.
 
     Returns:
-        Plain values; clearances in m, commands as fields of ``Row``.
+        Plain values. Clearances are in m, and commands have the fields of ``Row``.
     """
     tick_s = trial.fields.get("tick_s", TICK_S)
     rows = [Row(*row) for row in trial.table.reshape(-1, len(Row._fields)).tolist()]
@@ -117,7 +118,7 @@ def trial_summary(trial: Trial, outcome: Outcome, seed: int) -> dict[str, Any]:
 
 
 def trial_text(summary: dict[str, Any]) -> str:
-    """The same for a terminal."""
+    """Formats the document of one trial for a terminal."""
     rows = [
         "  " + ", ".join(f"{name} {value:g}" for name, value in row.items())
         for row in summary["commands"]
@@ -132,14 +133,15 @@ def trial_text(summary: dict[str, Any]) -> str:
 
 
 def long_summary(found: Mapping[int, Sequence[LongRun]], seed: int) -> dict[str, Any]:
-    """The JSON document of long runs.
+    """Builds the JSON document of long runs.
 
     Args:
-        found: Results of the runs by the number of their job.
-        seed: Of all that was drawn and searched.
+        found: Results of the runs by number of their job.
+        seed: Seed of all random numbers and searches.
 
     Returns:
-        Plain values: the number of contacts, and fields of ``LongRun`` with the job.
+        Plain values: the number of contacts, and the fields of ``LongRun`` with the
+        number of the job.
     """
 
     def told(job: int, run: LongRun) -> dict[str, Any]:
@@ -154,7 +156,7 @@ def long_summary(found: Mapping[int, Sequence[LongRun]], seed: int) -> dict[str,
 
 
 def long_text(found: Mapping[int, Sequence[LongRun]]) -> str:
-    """Tables by driver and setting, and a line for each contact."""
+    """Formats tables by driver and setting, and one line per contact."""
     runs = [run for own in found.values() for run in own]
     by = (("driver", "setting"), ("driver",), ("setting",))
     tables = [f"{summary_table(runs, names)}\n" for names in by]
@@ -168,7 +170,7 @@ def long_text(found: Mapping[int, Sequence[LongRun]]) -> str:
 
 
 def cost_summary(costs: Sequence[TickCost]) -> dict[str, Any]:
-    """The JSON document of times of ticks."""
+    """Builds the JSON document of computing times per control period."""
     return {
         "schema_version": SCHEMA_VERSION,
         "versions": versions(),
@@ -177,7 +179,7 @@ def cost_summary(costs: Sequence[TickCost]) -> dict[str, Any]:
 
 
 def cost_text(costs: Sequence[TickCost]) -> str:
-    """The same for a terminal, a line for each."""
+    """Formats computing times for a terminal, one line each."""
     lines = []
     for what, mean, p99, worst in costs:
         rest = "" if p99 is None else f", 99 % below {p99:.1f} ms, worst {worst:.1f} ms"

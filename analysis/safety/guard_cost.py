@@ -1,4 +1,4 @@
-"""What the guard and the guarded law take of a tick."""
+"""Measures the computing time of the guard and of the guarded law."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from diagrams.running.simulation import prepared_loop
 
 
 class TickCost(NamedTuple):
-    """Time of a tick."""
+    """Computing time per control period."""
 
     what: str
-    """What was run."""
+    """Description of the run."""
     mean_ms: float
-    """Time of a tick on average, ms."""
+    """Mean time per control period, ms."""
     p99_ms: float | None
-    """99 % of the ticks take less, ms; None where the run was timed as a whole."""
+    """99 % quantile of the times, ms; None if only the whole run was timed."""
     worst_ms: float | None
-    """The longest tick, ms."""
+    """Longest time, ms; None if only the whole run was timed."""
 
 
 def tick_costs() -> list[TickCost]:
-    """Measures ``corridor`` with and without a guard, and the guarded law in four."""
+    """Measures the guard in ``corridor``, and the guarded law in four scenarios."""
     costs = []
     for engine in ("compiled", "drake"):
         for guard in ("{}", "null"):
@@ -46,7 +46,10 @@ def tick_costs() -> list[TickCost]:
 
 
 def _tick_times(name: str, preset: str) -> NDArray[np.float64]:
-    """(ticks,) s of a compiled run of the guarded law; of each the least of three."""
+    """(ticks,) computing times per control period of the guarded law, s.
+
+    The law runs three times in the compiled engine. Each time is the least of three.
+    """
     fields = ["hearing=ideal", "law=guarded", f"ultrasonic.preset={preset}"]
     scenario, times = load_scenario(name, fields), []
     for _ in range(3):

@@ -1,7 +1,7 @@
-"""Jobs in worker processes that are replaced from time to time.
+"""Runs jobs in worker processes that are replaced from time to time.
 
-Drake never frees blocks that are written in Python, so that a process grows with each
-scenario that it builds.
+Drake never frees blocks that are written in Python. The memory of a process therefore
+grows with each scenario that the process builds.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ Result = TypeVar("Result")
 def run_jobs(
     jobs: Sequence[Callable[[], Result]], workers: int, *, jobs_a_worker: int
 ) -> Iterator[Result]:
-    """Does jobs in worker processes.
+    """Runs jobs in worker processes.
 
     Args:
-        jobs: Functions that can be pickled.
+        jobs: Functions without arguments that can be pickled.
         workers: Number of processes.
-        jobs_a_worker: After so many jobs a process is replaced.
+        jobs_a_worker: Number of jobs after which a process is replaced.
 
     Yields:
-        What each job returns, in the order of the jobs.
+        Results of the jobs, in the order of the jobs.
     """
     with ProcessPoolExecutor(
         workers, max_tasks_per_child=jobs_a_worker, initializer=_end_at_interrupt
@@ -38,5 +38,5 @@ def run_jobs(
 
 
 def _end_at_interrupt() -> None:
-    """Ctrl-C ends a worker at once, and without a traceback."""
+    """Makes Ctrl-C end a worker at once, without a traceback."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)

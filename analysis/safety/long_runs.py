@@ -1,7 +1,7 @@
-"""Runs of minutes to an hour in which drivers try to make a guarded robot collide.
+"""Long runs in which drivers try to make a guarded robot collide.
 
-``jobs`` lists the drivers and settings; ``phonotaxis falsify --long`` runs them and
-prints the results.
+A run lasts from minutes to an hour. ``jobs`` lists the drivers and settings.
+``phonotaxis falsify --long`` runs them and prints the results.
 """
 
 from __future__ import annotations
@@ -39,23 +39,23 @@ from analysis.safety.swinging_drivers import (
 from diagrams import RunResult
 from systems.framework.input_error import InputError
 
-#: Boxes around drivers whose swing is given or was found by the search for drift.
+#: Boxes around drivers with a given swing, or with a swing found by the drift search.
 FOUR_BOXES = four_boxes(1.63)
 #: Settings that get the most simulated time.
 _MAIN = "plain", "encoders not rounded", "cells of 2 cm", "tick of 50 ms"
-#: Frequencies of the swing that was found by hand, Hz.
+#: Frequencies of runs with the swing that was found by hand, Hz.
 _FREQUENCIES_HZ = 0.1, 0.3, 1.0, 2.0, 3.18, 5.0, 10.0
 _HOUR_S = 3600.0
 #: Number of runs of each search.
 _DRIFT_RUNS = _CONTACT_RUNS = 96
-#: A worker process is replaced after so many jobs.
+#: Number of jobs after which a worker process is replaced.
 JOBS_A_WORKER = 30
-#: Settings for which a contact is searched.
+#: Settings for which a search for a contact runs.
 _SEARCHED = "plain", "tick of 50 ms"
 
 
 class LongRun(NamedTuple):
-    """Result of a run."""
+    """Result of a long run."""
 
     driver: str
     setting: str
@@ -65,27 +65,28 @@ class LongRun(NamedTuple):
     clearance_m: float
     """Least clearance of the body, m."""
     disc_m: float
-    """Least clearance of the disc that holds the body, m."""
+    """Least clearance of the disc that encloses the body, m."""
     odometry_m: float
-    """Largest error of the axle's place by the odometry, m."""
+    """Largest position error of the odometry at the axle, m."""
     swing: Swing | None
-    """Swing of the driver; None if it does not swing."""
+    """Swing of the driver; None if the driver does not swing."""
 
 
 Job = partial[list[LongRun]]
 
 
 class Journal:
-    """Keeps the runs of each job in a file as soon as the job is done.
+    """Saves the runs of each job in a file as soon as the job is done.
 
-    The file has one JSON object per line: the seed, the number of the job, its runs.
+    The file has one JSON object per line. Each object holds the seed, the number of the
+    job, and the runs of the job.
 
     Args:
-        path: The file; it need not exist.
-        seed: Seed of the jobs. The journal ignores jobs of other seeds in the file.
+        path: Path of the file. The file need not exist.
+        seed: Seed of the jobs. The journal ignores jobs with other seeds in the file.
 
     Raises:
-        InputError: A line of the file is no job.
+        InputError: A line of the file does not describe a job.
     """
 
     def __init__(self, path: Path, seed: int) -> None:
@@ -104,7 +105,7 @@ class Journal:
                 ) from None
 
     def keeping(self, number: int, job: Job) -> Job:
-        """A job that appends its runs to the file when it is done, in any process."""
+        """Wraps a job so that it appends its runs to the file, in any process."""
         return partial(_keep, self._path, self._seed, number, job)
 
 
@@ -113,7 +114,7 @@ def _keep(path: Path, seed: int, number: int, job: Job) -> list[LongRun]:
     kept = [
         {**run._asdict(), "swing": run.swing and run.swing._asdict()} for run in runs
     ]
-    # One write in append mode: several processes share the file.
+    # Several processes share the file. A single write in append mode is safe.
     line = json.dumps({"seed": seed, "job": number, "runs": kept})
     with path.open("a", encoding="utf-8") as file:
         file.write(f"{line}\n")
@@ -126,11 +127,11 @@ def _run_of(kept: dict[str, Any]) -> LongRun:
 
 
 def long_run(trial: Trial, swing: Swing | None = None) -> LongRun:
-    """Runs a trial.
+    """Runs a trial, and summarizes the result.
 
     Args:
-        trial: The trial to run.
-        swing: Swing of its driver, for the record.
+        trial: Trial to run.
+        swing: Swing of the driver, which is recorded in the result.
 
     Returns:
         The result.
@@ -154,13 +155,13 @@ def _judged(
 
 
 def jobs(seed: int) -> list[Job]:
-    """The jobs whose runs make the table.
+    """Lists the jobs whose runs make up the table.
 
     Args:
-        seed: Seed of all that is drawn and searched.
+        seed: Seed of all random numbers and searches.
 
     Returns:
-        The jobs, those that take longest first. Each can be called on its own.
+        The jobs, longest first. Each job is a function without arguments.
     """
     found: list[Job] = []
     slow_first = sorted(SETTINGS, key="cells of 2 cm".__ne__)

@@ -1,10 +1,15 @@
-"""Drivers that swing to make the odometry drift, and then press against bodies.
+"""Drivers that swing to make the odometry drift, and then press against obstacles.
 
-When the forward speed is in phase with the angular acceleration, the odometry's errors
-of successive ticks can have the same sign. A driver of this module looks around, visits
-each box, swings for minutes at the start, and then drives at the boxes again. There it
-turns each front corner of the body towards the box. It steers by the true pose, so that
-it finds the boxes however far the odometry has drifted.
+To swing means to oscillate in forward speed and yaw rate. If the forward speed is in
+phase with the angular acceleration, the odometry errors of successive control periods
+can have the same sign. A driver of this module does the following:
+
+1. Turn around once, and visit each box.
+2. Return to the start, and swing there for minutes.
+3. Drive at the boxes again, and turn each front corner of the body toward them.
+
+The driver steers by the true pose. The driver therefore finds the boxes however far the
+odometry has drifted.
 """
 
 from __future__ import annotations
@@ -35,14 +40,17 @@ from systems.framework.signals import TICK_S
 #: Range of the frequencies of swings, Hz.
 SLOWEST_HZ, FASTEST_HZ = 0.1, 10.0
 #: Duration of a run in the search for drift, and in the search for a contact, s. The
-#: latter suffices to visit four boxes, to swing, and to press against all four.
+#: second is enough to visit four boxes, to swing, and to press against all four.
 _DRIFT_S, _CONTACT_S = 48.0, 450.0
 #: Bearing of the body's front left corner from the axle, rad.
 _CORNER = math.atan2(0.5 * RobotParameters().width_m, 0.5 * RobotParameters().length_m)
 
 
 class Swing(NamedTuple):
-    """How a driver swings. Fields without a description are those of ``Row``."""
+    """Parameters of an oscillation of a driver's forward speed and yaw rate.
+
+    Fields without a description are those of ``Row``.
+    """
 
     swing_v: float
     """Amplitude of the forward speed, m/s."""
@@ -51,12 +59,12 @@ class Swing(NamedTuple):
     hz: float
     """Frequency, Hz."""
     phase: float
-    """Phase by which the turn leads the forward speed, rad."""
+    """Phase by which the yaw rate leads the forward speed, rad."""
     edge: float = 1.0
     skew: float = 0.0
 
     def until(self, end_s: float) -> Row:
-        """A row of a driver's table that swings until the given time, s."""
+        """Makes a row of a driver's table that swings until the given time, s."""
         v, omega, hz, *shape = self
         return Row(end_s, TWIST, 0, 0, 0, 0, 0, v, omega, math.tau * hz, *shape)
 
@@ -66,7 +74,7 @@ BY_HAND = Swing(0.72, 3.5, 20.0 / math.tau, -0.5 * math.pi)
 
 
 class _Script:
-    """A driver's table under construction."""
+    """Builds a driver's table step by step."""
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
@@ -78,11 +86,11 @@ class _Script:
         self.rows.append(row._replace(end_s=self.now_s))
 
     def look_around(self) -> None:
-        """Turns in place, by a full turn."""
+        """Adds a full turn in place."""
         self.add(8.0, Row(0.0, TWIST, 0.0, 0.9))
 
     def press(self, x: float, y: float) -> None:
-        """Drives at a point and turns both front corners of the body towards it."""
+        """Adds a drive to a point, and turns of both front corners toward the point."""
         goal = Row(0.0, x=x, y=y, by_truth=1.0)
         self.add(2.0 + math.hypot(x, y) / 0.4, goal._replace(mode=AHEAD, v=0.4))
         for bearing in (_CORNER, -_CORNER):
@@ -90,7 +98,7 @@ class _Script:
             self.add(2.0, goal._replace(mode=AIM, omega=bearing))
 
     def home(self, heading: float, seconds: float) -> None:
-        """Drives back to the start and turns to a heading."""
+        """Adds a drive back to the start, and a turn to a heading."""
         self.add(seconds, Row(0.0, AHEAD, 0.4, by_truth=1.0))
         x, y = 1e6 * math.cos(heading), 1e6 * math.sin(heading)
         self.add(2.0, Row(0.0, AIM, x=x, y=y, by_truth=1.0))
@@ -108,17 +116,19 @@ def swing_at_boxes(
     presses: int = 1,
     seed: int = 1,
 ) -> Trial:
-    """A driver that visits boxes, swings, and presses against the boxes again.
+    """Makes a driver that visits boxes, swings, and presses against the boxes again.
+
+    To swing means to oscillate in forward speed and yaw rate.
 
     Args:
         names: Names of layout, driver and setting.
-        boxes: (x, y, theta, length, width) each, m and rad.
-        swing: How it swings. After each swing it returns to the start.
+        boxes: (x, y, theta, length, width) of each box, m and rad.
+        swing: Swing of the driver. After each swing, the driver returns to the start.
         duration_s: Duration of the run, s.
         heading: Heading at the start and at the beginning of each swing, rad.
         swings: Number of swings between visits to boxes.
         swing_s: Duration of each swing, s.
-        presses: Number of boxes that it visits between swings.
+        presses: Number of boxes that the driver visits between swings.
         seed: Seed of the noise.
 
     Returns:
@@ -143,7 +153,7 @@ def swing_at_boxes(
 
 
 def _nearest_point(box: Sequence[float]) -> tuple[float, float]:
-    """The point of a box that is nearest to the origin."""
+    """Point of a box that is nearest to the origin."""
     x, y, theta, length, width = box
     c, s = math.cos(theta), math.sin(theta)
     u = min(max(-c * x - s * y, -0.5 * length), 0.5 * length)
@@ -152,13 +162,15 @@ def _nearest_point(box: Sequence[float]) -> tuple[float, float]:
 
 
 def swing_once(setting: str) -> Trial:
-    """A driver that visits a box, swings once for minutes, and visits the box again.
+    """Makes a driver that visits a box, swings once, and visits the box again.
 
-    It swings for 150 s, with cells of 2 cm for 80 s, with a tick of 50 ms for 40 s.
-    With an odometry that takes the chord of each tick, the robot touches the box.
+    To swing means to oscillate in forward speed and yaw rate. The swing lasts 150 s.
+    With grid cells of 2 cm, the swing lasts 80 s. With a control period of 50 ms, the
+    swing lasts 40 s. If the odometry approximates the arc of each control period by its
+    chord, the robot touches the box.
 
     Args:
-        setting: Name of the robot's settings.
+        setting: Name of the robot's setting in ``SETTINGS``.
 
     Returns:
         The trial.
@@ -170,11 +182,11 @@ def swing_once(setting: str) -> Trial:
 
 
 def swing_alone(swing: Swing, setting: str, duration_s: float) -> Trial:
-    """A driver that looks around and then swings on an empty floor.
+    """Makes a driver that turns around once and then swings on an empty floor.
 
     Args:
-        swing: How it swings.
-        setting: Name of the robot's settings.
+        swing: Swing of the driver.
+        setting: Name of the robot's setting in ``SETTINGS``.
         duration_s: Duration of the run, s.
 
     Returns:
@@ -187,8 +199,8 @@ def swing_alone(swing: Swing, setting: str, duration_s: float) -> Trial:
     return make_trial(names, [], script.rows, 0.0, source, 1, duration_s)
 
 
-#: Bounds of the numbers that make a swing: forward speed, m/s; logarithms of the yaw
-#: rate, rad/s, and of the frequency, Hz; phase, rad; edge and skew.
+#: Bounds of the parameters of a swing, in this order: forward speed, m/s; logarithm of
+#: the yaw rate, rad/s; logarithm of the frequency, Hz; phase, rad; edge; skew.
 _BOUNDS = (
     (0.02, 0.72),
     (math.log(1e-3), math.log(6.0)),
@@ -205,16 +217,17 @@ def draw_swing(draw: np.random.Generator) -> Swing:
 
 
 def _swing_at(x: Any) -> Swing:
-    """The swing that a point of the unit cube stands for."""
+    """Converts a point of the unit cube to a swing."""
     low, high = np.transpose(_BOUNDS)
     v, log_omega, log_hz, *shape = (low + (high - low) * np.asarray(x)).tolist()
     return Swing(v, math.exp(log_omega), math.exp(log_hz), *shape)
 
 
 def _repeated(swing: Swing, setting: str) -> Swing:
-    """The same swing with a period of whole ticks.
+    """Changes the period of an oscillation to a whole number of control periods.
 
-    The encoders then round each period alike, and the errors of periods add up.
+    The encoders then round each period of the oscillation alike. The errors of the
+    periods therefore add up.
     """
     tick_s = SETTINGS[setting].get("tick_s", TICK_S)
     period_s = tick_s * max(round(1.0 / (swing.hz * tick_s)), 2)
@@ -222,7 +235,7 @@ def _repeated(swing: Swing, setting: str) -> Swing:
 
 
 def odometry_error(result: RunResult) -> NDArray[np.float64]:
-    """(ticks,) distance of the axle's estimated place from its true place, m."""
+    """(ticks,) distance from the axle's estimated position to its true position, m."""
     columns = result.columns
     x = columns["p_WB_x"] - columns["p_WB_estimated_x"]
     y = columns["p_WB_y"] - columns["p_WB_estimated_y"]
@@ -230,10 +243,12 @@ def odometry_error(result: RunResult) -> NDArray[np.float64]:
 
 
 def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
-    """Searches by differential evolution for the swing with the largest drift.
+    """Searches by differential evolution for the swing with the largest odometry drift.
+
+    A swing is an oscillation in forward speed and yaw rate.
 
     Args:
-        setting: Name of the robot's settings.
+        setting: Name of the robot's setting in ``SETTINGS``.
         runs: Approximate number of runs, of 48 s each.
         seed: Seed of the search.
 
@@ -251,22 +266,23 @@ def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
 
 
 def four_boxes(distance_m: float) -> list[tuple[float, ...]]:
-    """Boxes on all four sides of the start, for drift in any direction.
+    """Places boxes on all four sides of the start, for drift in any direction.
 
     Args:
-        distance_m: Distance of their centers from the start, m.
+        distance_m: Distance of the box centers from the start, m.
 
     Returns:
-        (x, y, theta, length, width) each, m and rad.
+        (x, y, theta, length, width) of each box, m and rad.
     """
     sides = (0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0)
     return [(distance_m * x, distance_m * y, 0.0, 0.3, 0.3) for x, y in sides]
 
 
 def _searched_trial(x: NDArray[np.float64], setting: str) -> Trial:
-    """The trial that a point of the unit cube stands for.
+    """Converts a point of the unit cube to a trial.
 
-    The point gives the swing, the heading and the distance of the boxes.
+    The coordinates of the point determine the swing, the heading and the distance of
+    the boxes.
     """
     heading, far = math.tau * x[-2], 1.5 + 0.5 * x[-1]
     names = "four boxes", "swing, searched for contact", setting
@@ -284,19 +300,20 @@ def search_contact(
 ) -> None:
     """Searches by differential evolution for a run that ends in a contact.
 
-    It varies the swing, the heading and the distance of four boxes.
+    The search varies the heading, the distance of four boxes, and the swing. A swing is
+    an oscillation in forward speed and yaw rate.
 
     Args:
-        setting: Name of the robot's settings.
+        setting: Name of the robot's setting in ``SETTINGS``.
         runs: Approximate number of runs, of 450 s each.
         seed: Seed of the search.
-        judge: Called with the swing and the result of each run. The search minimizes
-            the value that it returns.
+        judge: Function of the swing and the result of a run. The search minimizes the
+            value that the function returns.
     """
 
     def worth(x: NDArray[np.float64]) -> float:
         trial = _searched_trial(x, setting)
-        # The clearance is infinite where the robot never came near a body.
+        # If the robot never came near a body, the clearance is infinite.
         return min(judge(_swing_at(x[:-2]), run_result(trial)), 10.0)
 
     _evolve(worth, len(_BOUNDS) + 2, runs, seed)

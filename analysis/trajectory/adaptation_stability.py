@@ -1,4 +1,8 @@
-"""Whether gains that adapt stay bounded: Lyapunov function, drift, jam, rates."""
+"""Analyzes whether the adaptive gains of a law stay bounded.
+
+The analysis covers a Lyapunov function, the drift under a constant push, a robot that
+is jammed at a wall, and the critical adaptation rate.
+"""
 
 from __future__ import annotations
 
@@ -19,96 +23,113 @@ from systems.laws.trajectory.sampled_bounds import pull_through_m
 from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 from systems.laws.trajectory.trajectory_impedance import target_force
 
-#: Length of a run that learns, and of one that looks for a critical rate, s.
+# Length of a run with the Lyapunov function, and of a run for the critical rate, s.
 _LEARN_S, _CRITICAL_S = 60.0, 60.0
-#: Gains that the learning starts from, of the wanted ones.
+# Initial gains over desired gains in a run with the Lyapunov function.
 _OFF = 0.5
-#: A motion, m, or a gain beyond this runs away.
+# The adaptation runs away if a gain, or a motion in m or m/s, exceeds this.
 _WILD = 1e4
-#: Rates that are tried, (N/m)^2/(m^2 s) at 1 m, ten a decade.
+# Adaptation rates to try for an amplitude of 1 m, ten per decade, (N/m)^2/(m^2 s).
 _RATES = np.geomspace(1.0, 1e6, 61)
 _HALVINGS = 8
-#: Largest rate that the parameters take.
+# Largest rate that the parameters of the law allow.
 _LARGEST_RATE = 1e6
-#: Amplitudes whose critical rates are compared, m.
+# Amplitudes of the target whose critical rates are compared, m.
 _AMPLITUDES_M = (0.3, 1.0, 3.0)
-#: When the drift is read, s.
+# Times at which the drift is listed, s.
 _DRIFT_S = (60.0, 600.0, 6000.0)
-#: The jam: how long, how long after it, s, the target's speed, m/s, the wall and where
-#: it holds P, m.
+# The jam, in this order: duration, s; time simulated afterward, s; target speed, m/s;
+# x of the wall, m; largest x of control point P, m.
 _JAM_S, _AFTER_S, _JAM_SPEED_M_S, _WALL_M, _HELD_M = 90.0, 60.0, 0.15, 1.6, 1.0
-#: A wall there is none, m.
+# Coordinates of a wall that is absent, m.
 _GONE_M = 1e9
-#: Rises of V below this share of its start are rounding.
+# Rises of V below this share of V(0) count as rounding errors.
 _ROUNDING = 1e-9
-#: Points of a curve that is drawn.
+# Number of points of a plotted curve.
 _DRAWN = 600
 
 
 @dataclass(frozen=True)
 class LyapunovRun:
-    """V over a run without contacts whose gains start off, and the gains."""
+    """Lyapunov function V and gains over a run without contacts.
+
+    The gains start at half their desired values.
+    """
 
     time_s: NDArray[np.float64]
-    """(n,) s."""
+    """(n,) time, s."""
     continuous: NDArray[np.float64]
-    """(n,) V/V(0) of the rule in continuous time."""
+    """(n,) V/V(0) of the adaptation rule in continuous time."""
     sampled: NDArray[np.float64]
-    """(n,) the same of the sampled loop with its motors."""
+    """(n,) V/V(0) of the sampled loop with motor lag."""
     gains: NDArray[np.float64]
     """(n, 2) K, N/m, and D, N s/m, in continuous time."""
     wanted: tuple[float, float]
-    """M w_n^2 and 2 xi w_n M."""
+    """Desired gains: K = M w_n^2, N/m, and D = 2 xi w_n M, N s/m."""
     largest_rise: float
-    """Of the continuous V between two instants, of V(0)."""
+    """Largest rise of the continuous V between samples, as a share of V(0)."""
     sampled_rise: float
-    """The same of the sampled one between two ticks."""
+    """Largest rise of the sampled V in a control period, as a share of V(0)."""
 
     @property
     def falls(self) -> bool:
-        """Whether V never rises, to rounding."""
+        """Whether the continuous V never rises, except for rounding."""
         return self.largest_rise <= _ROUNDING
 
 
 @dataclass(frozen=True)
 class Drift:
-    """K under a constant push that the reference does not know."""
+    """Drift of the stiffness K under a constant push that the reference model ignores.
+
+    K is computed twice: without limits of the gains, and with those of the scenario
+    ("limited").
+    """
 
     push_n: float
-    """F, N."""
+    """Push F, N."""
     time_s: tuple[float, ...]
+    """Times at which K is listed, s."""
     gradient_n_m: tuple[float, ...]
-    """(K_0^4 + 4 gamma F^2 t)^(1/4), the gradient's without limits, N/m."""
+    """K of the gradient rule without limits: (K_0^4 + 4 gamma F^2 t)^(1/4), N/m."""
     simulated_n_m: tuple[float, ...]
-    """This rule without limits of the gains, N/m."""
+    """Simulated K of the scenario's rule without limits, N/m."""
     limited_n_m: tuple[float, ...]
-    """This rule as the scenario has it, N/m."""
+    """Simulated K of the scenario's rule, N/m."""
     curve_s: NDArray[np.float64]
-    """(n,) s."""
+    """(n,) times of the curves, s."""
     curves_n_m: NDArray[np.float64]
-    """(n, 2) K without limits, and as the scenario has it, N/m."""
+    """(n, 2) K without limits, and limited K, N/m."""
 
 
 @dataclass(frozen=True)
 class Jam:
-    """K behind a wall that P cannot pass while the target goes on; then it is gone."""
+    """Stiffness K while a wall blocks the robot, and after the wall is removed.
+
+    The target moves on while the robot is blocked.
+    """
 
     jam_s: float
+    """Duration of the jam, s."""
     after_s: float
+    """Simulated time after the jam, s."""
     end_n_m: tuple[float, float]
-    """K at the end of the jam without limits, and as the scenario has it, N/m."""
+    """Stiffness K at the end of the jam, N/m.
+
+    The first value is without limits of the gains. The second value is with the
+    scenario's limits.
+    """
     left_n_m: tuple[float, float]
-    """The same so long after; infinite: it has run away."""
+    """Stiffness K at the end of the run, in the same order; infinite if K diverged."""
 
 
 @dataclass(frozen=True)
 class CriticalRate:
-    """The rate from which K and D run away, without limits and without contacts."""
+    """The adaptation rate from which K and D run away, without limits and contacts."""
 
     amplitude_m: float
-    """a of the target a (sin 0.6 t + 0.5 sin 1.7 t)."""
+    """Amplitude a of the target a (sin 0.6 t + 0.5 sin 1.7 t), m."""
     rate: float
-    """gamma_crit, (N/m)^2/(m^2 s); infinite where none that is allowed is."""
+    """gamma_crit, (N/m)^2/(m^2 s); infinite if no allowed rate is critical."""
 
     @property
     def product(self) -> float:
@@ -118,45 +139,53 @@ class CriticalRate:
 
 @dataclass(frozen=True)
 class AdaptationStability:
-    """All of it for the rule of a scenario."""
+    """Stability results for the adaptation rule of a scenario."""
 
     rule: str
+    """Name of the rule."""
     rate: float
-    """gamma, (N/m)^2/(m^2 s)."""
+    """Adaptation rate gamma, (N/m)^2/(m^2 s)."""
     reference: tuple[float, float]
-    """w_n, rad/s, and xi."""
+    """Natural frequency w_n, rad/s, and damping ratio xi of the reference model."""
     reference_poles: NDArray[np.complex128]
-    """(2,) s plane, rad/s."""
+    """(2,) poles of the reference model in the s plane, rad/s."""
     held_poles: NDArray[np.complex128]
-    """(2,) of the block, z plane."""
+    """(2,) poles of the discrete reference model in the z plane."""
     lyapunov: LyapunovRun | None
-    """None for a rule that has no such function."""
+    """Run with the Lyapunov function; None if the rule has no such function."""
     drift: Drift
     jam: Jam
     critical: CriticalRate
-    """At the lag at which the target pulls P through a contact, or 1 m."""
+    """Critical adaptation rate for a target with the amplitude K_e S/K.
+
+    If the target leads by K_e S/K, it pulls the robot through a contact. K_e is the
+    stiffness of contacts, S is the distance at which contacts begin, and K is the
+    stiffness to the target. If K_e is 0, the amplitude is 1 m.
+    """
     products: tuple[CriticalRate, ...]
-    """At other amplitudes."""
+    """Critical rates for the other amplitudes."""
     bounded: bool
-    """Whether limits hold K and D whatever happens."""
+    """Whether the rule limits K and D to a fixed range."""
 
     @property
     def margin(self) -> float:
-        """gamma_crit/gamma; above 1 it is stable."""
+        """gamma_crit/gamma; above 1, the adaptation is stable."""
         return self.critical.rate / self.rate if self.rate else math.inf
 
 
 def adaptation_stability(scenario: Scenario) -> AdaptationStability:
-    """Stability of the adaptation of a robot on a route.
+    """Analyzes the stability of the gain adaptation of a robot on a route.
+
+    The results come from formulas, and from simulations of a point mass with motor lag.
 
     Args:
-        scenario: Its law adapts.
+        scenario: Scenario whose law adapts its gains.
 
     Returns:
-        By simulation of a point with the motors' lag, and by closed forms.
+        The stability results.
 
     Raises:
-        InputError: The law does not adapt.
+        InputError: The law does not adapt its gains.
     """
     own = route_law(scenario)
     if not isinstance(own, AdaptiveTrajectoryParameters):
@@ -194,15 +223,17 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
 def swinging_target(
     amplitude_m: float, duration_s: float, tick_s: float
 ) -> NDArray[np.float64]:
-    """a (sin 0.6 t + 0.5 sin 1.7 t) along x: two frequencies tell K and D apart.
+    """Computes a target that oscillates along x: a (sin 0.6 t + 0.5 sin 1.7 t).
+
+    The two frequencies allow the adaptation to distinguish stiffness K from damping D.
 
     Args:
-        amplitude_m: a, m.
-        duration_s: s.
-        tick_s: s.
+        amplitude_m: Amplitude a, m.
+        duration_s: Duration, s.
+        tick_s: Control period, s.
 
     Returns:
-        (ticks, 4) p_d and v_d, m and m/s.
+        (ticks, 4) positions p_d and velocities v_d of the target, m and m/s.
     """
     time = np.arange(0.0, duration_s, tick_s)
     targets = np.zeros((len(time), 4))
@@ -212,14 +243,18 @@ def swinging_target(
 
 
 def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
-    """The least rate at which the rule, without limits, runs away within a minute.
+    """Finds the least adaptation rate at which gains or motion diverge within 60 s.
+
+    The adaptation rule has no limits of the gains. Ten rates per decade are tried. The
+    interval below the first divergent rate is bisected. Some higher rates may not
+    diverge.
 
     Args:
-        loop: Its rule, gains, reference, mass, lag and tick are used.
-        amplitude_m: Of the target, m.
+        loop: Loop with the rule, gains, reference, mass, motor lag and control period.
+        amplitude_m: Amplitude of the target, m.
 
     Returns:
-        To 2 %; rates in which it runs away are no interval, and this is the first.
+        The least critical rate. If no allowed rate is critical, the rate is infinite.
     """
     targets = swinging_target(amplitude_m, _CRITICAL_S, loop.tick_s)
 
@@ -242,29 +277,32 @@ def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
 
 
 def drift_stiffness(start: float, rate: float, push: float, time_s: float) -> float:
-    """K(t) of the gradient under a constant push: K^3 K' = gamma F^2 at rest.
+    """Computes the stiffness K(t) of the gradient rule under a constant push F.
+
+    At rest, the robot is off its target by F/K. The sensitivity of its position p is
+    dp/dK = -F/K^2. The gradient rule therefore gives K^3 K' = gamma F^2.
 
     Args:
-        start: K_0, N/m.
-        rate: gamma, (N/m)^2/(m^2 s).
-        push: F, N.
-        time_s: t, s.
+        start: Initial stiffness K_0, N/m.
+        rate: Adaptation rate gamma, (N/m)^2/(m^2 s).
+        push: Push F, N.
+        time_s: Time t, s.
 
     Returns:
-        N/m: P is off by F/K, and dp/dK is -F/K^2.
+        K(t), N/m.
     """
     return float((start**4 + 4.0 * rate * push**2 * time_s) ** 0.25)
 
 
 def _unlimited(loop: PointLoop, rate: float | None = None) -> PointLoop:
-    """The same rule of K and D without limits and without the safety term."""
+    """Returns the loop without limits of K and D, and without the safety term."""
     plain = {"projected": False, "penalty": 0.0, "contact_rate": 0.0}
     rates = {} if rate is None else {"rate": rate}
     return loop._replace(law=loop.law.model_copy(update={**plain, **rates}))
 
 
 def _lyapunov(loop: PointLoop, wanted: tuple[float, float]) -> LyapunovRun:
-    """Both loops from gains that are off, at the scenario's rate."""
+    """Simulates the continuous and the sampled loop from wrong gains."""
     mass, rate = loop.robot.mass_kg, loop.law.rate
     assert loop.poles is not None
     frequency, ratio = loop.poles
@@ -357,7 +395,7 @@ def _drift(loop: PointLoop) -> Drift:
 
 
 def _jam(loop: PointLoop) -> Jam:
-    """The target goes on for the jam's length, and then stays where it is."""
+    """Simulates a jam. The target moves on during the jam, and then stops."""
     time = np.arange(0.0, _JAM_S + _AFTER_S, loop.tick_s)
     jammed = time < _JAM_S
     targets = np.zeros((len(time), 4))
@@ -372,6 +410,6 @@ def _jam(loop: PointLoop) -> Jam:
     ]
     last = int(np.flatnonzero(jammed)[-1])
     found = [[float(run[at]) for run in runs] for at in (last, -1)]
-    # What has run away is no number any more.
+    # A gain that has run away may not be a finite number.
     ends, left = ([k if abs(k) < _WILD else math.inf for k in row] for row in found)
     return Jam(_JAM_S, _AFTER_S, (ends[0], ends[1]), (left[0], left[1]))

@@ -1,4 +1,4 @@
-"""Robots that follow one another on a line, in time: the law, tick by tick."""
+"""Simulates a line of robots that follow one another, by the law in discrete time."""
 
 from __future__ import annotations
 
@@ -34,34 +34,44 @@ from systems.laws.trajectory.trajectory_impedance_controller import (
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, X
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Robots of a simulated chain, the first one among them.
+#: Number of robots in a simulated chain, including the first.
 _ROBOTS = ROBOTS[-1]
-#: Amplitude of a first robot that is shaken, m: far below all limits.
+#: Amplitude of the first robot's oscillation, m. Far too small to reach any limit.
 _SHAKEN_M = 0.002
-#: Periods that the chain is shaken for; amplitudes are those of the last ones.
+# Number of simulated periods, and number of final periods that give the amplitudes.
 _PERIODS, _READ = 40, 5
-#: A chain is watched so long after its first robot has braked, s.
+# Simulated time after and before the first robot begins to brake, s.
 _WATCHED_S, _DRIVEN_S = 25.0, 40.0
 
 
 class ChainNumbers(NamedTuple):
-    """What the run depends on."""
+    """Parameters of a simulated line of robots (chain), for the compiled code.
+
+    P is a robot's control point ahead of the axle.
+    """
 
     gains: tuple[float, float, float, float]
-    """K, D, K_e and D_e."""
+    """K, D, K_e and D_e: stiffness and damping to the target, and those of contacts."""
     feed_forward: float
+    """Target velocity over velocity of the robot ahead."""
     spacing_m: float
+    """Desired distance between the points P of neighbors, m."""
     offset_ahead_m: float
-    """Of a neighbour's nearest point from its P: less so far ahead ..."""
+    """Distance between points P minus that to the disc of the robot ahead, m."""
     offset_behind_m: float
-    """... and so far behind."""
+    """Distance between points P minus that to the disc of the robot behind, m."""
     contacts: ContactNumbers
     mass: float
     top_speed: float
-    """Of P, m/s."""
+    """Largest speed of P, m/s."""
     motors: tuple[float, float]
-    """Share of the speed that is left after a tick, and way for each m/s of it, s."""
+    """Effect of the motor lag over a control period.
+
+    The first value is the share of the old speed in the new speed. The second value is
+    the coasting distance per old speed, s.
+    """
     late_ticks: int
+    """Latency of the observed neighbors, in control periods."""
     tick_s: float
 
 
@@ -77,9 +87,10 @@ def _object(
 
 @njit(cache=True)
 def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cover
-    """Places P of all robots at each tick.
+    """Positions of the control points P of all robots at each control period.
 
-    They start in formation, and drive as the first one does at its first tick.
+    The robots start in formation. Their initial speed is that of the first robot's
+    first step.
     """
     ticks, robots, tick_s = len(first), len(gaps) + 1, numbers.tick_s
     places = np.empty((ticks, robots))
@@ -94,7 +105,7 @@ def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cov
     for tick in range(ticks):
         p[0] = first[tick]
         places[tick] = p
-        # What is seen is a latency old; before the start all went on as at it.
+        # Observed positions are one latency old. Before the start, speeds are equal.
         seen, speed = np.empty(robots), np.full(robots, begin)
         for i in range(robots):
             then = tick - late
@@ -139,21 +150,23 @@ def run_chain(
     spacing_m: float,
     robots: int = _ROBOTS,
 ) -> NDArray[np.float64]:
-    """Places of robots on a line, the first of which moves as it is told.
+    """Simulates robots that follow one another on a line, behind a given first robot.
 
-    The law's own functions with contacts to both neighbours, the limits of acceleration
-    and speed, and the motors' lag; no filter.
+    The simulation uses the law's own functions. The simulation includes contacts with
+    both neighbors, the limits of acceleration and speed, and the motor lag, but no
+    safety filter. P is a robot's control point ahead of the axle.
 
     Args:
-        scenario: Law, robot, motors, tick and latency of objects are used.
-        first_m: (ticks,) place P of the first robot, m; its first step is how fast all
-            drive at the start.
-        feed_forward: Share of the velocity of the robot before it that a target has.
-        spacing_m: Between P of neighbours, m.
-        robots: How many, the first one among them.
+        scenario: Scenario with the law, robot, motors, control period and latency of
+            the object sensor.
+        first_m: (ticks,) positions P of the first robot, m. The first step gives the
+            initial speed of all robots.
+        feed_forward: Target velocity over velocity of the robot ahead.
+        spacing_m: Desired distance between the points P of neighbors, m.
+        robots: Number of robots, including the first.
 
     Returns:
-        (ticks, robots) places P, m.
+        (ticks, robots) positions P, m.
     """
     own, robot, tick_s = route_law(scenario), scenario.only.robot, scenario.tick_s
     lag = scenario.only.plant.motor_lag_s
@@ -181,39 +194,40 @@ def run_chain(
 
 @dataclass(frozen=True)
 class ChainRun:
-    """A shaken chain, simulated, beside its frequency response."""
+    """Amplitudes in an oscillating chain, by simulation and by frequency response."""
 
     name: str
     frequency_rad_s: float
     simulated: NDArray[np.float64]
-    """(robots,) amplitude of each, of the first one's."""
+    """(robots,) simulated amplitude of each robot over that of the first."""
     predicted: NDArray[np.float64]
-    """(robots,) the same by ``chain_response``."""
+    """(robots,) amplitude ratios predicted by ``chain_response``."""
 
     @property
     def difference(self) -> float:
-        """Largest share by which both differ."""
+        """Largest relative difference between simulation and prediction."""
         return float(np.abs(self.simulated / self.predicted - 1.0).max())
 
 
 def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
-    """Shakes the first of eight robots where the chain amplifies most.
+    """Simulates eight robots on a line, of which the first oscillates.
 
-    Where nothing grows, at the natural frequency of a robot.
+    The oscillation has the frequency of the largest amplification. If nothing is
+    amplified, the oscillation has the natural frequency of a robot.
 
     Args:
-        scenario: As of ``run_chain``.
-        name: Of the chain.
-        peak: Where it amplifies.
+        scenario: Scenario as for ``run_chain``.
+        name: Name of the chain of robots.
+        peak: Largest amplification of the chain, with its frequency.
 
     Returns:
-        Amplitudes of the last five of forty periods.
+        Amplitudes over the last five of forty periods.
     """
     natural = math.sqrt(route_law(scenario).stiffness_n_m / scenario.only.robot.mass_kg)
     omega = peak.frequency_rad_s if peak.grows else natural
     period = math.tau / omega
     time = np.arange(0.0, _PERIODS * period, scenario.tick_s)
-    # It starts at rest, at the turn of its swing.
+    # The first robot starts at rest, at an end of its oscillation.
     first = _SHAKEN_M * (np.cos(omega * time) - 1.0)
     share, spacing = peak.feed_forward, peak.spacing_m
     places = run_chain(scenario, first, feed_forward=share, spacing_m=spacing)
@@ -230,32 +244,36 @@ def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
 
 @dataclass(frozen=True)
 class BrakedChain:
-    """A chain whose first robot brakes from the target's speed to rest."""
+    """Gaps in a chain whose first robot brakes from the target's speed to rest.
+
+    P is a robot's control point ahead of the axle.
+    """
 
     name: str
     time_s: NDArray[np.float64]
-    """(n,) s; it brakes at 0."""
+    """(n,) time since the first robot began to brake, s."""
     gap_m: NDArray[np.float64]
-    """(n, robots - 1) way between P of neighbours, m."""
+    """(n, robots - 1) distance between the points P of neighbors, m."""
     least_gap_m: NDArray[np.float64]
-    """(robots - 1,) least of it from the braking on, m."""
+    """(robots - 1,) least distance after the braking began, m."""
     overshoot_m: NDArray[np.float64]
-    """(robots - 1,) how much less than at the end that is, m."""
+    """(robots - 1,) final distance minus least distance, m."""
 
 
 def brake_chain(
     scenario: Scenario, name: str, *, feed_forward: float, spacing_m: float
 ) -> BrakedChain:
-    """Drives eight robots in formation, and brakes the first as a target brakes.
+    """Simulates eight robots in formation, of which the first brakes to rest.
 
     Args:
-        scenario: As of ``run_chain``; its route has speed and acceleration.
-        name: Of the chain.
-        feed_forward: Share of the velocity of the robot before it.
-        spacing_m: Between P of neighbours, m.
+        scenario: Scenario as for ``run_chain``. Its route gives the speed and the
+            braking acceleration.
+        name: Name of the chain.
+        feed_forward: Target velocity over velocity of the robot ahead.
+        spacing_m: Desired distance between the control points P of neighbors, m.
 
     Returns:
-        Gaps between neighbours from the braking on.
+        Gaps between neighbors after the braking began.
     """
     speed, slope = (
         scenario.router.route.speed_m_s,

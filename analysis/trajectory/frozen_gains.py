@@ -1,4 +1,4 @@
-"""Poles and margins of a robot on a route, and how stiff and damped it may be."""
+"""Poles and margins of a robot on a route, and bounds of its stiffness and damping."""
 
 from __future__ import annotations
 
@@ -37,44 +37,47 @@ from systems.laws.trajectory.trajectory_conventional import (
     TrajectoryImpedanceParameters,
 )
 
-#: The damping ratio that is asked for.
+#: Desired damping ratio.
 WELL_DAMPED = 0.7
-#: Ages of the place that the bounds are for, ticks: as built, and a processor's more.
+#: Delays of the position for which bounds are computed, in control periods. The first
+#: is that of the model. The second adds the delay of a processor.
 LATE_TICKS = (0, 1)
-#: Dampings of the chart, N s/m, up to this share of the greatest.
+# Chart over damping: number of points, least damping in N s/m, and largest damping as
+# a share of its bound.
 _CHART_POINTS, _LEAST_N_S_M, _MOST = 60, 0.5, 0.97
 _HALVINGS = 50
-#: Poles nearer to z = 0 are delays.
+#: Poles nearer to z = 0 than this count as delays.
 _DELAY = 1e-6
 
 
 @dataclass(frozen=True)
 class FrozenPoint:
-    """The loop at one place, gains frozen."""
+    """The linearized loop at one operating point, with constant gains."""
 
     at: RoutePoint
+    """The operating point."""
     stiffness_n_m: float
-    """All springs along the route, N/m."""
+    """Sum of all springs along the route, N/m."""
     damping_n_s_m: float
-    """All dampers along the route, N s/m."""
+    """Sum of all dampers along the route, N s/m."""
     model: LinearModel
-    """From target to P."""
+    """Closed loop from the target to the control point P."""
     margins: dict[str, LoopMargins]
-    """Of the loop cut at the acceleration, along and across."""
+    """Margins of the loop cut at the acceleration, along and across the route."""
 
     @property
     def poles(self) -> NDArray[np.complex128]:
-        """(n,) s plane, rad/s: ln(z)/T."""
+        """(n,) poles ln(z)/T in the s plane, rad/s."""
         return _s_plane(self.model.poles, self.model.period_s or 1.0)
 
     @property
     def growth_per_s(self) -> float:
-        """Of the slowest mode, 1/s; negative where all decay."""
+        """Growth rate of the slowest mode, 1/s; negative if all modes decay."""
         return float(self.poles.real.max())
 
     @property
     def damping_ratio(self) -> float:
-        """Of the least damped mode; 1 where none swings."""
+        """Damping ratio of the least damped mode; 1 if no mode oscillates."""
         return float((-self.poles.real / np.abs(self.poles)).min())
 
 
@@ -84,10 +87,16 @@ def _s_plane(z: NDArray[Any], period_s: float) -> NDArray[np.complex128]:
 
 
 def frozen_gains(scenario: Scenario) -> tuple[FrozenPoint, ...]:
-    """Poles and margins at each of ``route_points``.
+    """Computes poles and margins at each operating point of ``route_points``.
+
+    Args:
+        scenario: Scenario whose robot follows a route.
+
+    Returns:
+        One entry per operating point.
 
     Raises:
-        InputError: The law is none of a route, or the wheels can slip.
+        InputError: The law is not for a route, or the wheels can slip.
     """
     return tuple(_frozen(scenario, point) for point in route_points(scenario))
 
@@ -112,41 +121,64 @@ def _frozen(scenario: Scenario, point: RoutePoint) -> FrozenPoint:
 
 @dataclass(frozen=True)
 class GainBounds:
-    """How stiff and how damped the sampled loop may be."""
+    """Bounds of stiffness K and damping D of the sampled loop.
+
+    Several fields have one value per delay of the position measurement.
+    """
 
     mass: SampledMass
-    """Mass, lag and tick."""
+    """Mass, motor lag and control period."""
     late_ticks: tuple[int, ...]
-    """Ages of the place, one a column of the curves."""
+    """Delays of the position in control periods, one per column of the curves."""
     damping_n_s_m: NDArray[np.float64]
     """(n,) dampings of the curves, N s/m."""
     stable_n_m: NDArray[np.float64]
-    """(n, ages) stiffness at which it stops coming to rest, N/m."""
+    """(n, delays) stiffness at which the loop becomes unstable, N/m."""
     damped_n_m: NDArray[np.float64]
-    """(n, ages) stiffness up to which the damping ratio is 0.7 or more, N/m."""
+    """(n, delays) stiffness up to which the damping ratio is 0.7 or more, N/m."""
     today: dict[str, tuple[float, float]]
-    """(K, D) of the scenario: of the target alone, and with a contact."""
+    """(K, D) of the scenario, for the target alone and with a contact."""
     stable_today_n_m: tuple[float, ...]
-    """At the target's own damping, for each age, N/m."""
+    """Stiffness at which the loop with the scenario's damping becomes unstable, N/m.
+
+    The tuple has one value per delay of the position.
+    """
     damped_today_n_m: tuple[float, ...]
-    """The same for a damping ratio of 0.7."""
+    """Stiffness up to which the loop with the scenario's damping is well damped, N/m.
+
+    Well damped means a damping ratio of 0.7 or more. The tuple has one value per delay
+    of the position.
+    """
     closed_form_n_m: tuple[float, ...]
-    """``stable_today_n_m`` by ``stiffness_bound``, N/m."""
+    """``stable_today_n_m`` as computed by ``stiffness_bound``, N/m."""
     most_damping_n_s_m: float
-    """Greatest sum of dampers, by bisection, N s/m."""
+    """Largest stable sum of dampers, by bisection, N s/m."""
     closed_damping_n_s_m: float
-    """2 M/T."""
+    """Largest stable sum of dampers by the formula 2 M/T, N s/m."""
     contacts: float
-    """How many contacts of full damping may be summed; infinite without damping."""
+    """Largest number of simultaneous contacts for which the loop is stable.
+
+    Each contact has its full damping. If contacts have no damping, the number is
+    infinite.
+    """
     box: tuple[tuple[float, float], tuple[float, float]] | None
-    """(K, D) of the adaptation's box, least and greatest; none: it has none."""
+    """Ranges of K and of D to which the adaptation is limited; None without limits."""
 
 
 def gain_bounds(scenario: Scenario) -> GainBounds:
-    """Bounds of K and D by bisection on the blocks' own one-period matrix.
+    """Computes bounds of stiffness K and damping D by bisection.
+
+    Stability follows from the eigenvalues of the blocks' state matrix over one control
+    period.
+
+    Args:
+        scenario: Scenario whose robot follows a route.
+
+    Returns:
+        The bounds, with curves over the damping D.
 
     Raises:
-        InputError: The law is none of a route, or the wheels can slip.
+        InputError: The law is not for a route, or the wheels can slip.
     """
     own = route_law(scenario)
     of = SampledMass(
@@ -185,16 +217,16 @@ def gain_bounds(scenario: Scenario) -> GainBounds:
 def axis_damping_ratio(
     scenario: Scenario, stiffness: float, damping: float, late_ticks: int = 0
 ) -> float:
-    """Of the least damped mode of one axis.
+    """Computes the damping ratio of the least damped mode along one axis.
 
     Args:
-        scenario: Robot, plant and tick are used.
-        stiffness: All springs together, N/m, above 0.
-        damping: All dampers together, N s/m.
-        late_ticks: Age of the place that springs act on.
+        scenario: Scenario with the robot, plant and control period.
+        stiffness: Sum of all springs, N/m, above 0.
+        damping: Sum of all dampers, N s/m.
+        late_ticks: Delay of the position that the springs act on, in control periods.
 
     Returns:
-        -Re s/|s|, least of all modes; 1 where none swings.
+        Least value of -Re s/|s| over all modes; 1 if no mode oscillates.
     """
     matrix = contact_matrix(
         scenario, stiffness, damping_n_s_m=damping, latency_ticks=late_ticks
@@ -204,15 +236,15 @@ def axis_damping_ratio(
 
 
 def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) -> float:
-    """Stiffness up to which the damping ratio is ``WELL_DAMPED`` or more.
+    """Computes the largest stiffness that gives a damping ratio of at least 0.7.
 
     Args:
-        scenario: Robot, plant and tick are used.
-        damping: All dampers together, N s/m.
-        late_ticks: Age of the place that springs act on.
+        scenario: Scenario with the robot, plant and control period.
+        damping: Sum of all dampers, N s/m.
+        late_ticks: Delay of the position that the springs act on, in control periods.
 
     Returns:
-        N/m; 0 where there is none.
+        Stiffness, N/m; 0 if no stiffness has this damping ratio.
     """
     return _last(
         lambda k: axis_damping_ratio(scenario, k, damping, late_ticks) >= WELL_DAMPED
@@ -220,7 +252,7 @@ def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) ->
 
 
 def _bounds(scenario: Scenario, damping: float, late: int) -> tuple[float, float]:
-    """Where one axis stops coming to rest, and where it begins to swing, N/m."""
+    """Stiffness at which one axis becomes unstable, and at which it oscillates, N/m."""
 
     def rests(stiffness: float) -> bool:
         matrix = contact_matrix(
@@ -232,7 +264,7 @@ def _bounds(scenario: Scenario, damping: float, late: int) -> tuple[float, float
 
 
 def _last(holds: Callable[[float], bool], begin: float = 1e-3) -> float:
-    """The end of the interval from 0 on in which something holds; 0: it is empty."""
+    """Upper end of the interval from 0 in which a condition holds; 0 if it is empty."""
     if not holds(begin):
         return 0.0
     low, high = begin, 2.0 * begin
@@ -245,12 +277,12 @@ def _last(holds: Callable[[float], bool], begin: float = 1e-3) -> float:
 
 
 def _most_damping(scenario: Scenario) -> float:
-    """Where a damper without a spring stops taking the velocity, N s/m."""
+    """Damping at which a damper without a spring becomes unstable, N s/m."""
 
     def rests(damping: float) -> bool:
         matrix = contact_matrix(scenario, 0.0, damping_n_s_m=damping)
         poles = np.linalg.eigvals(matrix)
-        # Without a spring the place stays where it is, at z = 1.
+        # Without a spring, the position has a pole at z = 1.
         moving = np.delete(poles, np.abs(poles - 1.0).argmin())
         return bool(np.abs(moving).max() < 1.0)
 
@@ -261,7 +293,7 @@ def _contacts(own: TrajectoryImpedanceParameters, most: float) -> float:
     if own.contact_damping_n_s_m == 0.0:
         return math.inf
     room = (most - own.damping_n_s_m) / own.contact_damping_n_s_m
-    # At the bound itself it does not come to rest.
+    # At the bound itself, the loop is not asymptotically stable.
     return float(max(math.ceil(room - 1e-6) - 1, 0))
 
 

@@ -1,4 +1,4 @@
-"""A point that obeys the law of a route, tick by tick, in compiled code."""
+"""Simulates a point that obeys the law of a route, in compiled code."""
 
 from __future__ import annotations
 
@@ -31,41 +31,47 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.objects import KNOWN, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Farther objects are not there, m.
+#: Objects with larger x are ignored, m.
 _FAR_M = 1e6
 
 
 class PointLoop(NamedTuple):
-    """What is run: a law, and the robot that it moves."""
+    """A law, and the robot that the law moves."""
 
     law: AdaptiveTrajectoryParameters
     poles: tuple[float, float] | None = None
-    """w_n, rad/s, and xi of the reference; none: those of the law."""
+    """Natural frequency w_n, rad/s, and damping ratio xi of the reference model.
+
+    If None, the gains of the law determine them.
+    """
     robot: RobotParameters = RobotParameters()
     motor_lag_s: float = 0.0
     tick_s: float = TICK_S
 
 
 class PointRun(NamedTuple):
-    """States at each tick, before its updates."""
+    """States at each control period, before its updates.
+
+    P is the robot's control point ahead of the axle.
+    """
 
     motion: NDArray[np.float64]
-    """(ticks, 4) p and v of P's virtual mass, x and y, m and m/s."""
+    """(ticks, 4) position p and velocity v of P's virtual mass, x and y, m and m/s."""
     gains: NDArray[np.float64]
-    """(ticks, 3) K, D and K_e."""
+    """(ticks, 3) stiffness K, damping D and contact stiffness K_e."""
     sensitivities: NDArray[np.float64]
-    """(ticks, 12) of p and v to K, D and K_e, after the tick's update."""
+    """(ticks, 12) sensitivities of p and v to K, D and K_e, after the update."""
     reference: NDArray[np.float64]
-    """(ticks, 4) p and v of the reference, m and m/s."""
+    """(ticks, 4) position and velocity of the reference, m and m/s."""
 
 
 class _Motors(NamedTuple):
-    """Of the speed of P over a tick."""
+    """Effect of the motor lag on the control point P over a control period."""
 
     kept: float
-    """Share that is left of its speed."""
+    """Share of the old speed in the new speed."""
     coasting_s: float
-    """Way for each m/s of it."""
+    """Coasting distance per old speed, s."""
 
 
 @njit(cache=True)
@@ -128,21 +134,24 @@ def run_point(
     push: tuple[float, float] = (0.0, 0.0),
     held: ArrayLike = math.inf,
 ) -> PointRun:
-    """Runs reference, adaptation, law and virtual mass, with the motors' lag.
+    """Simulates a point robot with reference model, gain adaptation and control law.
 
-    No limits of speed and acceleration, and no heading: what the formulas are about.
+    The simulation includes the virtual mass of control point P, and the motor lag. The
+    simulation has no heading, and no limits of speed and acceleration. The formulas of
+    the analysis make the same assumptions.
 
     Args:
-        loop: What is run.
-        targets: (ticks, 4) p_d and v_d, m and m/s.
-        places: (ticks, n, 4) or (n, 4) points and their velocities, m and m/s; x beyond
-            1e6: not there.
-        start: (4,) p and v; none: the first target.
-        push: A constant force on P, N.
-        held: P cannot pass this x, m; one for all ticks, or (ticks,).
+        loop: The law and the robot.
+        targets: (ticks, 4) positions p_d and velocities v_d of the target, m and m/s.
+        places: (ticks, n, 4) or (n, 4) positions and velocities of contact points, m
+            and m/s. Points with x beyond 1e6 m are ignored.
+        start: (4,) initial position and velocity. None: those of the first target.
+        push: Constant force on P, N.
+        held: Largest x that P can reach, m. Either (ticks,), or one value for all
+            control periods.
 
     Returns:
-        The run.
+        States at each control period.
     """
     wanted = np.asarray(targets, dtype=float)
     points = np.asarray(places, dtype=float)

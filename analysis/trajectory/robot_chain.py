@@ -1,4 +1,4 @@
-"""Robots that follow one another on a line: does a disturbance grow to the tail?"""
+"""Computes whether disturbances grow along a line of robots that follow one another."""
 
 from __future__ import annotations
 
@@ -17,106 +17,130 @@ from analysis.trajectory.route_loop import contact_gains, route_law
 from diagrams.scenario.scenario import Scenario
 from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
 
-#: Numbers of robots in the chains that are looked at, the first one among them.
+#: Numbers of robots in the analyzed chains, including the first robot.
 ROBOTS = tuple(range(2, 9))
-#: Frequencies that are looked at besides the modes, from here to Nyquist's, rad/s.
+# Frequency grid up to the Nyquist frequency: lowest frequency in rad/s, and number of
+# points. Frequencies near the modes are added.
 _LOWEST, _POINTS = 1e-2, 600
-#: A peak that is no more than this above 1 is none: at rest the response is 1.
+# A peak up to this much above 1 does not count. At zero frequency, the response is 1.
 _ROUNDING = 1e-6
 _HALVINGS = 40
-#: Zones between P and the disc before it in a chain without contacts.
+# Distance from P to the disc of the robot ahead in a chain without contacts, as a
+# multiple of the security zone.
 _APART = 1.25
-#: Dampings that are tried, N s/m.
+# Values of the damping D that are tried, N s/m.
 _DAMPINGS = np.geomspace(0.05, 60.0, 80)
 
 
 class ChainLinks(NamedTuple):
-    """What joins a robot to its neighbours, for small motions along the line."""
+    """Springs and dampers between a robot and its neighbors, for small motions."""
 
     stiffness: float
-    """K to the place behind the robot before it, N/m."""
+    """Stiffness K to the desired position behind the robot ahead, N/m."""
     damping: float
-    """D, N s/m."""
+    """Damping D to the target's velocity, N s/m."""
     feed_forward: float
-    """Share of the velocity of the robot before it that its target has."""
+    """Target velocity over velocity of the robot ahead."""
     ahead: tuple[float, float] = (0.0, 0.0)
-    """K_e, N/m, and felt D_e, N s/m, of the contact with the robot before it."""
+    """Stiffness, N/m, and damping, N s/m, of the contact with the robot ahead."""
     behind: tuple[float, float] = (0.0, 0.0)
-    """The same with the robot after it."""
+    """Stiffness, N/m, and damping, N s/m, of the contact with the robot behind."""
     late_ticks: int = 0
-    """Age of what it knows of its neighbours."""
+    """Latency of the observed neighbors, in control periods."""
 
 
 @dataclass(frozen=True)
 class ChainPeak:
-    """How much a chain amplifies what its first robot does."""
+    """How much a line of robots (chain) amplifies the motion of its first robot.
+
+    If the chain is unstable, all amplifications are infinite. P is a robot's control
+    point ahead of the axle.
+    """
 
     feed_forward: float
-    """Share of the velocity of the robot before that a target has."""
+    """Target velocity over velocity of the robot ahead."""
     spacing_m: float
-    """That is asked for between P of neighbours, m."""
+    """Desired distance between the points P of neighbors, m."""
     peak: float
-    """Largest amplification by a pair over frequency, 1 at rest; infinite, as the
-    others, where they come to no rest."""
+    """Largest amplification by a chain of two robots over all frequencies."""
     omega: NDArray[np.float64]
-    """(n,) rad/s."""
+    """(n,) frequencies, rad/s."""
     gain: NDArray[np.float64]
-    """(n, robots - 1) amplitude of each robot of the longest chain, of the first."""
+    """(n, robots - 1) amplitude of each robot over that of the first, longest chain."""
     each: tuple[float, ...]
-    """Largest of it over frequency, robot by robot."""
+    """Largest amplification over frequency for each robot of the longest chain."""
     tail: dict[int, float]
-    """Largest amplification from the first to the last of so many robots."""
+    """Largest amplification from the first to the last robot, by number of robots."""
     frequency_rad_s: float
-    """Where the last of the longest chain is amplified most."""
+    """Frequency of the largest amplification of the longest chain's last robot."""
 
     @property
     def grows(self) -> bool:
-        """Whether some robot ever swings more than the first."""
+        """Whether any robot oscillates more than the first at any frequency."""
         return max(*self.each, *self.tail.values()) > 1.0 + _ROUNDING
 
 
 @dataclass(frozen=True)
 class RobotChain:
-    """Chains of robots with a scenario's gains."""
+    """Amplification of motions in lines of robots that follow one another (chains).
+
+    All robots have the scenario's gains. Spacing and feed-forward differ between
+    chains. A chain is "apart" if the robots are outside each other's security zones.
+    Otherwise, the chain is "in contact".
+    """
 
     stiffness_n_m: float
     damping_n_s_m: float
     peaks: dict[str, ChainPeak]
-    """With and without velocity feed-forward, apart and in contact."""
+    """Largest amplification of each chain, by name of the chain."""
     least_damping_n_s_m: float
-    """D from which, without feed-forward and apart, nothing grows at this K; infinite:
-    from none that is tried."""
+    """Least damping D that does not amplify motions of two robots apart, N s/m.
+
+    The chain has no feed-forward and the stiffness ``stiffness_n_m``. If no tried D
+    suffices, the value is infinite.
+    """
     least_damping_in_contact_n_s_m: float
-    """The same in contact, in a chain of eight."""
+    """Least damping D that does not amplify motions of eight robots in contact, N s/m.
+
+    The chain has no feed-forward and the stiffness ``stiffness_n_m``. If no tried D
+    suffices, the value is infinite.
+    """
     most_feed_forward: float
-    """Share of the velocity up to which nothing grows at these gains; below 0: even
-    without it does something grow."""
+    """Largest ratio of velocity feed-forward that does not amplify motions.
+
+    If motions are amplified even without feed-forward, the value is negative.
+    """
     dampings: NDArray[np.float64]
-    """(n,) N s/m."""
+    """(n,) tried values of D, N s/m."""
     peaks_by_damping: NDArray[np.float64]
-    """(n, 2) largest |G| with and without feed-forward at this K; infinite where a
-    robot alone does not come to rest."""
+    """(n, 2) largest amplification with and without feed-forward at this K.
+
+    If a single robot is unstable, the value is infinite.
+    """
 
     @property
     def time_headway_s(self) -> float:
-        """D/K: without feed-forward the gap grows by so much times the speed, s."""
+        """Time headway D/K, s: growth of the gap per speed, without feed-forward."""
         return self.damping_n_s_m / self.stiffness_n_m
 
 
 def robot_chain(scenario: Scenario) -> RobotChain:
-    """Frequency responses of chains of robots like the scenario's.
+    """Computes frequency responses of lines of robots that follow one another.
 
-    Each robot's target is the place of the one before it, less a fixed way, and that
-    robot's velocity, all seen by the object sensor: velocities over the last tick.
+    All robots are like the scenario's robot. Each robot's target is a fixed distance
+    behind the robot ahead, and has the velocity of the robot ahead. The object sensor
+    measures the position of the robot ahead. The velocity is computed from the last two
+    positions.
 
     Args:
-        scenario: Its law, mass, motors and tick are used.
+        scenario: Scenario with the law, mass, motors, control period and latency of the
+            object sensor.
 
     Returns:
         Responses and bounds.
 
     Raises:
-        InputError: The law is none of a route, or the wheels can slip.
+        InputError: The law is not for a route, or the wheels can slip.
     """
     own = route_law(scenario)
     k, d = own.stiffness_n_m, own.damping_n_s_m
@@ -153,15 +177,18 @@ def robot_chain(scenario: Scenario) -> RobotChain:
 
 
 def chain_spacings(scenario: Scenario) -> tuple[float, float]:
-    """Ways between P of neighbours at which they are out of zones, and in them, m.
+    """Computes two distances between neighboring robots: without and with contacts.
 
-    What moves is seen as the disc that holds it.
+    Other robots observe a moving robot as the disc that encloses it. P is a robot's
+    control point.
 
     Args:
-        scenario: Law and robot are used.
+        scenario: Scenario with the law and the robot.
 
     Returns:
-        1.25 zones, and half a zone, between P and the disc before it.
+        Two distances between the points P of neighbors, m. With the first, P is 1.25
+        security zones from the disc of the robot ahead. With the second, P is half a
+        security zone from the disc.
     """
     zone_m = route_law(scenario).security_zone_m
     offset = disc_offsets(scenario)[0]
@@ -169,13 +196,16 @@ def chain_spacings(scenario: Scenario) -> tuple[float, float]:
 
 
 def disc_offsets(scenario: Scenario) -> tuple[float, float]:
-    """How much nearer than a neighbour's P its disc is, of one before and one behind.
+    """Computes how much nearer a neighbor's disc is than its control point P.
+
+    Other robots observe a moving robot as the disc that encloses it. The disc has its
+    center at the axle, and P is ahead of the axle.
 
     Args:
-        scenario: Its robot is used.
+        scenario: Scenario with the robot.
 
     Returns:
-        m: P is ahead of its axle, about which the disc is.
+        Two offsets, m: the first for the robot ahead, the second for the robot behind.
     """
     disc = 0.5 * math.hypot(scenario.only.robot.length_m, scenario.only.robot.width_m)
     epsilon = scenario.only.robot.control_point_m
@@ -189,22 +219,23 @@ def _late(scenario: Scenario) -> int:
 def resting_gaps(
     scenario: Scenario, spacing_m: float, robots: int
 ) -> NDArray[np.float64]:
-    """Ways between P of neighbours where the chain rests, m.
+    """Computes the distances between neighbors in a chain at rest.
 
-    Contacts push: the last robot is pushed back by one alone, and so on from there.
+    Contacts push the robots apart. The computation starts at the last robot, which has
+    a contact only with the robot ahead. P is a robot's control point.
 
     Args:
-        scenario: Law and robot are used.
-        spacing_m: That is asked for, m.
-        robots: How many, the first one among them.
+        scenario: Scenario with the law and the robot.
+        spacing_m: Desired distance between the points P of neighbors, m.
+        robots: Number of robots, including the first.
 
     Returns:
-        (robots - 1,) from the first to the last.
+        (robots - 1,) distances between points P, from the first robot to the last, m.
     """
     own = route_law(scenario)
     k, k_e, zone_m = own.stiffness_n_m, own.contact_stiffness_n_m, own.security_zone_m
     ahead, behind = disc_offsets(scenario)
-    # Along the line a contact with what is ahead is k_e (d - S).
+    # Force along the line of a contact with the robot ahead: k_e (d - S).
     gaps, pushed = np.empty(robots - 1), 0.0
     for i in reversed(range(robots - 1)):
         gap = spacing_m - pushed / k
@@ -220,16 +251,19 @@ def resting_gaps(
 def links_of(
     scenario: Scenario, feed_forward: float, spacing_m: float, robots: int
 ) -> tuple[ChainLinks, ...]:
-    """What joins the robots of a chain that rests in formation.
+    """Computes the springs and dampers between the robots of a chain at rest.
+
+    A chain is a line of robots that follow one another.
 
     Args:
-        scenario: Law, robot and latency of objects are used.
-        feed_forward: Share of the velocity of the robot before it.
-        spacing_m: That is asked for between P of neighbours, m.
-        robots: How many, the first one among them.
+        scenario: Scenario with the law, robot and latency of the object sensor.
+        feed_forward: Target velocity over velocity of the robot ahead.
+        spacing_m: Desired distance between the control points P of neighbors, m.
+        robots: Number of robots, including the first.
 
     Returns:
-        Of each but the first; contacts only where a neighbour's disc is in the zone.
+        One entry per robot except the first. If a neighbor's disc is outside the
+        security zone, its contact has no stiffness and no damping.
     """
     own = route_law(scenario)
     gaps = resting_gaps(scenario, spacing_m, robots)
@@ -253,19 +287,20 @@ def links_of(
 def chain_response(
     scenario: Scenario, links: Sequence[ChainLinks], omega: ArrayLike
 ) -> NDArray[np.complex128]:
-    """From the place of the first robot to the places of all that follow.
+    """Computes the response of the following robots' positions to the first robot's.
 
-    Each obeys M a = -K (p - p') - D (v - c v') and the springs and dampers of its
-    contacts; the first one moves as it is made to. p = G_p a and v = G_v a are those of
-    wheel command and plant.
+    Each robot obeys M a = -K (p - p') - D (v - c v'), plus the forces of its contacts.
+    p' and v' are position and velocity of the robot ahead, and c is the ratio of
+    velocity feed-forward. Wheel command and plant give p = G_p a and v = G_v a. The
+    first robot's motion is given.
 
     Args:
-        scenario: Mass, motors and tick are used.
-        links: Of each robot but the first.
-        omega: (n,) rad/s.
+        scenario: Scenario with the mass, motors and control period.
+        links: Springs and dampers of each robot except the first.
+        omega: (n,) frequencies, rad/s.
 
     Returns:
-        (n, len(links)) amplitudes, the first robot's being 1.
+        (n, len(links)) complex amplitudes relative to the first robot's amplitude.
     """
     grid, count = np.asarray(omega, dtype=float), len(links)
     response = motion_chain(scenario).response(grid)
@@ -277,7 +312,7 @@ def chain_response(
         seen = before**link.late_ticks
         speed = seen * (1.0 - before) / scenario.tick_s
         (k_a, d_a), (k_b, d_b) = link.ahead, link.behind
-        # A contact is with what was seen, and P is where it is.
+        # Contacts use the neighbor's delayed position, and the present position of P.
         matrix[:, i, i] = (
             scenario.only.robot.mass_kg / G_p
             + (link.stiffness + k_a + k_b)
@@ -295,15 +330,19 @@ def chain_response(
 
 
 def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> ChainPeak:
-    """Largest amplification by a pair, of each robot, and from head to tail.
+    """Computes how much a line of robots (chain) amplifies its first robot's motion.
+
+    The frequencies range from 0.01 rad/s to the Nyquist frequency.
 
     Args:
-        scenario: Law, mass, motors, tick and latency of objects are used.
-        feed_forward: Share of the velocity of the robot before it.
-        spacing_m: That is asked for between P of neighbours, m.
+        scenario: Scenario with the law, mass, motors, control period and latency of the
+            object sensor.
+        feed_forward: Target velocity over velocity of the robot ahead.
+        spacing_m: Desired distance between the control points P of neighbors, m.
 
     Returns:
-        Over frequencies from 0.01 rad/s to Nyquist's.
+        Largest amplifications, for chains of 2 to 8 robots, and for each robot of the
+        longest chain.
     """
     most = ROBOTS[-1]
     links = {n: links_of(scenario, feed_forward, spacing_m, n) for n in ROBOTS}
@@ -322,7 +361,7 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
 
 
 def _grid(scenario: Scenario, links: Sequence[ChainLinks]) -> NDArray[np.float64]:
-    """Frequencies that show every mode of the chain, however lightly damped."""
+    """Frequencies that resolve every mode of the chain, even lightly damped modes."""
     poles = np.linalg.eigvals(chain_matrix(scenario, links)).astype(np.complex128)
     return frequency_grid(poles, scenario.tick_s, lowest=_LOWEST, points=_POINTS)
 
@@ -330,7 +369,7 @@ def _grid(scenario: Scenario, links: Sequence[ChainLinks]) -> NDArray[np.float64
 def _peak(
     scenario: Scenario, links: Sequence[ChainLinks], robot: int = -1
 ) -> tuple[float, float]:
-    """Largest amplification of one of them, and its frequency, rad/s."""
+    """Largest amplification of one robot, and its frequency, rad/s."""
     omega = _grid(scenario, links)
 
     def size(at: ArrayLike) -> NDArray[np.float64]:
@@ -350,22 +389,22 @@ def _peak(
 def chain_matrix(
     scenario: Scenario, links: Sequence[ChainLinks]
 ) -> NDArray[np.float64]:
-    """x+ = A x of the robots behind a first one that rests.
+    """Computes the matrix A of x+ = A x for the robots behind a first robot at rest.
 
     Args:
-        scenario: Mass, motors and tick are used.
-        links: Of each robot but the first.
+        scenario: Scenario with the mass, motors and control period.
+        links: Springs and dampers of each robot except the first.
 
     Returns:
-        (n, n); states of each robot are those of ``sampled_matrix``, then as many
-        earlier places as its neighbours need.
+        (n, n) matrix. The states of each robot are those of ``sampled_matrix``,
+        followed by the earlier positions that its neighbors observe.
     """
     tick_s, mass = scenario.tick_s, scenario.only.robot.mass_kg
     of = SampledMass(mass, scenario.only.plant.motor_lag_s, tick_s)
     free = sampled_matrix(0.0, 0.0, of)
     late = links[0].late_ticks
     size = 3 + late + 1
-    # An acceleration moves v by T, and w and p as v moves them.
+    # An acceleration a changes v by T a. The change of v then acts on w and p.
     moved = tick_s / mass * free[:, 2]
     matrix = np.zeros((size * len(links), size * len(links)))
     for i, link in enumerate(links):
@@ -390,7 +429,7 @@ def chain_matrix(
 
 
 def _rests(scenario: Scenario, links: Sequence[ChainLinks]) -> bool:
-    """Whether the robots come to rest behind one that rests."""
+    """Whether the robots behind a first robot at rest come to rest."""
     matrix = chain_matrix(scenario, links)
     return bool(np.abs(np.linalg.eigvals(matrix)).max() < 1.0)
 
@@ -398,19 +437,19 @@ def _rests(scenario: Scenario, links: Sequence[ChainLinks]) -> bool:
 def _stable_peak(
     scenario: Scenario, links: Sequence[ChainLinks], robot: int = -1
 ) -> float:
-    """Largest amplification of one of them; infinite where they come to no rest."""
+    """Largest amplification of one robot; infinite if the chain is unstable."""
     return _peak(scenario, links, robot)[0] if _rests(scenario, links) else math.inf
 
 
 def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
-    """D from which no robot of a chain swings more than the first, N s/m.
+    """Computes the least damping D at which no robot oscillates more than the first.
 
     Args:
-        scenario: Mass, motors and tick are used.
-        links: Of each robot but the first; their own D does not count.
+        scenario: Scenario with the mass, motors and control period.
+        links: Springs and dampers of each robot except the first. Their D is replaced.
 
     Returns:
-        By bisection; infinite where no damping that is tried will do.
+        D by bisection, N s/m. If no tried D suffices, the result is infinite.
     """
 
     def calm(damping: float) -> bool:
@@ -432,15 +471,20 @@ def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
 
 
 def most_feed_forward(scenario: Scenario, stiffness: float, damping: float) -> float:
-    """Share of the velocity of the one before up to which nothing grows, apart.
+    """Computes the largest velocity feed-forward that does not amplify motions.
+
+    Feed-forward is the ratio of a target's velocity to the velocity of the robot ahead.
+    The chain has no contacts.
 
     Args:
-        scenario: Mass, motors, tick and latency of objects are used.
-        stiffness: K, N/m.
-        damping: D, N s/m.
+        scenario: Scenario with the mass, motors, control period and latency of the
+            object sensor.
+        stiffness: Stiffness K, N/m.
+        damping: Damping D, N s/m.
 
     Returns:
-        By bisection, 0 to 1; -1 where something grows even without it.
+        Ratio from 0 to 1, by bisection. If motions are amplified even without
+        feed-forward, the result is -1.
     """
     late = _late(scenario)
 

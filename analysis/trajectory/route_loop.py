@@ -1,4 +1,4 @@
-"""The loop of a robot on a route, linear, with gains that are frozen."""
+"""The linearized loop of a robot on a route, with constant gains."""
 
 from __future__ import annotations
 
@@ -31,30 +31,36 @@ from systems.laws.trajectory.trajectory_impedance_controller import (
 from systems.ranging.objects import KNOWN, THERE, X
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Along the route, and across it.
+#: Directions along the route, and across the route.
 AXES = ("along", "across")
-#: What the law commands, and the same before it is joined to the wheels.
+#: Name of the law's output, and its name where the loop is cut.
 _COMMAND, _LAW = "acceleration_W", "law_W"
-#: Shares of the zone at which a contact is looked at: damping that fades differs there.
+#: Distances to a contact, as shares of the zone. Damping that fades depends on them.
 _DEPTHS = {"edge of a zone": 0.999, "half way in": 0.5, "deep in": 0.1}
 
 
 @dataclass(frozen=True)
 class RoutePoint:
-    """Where the loop is linearised; the robot heads along x."""
+    """An operating point at which the loop is linearized; the robot faces along x."""
 
     name: str
     speed_m_s: float = 0.0
-    """Of target and robot, along x."""
+    """Speed of target and robot along x, m/s."""
     wall_m: float | None = None
-    """Distance from P to a wall across its way; none: nothing is near."""
+    """Distance from control point P to a wall straight ahead, m. None: no wall."""
 
 
 def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
-    """The parameters of the law of a robot on a route.
+    """Returns the parameters of the law of a robot on a route.
+
+    Args:
+        scenario: Scenario with one robot.
+
+    Returns:
+        Parameters of the law.
 
     Raises:
-        InputError: It has another law.
+        InputError: The robot has no route, or its law is not for a route.
     """
     if scenario.only.kind != "router" or scenario.only.law not in ROUTE_LAWS:
         raise InputError(
@@ -67,13 +73,14 @@ def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
 
 
 def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
-    """Along the route, at rest, and before a wall: at the zone's edge, and within.
+    """Lists operating points: on the route, at rest, and at distances from a wall.
 
     Args:
-        scenario: Has a route.
+        scenario: Scenario whose robot follows a route.
 
     Returns:
-        Contacts only where the law has a spring or a damper for them.
+        Operating points. Those at a wall exist only if the law has a contact spring or
+        a contact damper.
     """
     own = route_law(scenario)
     points = [
@@ -90,14 +97,14 @@ def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
 def contact_gains(
     own: TrajectoryImpedanceParameters, distance_m: float
 ) -> tuple[float, float]:
-    """What a contact adds to K, N/m, and D, N s/m, along its normal.
+    """Computes the stiffness and damping that a contact adds along its normal.
 
     Args:
-        own: The law's parameters.
-        distance_m: Of P from the object, m.
+        own: Parameters of the law.
+        distance_m: Distance from control point P to the object, m.
 
     Returns:
-        0 and 0 outside its zone.
+        Stiffness, N/m, and damping, N s/m. Outside the security zone, both are 0.
     """
     if distance_m >= own.security_zone_m:
         return 0.0, 0.0
@@ -106,34 +113,38 @@ def contact_gains(
 
 
 def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """The closed loop over a tick, without what no target moves or no place shows.
+    """Computes a minimal linear model of the closed loop over a control period.
 
-    Law, wheel command, plant and odometry are those that simulate, each linearised by
-    AutoDiff and joined by the names of their ports. A filter that has nothing to do is
-    the wheel command. Gains do not adapt, and no limit is reached.
+    The law, wheel command, plant and odometry are those of the simulation. Each block
+    is linearized by AutoDiff. The blocks are connected by the names of their ports.
+    States that are not controllable or not observable are removed. The model assumes
+    that the safety filter is inactive, that gains do not adapt, and that no limit is
+    reached.
 
     Args:
-        scenario: Has a route.
-        point: Where.
+        scenario: Scenario whose robot follows a route.
+        point: Operating point.
 
     Returns:
-        From the target, m and m/s, to the place of P, m.
+        Model from the target, m and m/s, to the position of control point P, m.
 
     Raises:
-        InputError: The law is none of a route, or the wheels can slip.
+        InputError: The law is not for a route, or the wheels can slip.
     """
     return minimal_model(whole_route_model(scenario, point))
 
 
 def whole_route_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """The same with every state of plant, odometry, wheel command and seen objects.
+    """Computes the model of the closed loop over a control period, with every state.
+
+    The states are those of plant, odometry, wheel command and observed objects.
 
     Args:
-        scenario: Has a route.
-        point: Where.
+        scenario: Scenario whose robot follows a route.
+        point: Operating point.
 
     Returns:
-        From the target, m and m/s, to the place of P, m.
+        Model from the target, m and m/s, to the position of control point P, m.
     """
     models = _blocks(scenario, point)
     targets = tuple(f"target_state[{k}]" for k in range(4))
@@ -152,15 +163,17 @@ def whole_route_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
 
 
 def acceleration_loop(scenario: Scenario, point: RoutePoint, axis: str) -> LinearModel:
-    """The loop cut at the law's acceleration, the other axis closed.
+    """Computes the open loop, cut at the law's acceleration along one axis.
+
+    The loop along the other axis stays closed.
 
     Args:
-        scenario: Has a route.
-        point: Where.
+        scenario: Scenario whose robot follows a route.
+        point: Operating point.
         axis: One of ``AXES``.
 
     Returns:
-        L, in the convention of negative feedback.
+        Loop transfer function L for negative feedback.
     """
     k = AXES.index(axis)
     models = tuple(
@@ -198,7 +211,7 @@ def _states(models: tuple[LinearModel, ...]) -> tuple[str, ...]:
 
 
 def _place_of_P(scenario: Scenario) -> NDArray[np.float64]:
-    """(2, 3) from a small change of pose to one of P, at heading 0."""
+    """(2, 3) Jacobian from the pose to the position of P, at heading 0."""
     epsilon = scenario.only.robot.control_point_m
     return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, epsilon]])
 
@@ -223,7 +236,7 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
         robot=robot, odometry=unrounded, plant=scenario.only.plant, tick_s=tick_s
     )
     command = WheelCommand_[AutoDiffXd](robot=robot, tick_s=tick_s)
-    # Eq. 6, which stops P, has no linear model.
+    # Eq. 6, which stops P, has no linear model. It is therefore switched off.
     unblocked = own.model_copy(update={"block_distance_m": None})
     law = TrajectoryImpedanceController_[AutoDiffXd](
         parameters=unblocked, robot=robot, tick_s=tick_s
@@ -271,7 +284,7 @@ def _named(block: Block, model: LinearModel) -> LinearModel:
 
 
 def _seen_wall(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """How ``objects_W`` follows the pose: a face across x, seen a latency late."""
+    """Model from the pose to ``objects_W``: a wall ahead, observed with latency."""
     ticks = round(scenario.router.objects.latency_s / scenario.tick_s)
     away = -_place_of_P(scenario)[:1]
     if point.wall_m is None:

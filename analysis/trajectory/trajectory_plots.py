@@ -1,4 +1,4 @@
-"""Pictures of robots on routes: poles, bounds, adaptation, chains."""
+"""Plots poles, gain bounds, adaptation and chains of robots on routes."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from analysis.trajectory.robot_chain import RobotChain
 
 _LINES = SERIES_COLOURS[1:]
 _MARKS = "osD^v"
-#: Amplifications beyond it are cut off.
+#: Largest plotted amplification.
 _HIGHEST = 4.0
 
 
 def plot_frozen_poles(points: Sequence[FrozenPoint]) -> Figure:
-    """Poles in the s plane at each place, with the line of the damping asked for."""
+    """Plots poles in the s plane at each operating point, and the desired damping."""
     figure = Figure(figsize=(7.2, 4.6), layout="constrained")
     axes = figure.subplots()
     for k, point in enumerate(points):
@@ -31,7 +31,7 @@ def plot_frozen_poles(points: Sequence[FrozenPoint]) -> Figure:
             poles.real,
             poles.imag,
             _MARKS[k % len(_MARKS)],
-            # Those of one place hide none of another.
+            # Markers of different sizes do not hide one another.
             markersize=10 - 1.5 * k,
             markerfacecolor="none",
             markeredgecolor=_LINES[k % len(_LINES)],
@@ -60,7 +60,7 @@ def plot_frozen_poles(points: Sequence[FrozenPoint]) -> Figure:
 
 
 def plot_gain_bounds(bounds: GainBounds) -> Figure:
-    """The plane of D and K: where it comes to rest, and where it hardly swings."""
+    """Plots the plane of D and K with its stable and its well-damped regions."""
     figure = Figure(figsize=(7.2, 5.0), layout="constrained")
     axes = figure.subplots()
     damping = bounds.damping_n_s_m
@@ -110,7 +110,7 @@ def plot_gain_bounds(bounds: GainBounds) -> Figure:
 
 
 def plot_adaptation(found: AdaptationStability) -> Figure:
-    """V over time where there is one, and K under a push over time."""
+    """Plots V over time if the rule has a V, and K under a push over time."""
     both = found.lyapunov is not None
     figure = Figure(figsize=(9.4 if both else 5.4, 3.8), layout="constrained")
     cells = figure.subplots(1, 2 if both else 1, squeeze=False)[0]
@@ -148,14 +148,14 @@ def plot_adaptation(found: AdaptationStability) -> Figure:
 
 
 def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
-    """Amplification over frequency, robot by robot, and over D.
+    """Plots the amplification over frequency, over robots and over D.
 
     Args:
-        chain: Responses.
-        runs: The same chains, shaken.
+        chain: Frequency responses.
+        runs: Simulated amplitudes in the same chains.
 
     Returns:
-        Three panels.
+        A figure with three panels.
     """
     figure = Figure(figsize=(11.4, 3.9), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
@@ -192,7 +192,7 @@ def _unit_line(axes: Axes) -> None:
 
 
 def plot_braked_chains(chains: Sequence[BrakedChain]) -> Figure:
-    """Gaps between neighbours from the braking of the first robot on."""
+    """Plots the gaps between neighbors after the first robot begins to brake."""
     figure = Figure(figsize=(11.4, 3.2), layout="constrained")
     cells = figure.subplots(1, len(chains), squeeze=False)[0]
     for axes, chain in zip(cells, chains, strict=True):
