@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from diagrams.scenario.fields.shipped import SCHEMA_FILE
-from diagrams.scenario.former_fields import renewed
-from diagrams.scenario.settings import apply_settings, plain_settings
 from diagrams.scenario.suggestions import did_you_mean
 from diagrams.scenario.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
@@ -49,7 +47,9 @@ def load_scenario(
         InputError: A field is unknown, has the wrong type, or is out of range. The
             error states the full path of each such field.
     """
+    # Lists of commands and of scenarios need no models of the fields.
     from diagrams.scenario.scenario import scenario_from_mapping
+    from diagrams.scenario.settings import apply_settings, plain_settings
 
     data = written_fields(source)
     apply_settings(data, dict(plain_settings(overrides)))
@@ -73,6 +73,8 @@ def written_fields(source: str | Path) -> dict[str, Any]:
     Raises:
         InputError: The name is unknown, or the file is unreadable.
     """
+    from diagrams.scenario.former_fields import renewed
+
     path = _find(source)
     data = renewed(read_mapping(path))
     data.setdefault("name", path.stem)

@@ -50,16 +50,16 @@ def differences(where, point):
     if point.wall_m is not None:
         push = own.contact_stiffness_n_m * (own.security_zone_m - point.wall_m)
         ahead = push / own.stiffness_n_m
-    wheel = speed / where.robot.wheel_radius_m
+    wheel = speed / where.only.robot.wheel_radius_m
     rest = {
         "plant": [0.0] * 5 + [wheel] * 2,
         "odometry": [-speed * T, 0.0, 0.0, -wheel * T, -wheel * T],
         "command": [speed, 0.0, wheel, wheel],
     }
-    if where.law == "trajectory_filtered":  # its wheels come first
+    if where.only.law == "trajectory_filtered":  # its wheels come first
         rest["command"] = [wheel, wheel, speed, 0.0, 0.0, 0.0]
     law = blocks["controller"].GetMyMutableContextFromRoot(context)
-    target = [where.robot.control_point_m + ahead, 0.0, speed, 0.0]
+    target = [where.only.robot.control_point_m + ahead, 0.0, speed, 0.0]
     blocks["controller"].GetInputPort("target_state").FixValue(law, target)
     numbered = np.arange(len(get_state(context)), dtype=float)
     # A state of numbers tells where each block's own states are.
@@ -124,7 +124,7 @@ def test_poles_are_those_of_the_closed_form(law):
     """
     where = scenario(law)
     own = route_law(where)
-    of = SampledMass(where.robot.mass_kg, where.plant.motor_lag_s, T)
+    of = SampledMass(where.only.robot.mass_kg, where.only.plant.motor_lag_s, T)
     for point in route_points(where)[1:]:
         k, d = own.stiffness_n_m, own.damping_n_s_m
         share = 0.0
@@ -148,7 +148,9 @@ def test_poles_are_those_of_the_closed_form(law):
 def test_a_contact_that_is_late_acts_on_an_old_place():
     """K_e on the place two ticks ago and K on the present one, in closed form."""
     where = scenario("trajectory_filtered", "objects.latency_s=0.05")
-    of = SampledMass(where.robot.mass_kg, where.plant.motor_lag_s, T, late_ticks=2)
+    of = SampledMass(
+        where.only.robot.mass_kg, where.only.plant.motor_lag_s, T, late_ticks=2
+    )
     along = sampled_matrix(8.0, 4.0 + 2.0, of)
     kept = math.exp(-T / of.motor_lag_s)
     pull = -T * 3.0 / of.mass_kg

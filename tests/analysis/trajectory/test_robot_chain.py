@@ -81,7 +81,7 @@ def test_the_matrix_of_a_chain_is_that_of_its_response(late):
     for link in links:
         speed = (1.0 - 1.0 / z) / T
         pull = link.stiffness + link.ahead[0] + (0.7 * D + link.ahead[1]) * speed
-        coupled *= pull * z**-late * place / where.robot.mass_kg
+        coupled *= pull * z**-late * place / where.only.robot.mass_kg
     loose = [ChainLinks(0.0, 0.0, 0.0, late_ticks=late)] * 3
     determinants = [
         np.array([np.linalg.det(each * np.eye(len(A)) - A) for each in z])

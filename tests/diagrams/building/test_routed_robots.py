@@ -133,8 +133,14 @@ def test_the_same_seed_gives_the_same_bytes():
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        (["law=active"], "^route: is not a field of a follower.* trajectory_filtered$"),
-        (["route=null"], "^route: is null; input should be a valid mapping"),
+        (
+            ["law=active"],
+            "^route: is not a field of robots that follow .* trajectory_filtered$",
+        ),
+        (
+            ["route=null"],
+            "^route: is missing, and law .* drives on one; set route.goal_m",
+        ),
         (
             ["obstacles.0.known=true", "route.goal_m=[3.0, 0.1]"],
             r"^route.goal_m: \(3, 0.1\) lies in a known obstacle",
@@ -148,7 +154,7 @@ def test_the_same_seed_gives_the_same_bytes():
             ["route.goal_m=[60, 0]"],
             "^route.goal_m: .* beyond stop.diverged_range_m, 20",
         ),
-        (["guard={}"], "^guard: is not a field of a router; .* guarded, "),
+        (["guard={}"], "^guard: is not a field of robots that drive .* guarded, "),
     ],
 )
 def test_what_cannot_be_is_refused(fields, message):
