@@ -89,7 +89,8 @@ class EquilibriumSearch:
         """Returns the length of the shortest free path of P from the start to a point.
 
         The path keeps a distance of half the robot's width from every body. If the
-        point itself is nearer to a body, the path may come as near as the point.
+        start or the point itself is nearer to a body, the path may come as near as
+        this.
 
         Args:
             point: One of ``points``.
@@ -111,15 +112,16 @@ class EquilibriumSearch:
         return np.array(control_point(self.scenario.only.start.pose, epsilon))
 
     def follow_point(self) -> OperatingPoint:
-        """Returns the stable equilibrium at which the robot is expected to follow the source.
+        """Returns the stable equilibrium at which the robot should follow the source.
 
         The choice has these rules:
 
         - Equilibria with a free path from the start come first. If no equilibrium has a
           free path, all stable equilibria are candidates.
-        - Among the candidates, the distance from the source is nearest to the follow
-          distance.
-        - If several are equally near, the equilibrium nearest to the start is chosen.
+        - The method returns the candidate whose distance from the source is nearest to
+          the follow distance.
+        - If several candidates are equally near, the method returns the one nearest to
+          the start.
 
         Returns:
             One of ``points``.
@@ -147,9 +149,7 @@ class EquilibriumSearch:
 
     @property
     def statement(self) -> str:
-        """One or two sentences on the searched area and on the completeness of the
-        search.
-        """
+        """What was searched, and how completely, in one or two sentences."""
         x0, x1, y0, y1 = self.area_m
         where = f"[{x0:g}, {x1:g}] m x [{y0:g}, {y1:g}] m"
         text = (

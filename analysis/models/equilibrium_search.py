@@ -142,7 +142,7 @@ class Leftover:
 
 
 class CellSearch:
-    """Search by cells: bounds the force in each cell and excludes cells without equilibria.
+    """Bounds the force in each cell and excludes cells without equilibria.
 
     Args:
         field: Force on P at rest.
@@ -240,9 +240,7 @@ class CellSearch:
     def _vectors(
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Vectors to the nearest points of the bodies (k, n, 2) and distances (k, n),
-        m.
-        """
+        """Vectors to the nearest points of bodies (k, n, 2), and lengths (k, n), m."""
         vectors = (nearest_point_on_rectangle(points.T, body) for body in self._bodies)
         stacked = np.array([np.stack(vector, axis=-1) for vector in vectors])
         return stacked, np.linalg.norm(stacked, axis=-1)
@@ -254,8 +252,9 @@ class CellSearch:
         return -vectors * (force / np.maximum(distances, 1e-12))[..., None]
 
     def _excluded(self, cells: NDArray[np.float64], edge: float) -> NDArray[np.bool_]:
-        """Which cells contain no place of rest; see the top of this module for the
-        proof.
+        """(n,) whether each cell contains no place of rest.
+
+        The proof is at the top of this module.
         """
         radius = edge * np.sqrt(0.5)
         vectors, distances = self._vectors(cells)
