@@ -43,7 +43,8 @@ class OperatingPoint:
     loop: IdealLoop = field(repr=False)
     """Control loop with exact sensors."""
     p_WP: NDArray[np.float64]
-    """(2,) position of the control point P in W, m. If P moves: position at ``time_s``."""
+    """(2,) control point P, ahead of the wheel axle, in W, m. If P moves: at
+    ``time_s``."""
     theta_WB: float
     """Heading towards the source, rad. At rest, any other heading is an equilibrium
     too."""
@@ -303,9 +304,7 @@ def moving_equilibrium(
 
 
 def _steady_scenario(scenario: Scenario, vx: float, vy: float) -> Scenario:
-    """Scenario with exact sensors, without obstacles, and with a source on a 900 m
-    line.
-    """
+    """Ideal scenario without obstacles, with a source that drives 900 m straight on."""
     speed = math.hypot(vx, vy)
     source = {
         "waypoints_m": [[0.0, 0.0], [900.0 * vx / speed, 900.0 * vy / speed]],
