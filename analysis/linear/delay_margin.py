@@ -87,7 +87,7 @@ class DelayedLoop:
         self._turn = np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
 
     def _flow(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Derivatives of the plant's state after some seconds.
+        """Derivatives of the plant's state after some seconds, as two matrices.
 
         The first is by the state at the beginning, the second by the constant wheel
         command.
@@ -149,7 +149,7 @@ def _with_delays(
     row: NDArray[np.float64],
     columns: list[tuple[NDArray[np.float64], int]],
 ) -> NDArray[np.float64]:
-    """Matrix of x+ = A x + sum of b_i y(k - n_i), y = row x, with delays of n_i ticks.
+    """Matrix of x+ = A x + sum of b_i y[k - n_i], y = row x, with delays of n_i ticks.
 
     The model keeps only its controllable and observable states.
     """

@@ -36,7 +36,7 @@ class DelayedRun:
     time_s: NDArray[np.float64] = field(repr=False)
     """(n,) times, s."""
     offset_m: NDArray[np.float64] = field(repr=False)
-    """(n,) deviation of P from the operating point in the direction of the motion, m."""
+    """(n,) deviation of P from the operating point in the direction of the kick, m."""
 
 
 @dataclass(frozen=True)
@@ -103,18 +103,18 @@ def simulate_delayed(
     direction: Direction = "along",
     duration_s: float = 300.0,
 ) -> DelayedRun:
-    """Simulates the diagram with one delayed signal, after a small initial velocity of P.
+    """Simulates the diagram with one delayed signal, after a small kick to P.
 
-    Both elements of the signal are delayed. At rest, the motions along and across are
-    decoupled. An initial velocity along the line to the source therefore shows the loop
-    along this line only.
+    The kick is an initial velocity. Both elements of the signal are delayed. At rest,
+    the motions along and across the line to the source are decoupled. A kick along this
+    line therefore shows only the loop along the line.
 
     Args:
         point: Equilibrium at rest.
         at: Place of the delay. ``wheels``: wheel commands reach the motors later.
             ``sensor``: estimates of the source are older.
         delay_s: Additional delay, 0 or more, s.
-        direction: Direction of the initial velocity.
+        direction: Direction of the kick.
         duration_s: Simulated time, s.
 
     Returns:
