@@ -87,7 +87,7 @@ class DelayedLoop:
         self._turn = np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
 
     def _flow(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Derivatives of the plant's state after some seconds, as two matrices.
+        """Two derivatives of the plant's state after some seconds.
 
         The first is by the state at the beginning, the second by the constant wheel
         command.
@@ -107,9 +107,7 @@ class DelayedLoop:
         )
 
     def _wheel_delay(self, late: int, part: float) -> NDArray[np.float64]:
-        """One-period map if the wheels hold an older command for the first ``part``
-        seconds.
-        """
+        """One-period map if the wheels hold an older command for ``part`` seconds."""
         cut, column = self._cut, self._column
         rest, _ = self._flow(self._tick_s - part)
         _, first = self._flow(part)

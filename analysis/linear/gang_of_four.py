@@ -27,7 +27,7 @@ class GangOfFour:
     """(n,) frequencies up to the Nyquist frequency, rad/s. They include modes and
     peaks."""
     S: NDArray[np.complex128]
-    """(n,) sensitivity: from an estimation error to the remaining error at the sensor."""
+    """(n,) sensitivity: from an estimation error to the remaining error."""
     T: NDArray[np.complex128]
     """(n,) complementary sensitivity 1 - S."""
     PS: NDArray[np.complex128]

@@ -48,7 +48,7 @@ def heading_loop(
     lag_s: float,
     tick_s: float | None = TICK_S,
 ) -> LinearModel:
-    """Returns the open loop from heading deviation to heading, while the robot drives ahead.
+    """Returns the open loop from heading deviation to heading of a driving robot.
 
     The loop has these parts:
 
@@ -115,7 +115,7 @@ def _continuous(turn: float, lag_s: float, _: float) -> _Matrices:
 
 
 def _sampled(turn: float, lag_s: float, tick_s: float) -> _Matrices:
-    """Matrices with states: integral of the PID, last deviation, heading, and its rate."""
+    """Matrices with states: integral, last deviation, heading, and heading rate."""
     kp, ki, kd = PROPORTIONAL, INTEGRAL_1_S, DIFFERENTIAL_S
     keep = math.exp(-tick_s / lag_s) if lag_s > 0.0 else 0.0
     # Heading and rate after one period, by the initial rate and by the command.

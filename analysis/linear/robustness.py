@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from systems.framework.input_error import InputError
 
-#: Function from parameter values by name to poles in the z plane. Poles that are neutral
-#: at all values (the heading at rest) are left out.
+#: Function from parameter values by name to poles in the z plane. Poles that are
+#: neutral at all values (the heading at rest) are left out.
 PoleFunction = Callable[[Mapping[str, float]], NDArray[np.complex128]]
 
 #: Step of the finite differences, as a share of the parameter's interval.
@@ -231,8 +231,8 @@ def pole_sensitivities(
 
     The differences are central, with two exceptions. If the nominal value is an end of
     the interval, the parameter varies towards the inside only. A whole number varies
-    over steps of one interval. The pole after the variation is the one nearest to the
-    nominal pole. This is valid for simple poles.
+    over its whole interval. After the variation, the pole nearest to the nominal pole
+    counts as the same pole. This is valid for simple poles.
 
     Args:
         poles: Loop, as function from parameter values to poles.

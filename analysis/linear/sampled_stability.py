@@ -1,4 +1,4 @@
-"""Effects of sampling: stability conditions, poles over the period, stability charts."""
+"""Effects of sampling: stability conditions, poles by period, stability charts."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ _ALL_SPRINGS_N_M = np.geomspace(0.2, 100.0, 50)
 
 @dataclass(frozen=True)
 class ConditionCheck:
-    """Comparison of a closed-form stability condition with eigenvalues at random gains."""
+    """Comparison of a closed-form stability condition with eigenvalues."""
 
     scheme: Scheme
     """How the double integrator of unit mass is sampled."""
     condition: str
-    """Condition on stiffness K, damping D and period T that is equivalent to stability."""
+    """Necessary and sufficient condition on stiffness K, damping D and period T."""
     pairs: int
     """Number of random pairs (K, D)."""
     stable: int

@@ -41,7 +41,7 @@ class StepCheck:
     ideal: Oscillation
     """Oscillation fitted to the simulation with exact sensors."""
     full: Oscillation | None
-    """Oscillation fitted to the simulation with the scenario's sensors, if requested."""
+    """Oscillation fitted to the simulation with the scenario's sensors, or None."""
     step_m: float
     """Size of the step, m."""
     time_s: NDArray[np.float64] = field(repr=False)
@@ -51,7 +51,7 @@ class StepCheck:
     ideal_m: NDArray[np.float64] = field(repr=False)
     """(n,) distance of P from the source, with exact sensors, m."""
     full_m: NDArray[np.float64] | None = field(repr=False)
-    """(n,) distance of P from the source, with the scenario's sensors, m."""
+    """(n,) distance of P from the source with the scenario's sensors, or None, m."""
 
     @property
     def frequency_error(self) -> float:

@@ -157,7 +157,7 @@ class GradientCheck:
     step: float
     """Step in each state for the differences, in its SI unit."""
     largest_difference: float
-    """Largest difference of any element of A between AutoDiff and central differences."""
+    """Largest difference of an element of A: AutoDiff minus central differences."""
     largest_at: tuple[str, str]
     """Names of two states: the one that changed, and the one that was stepped."""
     kink: float
