@@ -52,11 +52,11 @@ def motion_chain(
     motor_lag_s: float | None = None,
     period_s: float | None = None,
 ) -> LinearModel:
-    """Returns the model from ``acceleration_W`` to the motion of P along the robot's axis.
+    """Returns the model from the law's acceleration to the motion of P along the axis.
 
-    The model is linearized at rest.
+    The axis is that of the robot, which points ahead. The model is linearized at rest.
 
-    - Input: acceleration from the law at the tick (control update), m/s^2.
+    - Input: ``acceleration_W`` at the tick (control update), m/s^2.
     - Outputs at the tick, before its updates: position of P, m, and velocity of the
       virtual mass, m/s.
 

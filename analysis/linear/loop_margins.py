@@ -124,9 +124,9 @@ class LoopMargins:
     stable: bool
     """Whether the closed loop is stable."""
     gain_increase_margin: float
-    """Gain factor above 1 at which the loop becomes unstable; infinite without a limit."""
+    """Gain factor above 1 at which the loop becomes unstable; infinite if none does."""
     gain_reduction_margin: float
-    """Gain factor below 1 at which the loop becomes unstable; 0 without a limit."""
+    """Gain factor below 1 at which the loop becomes unstable; 0 if none does."""
     phase_lag_margin_deg: float
     """Smallest destabilizing phase lag at a gain crossover, deg. Without a crossover:
     infinity."""
@@ -134,7 +134,7 @@ class LoopMargins:
     """Smallest destabilizing phase lead at a gain crossover, deg. Without a crossover:
     infinity."""
     crossover_rad_s: float
-    """Gain crossover with the smallest phase margin, rad/s. Without a crossover: NaN."""
+    """Gain crossover of the phase margin, rad/s. Without a crossover: NaN."""
     delay_margin_s: float
     """Delay margin, s: smallest ratio of phase lag to -180 deg and frequency, over all
     gain crossovers. The value is exact in continuous time. For sampled loops see
@@ -341,8 +341,10 @@ def _gain_margins(
 def _phase_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """Smallest lag and lead, rad, frequency of the smaller, rad/s, and smallest delay,
-    s.
+    """Phase and delay margins as four numbers.
+
+    They are the smallest lag and lead, rad, the frequency of the smaller of these,
+    rad/s, and the smallest delay, s.
     """
     # |L| = 1 where the real part of T is 1/2.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))
