@@ -1,4 +1,4 @@
-"""The burst cycle as a periodic system, for example 0.5 s of sound and 1.5 s of silence.
+"""The burst cycle as a periodic system: for example 0.5 s sound and 1.5 s silence.
 
 During the silence, the tracker holds the target in W, holds it relative to the robot,
 or moves it with its last velocity. The product of the one-period matrices of a cycle
@@ -41,9 +41,7 @@ _SETTLING_CYCLES = 3
 
 @dataclass(frozen=True)
 class BurstCycle:
-    """Multipliers of P's motion over one cycle of the sound, about an equilibrium at
-    rest.
-    """
+    """Multipliers of P's motion over one cycle of the sound, about a resting point."""
 
     hold: Hold
     """How the tracker holds the target during the silence."""
@@ -55,7 +53,7 @@ class BurstCycle:
     """Multipliers along the line to the source, largest first. Neutral multipliers of a
     continuum of equilibria are left out."""
     across: NDArray[np.complex128]
-    """Multipliers across the line to the source, largest first, without neutral ones."""
+    """Multipliers across the line to the source, without neutral ones, largest first."""
     matrices: NDArray[np.float64] = field(repr=False)
     """(ticks, n, n) matrices of the whole state over each control period of a cycle."""
     loop: IdealLoop = field(repr=False)
@@ -105,7 +103,7 @@ def burst_cycle(
     gap_s: float | None = None,
     point: OperatingPoint | None = None,
 ) -> BurstCycle:
-    """Computes the multipliers at the stable equilibrium nearest to the follow distance.
+    """Computes the multipliers at the equilibrium where the robot follows the source.
 
     Args:
         scenario: Any scenario. Its sensors are taken as exact, and its bodies as at

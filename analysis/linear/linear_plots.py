@@ -354,7 +354,16 @@ def _s(cloud: PoleCloud, poles: NDArray[np.complex128]) -> NDArray[np.complex128
 
 
 def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
-    """Plots the first-order change of the slowest pole over each parameter's interval."""
+    """Plots the change of the slowest pole over each parameter's interval.
+
+    The change is computed to first order.
+
+    Args:
+        rows: Sensitivities, one per parameter.
+
+    Returns:
+        The figure.
+    """
     figure = Figure(figsize=(8.0, 0.4 * len(rows) + 1.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     ordered = sorted(rows, key=lambda row: abs(row.per_interval))

@@ -1,1 +1,1 @@
-"""What they do not: velocity terms, oscillations, equilibria, portraits."""
+"""Results beyond linear models: velocity terms, oscillations, equilibria, portraits."""
