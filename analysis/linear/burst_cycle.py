@@ -53,7 +53,7 @@ class BurstCycle:
     """Multipliers along the line to the source, largest first. Neutral multipliers of a
     continuum of equilibria are left out."""
     across: NDArray[np.complex128]
-    """Multipliers across the line to the source, without neutral ones, largest first."""
+    """Multipliers across the line to the source, without neutral ones."""
     matrices: NDArray[np.float64] = field(repr=False)
     """(ticks, n, n) matrices of the whole state over each control period of a cycle."""
     loop: IdealLoop = field(repr=False)

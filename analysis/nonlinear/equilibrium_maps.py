@@ -76,9 +76,7 @@ class EquilibriumMap:
 
     @property
     def collisions(self) -> tuple[float, ...]:
-        """Values at which the robot hits a box. Only runs with cones can have
-        collisions.
-        """
+        """Values at which the robot hits a box. Only cones can lead to collisions."""
         return self._values("collision")
 
     def _values(self, outcome: str) -> tuple[float, ...]:
@@ -120,9 +118,10 @@ def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
 def _refined(
     model: PointMass, point: NDArray[np.float64], cell_m: float
 ) -> tuple[float, float]:
-    """Refines a minimum: moves to lower neighbors, and halves the step if there is none.
+    """Refines a minimum of the potential by compass search.
 
-    The first step is short, so that the search does not leave a small basin.
+    The search moves to a lower neighbor, and halves its step if there is none. The
+    first step is short, so that the search does not leave a small basin.
     """
     step, here = 0.125 * cell_m, point.copy()
     angle = 2.0 * np.pi * np.arange(16) / 16
@@ -145,7 +144,9 @@ def gap_map(
     *,
     sensing: str = "exact nearest",
 ) -> EquilibriumMap:
-    """Finds the places of rest before two boxes on both sides of the line to the source.
+    """Finds the places of rest before two boxes, for several gaps between the boxes.
+
+    The boxes stand on both sides of the line to the source.
 
     Args:
         scenario: Scenario with law and gains.
@@ -202,9 +203,7 @@ def _map(
     ],
     sensing: str,
 ) -> EquilibriumMap:
-    """Map over a parameter. ``varied``: its name, values, boxes by value, and cell
-    size, m.
-    """
+    """Map over a parameter: its name, values, boxes by value, and cell size, m."""
     parameter, numbers, boxes, cell_m = varied
     if sensing not in _SENSING:
         words = ", ".join(repr(word) for word in _SENSING)

@@ -35,8 +35,7 @@ class PhasePortrait:
     collides: NDArray[np.bool_]
     """(n, m) whether the simulation from the start leads to contact."""
     certified_speed_m_s: NDArray[np.float64]
-    """(n,) speeds below which a start is certified, m/s. If not even rest is certified:
-    NaN."""
+    """(n,) speeds below which a start is certified, m/s; NaN if not even rest is."""
     trajectories: tuple[NDArray[np.float64], ...]
     """(k, 2) c, m, and c', m/s, of some runs."""
 
@@ -103,7 +102,7 @@ def phase_portrait(
     velocity_term: VelocityTermModel | None = None,
     points: int = 41,
 ) -> PhasePortrait:
-    """Computes the phase plane for clearances up to 1.5 m and rates up to the top speed.
+    """Computes the phase plane up to 1.5 m of clearance and up to the top speed.
 
     Args:
         scenario: Scenario with law and gains.
@@ -146,12 +145,15 @@ def phase_portrait(
 def certified_speeds(
     model: PointMass, clearances: NDArray[np.float64], least: float
 ) -> NDArray[np.float64]:
-    """Returns the speed below which the energy cannot reach contact, by clearance.
+    """Returns the speed below which the energy does not suffice to reach contact.
 
     On the way to contact, P must pass the largest potential between its clearance and
-    contact. The certified speed is the speed with just this energy. If even the top
-    speed is not sufficient, every speed is certified. If the potential at the clearance
-    itself is the largest, not even rest is certified.
+    contact. The kinetic energy at the certified speed is the difference between this
+    largest potential and the potential at the clearance. Two cases are special:
+
+    - If the potential at the clearance itself is the largest, not even rest is
+      certified.
+    - If even the top speed does not suffice to pass, every speed is certified.
 
     Args:
         model: Head-on approach along x, with P at -c before a face at 0.

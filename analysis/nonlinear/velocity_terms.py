@@ -83,8 +83,7 @@ class DescribingFunction:
     bias_n: NDArray[np.float64]
     """(n,) mean of f(c, s) - f(c, 0), N. Positive: away from the obstacle."""
     damping_n_s_m: NDArray[np.float64]
-    """(n,) damping by the first harmonic, N s/m. Negative: the oscillation gains
-    energy."""
+    """(n,) damping by the first harmonic, N s/m. If negative, the motion gains energy."""
     sampled_bias_n: NDArray[np.float64]
     """(n,) bias with the speed s that the controller computes over one period, N."""
     sampled_damping_n_s_m: NDArray[np.float64]
@@ -107,10 +106,11 @@ class VelocityTermVariant:
 
     @property
     def amplitude_ratio(self) -> float | None:
-        """Ratio by which a very small oscillation changes per cycle, or None without one.
+        """Ratio of successive amplitudes of a very small oscillation.
 
         Each of the two models is valid for half a cycle. With its damping ratio z, it
-        multiplies the amplitude by exp(-pi z/sqrt(1 - z^2)).
+        multiplies the amplitude by exp(-pi z/sqrt(1 - z^2)). Without an oscillation the
+        ratio is None.
         """
         ratio = 1.0
         for side in (self.approaching, self.receding):
