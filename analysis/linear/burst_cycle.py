@@ -87,8 +87,7 @@ class BurstRun:
     hold: Hold
     """How the tracker holds the target during the silence."""
     factor: float
-    """Fitted growth factor per cycle, an estimate of the largest |multiplier| in this
-    direction."""
+    """Fitted growth factor per cycle, to compare with the largest |multiplier|."""
     time_s: NDArray[np.float64] = field(repr=False)
     """(n,) times of all control periods, s."""
     offset_m: NDArray[np.float64] = field(repr=False)
@@ -206,7 +205,9 @@ def _multipliers(
 def simulate_burst_cycle(
     cycle: BurstCycle, cycles: int = 40, *, direction: Direction = "along"
 ) -> BurstRun:
-    """Simulates the diagram over many cycles after a small kick to P.
+    """Simulates the diagram over many cycles after a small kick to the robot.
+
+    The kick changes the velocity of the virtual mass.
 
     Args:
         cycle: Cycle whose multipliers the simulation checks.
@@ -214,7 +215,7 @@ def simulate_burst_cycle(
         direction: Direction of the kick: along the line to the source, or across.
 
     Returns:
-        Growth factor per cycle, and the motion of P.
+        Growth factor per cycle, and the motion of the robot's control point.
     """
     loop, point = cycle.loop, cycle.point
     axis = point.axes[DIRECTIONS.index(direction)]

@@ -52,13 +52,14 @@ def motion_chain(
     motor_lag_s: float | None = None,
     period_s: float | None = None,
 ) -> LinearModel:
-    """Returns the model from the law's acceleration to the motion of P along the axis.
+    """Returns the model from the law's acceleration to the robot's motion along its axis.
 
-    The axis is that of the robot, which points ahead. The model is linearized at rest.
+    The axis points ahead. The model is linearized at rest. Input and outputs are the
+    values before the control update that begins the period.
 
-    - Input: ``acceleration_W`` at the tick (control update), m/s^2.
-    - Outputs at the tick, before its updates: position of P, m, and velocity of the
-      virtual mass, m/s.
+    - Input: ``acceleration_W``, m/s^2.
+    - Outputs: position of the control point P, m, and velocity of the virtual mass,
+      m/s.
 
     Args:
         scenario: Scenario with robot and plant.
@@ -156,12 +157,12 @@ def contact_matrix(
     approach_damping_n_s_m: float = 0.0,
     period_s: float | None = None,
 ) -> NDArray[np.float64]:
-    """Returns the one-period matrix of the radial motion of P before an obstacle.
+    """Returns the one-period matrix of the robot's motion straight towards an obstacle.
 
     Args:
         scenario: Scenario with mass, robot, plant and damping.
-        stiffness_n_m: Sum of all springs, K_r + K_0, N/m.
-        damping_n_s_m: Damping to use instead of D_r, N s/m.
+        stiffness_n_m: Sum of all springs, those of attraction and obstacle, N/m.
+        damping_n_s_m: Damping to use instead of the attraction's, N s/m.
         motor_lag_s: Motor lag to use instead of ``plant.motor_lag_s``, s.
         latency_ticks: Age of the position that the springs act on, in control periods.
             It is 0 in the diagram, where an echo drives the wheels in the same period.
@@ -204,7 +205,7 @@ class ContactOptions(TypedDict, total=False):
 def contact_spectral_radius(
     scenario: Scenario, stiffness_n_m: float, **options: Unpack[ContactOptions]
 ) -> float:
-    """Returns the largest |z| of the radial motion before an obstacle.
+    """Returns the largest |z| of the motion straight towards an obstacle.
 
     The motion is stable if the value is below 1. ``contact_matrix`` describes the
     model.
@@ -224,7 +225,10 @@ def contact_spectral_radius(
 def largest_contact_stiffness(
     scenario: Scenario, **options: Unpack[ContactOptions]
 ) -> float:
-    """Returns the sum of springs K_r + K_0 at which the radial motion stops decaying.
+    """Returns the largest stable stiffness of the motion straight towards an obstacle.
+
+    The stiffness is the sum of all springs: those of the attraction and of the
+    obstacle.
 
     Args:
         scenario: Scenario with mass, robot, plant and damping.
@@ -257,8 +261,8 @@ class ContactLimits:
     latency_ticks: tuple[int, ...]
     """Latencies of the columns, in control periods."""
     stiffness_n_m: NDArray[np.float64]
-    """(rows, columns) largest K_0 of the conventional law, N/m. A negative value means
-    that the attraction alone is too stiff."""
+    """(rows, columns) largest stiffness K_0 of the conventional law, N/m. A negative
+    value means that the attraction alone is too stiff."""
     reference_stiffness_n_m: NDArray[np.float64]
     """(rows, columns) largest k_ref of the active law, from its largest slope, N/m."""
     today: tuple[float, int]
@@ -289,7 +293,8 @@ def contact_limits(
         latency_ticks: Columns of the tables, in control periods.
 
     Returns:
-        Largest gains of both laws, N/m. K_r is subtracted.
+        Largest stiffnesses of both laws, N/m. The stiffness of the attraction is
+        subtracted.
     """
     lags = sorted({*motor_lags_s, scenario.only.plant.motor_lag_s})
     total = np.array(

@@ -46,8 +46,7 @@ class DelayMargin:
     direction: Direction
     """Direction of the delayed signal and of the oscillation."""
     delay_s: float
-    """Delay in addition to that of the diagram, s. If no delay makes the loop unstable:
-    infinity."""
+    """Delay in addition to that of the diagram, s. Infinity: no delay destabilizes."""
     frequency_rad_s: float
     """Frequency of the oscillation, rad/s. Without an oscillation: NaN."""
 
@@ -147,7 +146,7 @@ def _with_delays(
     row: NDArray[np.float64],
     columns: list[tuple[NDArray[np.float64], int]],
 ) -> NDArray[np.float64]:
-    """Matrix of x+ = A x + sum of b_i y[k - n_i], y = row x, with delays of n_i ticks.
+    """Matrix of x+ = A x + sum of b_i y[k - n_i], y = row x, with delays of n_i periods.
 
     The model keeps only its controllable and observable states.
     """

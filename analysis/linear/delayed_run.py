@@ -103,11 +103,11 @@ def simulate_delayed(
     direction: Direction = "along",
     duration_s: float = 300.0,
 ) -> DelayedRun:
-    """Simulates the diagram with one delayed signal, after a small kick to P.
+    """Simulates the diagram with one delayed signal, after a small kick to the robot.
 
-    The kick is an initial velocity. Both elements of the signal are delayed. At rest,
-    the motions along and across the line to the source are decoupled. A kick along this
-    line therefore shows only the loop along the line.
+    The kick changes the velocity of the virtual mass. Both elements of the signal are
+    delayed. At rest, the motions along and across the line to the source are decoupled.
+    A kick along this line therefore shows only the loop along the line.
 
     Args:
         point: Equilibrium at rest.
@@ -118,7 +118,7 @@ def simulate_delayed(
         duration_s: Simulated time, s.
 
     Returns:
-        The motion of P, with fitted growth rate and frequency.
+        The motion of the robot's control point, with fitted growth rate and frequency.
 
     Raises:
         InputError: The operating point moves, or the delay is negative.
@@ -164,7 +164,7 @@ def offsets(
     poses_WB: Sequence[NDArray[np.float64]],
     axis: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Returns the deviation of P from an equilibrium along one axis.
+    """Returns the deviation of the control point P from an equilibrium along one axis.
 
     Args:
         point: Equilibrium.

@@ -24,8 +24,7 @@ class GangOfFour:
     direction: Direction
     """Along the line to the source, or across it."""
     omega: NDArray[np.float64]
-    """(n,) frequencies up to the Nyquist frequency, rad/s. They include modes and
-    peaks."""
+    """(n,) frequencies with all modes and peaks, up to the Nyquist frequency, rad/s."""
     S: NDArray[np.complex128]
     """(n,) sensitivity: from an estimation error to the remaining error."""
     T: NDArray[np.complex128]

@@ -128,11 +128,9 @@ class LoopMargins:
     gain_reduction_margin: float
     """Gain factor below 1 at which the loop becomes unstable; 0 if none does."""
     phase_lag_margin_deg: float
-    """Smallest destabilizing phase lag at a gain crossover, deg. Without a crossover:
-    infinity."""
+    """Smallest destabilizing phase lag at a gain crossover, deg; infinite if none."""
     phase_lead_margin_deg: float
-    """Smallest destabilizing phase lead at a gain crossover, deg. Without a crossover:
-    infinity."""
+    """Smallest destabilizing phase lead at a gain crossover, deg; infinite if none."""
     crossover_rad_s: float
     """Gain crossover of the phase margin, rad/s. Without a crossover: NaN."""
     delay_margin_s: float
@@ -378,8 +376,9 @@ class PointMargins:
 def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:
     """Computes the margins at sensor, actuator and wheels, along and across.
 
-    Loops that do not exist are left out. For example, if the law does not push, no
-    force acts on P across the line to the source at the follow distance.
+    "Along" and "across" refer to the line to the source. Loops that do not exist are
+    left out. For example, if the law does not push, no force acts on the robot across
+    this line at the follow distance.
 
     Args:
         point: Operating point.

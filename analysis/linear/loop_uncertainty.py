@@ -186,8 +186,8 @@ def law_stiffness(scenario: Scenario) -> float:
 def contact_poles(scenario: Scenario) -> PoleFunction:
     """Returns a function for the poles of the contact mode, in the z plane.
 
-    The contact mode is the radial motion of P before an obstacle, at the distance where
-    the law is stiffest.
+    The contact mode is the robot's motion straight towards an obstacle, at the distance
+    where the law is stiffest.
 
     Args:
         scenario: Scenario with the nominal values.
@@ -210,7 +210,7 @@ def contact_poles(scenario: Scenario) -> PoleFunction:
 
 
 def following_poles(at: OperatingPoint) -> PoleFunction:
-    """Returns a function for the z-plane poles of P's motion about an equilibrium.
+    """Returns a function for the z-plane poles of the robot's motion about an equilibrium.
 
     The equilibrium moves with the parameters. Neutral poles (z = 1) are left out. The
     latency of hearing is not a parameter here. Odometry assigns each measurement to the

@@ -31,8 +31,7 @@ class ContactSlopes:
     stiffness_n_m: float
     """Stiffness -df/dc at this distance, N/m."""
     approach_damping_n_s_m: float
-    """Damping df/ds at this distance and at s = 0, for an obstacle that comes nearer, N
-    s/m."""
+    """Damping df/ds there for an approaching obstacle, at s = 0, N s/m."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ def contact_slopes(scenario: Scenario) -> ContactSlopes:
         Distance, stiffness and damping.
 
     Raises:
-        InputError: The law does not push P away from obstacles.
+        InputError: The law does not push the robot away from obstacles.
     """
     field = ForceField(ideal_loop(frozen_scenario(ideal_scenario(scenario))))
     forces = field.law(_DISTANCES_M)

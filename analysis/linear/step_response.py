@@ -51,7 +51,7 @@ class StepCheck:
     ideal_m: NDArray[np.float64] = field(repr=False)
     """(n,) distance of P from the source, with exact sensors, m."""
     full_m: NDArray[np.float64] | None = field(repr=False)
-    """(n,) distance of P from the source with the scenario's sensors, m, or None."""
+    """(n,) distance from the source with the scenario's sensors, m."""
 
     @property
     def frequency_error(self) -> float:

@@ -21,7 +21,7 @@ from analysis.models.ideal_loop import IdealLoop
 from analysis.models.linear_models import LinearModel
 from diagrams.running.simulation import simulator_config
 
-#: Suffix of a signal's name for its value after the update of the tick.
+#: Suffix of a signal's name for its value after the control update.
 AFTER = "_after"
 
 
@@ -30,15 +30,15 @@ def sampled_blocks(
 ) -> tuple[LinearModel, ...]:
     """Linearizes every block that has inputs, each block alone.
 
-    A tick is the control update at the beginning of a period. Sampled blocks read each
-    other's outputs at the tick, before the update. Continuous blocks read outputs after
-    the update, because these are held over the period. A block that feeds a continuous
-    block therefore has some outputs twice: before and after the update.
+    At the control update that begins a period, sampled blocks read each other's outputs
+    before the update. Continuous blocks read outputs after the update, because these
+    are held over the period. A block that feeds a continuous block therefore has some
+    outputs twice: before and after the update.
 
     Args:
         loop: Control loop with exact sensors.
-        state: (n,) operating point, just before the updates of a tick.
-        time_s: Time of this tick, s.
+        state: (n,) operating point, just before a control update.
+        time_s: Time of this control update, s.
 
     Returns:
         One model per block over one period, in the order of ``SoundFollower.blocks``.

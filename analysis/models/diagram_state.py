@@ -16,14 +16,14 @@ Port = tuple[str, str]
 class Runner:
     """Simulation whose state and cut inputs can be changed between steps.
 
-    A tick is a control update; ticks are one period apart. The run uses the context of
-    its simulator. Finish the run before you use the same loop for anything else.
+    The run uses the context of its simulator. Finish the run before you use the same
+    loop for anything else.
 
     Args:
         simulator: Simulator whose context the run uses.
         fix: Function ``fix(context, port, value)`` that sets the value of a cut input.
-        state: (n,) state just before the updates of the tick at ``time_s``.
-        time_s: Time of the first tick, a multiple of the period, s.
+        state: (n,) state just before the control update at ``time_s``.
+        time_s: Time of the first control update, a multiple of the period, s.
         tick_s: Control period, s.
     """
 
@@ -57,7 +57,7 @@ class Runner:
         self._fix(self._context, port, value)
 
     def advance(self, time_s: float) -> None:
-        """Simulates up to ``time_s``, without the updates of a tick at that time."""
+        """Simulates up to ``time_s``, without a control update at that time."""
         if time_s > self._context.get_time():
             self._simulator.AdvanceTo(time_s)
 
@@ -80,14 +80,12 @@ class Runner:
 def run_periods(
     simulator: Any, state: Any, time_s: float, periods: int, tick_s: float
 ) -> None:
-    """Simulates whole control periods, up to just before the next tick.
-
-    A tick is the control update at the beginning of a period.
+    """Simulates whole control periods, up to just before the next control update.
 
     Args:
         simulator: Simulator whose context is changed.
-        state: (n,) state just before the updates of the tick at ``time_s``.
-        time_s: Time of the first tick, a multiple of the period, s.
+        state: (n,) state just before the control update at ``time_s``.
+        time_s: Time of the first control update, a multiple of the period, s.
         periods: Number of periods, 0 or more.
         tick_s: Control period, s.
     """
@@ -97,14 +95,13 @@ def run_periods(
 
 
 def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
-    """Puts a simulator into the state just before the updates of one tick.
-
-    A tick is the control update at the beginning of a period.
+    """Puts a simulator into a given state just before a control update.
 
     Args:
         simulator: Simulator whose context is changed.
-        state: (n,) state just before the updates.
-        time_s: Time of the tick, s. It is rounded to a multiple of the period.
+        state: (n,) state just before the control update.
+        time_s: Time of the control update, s. It is rounded to a multiple of the
+            period.
         tick_s: Control period, s.
     """
     context = simulator.get_mutable_context()

@@ -86,11 +86,11 @@ class EquilibriumSearch:
         return not self.unresolved and self.empty_outside
 
     def way_m(self, point: OperatingPoint) -> float:
-        """Returns the length of the shortest free path of P from the start to a point.
+        """Returns the length of the shortest free path from the start to an equilibrium.
 
-        The path keeps a distance of half the robot's width from every body. If the
-        start or the point itself is nearer to a body, the path may come as near as
-        this.
+        The path is that of the control point P. It keeps a distance of half the robot's
+        width from every body. If the start or the equilibrium is nearer to a body, the
+        path may come as near as this.
 
         Args:
             point: One of ``points``.
@@ -222,8 +222,9 @@ def find_equilibria(
     Args:
         scenario: Any scenario. The search takes its sensors as exact, and its bodies as
             at rest where they are at 0 s. Use ``frozen_scenario`` for another time.
-        area_m: Area of P to search. By default the area contains all bodies and the
-            start, with a margin of the follow distance plus 1 m.
+        area_m: Area in which to search for positions of the control point P. By default
+            the area contains all bodies and the start, with a margin of the follow
+            distance plus 1 m.
         smallest_m: Cells whose edge is not longer than this are not divided any more,
             m.
 
@@ -393,10 +394,10 @@ def _near(root: NDArray[np.float64], roots: list[NDArray[np.float64]]) -> bool:
 def nearest_equilibrium(
     field_: ForceField, begin: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Finds a point without force on P by Newton's method.
+    """Finds a point without force on the robot by Newton's method.
 
     Args:
-        field_: Force on P at rest.
+        field_: Force on the control point P of the robot at rest.
         begin: (2,) start of the iteration in W, m.
 
     Returns:

@@ -122,8 +122,7 @@ class SwitchingPoint:
     p_WP: NDArray[np.float64]
     """(2,) position of P in W, m."""
     attractive: bool
-    """Whether all forces drive P to this point. P then stays near the point and
-    chatters."""
+    """Whether all forces drive P to this point, so that P chatters near the point."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +144,7 @@ class CellSearch:
     """Bounds the force in each cell and excludes cells without equilibria.
 
     Args:
-        field: Force on P at rest.
+        field: Force on the control point P of the robot at rest.
     """
 
     def __init__(self, field: ForceField) -> None:
@@ -484,7 +483,7 @@ class CellSearch:
         return bool(min(turns) > 0.0 or max(turns) < 0.0)
 
     def _attracts(self, p: NDArray[np.float64], bodies: NDArray[np.int64]) -> bool:
-        """Whether the forces drive P to a switching point.
+        """Whether the forces drive the control point P to a switching point.
 
         The nearest body alone pushes P. The force is then that of a potential: the
         potential of the pull plus Phi(smallest distance). If the bodies push, the

@@ -46,7 +46,8 @@ class PeriodDerivatives:
     """Linearization of one control period about a state.
 
     The period maps state x and held inputs u to the next state x+ = f(x, u). The
-    outputs y = g(x, u) belong to the tick (control update) that begins the period.
+    outputs y = g(x, u) are those at the beginning of the period, before the control
+    update.
     """
 
     next_state: NDArray[np.float64]
@@ -56,7 +57,7 @@ class PeriodDerivatives:
     B: NDArray[np.float64]
     """(n, m) derivative of the next state by the inputs, held over the period."""
     y: NDArray[np.float64]
-    """(p,) outputs at the beginning of the period, before the update of the tick."""
+    """(p,) outputs at the beginning of the period, before the control update."""
     C: NDArray[np.float64]
     """(p, n) derivative of the outputs by the state."""
     D: NDArray[np.float64]
@@ -68,9 +69,8 @@ class IdealLoop:
 
     The AutoDiffXd diagram is converted once and used again. The state is that of the
     diagram: first the continuous states, then the discrete groups. ``state_names``
-    names its elements. A tick is the control update at the beginning of a period. Each
-    period begins just before the updates of one tick and ends just before those of the
-    next.
+    names its elements. A period begins just before one control update and ends just
+    before the next.
 
     Args:
         scenario: Scenario with exact sensors, see ``ideal_scenario``.
@@ -214,14 +214,14 @@ class IdealLoop:
         """Returns the state after some whole periods.
 
         Args:
-            state: (n,) state just before the updates of the tick at ``time_s``.
-            time_s: Time of the first tick, a multiple of the period, s.
+            state: (n,) state just before the control update at ``time_s``.
+            time_s: Time of the first control update, a multiple of the period, s.
             fixed: Constant values of input ports. These ports are cut off from their
                 source.
             periods: Number of periods.
 
         Returns:
-            (n,) state just before the updates of the last tick.
+            (n,) state just before the control update that follows the last period.
         """
         fixed = fixed or {}
         simulator = self._simulator(frozenset(fixed), twin=False)
@@ -242,11 +242,11 @@ class IdealLoop:
         """Differentiates one period with AutoDiff through the whole diagram.
 
         Args:
-            state: (n,) state just before the updates of the tick at ``time_s``.
-            time_s: Time of the tick, a multiple of the period, s.
+            state: (n,) state just before the control update at ``time_s``.
+            time_s: Time of the control update, a multiple of the period, s.
             inputs: Values of input ports that are cut off from their source and held
                 over the period. The ports of one key share a value and its derivative.
-            outputs: Output ports to read and differentiate at the tick.
+            outputs: Output ports to read and differentiate before the control update.
 
         Returns:
             The next state, the outputs, and the derivatives of both.
@@ -286,13 +286,13 @@ class IdealLoop:
         """Prepares a run of the float diagram that can be stopped at any time.
 
         Args:
-            state: (n,) state just before the updates of the tick at ``time_s``.
-            time_s: Time of the first tick, a multiple of the period, s.
+            state: (n,) state just before the control update at ``time_s``.
+            time_s: Time of the first control update, a multiple of the period, s.
             fixed: Input ports that are cut off from their source. ``Runner.fix`` sets
                 their values.
 
         Returns:
-            The run, before its first tick.
+            The run, before its first control update.
         """
         simulator = self._simulator(frozenset(fixed), twin=False)
         return Runner(simulator, self.fix, state, time_s, self.tick_s)
@@ -311,15 +311,16 @@ class IdealLoop:
 
         Args:
             pose_WB: (3,) pose of the robot in W at ``begin_s``, m and rad.
-            v_WP: Velocity of P in W, m/s. It points along the heading.
+            v_WP: Velocity of the robot's control point P in W, m/s. It points along the
+                heading.
             begin_s: Time from which on the source moves steadily, s. It is a multiple
                 of the period.
 
         Returns:
             Two values:
 
-            - (n,) state just before the updates of a tick
-            - time of this tick, s
+            - (n,) state just before a control update
+            - time of this control update, s
         """
         context = self.follower.diagram.CreateDefaultContext()
         state = get_state(context)

@@ -32,8 +32,7 @@ class Mode:
     eigenvalue: complex
     """Pole in the s plane, rad/s. In a sampled model: ln(z)/T."""
     participation: dict[str, float]
-    """Share of each state in the mode, largest first. Shares of at most 1 % are left
-    out."""
+    """Share of each state in the mode, largest first; only shares above 1 %."""
 
     @property
     def frequency_rad_s(self) -> float:

@@ -37,12 +37,12 @@ _READ: tuple[Port, ...] = (
 def sampled_model(point: OperatingPoint) -> LinearModel:
     """Returns the sampled closed loop, by AutoDiff through one period of the diagram.
 
-    A tick is the control update at the beginning of a period. The model has these
-    signals:
+    Inputs and outputs are the values at the control update that begins the period.
+    Outputs are read before the update. The model has these signals:
 
-    - Input: pose of the source at the tick, m and rad.
-    - Outputs at the tick, before its updates: position of the control point P, heading,
-      source position that hearing reports, and acceleration from the law.
+    - Input: pose of the source, m and rad.
+    - Outputs: position of the control point P, heading, source position that hearing
+      reports, and acceleration from the law.
     - States: all states of the diagram.
 
     Args:
@@ -121,8 +121,7 @@ class RouteComparison:
     matrix_difference: float
     """Largest difference of an element of A, B, C or D."""
     pole_difference: float
-    """Largest distance of a simple nonzero pole from the nearest pole of the other
-    model."""
+    """Largest distance of a simple nonzero pole from the other model's nearest pole."""
     simple_poles: NDArray[np.complex128]
     """Compared poles in the z plane."""
     states: int
@@ -165,8 +164,7 @@ class GradientCheck:
     zero, the loop has a corner, for example because an obstacle's speed is the norm
     |dC/dt|."""
     kink_at: tuple[str, str]
-    """Names of two states at the kink: the one that changed, and the one that was
-    stepped."""
+    """Names of the state that changed and of the state that was stepped, at the kink."""
 
 
 def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:

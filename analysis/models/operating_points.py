@@ -43,11 +43,9 @@ class OperatingPoint:
     loop: IdealLoop = field(repr=False)
     """Control loop with exact sensors."""
     p_WP: NDArray[np.float64]
-    """(2,) control point P, ahead of the wheel axle, in W, m. If P moves: at
-    ``time_s``."""
+    """(2,) position of the control point P in W at ``time_s``, m."""
     theta_WB: float
-    """Heading towards the source, rad. At rest, any other heading is an equilibrium
-    too."""
+    """Heading, rad: towards the source. At rest, any other is an equilibrium too."""
     v_WS: NDArray[np.float64]
     """(2,) velocity of both source and robot in W, m/s."""
     force_n: float
@@ -55,9 +53,9 @@ class OperatingPoint:
     stiffness_n_m: NDArray[np.float64]
     """(2, 2) negative derivative of the force by position, N/m."""
     state: NDArray[np.float64] = field(repr=False)
-    """(n,) state of the diagram, just before the updates of a tick (control update)."""
+    """(n,) state of the diagram, just before a control update."""
     time_s: float
-    """Time of that tick, s."""
+    """Time of this control update, s."""
 
     @property
     def moves(self) -> bool:
@@ -96,7 +94,7 @@ class OperatingPoint:
 
     @cached_property
     def motion(self) -> LinearModel:
-        """Sampled model of P's motion in the closed loop.
+        """Sampled model of the motion of the control point P in the closed loop.
 
         - Inputs: change of the velocity of the virtual mass along x and y of W, m/s.
         - Outputs: position of P in W, m. If the robot moves, also the heading, rad.
@@ -127,7 +125,7 @@ class OperatingPoint:
 
     @property
     def kind(self) -> Kind:
-        """Kind of the equilibrium, by the number of growing modes of P's motion.
+        """Kind of the equilibrium, by the number of growing modes of the robot's motion.
 
         Without a growing mode the point is a sink, with one a saddle, with two or more
         a source. A growing oscillation counts as one mode, as a growing exponential
@@ -165,7 +163,7 @@ class OperatingPoint:
 def motion_model(
     point: OperatingPoint, A: NDArray[np.float64], period_s: float
 ) -> LinearModel:
-    """Returns a model of P's motion from the matrix of the whole loop.
+    """Returns a model of the motion of the control point P from the whole loop's matrix.
 
     Args:
         point: Operating point.
@@ -200,11 +198,11 @@ def motion_model(
 
 
 def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> OperatingPoint:
-    """Returns the equilibrium at rest with P at a given position without force.
+    """Returns the equilibrium at rest at a given position without force.
 
     Args:
         loop: Control loop with exact sensors and bodies at rest.
-        p_WP: (2,) position of P in W, m.
+        p_WP: (2,) position of the control point P in W, m.
 
     Returns:
         The equilibrium in which the robot heads towards the source.
@@ -253,7 +251,7 @@ def moving_equilibrium(
             along x.
 
     Returns:
-        The equilibrium, with its state just before the updates of a tick.
+        The equilibrium, with its state just before a control update.
 
     Raises:
         InputError: The source is too fast or at rest, or the forces balance at no

@@ -41,8 +41,8 @@ class PointMassRuns:
     starts: NDArray[np.float64]
     """(n, 4) initial states: x, y in m and vx, vy in m/s."""
     contact_times_s: NDArray[np.float64]
-    """(n,) times at which P first comes as near as the contact distance, s. A run
-    without contact has infinity."""
+    """(n,) times at which the point mass first touches a body, s. Without contact:
+    infinity."""
     closest_m: NDArray[np.float64]
     """(n,) smallest distances between P and a body, m."""
     energy_rises_j: NDArray[np.float64]
@@ -117,13 +117,13 @@ class PointMass:
         return kinetic + self.potential(states[:, :2])
 
     def force(self, states: ArrayLike, term: VelocityTermModel) -> NDArray[np.float64]:
-        """Returns the sum of all forces on P.
+        """Returns the sum of all forces on the point mass.
 
         Args:
             states: (n, 4) states x, y, vx, vy in W, in m and m/s.
             term: Dependence of the repulsion on speed. ``none`` takes the speed as
                 zero, ``printed`` takes the speed |dC/dt|, ``closing`` the speed of
-                approach.
+                approach. C is the vector to the nearest point of a body.
 
         Returns:
             (n, 2) forces in W, N.
@@ -147,7 +147,7 @@ class PointMass:
 
         Args:
             starts: (n, 4) initial states x, y, vx, vy in W, in m and m/s.
-            contact_m: Distance from a body at which P touches the body, m.
+            contact_m: Distance at which the point mass touches a body, m.
             duration_s: Simulated time, s.
             term: Dependence of the repulsion on speed, see ``force``.
 

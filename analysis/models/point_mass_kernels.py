@@ -4,8 +4,8 @@ A world has four parts:
 
 - bodies: (k, 6) rows x, y, cosine and sine of the heading, half length, half width
 - position of the source: (2,) in W, m
-- gains: K_r, D_r, d_f, M, top speed, whether all bodies push (0 or 1), and the number
-  of the velocity term (0: none, 1: printed, 2: closing)
+- gains: stiffness K_r, damping D_r, follow distance d_f, mass M, top speed, whether all
+  bodies push (0 or 1), and velocity term (0: none, 1: printed, 2: closing)
 - tables of ``RadialLaw``: forces, energies, increments
 """
 
@@ -197,7 +197,7 @@ def run(
         starts: (n, 4) initial states x, y, vx, vy in W, in m and m/s.
         steps: Largest number of steps.
         h: Integration step, s.
-        contact: Distance from a body at which P touches the body, m.
+        contact: Distance at which the point mass touches a body, m.
         world: World as described at the top of the module.
 
     Returns:
@@ -205,7 +205,7 @@ def run(
 
         - (n,) times of contact, s; infinity for a run without contact
         - (n,) smallest distances, m
-        - (n,) largest rises of V above its smallest earlier value, J
+        - (n,) largest rises of the energy above its smallest earlier value, J
     """
     count = starts.shape[0]
     times, closest = np.full(count, np.inf), np.full(count, np.inf)

@@ -122,7 +122,9 @@ def contact_oscillation(
 def simulate_oscillation(
     contact: HeadOn, term: Variant, start_m: float, duration_s: float
 ) -> OscillationRun:
-    """Simulates a head-on approach from rest with exact sensors, and divides it into cycles.
+    """Simulates a head-on approach from rest, and divides the motion into cycles.
+
+    The simulation uses exact sensors.
 
     Args:
         contact: Head-on approach with law, gains and distance to the goal.
@@ -147,7 +149,7 @@ def simulate_oscillation(
 def _head_on_scenario(
     contact: HeadOn, term: Variant, start_m: float, duration_s: float
 ) -> Scenario:
-    """Scenario with P ``start_m`` before a box, the goal ``to_go_m`` behind its face."""
+    """Scenario with P ``start_m`` before a box, the goal ``to_go_m`` behind it."""
     scenario = contact.scenario
     face = scenario.only.robot.control_point_m + start_m
     follow = max(

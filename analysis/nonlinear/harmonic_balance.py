@@ -38,8 +38,7 @@ class OscillationPrediction:
     frequencies_rad_s: NDArray[np.float64]
     """(n,) frequencies w, rad/s."""
     clamp_amplitude_m: float
-    """Amplitude above which A w exceeds the top speed, m. The balance neglects this
-    limit."""
+    """Largest amplitude whose speed A w does not exceed the top speed, m."""
 
     @property
     def limit_cycle(self) -> tuple[float, float, float] | None:

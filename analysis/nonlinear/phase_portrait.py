@@ -35,7 +35,7 @@ class PhasePortrait:
     collides: NDArray[np.bool_]
     """(n, m) whether the simulation from the start leads to contact."""
     certified_speed_m_s: NDArray[np.float64]
-    """(n,) speeds below which a start is certified, m/s; NaN if not even rest is."""
+    """(n,) speeds below which a start is certified, m/s. NaN: none."""
     trajectories: tuple[NDArray[np.float64], ...]
     """(k, 2) c, m, and c', m/s, of some runs."""
 
@@ -147,18 +147,19 @@ def certified_speeds(
 ) -> NDArray[np.float64]:
     """Returns the speed below which the energy does not suffice to reach contact.
 
-    On the way to contact, P must pass the largest potential between its clearance and
-    contact. The kinetic energy at the certified speed is the difference between this
-    largest potential and the potential at the clearance. Two cases are special:
+    On the way to contact, the point mass must pass the largest potential between its
+    clearance and contact. The kinetic energy at the certified speed is the difference
+    between this largest potential and the potential at the clearance. Two cases are
+    special:
 
     - If the potential at the clearance itself is the largest, not even rest is
       certified.
     - If even the top speed does not suffice to pass, every speed is certified.
 
     Args:
-        model: Head-on approach along x, with P at -c before a face at 0.
+        model: Head-on approach along x, with the point mass at -c before a face at 0.
         clearances: (n,) ascending clearances c, m.
-        least: Distance from the face at which P touches the face, m.
+        least: Distance at which the point mass touches the face, m.
 
     Returns:
         (n,) speeds, m/s; NaN where not even rest is certified.

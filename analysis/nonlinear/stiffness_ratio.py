@@ -1,6 +1,7 @@
-"""Head-on equilibria of the active law as functions of k_ref/K_0.
+"""Head-on equilibria of the active law as functions of the stiffness ratio k_ref/K_0.
 
-In a head-on approach, P moves straight towards an obstacle that lies before the goal.
+In a head-on approach, the robot moves straight towards an obstacle that lies before the
+goal.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ class RatioMap:
     ratios: NDArray[np.float64]
     """(n,) values of k_ref/K_0. K_0 and reach are those of the scenario."""
     outer_m: NDArray[np.float64]
-    """(n,) distances at which the obstacle stops P, m, or NaN. This equilibrium is a
-    saddle, because P can slip sideways."""
+    """(n,) distances at which the obstacle stops the robot, m, or NaN. This equilibrium
+    is a saddle, because the robot can slip sideways."""
     inner_m: NDArray[np.float64]
-    """(n,) smaller distances at which the decreasing push no longer holds P, m, or NaN.
-    This equilibrium is a source."""
+    """(n,) smaller distances at which the decreasing push no longer holds the robot, m,
+    or NaN. This equilibrium is a source."""
     to_go_m: float
     """Distance from the obstacle's face to the goal behind the obstacle, m."""
     today: float
@@ -44,10 +45,10 @@ def stiffness_ratio_map(
     *,
     to_go_m: float | None = None,
 ) -> RatioMap:
-    """Computes the head-on equilibria of the active law over k_ref/K_0.
+    """Computes the head-on equilibria of the active law over the stiffness ratio k_ref/K_0.
 
     Args:
-        scenario: Scenario with K_0, reach and velocity term of the active law.
+        scenario: Scenario with K_0 and reach of the active law.
         ratios: Values of k_ref/K_0, above 1.
         to_go_m: Distance from the obstacle's face to the goal, m, see ``head_on``.
 

@@ -1,11 +1,16 @@
 """Energy that a velocity term feeds into the loop, compared with the damping D_r.
 
-A velocity term adds the force g = f(c, s) - f(c, 0) along u, away from the obstacle.
-For a body at rest, |u.v| <= s <= |v|, because the nearest point of a convex body moves
-no faster than P. Hence the power of g is at most L |v|^2. L is the largest |g|/s for
-the sign of g that adds energy: g > 0 while P recedes (printed term only), and g < 0
-while P approaches. If L <= D_r, the whole loop dissipates energy. All conclusions from
-its energy function without the velocity term then remain valid.
+A velocity term is the dependence of the law's force f(c, s) on the speed s. It adds the
+force g = f(c, s) - f(c, 0) along u, away from the obstacle. The robot's control point
+has the velocity v. For a body at rest, |u.v| <= s <= |v|, because the nearest point of
+a convex body moves no faster than the control point. Hence the power of g is at most L
+|v|^2. L is the largest |g|/s for the sign of g that adds energy:
+
+- g > 0 while the robot moves away (printed term only)
+- g < 0 while the robot approaches
+
+If L <= D_r, the whole loop dissipates energy. All conclusions from its energy function
+without the velocity term then remain valid.
 """
 
 from __future__ import annotations
@@ -96,14 +101,17 @@ class EnergyBalance:
 def velocity_term_passivity(
     scenario: Scenario, velocity_term: str | None = None
 ) -> VelocityTermPassivity:
-    """Computes the bounds of a velocity term.
+    """Computes how much power the velocity term of a law can add.
+
+    A velocity term is the dependence of the law's force on the speed of the obstacle.
 
     Args:
         scenario: Scenario with law, gains and bodies.
         velocity_term: ``printed`` or ``closing``. With None: the scenario's.
 
     Returns:
-        Largest slopes of the push in the obstacle's speed, and D_r.
+        Largest slopes of the push in the obstacle's speed, and the damping of the
+        attraction.
 
     Raises:
         InputError: The law is not known.
@@ -127,13 +135,16 @@ def energy_balance(
 ) -> EnergyBalance:
     """Computes the energies along a run of the point mass from the scenario's start.
 
+    A velocity term is the dependence of the law's force on the speed of the obstacle.
+
     Args:
         scenario: Scenario with law, gains, bodies and start.
         duration_s: Simulated time, s.
         velocity_term: ``printed`` or ``closing``. With None: the scenario's.
 
     Returns:
-        Energy, work of the velocity term, and dissipation of D_r at every step.
+        Energy, work of the velocity term, and energy that the damping dissipates, at
+        every step.
 
     Raises:
         InputError: The law is not known.

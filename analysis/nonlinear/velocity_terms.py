@@ -83,12 +83,11 @@ class DescribingFunction:
     bias_n: NDArray[np.float64]
     """(n,) mean of f(c, s) - f(c, 0), N. Positive: away from the obstacle."""
     damping_n_s_m: NDArray[np.float64]
-    """(n,) damping by the first harmonic, N s/m. If negative, the motion gains energy."""
+    """(n,) damping by the first harmonic, N s/m. If negative, energy is added."""
     sampled_bias_n: NDArray[np.float64]
-    """(n,) bias with the speed s that the controller computes over one period, N."""
+    """(n,) bias with the speed s that the controller computes, N."""
     sampled_damping_n_s_m: NDArray[np.float64]
-    """(n,) damping with the speed s that the controller computes over one period, N
-    s/m."""
+    """(n,) damping with the speed s that the controller computes, N s/m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +140,7 @@ class VelocityTermAnalysis:
 
     @property
     def bias_shift_m(self) -> dict[str, float]:
-        """Shift of the center of an oscillation with the top speed, m, by velocity
-        term.
-        """
+        """Shift of an oscillation's center at the top speed, m, by velocity term."""
         return {
             name: float(v.describing.bias_n[-1]) / self.contact.stiffness_n_m
             for name, v in self.variants.items()
@@ -164,6 +161,8 @@ def velocity_term_analysis(
     scenario: Scenario, *, to_go_m: float | None = None
 ) -> VelocityTermAnalysis:
     """Computes one-sided models and describing functions of both velocity terms.
+
+    A velocity term is the dependence of the law's force on the speed of the obstacle.
 
     Args:
         scenario: Scenario with law, attraction and mass.
