@@ -52,10 +52,10 @@ def motion_chain(
     motor_lag_s: float | None = None,
     period_s: float | None = None,
 ) -> LinearModel:
-    """Returns the model from the law's acceleration to the robot's motion along its axis.
+    """Returns the model from the law's acceleration to the robot's motion ahead.
 
-    The axis points ahead. The model is linearized at rest. Input and outputs are the
-    values before the control update that begins the period.
+    The model is linearized at rest. Input and outputs are the values before the control
+    update that begins the period.
 
     - Input: ``acceleration_W``, m/s^2.
     - Outputs: position of the control point P, m, and velocity of the virtual mass,

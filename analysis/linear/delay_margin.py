@@ -146,7 +146,7 @@ def _with_delays(
     row: NDArray[np.float64],
     columns: list[tuple[NDArray[np.float64], int]],
 ) -> NDArray[np.float64]:
-    """Matrix of x+ = A x + sum of b_i y[k - n_i], y = row x, with delays of n_i periods.
+    """Matrix of x+ = A x + sum of b_i y[k - n_i], y = row x, with delays n_i.
 
     The model keeps only its controllable and observable states.
     """

@@ -210,7 +210,7 @@ def contact_poles(scenario: Scenario) -> PoleFunction:
 
 
 def following_poles(at: OperatingPoint) -> PoleFunction:
-    """Returns a function for the z-plane poles of the robot's motion about an equilibrium.
+    """Returns a function for the z-plane poles of the motion about an equilibrium.
 
     The equilibrium moves with the parameters. Neutral poles (z = 1) are left out. The
     latency of hearing is not a parameter here. Odometry assigns each measurement to the

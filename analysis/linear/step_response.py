@@ -51,16 +51,16 @@ class StepCheck:
     ideal_m: NDArray[np.float64] = field(repr=False)
     """(n,) distance of P from the source, with exact sensors, m."""
     full_m: NDArray[np.float64] | None = field(repr=False)
-    """(n,) distance from the source with the scenario's sensors, m."""
+    """(n,) distance of P from the source, with the scenario's sensors, m."""
 
     @property
     def frequency_error(self) -> float:
-        """Relative frequency error of the prediction, compared with exact sensors."""
+        """Relative error of the predicted frequency, compared to exact sensors."""
         return self.predicted.frequency_rad_s / self.ideal.frequency_rad_s - 1.0
 
     @property
     def damping_error(self) -> float:
-        """Relative error of the predicted damping ratio, compared with exact sensors."""
+        """Relative error of the predicted damping ratio, compared to exact sensors."""
         return self.predicted.damping_ratio / self.ideal.damping_ratio - 1.0
 
 
@@ -165,8 +165,8 @@ def fitted_step(
     """Fits a damped oscillation about a constant by least squares.
 
     The fit also has a bias and a second harmonic that decay with the oscillation. The
-    velocity terms of the laws contain the norm of a velocity. This norm causes a bias
-    and a second harmonic, but no damping.
+    repulsion depends on the norm of a velocity. This norm causes a bias and a second
+    harmonic, but no damping.
 
     Args:
         time_s: (n,) times, s. The first two seconds are left out.

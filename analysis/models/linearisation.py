@@ -164,7 +164,7 @@ class GradientCheck:
     zero, the loop has a corner, for example because an obstacle's speed is the norm
     |dC/dt|."""
     kink_at: tuple[str, str]
-    """Names of the state that changed and of the state that was stepped, at the kink."""
+    """Names of the state that changed and of the state that was stepped there."""
 
 
 def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:

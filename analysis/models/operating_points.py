@@ -125,7 +125,7 @@ class OperatingPoint:
 
     @property
     def kind(self) -> Kind:
-        """Kind of the equilibrium, by the number of growing modes of the robot's motion.
+        """Kind of the equilibrium, by the number of growing modes of the motion.
 
         Without a growing mode the point is a sink, with one a saddle, with two or more
         a source. A growing oscillation counts as one mode, as a growing exponential
@@ -163,11 +163,11 @@ class OperatingPoint:
 def motion_model(
     point: OperatingPoint, A: NDArray[np.float64], period_s: float
 ) -> LinearModel:
-    """Returns a model of the motion of the control point P from the whole loop's matrix.
+    """Returns a model of the motion of the control point P.
 
     Args:
         point: Operating point.
-        A: (n, n) map of the whole state over one period.
+        A: (n, n) map of the loop's whole state over one period.
         period_s: The period, s.
 
     Returns:

@@ -41,8 +41,7 @@ class PointMassRuns:
     starts: NDArray[np.float64]
     """(n, 4) initial states: x, y in m and vx, vy in m/s."""
     contact_times_s: NDArray[np.float64]
-    """(n,) times at which the point mass first touches a body, s. Without contact:
-    infinity."""
+    """(n,) times of the first contact with a body, s. Without contact: infinity."""
     closest_m: NDArray[np.float64]
     """(n,) smallest distances between P and a body, m."""
     energy_rises_j: NDArray[np.float64]

@@ -35,13 +35,13 @@ class PhasePortrait:
     collides: NDArray[np.bool_]
     """(n, m) whether the simulation from the start leads to contact."""
     certified_speed_m_s: NDArray[np.float64]
-    """(n,) speeds below which a start is certified, m/s. NaN: none."""
+    """(n,) speeds below which a start is certified, m/s; NaN: not even rest is."""
     trajectories: tuple[NDArray[np.float64], ...]
     """(k, 2) c, m, and c', m/s, of some runs."""
 
     @property
     def certified(self) -> NDArray[np.bool_]:
-        """(n, m) whether the energy certifies that the start does not lead to contact."""
+        """(n, m) whether the energy certifies that the start leads to no contact."""
         limit = np.nan_to_num(self.certified_speed_m_s, nan=-1.0)
         return np.abs(self.rates_m_s)[None, :] < limit[:, None]
 

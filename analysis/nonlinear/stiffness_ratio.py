@@ -45,11 +45,11 @@ def stiffness_ratio_map(
     *,
     to_go_m: float | None = None,
 ) -> RatioMap:
-    """Computes the head-on equilibria of the active law over the stiffness ratio k_ref/K_0.
+    """Computes the head-on equilibria of the active law over the ratio k_ref/K_0.
 
     Args:
-        scenario: Scenario with K_0 and reach of the active law.
-        ratios: Values of k_ref/K_0, above 1.
+        scenario: Scenario with stiffness K_0 and reach of the active law.
+        ratios: Ratios k_ref/K_0 of the active law's two stiffnesses, above 1.
         to_go_m: Distance from the obstacle's face to the goal, m, see ``head_on``.
 
     Returns:
