@@ -1,9 +1,9 @@
 """The burst cycle as a periodic system: for example 0.5 s sound and 1.5 s silence.
 
-During the silence, the tracker holds the target in W, holds it relative to the robot,
-or moves it with its last velocity. The product of the one-period matrices of a cycle
-maps deviations before the cycle to deviations after the cycle. Its eigenvalues are the
-multipliers.
+During the silence, the tracker holds the target in the world frame W, holds it relative
+to the robot, or moves it with its last velocity. The product of the one-period matrices
+of a cycle maps deviations before the cycle to deviations after the cycle. Its
+eigenvalues are the multipliers.
 """
 
 from __future__ import annotations

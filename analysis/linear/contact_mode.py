@@ -1,13 +1,13 @@
 """Contact mode: largest stable stiffness of an obstacle over motor lag and latency.
 
-Near an obstacle, the springs of the obstacle and of the attraction add. The damping is
-that of the attraction alone. Motor lag, sample period, and age of the echo reduce the
-effect of the damping, and so limit the stiffness.
+Near an obstacle, the stiffnesses of the obstacle's and the attraction's spring add. The
+damping is that of the attraction alone. Motor lag, sample period, and age of the echo
+reduce the effect of the damping, and so limit the stiffness.
 
 The model from acceleration to motion uses the blocks of the diagram. Drake linearizes
-the plant and samples it exactly. AutoDiff linearizes the wheel command. The velocity
-terms of the laws are left out: over an oscillation about an obstacle at rest, the
-printed terms have no damping on average.
+the plant and samples it exactly. AutoDiff linearizes the wheel command. The repulsion's
+dependence on speed (velocity term) is left out. Over an oscillation about an obstacle
+at rest, the printed velocity terms have no damping on average.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def motion_chain(
     motor_lag_s: float | None = None,
     period_s: float | None = None,
 ) -> LinearModel:
-    """Returns the model from the law's acceleration to the robot's motion ahead.
+    """Returns the model from the law's acceleration to the robot's forward motion.
 
     The model is linearized at rest. Input and outputs are the values before the control
     update that begins the period.

@@ -149,7 +149,7 @@ def kicked(
     Args:
         point: Operating point, whose loop gives the names of the states.
         state: (n,) state of the diagram. It is not changed.
-        kick_W: (2,) velocity to add in W, m/s.
+        kick_W: (2,) velocity to add in the world frame W, m/s.
 
     Returns:
         (n,) the changed copy.
@@ -168,7 +168,7 @@ def offsets(
 
     Args:
         point: Equilibrium.
-        poses_WB: n poses of the robot in W, m and rad.
+        poses_WB: n poses of the robot in the world frame W, m and rad.
         axis: (2,) unit vector in W.
 
     Returns:

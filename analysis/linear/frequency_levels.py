@@ -1,4 +1,4 @@
-"""Frequencies at which a frequency response reaches a level, from its matrices.
+"""Search for the frequencies at which a frequency response reaches a level.
 
 A frequency grid alone misses what happens between two of its points. For example, the
 peak of a mode with a damping ratio of 1e-3 is only a thousandth of its frequency wide.
@@ -124,8 +124,8 @@ def level_frequencies(
         c: Constant term.
 
     Returns:
-        (k,) ascending frequencies between 0 and the Nyquist frequency, rad/s. They
-        include all zeros, up to rounding errors, and other frequencies.
+        (k,) ascending frequencies between 0 and the Nyquist frequency, rad/s. All zeros
+        are among them, up to rounding errors. Not every frequency is a zero.
     """
     n, T = len(model.A), model.period_s
     if n == 0:
@@ -232,8 +232,8 @@ def peak(model: LinearModel, offset: float = 0.0) -> tuple[float, float]:
     """Returns the largest |G - offset| over all frequencies: the H-infinity norm.
 
     The method is that of Bruinsma and Steinbuch. The largest value so far is a level.
-    Larger values are searched at the frequencies where the response crosses this level,
-    and half way between them.
+    The method then looks for larger values at the frequencies where the response
+    crosses this level, and half way between them.
 
     Args:
         model: Stable G with one input and one output.
@@ -243,7 +243,7 @@ def peak(model: LinearModel, offset: float = 0.0) -> tuple[float, float]:
         Two values:
 
         - the peak
-        - its frequency, rad/s; it may be 0, and infinity or the Nyquist frequency
+        - its frequency, rad/s, from 0 to infinity or to the Nyquist frequency
     """
 
     def size(omega: NDArray[np.float64]) -> NDArray[np.float64]:

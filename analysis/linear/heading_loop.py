@@ -52,7 +52,7 @@ def heading_loop(
 
     The loop has these parts:
 
-    - PID controller (Song 2011, table 1)
+    - PID controller with the output e (Song 2011, table 1)
     - duties v +- 0.01 e of the two wheels (table 2, corrected)
     - motors with a first-order lag
     - heading as the integral of the difference of the wheel speeds

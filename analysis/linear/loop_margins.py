@@ -1,8 +1,8 @@
 """Stability margins of a loop: gain, phase, modulus, disk and delay margins.
 
-Crossovers and peaks come from the matrices of the loop (``frequency_levels``), in
-continuous and in sampled time. Therefore none is missed between two points of a
-frequency grid or outside the grid. Gain and phase margins count in both directions,
+The matrices of the loop give the crossovers and peaks (``frequency_levels``), in
+continuous and in sampled time. Therefore no crossover or peak is missed between two
+points of a frequency grid or outside the grid. Gain and phase margins are two-sided,
 because a loop with an unstable plant also becomes unstable if its gain is too low.
 """
 
@@ -56,8 +56,11 @@ class FrequencyResponse:
 class DiskMargin:
     """Disk margin: largest disk of gain and phase changes that keeps the loop stable.
 
-    The loop stays stable if L is multiplied by any factor (1 + (1 - skew)/2 d)/(1 - (1
-    + skew)/2 d) with a complex |d| < alpha (Seiler, Packard and Gahinet 2020).
+    The loop stays stable if L is multiplied by any factor
+
+        (1 + (1 - skew)/2 d) / (1 - (1 + skew)/2 d)
+
+    with a complex |d| < alpha (Seiler, Packard and Gahinet 2020).
     """
 
     skew: float
@@ -134,9 +137,9 @@ class LoopMargins:
     crossover_rad_s: float
     """Gain crossover of the phase margin, rad/s. Without a crossover: NaN."""
     delay_margin_s: float
-    """Delay margin, s: smallest ratio of phase lag to -180 deg and frequency, over all
-    gain crossovers. The value is exact in continuous time. For sampled loops see
-    ``analysis.linear.delay_margin``."""
+    """Delay margin, s: smallest ratio of phase lag margin, rad, to frequency, rad/s,
+    over all gain crossovers. The value is exact in continuous time. For sampled loops
+    see ``analysis.linear.delay_margin``."""
     modulus_margin: float
     """Smallest distance of L from -1."""
     modulus_frequency_rad_s: float
@@ -310,7 +313,7 @@ def _complementary(model: LinearModel) -> LinearModel:
 def _gain_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Gain factors that put a pole on the stability border.
+    """Returns two gain factors that put a pole on the stability border.
 
     The first is the smallest above 1, the second the largest below 1.
     """
@@ -339,10 +342,14 @@ def _gain_margins(
 def _phase_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """Phase and delay margins as four numbers.
+    """Returns phase and delay margins as four numbers.
 
-    They are the smallest lag and lead, rad, the frequency of the smaller of these,
-    rad/s, and the smallest delay, s.
+    The numbers are:
+
+    - smallest lag, rad
+    - smallest lead, rad
+    - frequency of the smaller of both, rad/s
+    - smallest delay, s
     """
     # |L| = 1 where the real part of T is 1/2.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))

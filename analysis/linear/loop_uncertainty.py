@@ -161,8 +161,11 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
 
     The slope is that at the follow distance. Let l be half the length of the microphone
     row, R the range, h^2 = R^2 + l^2, and k the believed over the true speed of sound.
-    From the measured delay the estimator computes the range l^2/(2 k (h - R)) - k (h -
-    R)/2. Its slope is ((h + R)/k + k (h - R))/(2 h).
+    From the measured delay the estimator computes the range
+
+        l^2/(2 k (h - R)) - k (h - R)/2.
+
+    The slope of this range is ((h + R)/k + k (h - R))/(2 h).
 
     Args:
         scenario: Scenario with the believed speed of sound.

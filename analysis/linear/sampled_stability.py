@@ -143,8 +143,8 @@ def poles_against_period(
 
     Args:
         scenario: Scenario with attraction, robot and plant.
-        stiffness_n_m: Stiffness to use instead of K_r, for example with the spring of
-            an obstacle, N/m.
+        stiffness_n_m: Stiffness to use instead of the attraction's, for example with
+            the spring of an obstacle, N/m.
         periods_s: (n,) ascending sample periods, s.
 
     Returns:
@@ -215,9 +215,10 @@ def gain_chart(
     stiffnesses_n_m: ArrayLike = _SPRINGS_N_M,
     dampings_n_s_m: ArrayLike = _DAMPERS_N_S_M,
 ) -> StabilityChart:
-    """Computes the stability of the sampled loop over K_r and D_r.
+    """Computes the stability of the sampled loop over two gains of the attraction.
 
-    The loop has motor lag, and no obstacle is near.
+    The gains are stiffness K_r and damping D_r. The loop has motor lag, and no obstacle
+    is near.
 
     Args:
         scenario: Scenario with robot and plant. The chart marks its gains.
@@ -252,12 +253,13 @@ def gain_delay_chart(
     delays_s: ArrayLike | None = None,
     stiffnesses_n_m: ArrayLike = _ALL_SPRINGS_N_M,
 ) -> StabilityChart:
-    """Computes the stability over the age of the measured position and the stiffness.
+    """Computes the stability over stiffness and age of the measured position.
 
     The stiffness is the sum of all springs that act on this position.
 
     Args:
-        scenario: Scenario with robot, plant and damping. The chart marks its K_r.
+        scenario: Scenario with robot, plant and damping. The chart marks the
+            attraction's stiffness.
         delays_s: (nx,) ages of the position, s; by default 0 to 1 s. They are rounded
             to whole control periods.
         stiffnesses_n_m: (ny,) sums of all springs, N/m; by default 0.2 to 100.

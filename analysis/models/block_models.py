@@ -1,8 +1,9 @@
 """Closed loop joined from blocks that are linearized alone.
 
-This is the second way to the matrix of one period. The first is AutoDiff through the
-whole diagram. Both use the same blocks. Wiring, order of updates, and integration of
-the joined system are independent, so that each way checks the other.
+The joined blocks give the matrix of one control period. AutoDiff through the whole
+diagram gives the same matrix in another way. Both ways use the same blocks. Wiring,
+order of updates, and integration of the joined system are independent, so that each way
+checks the other.
 """
 
 from __future__ import annotations

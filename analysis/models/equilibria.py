@@ -72,8 +72,8 @@ class EquilibriumSearch:
     cells: int
     """Number of cells of all sizes that were examined."""
     unresolved: tuple[tuple[float, float], ...]
-    """Points in groups of cells that the search could neither exclude nor explain by a
-    listed place of rest, m."""
+    """One point, m, of each group of cells that the search could neither exclude nor
+    explain by a listed place of rest."""
     empty_outside: bool
     """Whether the attraction exceeds every repulsion outside the area."""
 
@@ -398,7 +398,7 @@ def nearest_equilibrium(
 
     Args:
         field_: Force on the control point P of the robot at rest.
-        begin: (2,) start of the iteration in W, m.
+        begin: (2,) start of the iteration in the world frame W, m.
 
     Returns:
         (2,) position of P in W, m, or None if the method did not converge.

@@ -116,7 +116,8 @@ def _sampled(field: ForceField, farthest: float) -> tuple[NDArray[np.float64], .
 class SwitchingPoint:
     """Place of rest where several bodies are equally near.
 
-    A weighted mean of the forces with each of these bodies as the nearest is zero.
+    Each body would give another force if it alone were the nearest. A weighted mean of
+    these forces is zero.
     """
 
     p_WP: NDArray[np.float64]
@@ -294,9 +295,9 @@ class CellSearch:
     ) -> NDArray[np.bool_]:
         """(n,) whether all forces of a cell exceed their change along some direction.
 
-        Gilbert's method tries several directions. Each is the direction of a point of
-        the convex hull of the forces. The point moves nearer to the origin at each
-        step.
+        The change is the largest that is possible within a cell. Gilbert's method tries
+        several directions. Each is the direction of a point in the convex hull of the
+        forces. The point moves nearer to the origin at each step.
         """
         fixed = pull + np.where(surely[..., None], pushes, 0.0).sum(axis=0)
         missing = self._slots - surely.sum(axis=0)

@@ -310,7 +310,8 @@ class IdealLoop:
         tracker and the controller's memory have settled.
 
         Args:
-            pose_WB: (3,) pose of the robot in W at ``begin_s``, m and rad.
+            pose_WB: (3,) pose of the robot in the world frame W at ``begin_s``, m and
+                rad.
             v_WP: Velocity of the robot's control point P in W, m/s. It points along the
                 heading.
             begin_s: Time from which on the source moves steadily, s. It is a multiple

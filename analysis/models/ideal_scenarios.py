@@ -72,8 +72,8 @@ def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 
     Args:
         scenario: Any scenario. It is not changed.
-        changes: New values by field name, in the units of the fields. A mapping as
-            value changes single fields of a group.
+        changes: New values by field name, in the units of the fields. If a value is a
+            mapping, it changes single fields of a group.
 
     Returns:
         The changed copy.

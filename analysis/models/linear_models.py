@@ -24,7 +24,7 @@ _CHUNK = 100_000
 class Mode:
     """One real pole, or one conjugate pair of poles.
 
-    A pair is represented by its pole with the positive imaginary part.
+    The pole with the positive imaginary part represents the pair.
     """
 
     z: complex | None

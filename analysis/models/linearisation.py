@@ -293,7 +293,10 @@ def plant_jacobians(
         point: Operating point.
 
     Returns:
-        A by the plant's state, and B by the two wheel speeds.
+        Two matrices:
+
+        - A: derivative of the state's rate by the state
+        - B: derivative of the state's rate by the two commanded wheel speeds
     """
     loop = point.loop
     plant = loop.block("plant", twin=True)

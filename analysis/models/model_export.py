@@ -27,7 +27,7 @@ def write_models(models: Sequence[LinearModel], directory: Path) -> None:
 
     Args:
         models: Models to write. If several have the same name, the second gets the
-            suffix 2, and so on.
+            suffix ``_2``, and so on.
         directory: An existing directory.
     """
     names = distinct_names([_identifier(m.name) for m in models], joint="_")

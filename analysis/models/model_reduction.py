@@ -16,10 +16,10 @@ _NEGLIGIBLE = 1e-9
 def minimal_model(model: LinearModel) -> LinearModel:
     """Returns the controllable and observable part of a model.
 
-    The frequency response stays the same. The closed loop has many other states: the
-    origin of W as odometry believes it, the angles of the wheels, and the covariances
-    of the tracker. Their poles are at z = 1 or z = 0. They make polynomials of the
-    whole model useless.
+    The frequency response stays the same. The closed loop has many states outside this
+    part: the error of odometry, the angles of the wheels, and the covariances of the
+    tracker. Their poles are at z = 1 or z = 0. With these states, transfer polynomials
+    of the model would be useless.
 
     Args:
         model: Any model.

@@ -96,7 +96,8 @@ class OperatingPoint:
     def motion(self) -> LinearModel:
         """Sampled model of the motion of the control point P in the closed loop.
 
-        - Inputs: change of the velocity of the virtual mass along x and y of W, m/s.
+        - Inputs: change of the velocity of the virtual mass along x and y of the world
+          frame W, m/s.
         - Outputs: position of P in W, m. If the robot moves, also the heading, rad.
         """
         A = self.loop.period_derivatives(self.state, self.time_s).A
@@ -202,7 +203,7 @@ def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> Operating
 
     Args:
         loop: Control loop with exact sensors and bodies at rest.
-        p_WP: (2,) position of the control point P in W, m.
+        p_WP: (2,) position of the control point P in the world frame W, m.
 
     Returns:
         The equilibrium in which the robot heads towards the source.
@@ -247,8 +248,8 @@ def moving_equilibrium(
 
     Args:
         scenario: Any scenario. Its sensors are taken as exact.
-        velocity_W: Velocity of the source in W, m/s. By default ``source.speed_m_s``
-            along x.
+        velocity_W: Velocity of the source in the world frame W, m/s. By default
+            ``source.speed_m_s`` along x.
 
     Returns:
         The equilibrium, with its state just before a control update.

@@ -119,7 +119,7 @@ class PointMass:
         """Returns the sum of all forces on the point mass.
 
         Args:
-            states: (n, 4) states x, y, vx, vy in W, in m and m/s.
+            states: (n, 4) states x, y, vx, vy in the world frame W, in m and m/s.
             term: Dependence of the repulsion on speed. ``none`` takes the speed as
                 zero, ``printed`` takes the speed |dC/dt|, ``closing`` the speed of
                 approach. C is the vector to the nearest point of a body.
@@ -145,7 +145,8 @@ class PointMass:
         speed limit of the model.
 
         Args:
-            starts: (n, 4) initial states x, y, vx, vy in W, in m and m/s.
+            starts: (n, 4) initial states x, y, vx, vy in the world frame W, in m and
+                m/s.
             contact_m: Distance at which the point mass touches a body, m.
             duration_s: Simulated time, s.
             term: Dependence of the repulsion on speed, see ``force``.
@@ -168,7 +169,7 @@ class PointMass:
         Contact with a body does not end the run.
 
         Args:
-            start: (4,) initial state x, y, vx, vy in W, in m and m/s.
+            start: (4,) initial state x, y, vx, vy in the world frame W, in m and m/s.
             duration_s: Simulated time, s.
             term: Dependence of the repulsion on speed, see ``force``.
 
@@ -209,9 +210,9 @@ def point_mass(scenario: Scenario) -> PointMass:
         The model.
 
     Raises:
-        InputError: The law is not known or has no radial force. Or the scenario has
-            ``aggregation: sum`` and more bodies than the three whose pushes the
-            controller adds.
+        InputError: The law is not known or has no radial force. The error also occurs
+            if the pushes of all bodies are added (``aggregation: sum``) and there are
+            more than three bodies.
     """
     bodies = scenario.bodies()
     all_bodies = scenario.follower.collision_vector.aggregation == "sum"

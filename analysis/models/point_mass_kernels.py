@@ -3,7 +3,7 @@
 A world has four parts:
 
 - bodies: (k, 6) rows x, y, cosine and sine of the heading, half length, half width
-- position of the source: (2,) in W, m
+- position of the source: (2,) in the world frame W, m
 - gains: stiffness K_r, damping D_r, follow distance d_f, mass M, top speed, whether all
   bodies push (0 or 1), and velocity term (0: none, 1: printed, 2: closing)
 - tables of ``RadialLaw``: forces, energies, increments
@@ -125,7 +125,7 @@ def forces(states: _Array, world: _World) -> _Array:  # pragma: no cover  (compi
     """Returns the sum of all forces at each state.
 
     Args:
-        states: (n, 4) states x, y, vx, vy in W, in m and m/s.
+        states: (n, 4) states x, y, vx, vy in the world frame W, in m and m/s.
         world: World as described at the top of the module.
 
     Returns:
@@ -194,7 +194,7 @@ def run(
     """Integrates from each start until contact or until the last step.
 
     Args:
-        starts: (n, 4) initial states x, y, vx, vy in W, in m and m/s.
+        starts: (n, 4) initial states x, y, vx, vy in the world frame W, in m and m/s.
         steps: Largest number of steps.
         h: Integration step, s.
         contact: Distance at which the point mass touches a body, m.
@@ -233,7 +233,7 @@ def trajectory(
     Contact with a body does not end the run.
 
     Args:
-        start: (4,) initial state x, y, vx, vy in W, in m and m/s.
+        start: (4,) initial state x, y, vx, vy in the world frame W, in m and m/s.
         steps: Number of steps.
         h: Integration step, s.
         world: World as described at the top of the module.

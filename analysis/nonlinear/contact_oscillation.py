@@ -93,6 +93,9 @@ def contact_oscillation(
 ) -> ContactOscillation:
     """Predicts and simulates the oscillation before an obstacle.
 
+    The results are given for each velocity term. A velocity term is the dependence of
+    the law's force on the speed of the obstacle.
+
     Args:
         scenario: Scenario with law, gains and robot.
         to_go_m: Distance from the obstacle's face to the goal, m, see ``head_on``.

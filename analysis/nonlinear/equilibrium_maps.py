@@ -1,8 +1,8 @@
-"""Maps of places where P rests before obstacles, over gap width or box offset.
+"""Maps of places where the robot rests before obstacles, over gap width or box offset.
 
 With exact nearest points, the point mass has an energy and rests at a local minimum of
-this energy. A grid search finds minima at kinks between two bodies as well as smooth
-minima. With the cones of ultrasonic sensors there is no energy. In this case the
+this energy. A grid search finds smooth minima, and also minima at kinks between two
+bodies. With the cones of ultrasonic sensors there is no energy. In this case the
 diagram is simulated.
 """
 
@@ -99,7 +99,7 @@ def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
         cell_m: Side of the square cells, m.
 
     Returns:
-        (n, 2) positions of the cells in W, m.
+        (n, 2) positions of the cells in the world frame W, m.
     """
     points = np.concatenate([model.rectangles[:, :2], [model.p_WP]])
     margin = model.follow_distance_m + 0.5
@@ -256,7 +256,7 @@ def boxes_scenario(
 
     Args:
         scenario: Scenario with law and gains.
-        places: Centers of the boxes in W, m.
+        places: Centers of the boxes in the world frame W, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
         size_m: Size of each box along and across the x axis, m.
 

@@ -1,10 +1,11 @@
 """Prediction of the oscillation before an obstacle by harmonic balance.
 
-The clearance of P is assumed to be c_0 + A exp(g t) sin(w t). The mean and the first
-harmonic of the law's force f(c, s) over a cycle close the loop through the sampled
-model from acceleration to motion (``analysis.linear.contact_mode``). For each amplitude
-A, the balance gives the center c_0, the growth rate g and the frequency w. The
-amplitude at which g changes from positive to negative is that of a limit cycle.
+The robot's clearance is assumed to be c_0 + A exp(g t) sin(w t). The repulsion f(c, s)
+then has a mean and a first harmonic over a cycle. Both must agree with the motion that
+they cause according to the sampled model of the robot
+(``analysis.linear.contact_mode``). For each amplitude A, this balance gives the center
+c_0, the growth rate g and the frequency w. The amplitude at which g changes from
+positive to negative is that of a limit cycle.
 """
 
 from __future__ import annotations
@@ -73,17 +74,17 @@ class OscillationPrediction:
 def predict_oscillation(
     contact: HeadOn, term: Variant, *, largest_m: float = 0.4, points: int = 20
 ) -> OscillationPrediction:
-    """Computes the harmonic balance for amplitudes up to a largest one.
+    """Computes the harmonic balance for several amplitudes up to the largest.
 
     Args:
         contact: Head-on approach with law and gains.
-        term: Velocity term.
+        term: Velocity term of the law: ``printed`` or ``closing``.
         largest_m: Largest amplitude, m.
         points: Number of amplitudes.
 
     Returns:
-        Center, growth rate and frequency for each amplitude. The amplitudes end before
-        the largest one if there is no further balance.
+        Center, growth rate and frequency for each amplitude. If an amplitude has no
+        balance, the results end before this amplitude.
     """
     chain = motion_chain(contact.scenario)
     mass = contact.scenario.only.robot.mass_kg

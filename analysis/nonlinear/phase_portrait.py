@@ -69,7 +69,8 @@ class PhasePortrait:
 def head_on_model(contact: HeadOn) -> PointMass:
     """Returns the point mass before a wide face at x = 0.
 
-    The goal lies ``to_go_m`` behind the face. P is at x = -c, y = 0.
+    The goal lies ``to_go_m`` behind the face. The point mass is at x = -c, y = 0, with
+    the clearance c.
 
     Args:
         contact: Head-on approach with law and gains.

@@ -1,9 +1,10 @@
 """Velocity terms of the laws near an obstacle: one-sided models, describing functions.
 
-The laws use the speed s = |dC/dt|, where C is the vector to the nearest point. At rest
-this norm has a corner. Therefore a linearization exists only for each direction
-separately. Over an oscillation with the speed amplitude A, the printed term has no
-damping, because its force is the same on the way in and on the way out. It adds a bias.
+A velocity term is the dependence of the law's force on the obstacle's speed s. The
+printed laws use s = |dC/dt|, where C is the vector to the nearest point. At rest this
+norm has a corner. Therefore a linearization exists only for each direction separately.
+In an oscillation the printed term has no damping, because its force is the same on the
+way in and on the way out. It adds a bias.
 """
 
 from __future__ import annotations
@@ -75,7 +76,8 @@ class OneSidedModel:
 class DescribingFunction:
     """Describing function of a velocity term over the speed amplitude A.
 
-    The clearance oscillates as c = c_0 + (A/w) sin(w t).
+    A velocity term is the dependence of the law's force on the obstacle's speed. The
+    clearance oscillates as c = c_0 + (A/w) sin(w t).
     """
 
     amplitudes_m_s: NDArray[np.float64]
@@ -107,9 +109,9 @@ class VelocityTermVariant:
     def amplitude_ratio(self) -> float | None:
         """Ratio of successive amplitudes of a very small oscillation.
 
-        Each of the two models is valid for half a cycle. With its damping ratio z, it
-        multiplies the amplitude by exp(-pi z/sqrt(1 - z^2)). Without an oscillation the
-        ratio is None.
+        The models ``approaching`` and ``receding`` are each valid for half a cycle. A
+        model with the damping ratio z multiplies the amplitude by exp(-pi z/sqrt(1 -
+        z^2)) in this half. Without an oscillation the ratio is None.
         """
         ratio = 1.0
         for side in (self.approaching, self.receding):
