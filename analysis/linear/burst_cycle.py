@@ -33,7 +33,7 @@ HOLDS: tuple[Hold, ...] = ("world", "robot", "motion")
 
 #: A mode whose share in the response is below this part of the largest is left out.
 _NO_SHARE = 1e-14
-#: Initial velocity that starts a run, m/s.
+#: Velocity that the kick adds to the virtual mass, m/s.
 _KICK_M_S = 1e-5
 #: Cycles at rest before the linearization, in which the tracker's memory settles.
 _SETTLING_CYCLES = 3

@@ -1,1 +1,1 @@
-"""Results beyond linear models: velocity terms, oscillations, equilibria, portraits."""
+"""Results from nonlinear models: velocity terms, oscillations, equilibria, phases."""

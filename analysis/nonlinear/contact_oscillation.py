@@ -24,8 +24,8 @@ from diagrams import Scenario, simulate
 
 #: Depth and width of the box, m. P never moves as far sideways as the box is wide.
 _BOX_M = (0.1, 1.0)
-#: Distance of the source behind the box, m. It keeps the leader robot, which carries
-#: the source, clear of the box.
+#: Smallest distance of the source behind the box, m. This distance keeps the leader
+#: robot, which carries the source, clear of the box.
 _ROOM_BEHIND_M = 0.5
 
 
