@@ -104,16 +104,20 @@ def burst_cycle(
 ) -> BurstCycle:
     """Computes the multipliers at the equilibrium where the robot follows the source.
 
+    The source alternates between sound and silence. A multiplier is an eigenvalue of
+    the map over one cycle of both.
+
     Args:
         scenario: Any scenario. Its sensors are taken as exact, and its bodies as at
             rest.
-        hold: How the tracker holds the target, instead of ``tracker.hold``.
+        hold: How the tracker holds the target during the silence: ``world``, ``robot``
+            or ``motion``.
         on_s: Duration of the sound instead of ``sound.on_s``, s.
         gap_s: Duration of the silence instead of the scenario's, s.
         point: Equilibrium, if it is already known.
 
     Returns:
-        Multipliers over one cycle, along and across the line to the source.
+        Multipliers along and across the line to the source.
 
     Raises:
         InputError: The cycle is not a whole number of control periods, or has no sound.
@@ -205,12 +209,12 @@ def _multipliers(
 def simulate_burst_cycle(
     cycle: BurstCycle, cycles: int = 40, *, direction: Direction = "along"
 ) -> BurstRun:
-    """Simulates the diagram over many cycles after a small kick to the robot.
+    """Simulates many cycles of sound and silence after a small kick to the robot.
 
     The kick changes the velocity of the virtual mass.
 
     Args:
-        cycle: Cycle whose multipliers the simulation checks.
+        cycle: Linearized cycle, whose multipliers the simulation checks.
         cycles: Number of cycles. The first quarter is left out of the fit.
         direction: Direction of the kick: along the line to the source, or across.
 

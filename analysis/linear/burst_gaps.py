@@ -1,7 +1,7 @@
-"""Stability as a function of the silence between bursts of sound.
+"""Stability of the robot's motion as a function of the silence between bursts of sound.
 
-The tracker can hold the target between bursts in several ways (``Hold``). The results
-are given for each of them.
+The tracker can hold the target during the silence in several ways (``Hold``). Each way
+has its own results.
 """
 
 from __future__ import annotations
@@ -54,22 +54,23 @@ def gap_chart(
     holds: Sequence[Hold] = HOLDS,
     point: OperatingPoint | None = None,
 ) -> GapChart:
-    """Computes the largest multipliers for many durations of the silence.
+    """Computes how the robot's motion decays, for many durations of the silence.
 
-    The control-period matrices of one long cycle suffice for all durations. Each matrix
-    depends on the time since the last sound, but not on the length of the silence to
-    come. The exception is the tracker's memory of velocities. With exact hearing this
-    memory does not move the control point P.
+    The source alternates between sound and silence. A multiplier is an eigenvalue of
+    the map over one such cycle. The one-period matrices of one long cycle suffice for
+    all durations. Each matrix depends on the time since the last sound, but not on the
+    length of the silence to come. The exception is the tracker's memory of velocities.
+    With exact hearing this memory does not move the robot.
 
     Args:
         scenario: Any scenario, see ``analysis.linear.burst_cycle.burst_cycle``.
         gaps_s: (n,) durations of the silence, multiples of the control period, s. The
             default is 0 to 4 s.
-        holds: Ways of holding the target to compare.
+        holds: Ways of holding the target to compare: ``world``, ``robot``, ``motion``.
         point: Equilibrium, if it is already known.
 
     Returns:
-        Largest |multiplier| over one cycle for each hold and duration.
+        Largest |multiplier| for each hold and duration.
     """
     point = point or follow_equilibrium(scenario)
     gaps = np.arange(0.0, 4.01, 0.25) if gaps_s is None else np.asarray(gaps_s, float)

@@ -283,9 +283,10 @@ def contact_limits(
     motor_lags_s: Sequence[float] = MOTOR_LAGS_S,
     latency_ticks: Sequence[int] = LATENCY_TICKS,
 ) -> ContactLimits:
-    """Computes the tables of the largest gains over motor lag and latency.
+    """Computes the largest stable stiffness before an obstacle for two control laws.
 
-    The motor lag of the scenario is one of the rows.
+    The results are tables over motor lag and latency. The motor lag of the scenario is
+    one of the rows.
 
     Args:
         scenario: Scenario with mass, robot, plant and attraction.
@@ -293,8 +294,7 @@ def contact_limits(
         latency_ticks: Columns of the tables, in control periods.
 
     Returns:
-        Largest stiffnesses of both laws, N/m. The stiffness of the attraction is
-        subtracted.
+        Stiffnesses of both laws, N/m. The stiffness of the attraction is subtracted.
     """
     lags = sorted({*motor_lags_s, scenario.only.plant.motor_lag_s})
     total = np.array(

@@ -56,7 +56,7 @@ class DelayedLoop:
 
     Args:
         point: Operating point.
-        at: Place of the delay.
+        at: Place of the delay: ``sensor`` or ``wheels``.
         direction: Direction of the delayed signal: along the line to the source, or
             across.
     """
@@ -179,12 +179,13 @@ def delay_margin(
     at: DelayPlace = "sensor",
     direction: Direction = "along",
 ) -> DelayMargin:
-    """Returns the smallest additional delay at which the loop stops decaying.
+    """Returns the smallest additional delay at which the loop becomes unstable.
 
     Args:
         point: Stable operating point.
-        at: Place of the delay.
-        direction: Direction of the delayed signal.
+        at: Place of the delay: ``sensor`` or ``wheels``.
+        direction: Direction of the delayed signal: along the line to the source, or
+            across.
 
     Returns:
         Delay margin and frequency of the oscillation. If no delay makes the loop

@@ -65,10 +65,13 @@ def check_delay_margin(
 ) -> DelayCheck:
     """Simulates the loop with 0.95 and with 1.05 of the computed delay margin.
 
+    Each run begins with a small kick to the robot.
+
     Args:
         point: Equilibrium at rest.
-        at: Place of the delay.
-        direction: Direction of the delayed signal and of the initial velocity.
+        at: Place of the delay: ``sensor`` or ``wheels``.
+        direction: Direction of the delayed signal and of the kick: along the line to
+            the source, or across.
         duration_s: Simulated time of each run, s.
 
     Returns:

@@ -44,14 +44,17 @@ class GangOfFour:
 
 
 def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangOfFour:
-    """Returns responses to errors of hearing and to disturbances of the virtual mass.
+    """Returns the closed-loop frequency responses S, T, PS and CS in one direction.
+
+    The disturbances are errors of hearing, and accelerations of the virtual mass.
 
     Args:
         point: Operating point.
-        direction: Direction of both disturbances and of the responses.
+        direction: Direction of disturbances and responses: along the line to the
+            source, or across.
 
     Returns:
-        S, T, PS and CS over frequency, up to the Nyquist frequency.
+        The responses, up to the Nyquist frequency.
     """
     cut = cut_model(point, "sensor", "actuator")
     whole = closed(cut, cut.input_names)

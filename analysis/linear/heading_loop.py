@@ -22,9 +22,10 @@ from systems.heading.parameters import MotorDriverParameters
 
 @dataclass(frozen=True)
 class HeadingLoopMargins:
-    """Margins of the heading loop, cut at the deviation, with and without sampling.
+    """Margins of the loop that controls the heading, with and without sampling.
 
-    Fields without ``continuous`` in their names belong to the sampled loop.
+    The loop is cut at the heading deviation. Fields without ``continuous`` in their
+    names belong to the sampled loop.
     """
 
     tick_s: float

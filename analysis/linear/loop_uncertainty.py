@@ -47,7 +47,7 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
         Parameters with their intervals.
 
     Raises:
-        InputError: The law's push does not grow as the obstacle comes nearer.
+        InputError: The repulsion does not grow as the obstacle comes nearer.
     """
     stiffness = law_stiffness(scenario)
     if stiffness <= 0.0:
@@ -187,10 +187,10 @@ def law_stiffness(scenario: Scenario) -> float:
 
 
 def contact_poles(scenario: Scenario) -> PoleFunction:
-    """Returns a function for the poles of the contact mode, in the z plane.
+    """Returns a function for the z-plane poles of the motion towards an obstacle.
 
-    The contact mode is the robot's motion straight towards an obstacle, at the distance
-    where the law is stiffest.
+    The motion is straight towards the obstacle (contact mode), at the distance where
+    the repulsion is stiffest.
 
     Args:
         scenario: Scenario with the nominal values.

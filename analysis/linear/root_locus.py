@@ -66,18 +66,18 @@ class RootLocus:
 
 
 def contact_slopes(scenario: Scenario) -> ContactSlopes:
-    """Returns the slopes of the scenario's law at the distance where it is stiffest.
+    """Returns the slopes of the repulsion at the distance where it is stiffest.
 
-    The forces are those of the controller block.
+    The forces are those of the scenario's controller block.
 
     Args:
-        scenario: Scenario with the law.
+        scenario: Scenario with the control law.
 
     Returns:
         Distance, stiffness and damping.
 
     Raises:
-        InputError: The law does not push the robot away from obstacles.
+        InputError: The control law does not push the robot away from obstacles.
     """
     field = ForceField(ideal_loop(frozen_scenario(ideal_scenario(scenario))))
     forces = field.law(_DISTANCES_M)
@@ -96,8 +96,8 @@ def contact_slopes(scenario: Scenario) -> ContactSlopes:
 def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
     """Returns root loci over the stiffness K_r and the damping D_r of the attraction.
 
-    If the law has a spring term and a damping term, the result also has a locus over
-    the gain of each.
+    If the repulsion has a spring term and a damping term, the result also has a root
+    locus over the gain of each term.
 
     Args:
         scenario: Scenario with gains, robot and plant.

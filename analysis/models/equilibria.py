@@ -417,7 +417,7 @@ def nearest_equilibrium(
 
 
 def follow_equilibrium(scenario: Scenario) -> OperatingPoint:
-    """Returns the stable equilibrium at rest at which the robot follows the source.
+    """Returns the stable equilibrium at rest where the robot should follow the source.
 
     ``EquilibriumSearch.follow_point`` describes the choice.
 

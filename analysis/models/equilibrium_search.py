@@ -164,7 +164,7 @@ class CellSearch:
     def left_over(
         self, area: SearchArea, smallest_m: float
     ) -> tuple[NDArray[np.float64], int, float]:
-        """Returns the cells of an area that cannot be excluded.
+        """Returns the cells of an area that may contain an equilibrium.
 
         Args:
             area: Area to search.
@@ -174,9 +174,9 @@ class CellSearch:
         Returns:
             Three values:
 
-            - (n, 2) centers of the remaining cells, m
-            - number of cells that were examined
-            - edge of the remaining cells, m
+            - (n, 2) centers of these cells, m
+            - number of cells of all sizes that were examined
+            - edge of these cells, m
         """
         edge = _FIRST_CELL_M
         x = np.arange(area[0] + edge / 2, area[1] + edge / 2, edge)
@@ -192,7 +192,7 @@ class CellSearch:
     def quartered(
         self, cells: NDArray[np.float64], edge: float
     ) -> tuple[NDArray[np.float64], float]:
-        """Divides cells into quarters and returns the quarters that cannot be excluded.
+        """Divides cells into quarters, and returns those with a possible equilibrium.
 
         Args:
             cells: (n, 2) centers of the cells, m.
@@ -201,7 +201,7 @@ class CellSearch:
         Returns:
             Two values:
 
-            - (k, 2) centers of the remaining quarters, m
+            - (k, 2) centers of these quarters, m
             - edge of the quarters, m
         """
         edge /= 2.0
@@ -252,7 +252,7 @@ class CellSearch:
         return -vectors * (force / np.maximum(distances, 1e-12))[..., None]
 
     def _excluded(self, cells: NDArray[np.float64], edge: float) -> NDArray[np.bool_]:
-        """(n,) whether each cell contains no place of rest.
+        """(n,) whether each cell certainly contains no equilibrium.
 
         The proof is at the top of this module.
         """

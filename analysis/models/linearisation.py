@@ -129,13 +129,13 @@ class RouteComparison:
 
 
 def compare_routes(point: OperatingPoint) -> RouteComparison:
-    """Compares AutoDiff through a whole period with blocks joined by ``control``.
+    """Compares the models of ``sampled_model`` and ``blockwise_model``.
 
     Args:
         point: Operating point.
 
     Returns:
-        Differences of the two sampled models.
+        Differences of matrices and poles.
     """
     whole, joined = sampled_model(point), blockwise_model(point)
     pairs = [(getattr(whole, m), getattr(joined, m)) for m in ("A", "B", "C", "D")]

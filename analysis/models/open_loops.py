@@ -139,9 +139,9 @@ def open_loop(
     The loop of the other direction stays closed.
 
     Args:
-        point: The operating point.
-        at: Signal at which the loop is cut.
-        direction: Direction in which the loop is cut.
+        point: Operating point.
+        at: Signal at which the loop is cut: ``sensor``, ``actuator`` or ``wheels``.
+        direction: Direction of the cut: along the line to the source, or across.
 
     Returns:
         L for negative feedback, with one input and one output in the same unit.

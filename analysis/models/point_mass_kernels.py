@@ -122,7 +122,7 @@ def _force(
 
 @njit(cache=True)
 def forces(states: _Array, world: _World) -> _Array:  # pragma: no cover  (compiled)
-    """Returns the sum of all forces at each state.
+    """Returns the sum of all forces on the point mass at each state.
 
     Args:
         states: (n, 4) states x, y, vx, vy in the world frame W, in m and m/s.

@@ -125,14 +125,14 @@ def contact_oscillation(
 def simulate_oscillation(
     contact: HeadOn, term: Variant, start_m: float, duration_s: float
 ) -> OscillationRun:
-    """Simulates a head-on approach from rest, and divides the motion into cycles.
+    """Simulates a head-on approach to an obstacle, and divides the motion into cycles.
 
-    The simulation uses exact sensors.
+    The robot starts at rest and has exact sensors.
 
     Args:
         contact: Head-on approach with law, gains and distance to the goal.
-        term: Velocity term.
-        start_m: Clearance at which the run starts at rest, m.
+        term: Velocity term of the law: ``printed`` or ``closing``.
+        start_m: Clearance at the start, m.
         duration_s: Simulated time, s.
 
     Returns:

@@ -74,10 +74,12 @@ class OscillationPrediction:
 def predict_oscillation(
     contact: HeadOn, term: Variant, *, largest_m: float = 0.4, points: int = 20
 ) -> OscillationPrediction:
-    """Computes the harmonic balance for several amplitudes up to the largest.
+    """Predicts the oscillation before an obstacle for several amplitudes.
+
+    The method is harmonic balance.
 
     Args:
-        contact: Head-on approach with law and gains.
+        contact: Head-on approach to the obstacle, with law and gains.
         term: Velocity term of the law: ``printed`` or ``closing``.
         largest_m: Largest amplitude, m.
         points: Number of amplitudes.

@@ -67,10 +67,10 @@ class PhasePortrait:
 
 
 def head_on_model(contact: HeadOn) -> PointMass:
-    """Returns the point mass before a wide face at x = 0.
+    """Returns the point-mass model of a head-on approach to an obstacle.
 
-    The goal lies ``to_go_m`` behind the face. The point mass is at x = -c, y = 0, with
-    the clearance c.
+    The obstacle has a wide face at x = 0. The goal lies ``to_go_m`` behind the face.
+    The point mass is at x = -c, y = 0, with the clearance c.
 
     Args:
         contact: Head-on approach with law and gains.
@@ -103,16 +103,19 @@ def phase_portrait(
     velocity_term: VelocityTermModel | None = None,
     points: int = 41,
 ) -> PhasePortrait:
-    """Computes the phase plane up to 1.5 m of clearance and up to the top speed.
+    """Computes the phase plane of a head-on approach to an obstacle.
+
+    The clearances reach to 1.5 m, and the speeds to the top speed.
 
     Args:
         scenario: Scenario with law and gains.
         to_go_m: Distance from the obstacle's face to the goal, m, see ``head_on``.
-        velocity_term: Velocity term to use instead of the scenario's.
+        velocity_term: Velocity term to use instead of the scenario's: ``none``,
+            ``printed`` or ``closing``.
         points: Number of starts along each axis.
 
     Returns:
-        Accelerations, contacts and certified speeds over the grid.
+        Accelerations, contacts and certified speeds over the grid of starts.
 
     Raises:
         InputError: The law is not known.
@@ -146,7 +149,7 @@ def phase_portrait(
 def certified_speeds(
     model: PointMass, clearances: NDArray[np.float64], least: float
 ) -> NDArray[np.float64]:
-    """Returns the speed below which the energy does not suffice to reach contact.
+    """Returns the speed below which a robot cannot reach an obstacle, from its energy.
 
     On the way to contact, the point mass must pass the largest potential between its
     clearance and contact. The kinetic energy at the certified speed is the difference
@@ -158,9 +161,10 @@ def certified_speeds(
     - If even the top speed does not suffice to pass, every speed is certified.
 
     Args:
-        model: Head-on approach along x, with the point mass at -c before a face at 0.
+        model: Head-on approach along x: the point mass is at -c, the obstacle's face at
+            0.
         clearances: (n,) ascending clearances c, m.
-        least: Distance at which the point mass touches the face, m.
+        least: Clearance at which the point mass touches the face, m.
 
     Returns:
         (n,) speeds, m/s; NaN where not even rest is certified.

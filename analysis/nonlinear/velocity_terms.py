@@ -204,9 +204,11 @@ def describe_velocity_term(
 ) -> DescribingFunction:
     """Computes the describing function of a velocity term up to the top speed.
 
+    A velocity term is the dependence of the law's force on the obstacle's speed.
+
     Args:
-        contact: Head-on approach with law and equilibrium distance.
-        term: Velocity term.
+        contact: Head-on approach to an obstacle, with law and equilibrium distance.
+        term: Velocity term: ``printed`` or ``closing``.
         points: Number of speed amplitudes.
 
     Returns:
@@ -267,16 +269,17 @@ def sensed_speeds(
     term: Variant,
     tick_s: float,
 ) -> NDArray[np.float64]:
-    """Returns the speed s that the controller computes for an obstacle straight ahead.
+    """Returns the speed that the controller computes for an obstacle straight ahead.
 
     Args:
         now_m: (n,) distances of the obstacle, m.
         before_m: (n,) distances one control period earlier, m.
-        term: Velocity term.
+        term: Definition of the speed. ``printed``: magnitude of the distance's rate.
+            ``closing``: speed of approach, 0 if the distance grows.
         tick_s: Control period, s.
 
     Returns:
-        (n,) speeds, m/s.
+        (n,) speeds, m/s, at least 0.
     """
     pairs = zip(now_m.tolist(), before_m.tolist(), strict=True)
     closing = term == "closing"
