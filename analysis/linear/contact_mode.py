@@ -166,9 +166,9 @@ def contact_matrix(
         motor_lag_s: Motor lag to use instead of ``plant.motor_lag_s``, s.
         latency_ticks: Age of the position that the springs act on, in control periods.
             It is 0 in the diagram, where an echo drives the wheels in the same period.
-        approach_damping_n_s_m: Slope of the law in the obstacle's speed, N s/m. The
-            speed is the change of the position over one period. This damping acts only
-            while the obstacle comes nearer.
+        approach_damping_n_s_m: Slope of the repulsion in the obstacle's speed, N s/m.
+            The speed is the mean rate of the position over one period. The result is
+            valid only while the obstacle comes nearer.
         period_s: Control period to use instead of the scenario's, s.
 
     Returns:

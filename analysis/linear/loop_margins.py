@@ -381,11 +381,11 @@ class PointMargins:
 
 
 def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:
-    """Computes the margins at sensor, actuator and wheels, along and across.
+    """Computes the stability margins with the loop cut at sensor, actuator and wheels.
 
-    "Along" and "across" refer to the line to the source. Loops that do not exist are
-    left out. For example, if the law does not push, no force acts on the robot across
-    this line at the follow distance.
+    Each cut gives two loops: along the line to the source, and across this line. Loops
+    that do not exist are left out. For example, without repulsion no force acts across
+    the line at the follow distance.
 
     Args:
         point: Operating point.

@@ -88,9 +88,9 @@ class EquilibriumSearch:
     def way_m(self, point: OperatingPoint) -> float:
         """Returns the length of the shortest free path from the start to a point.
 
-        The path is that of the control point P. It keeps a distance of half the robot's
-        width from every body. If the start or the point itself is nearer to a body, the
-        path may come as near as this.
+        The path is that of the control point P. The path keeps a distance of half the
+        robot's width from every body. If the start or the point itself is nearer to a
+        body, the path may come as near as this.
 
         Args:
             point: One of ``points``.

@@ -164,7 +164,7 @@ class PointMass:
     def trajectory(
         self, start: ArrayLike, *, duration_s: float, term: VelocityTermModel
     ) -> NDArray[np.float64]:
-        """Integrates from one start and returns all states.
+        """Integrates the point mass from one start and returns all states.
 
         Contact with a body does not end the run.
 

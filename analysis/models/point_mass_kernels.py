@@ -191,7 +191,7 @@ def _advance(
 def run(
     starts: _Array, steps: int, h: float, contact: float, world: _World
 ) -> tuple[_Array, _Array, _Array]:  # pragma: no cover
-    """Integrates from each start until contact or until the last step.
+    """Integrates the point mass from each start until contact or until the last step.
 
     Args:
         starts: (n, 4) initial states x, y, vx, vy in the world frame W, in m and m/s.
@@ -228,7 +228,7 @@ def run(
 def trajectory(
     start: _Array, steps: int, h: float, world: _World
 ) -> _Array:  # pragma: no cover
-    """Integrates from one start and returns all states.
+    """Integrates the point mass from one start and returns all states.
 
     Contact with a body does not end the run.
 

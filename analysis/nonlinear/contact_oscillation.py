@@ -1,6 +1,6 @@
 """Oscillation before an obstacle: harmonic balance compared with simulation.
 
-The simulation is that of the diagram with exact sensors, head-on to a wide box.
+In the simulation, the robot has exact sensors and drives head-on towards a wide box.
 ``analysis.nonlinear.harmonic_balance`` computes the prediction.
 """
 
