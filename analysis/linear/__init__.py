@@ -1,1 +1,1 @@
-"""What linear models tell: margins, delay, sampling, bursts, contact, robustness."""
+"""Results from linear models: margins, delay, sampling, bursts, contact, robustness."""

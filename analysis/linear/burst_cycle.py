@@ -1,8 +1,9 @@
-"""The burst cycle as a periodic system: 0.5 s heard, 1.5 s held, and again.
+"""The burst cycle as a periodic system: for example 0.5 s sound and 1.5 s silence.
 
-Between bursts the target is held in W, with the robot, or goes on with its own
-velocity. The product of the one-period matrices of a cycle has the multipliers:
-what is left after a cycle of what was off before it.
+During the silence, the tracker holds the target in the world frame W, holds it relative
+to the robot, or moves it with its last velocity. The product of the one-period matrices
+of a cycle maps deviations before the cycle to deviations after the cycle. Its
+eigenvalues are the multipliers.
 """
 
 from __future__ import annotations
@@ -27,70 +28,70 @@ from systems.world.geometry import control_point
 
 Hold = Literal["world", "robot", "motion"]
 
-#: What the tracker can do between bursts.
+#: How the tracker can hold the target during the silence.
 HOLDS: tuple[Hold, ...] = ("world", "robot", "motion")
 
-#: Of the response, less than this part of the greatest is no share.
+#: A mode whose share in the response is below this part of the largest is left out.
 _NO_SHARE = 1e-14
-#: Kick that starts a run, m/s.
+#: Velocity that the kick adds to the virtual mass, m/s.
 _KICK_M_S = 1e-5
-#: Cycles at rest before the linearisation: the tracker's memory settles.
+#: Cycles at rest before the linearization, in which the tracker's memory settles.
 _SETTLING_CYCLES = 3
 
 
 @dataclass(frozen=True)
 class BurstCycle:
-    """Multipliers of the motion over one cycle of the sound, at rest."""
+    """Multipliers of P's motion over one cycle of the sound, about a resting point."""
 
     hold: Hold
-    """What the target does between bursts."""
+    """How the tracker holds the target during the silence."""
     on_s: float
-    """Sound in each cycle, s."""
+    """Duration of the sound in each cycle, s."""
     period_s: float
-    """Length of a cycle, s."""
+    """Duration of a cycle, s."""
     along: NDArray[np.complex128]
-    """Multipliers over a cycle along the line to the source, largest first; those
-    of a continuum of equilibria left out."""
+    """Multipliers along the line to the source, largest first. Neutral multipliers of a
+    continuum of equilibria are left out."""
     across: NDArray[np.complex128]
-    """The same across the line."""
+    """Multipliers across the line to the source, without neutral ones."""
     matrices: NDArray[np.float64] = field(repr=False)
-    """(ticks, n, n) of the whole state, tick after tick of a cycle."""
+    """(ticks, n, n) matrices of the whole state over each control period of a cycle."""
     loop: IdealLoop = field(repr=False)
-    """The build, with bursts."""
+    """Control loop with exact sensors and bursts of sound."""
     state: NDArray[np.float64] = field(repr=False)
-    """At the beginning of a cycle."""
+    """(n,) state at the beginning of a cycle."""
     point: OperatingPoint = field(repr=False)
-    """The same equilibrium with a sound that never stops."""
+    """The same equilibrium with a sound without pauses."""
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
-        """Of both directions, largest first."""
+        """Multipliers of both directions, largest first."""
         both = np.concatenate([self.along, self.across])
         return both[np.argsort(-np.abs(both))]
 
     @property
     def largest(self) -> float:
-        """Largest |multiplier|: below 1 what is off decays."""
+        """Largest |multiplier|. If it is below 1, deviations decay."""
         return float(np.abs(self.multipliers).max(initial=0.0))
 
     @property
     def stable(self) -> bool:
-        """Whether all motions decay from cycle to cycle."""
+        """Whether all deviations decay from cycle to cycle."""
         return self.largest < 1.0
 
 
 @dataclass(frozen=True)
 class BurstRun:
-    """A simulated run over many cycles after a small kick."""
+    """Simulated motion over many cycles after a small initial velocity."""
 
     hold: Hold
-    """What the target does between bursts."""
+    """How the tracker holds the target during the silence."""
     factor: float
-    """Fitted growth over a cycle: the largest |multiplier| of that direction."""
+    """Fitted growth factor per cycle, to compare with the largest |multiplier|."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,) s, every tick."""
+    """(n,) times of all control periods, s."""
     offset_m: NDArray[np.float64] = field(repr=False)
-    """(n,) of P from the equilibrium in the direction of the kick, m."""
+    """(n,) deviation of P from the equilibrium in the direction of the kick, m."""
 
 
 def burst_cycle(
@@ -101,21 +102,26 @@ def burst_cycle(
     gap_s: float | None = None,
     point: OperatingPoint | None = None,
 ) -> BurstCycle:
-    """Multipliers at the equilibrium that is nearest to the follow distance.
+    """Computes the multipliers at the equilibrium where the robot follows the source.
+
+    The source alternates between sound and silence. A multiplier is an eigenvalue of
+    the map over one cycle of both.
 
     Args:
-        scenario: Any; its sensors are taken to be ideal, bodies to be at rest.
-        hold: In place of ``tracker.hold``.
-        on_s: In place of ``sound.on_s``, s.
-        gap_s: Silence in each cycle, s, in place of the scenario's.
-        point: The equilibrium, where it is known already.
+        scenario: Any scenario. Its sensors are taken as exact, and its bodies as at
+            rest.
+        hold: How the tracker holds the target during the silence: ``world``, ``robot``
+            or ``motion``.
+        on_s: Duration of the sound instead of ``sound.on_s``, s.
+        gap_s: Duration of the silence instead of the scenario's, s.
+        point: Equilibrium, if it is already known.
 
     Returns:
-        Multipliers over one cycle, along and across the line to the source.
+        Multipliers along and across the line to the source.
 
     Raises:
-        InputError: The cycle is no whole number of ticks, or has no sound; or
-            there is no stable equilibrium.
+        InputError: The cycle is not a whole number of control periods, or has no sound.
+            Or there is no stable equilibrium.
     """
     point = point or follow_equilibrium(scenario)
     sound = scenario.source.sound
@@ -155,7 +161,7 @@ def _with_bursts(scenario: Scenario, hold: Hold, on: float, period: float) -> Sc
 
 
 def _settled(loop: IdealLoop, point: OperatingPoint, ticks: int) -> NDArray[np.float64]:
-    """The state at rest when the robot has listened for some cycles."""
+    """State at rest after the robot has listened for some cycles."""
     x, y = control_point(
         (*point.p_WP, point.theta_WB), -loop.scenario.only.robot.control_point_m
     )
@@ -191,8 +197,8 @@ def _multipliers(
             D=np.zeros((1, 1)),
         )
     )
-    # Rounding, other on another machine, may leave states of the other direction in it,
-    # whose share in the response is nothing.
+    # Rounding errors, which depend on the machine, may leave states of the other
+    # direction in the model. Their share in the response is negligible.
     poles, modes = np.linalg.eig(line.A)
     seen, moved = (line.C @ modes)[0], np.linalg.solve(modes, line.B)[:, 0]
     share = np.abs(seen * moved)
@@ -203,15 +209,17 @@ def _multipliers(
 def simulate_burst_cycle(
     cycle: BurstCycle, cycles: int = 40, *, direction: Direction = "along"
 ) -> BurstRun:
-    """Runs the diagram after a kick.
+    """Simulates many cycles of sound and silence after a small kick to the robot.
+
+    The kick changes the velocity of the virtual mass.
 
     Args:
-        cycle: The analysed cycle.
-        cycles: To simulate; the first quarter does not count.
-        direction: Of the kick: along the line to the source, or across it.
+        cycle: Linearized cycle, whose multipliers the simulation checks.
+        cycles: Number of cycles. The first quarter is left out of the fit.
+        direction: Direction of the kick: along the line to the source, or across.
 
     Returns:
-        Growth over a cycle, and the way of P, m, at every tick.
+        Growth factor per cycle, and the motion of the robot's control point.
     """
     loop, point = cycle.loop, cycle.point
     axis = point.axes[DIRECTIONS.index(direction)]
@@ -231,9 +239,10 @@ def simulate_burst_cycle(
 
 
 def _dominant_factor(samples: NDArray[np.float64]) -> float:
-    """|z| of the mode pair that is left in equally spaced samples.
+    """|z| of the dominant mode or pair of modes in equally spaced samples.
 
-    x[n + 2] = a x[n + 1] + b x[n], each row weighed by its own size.
+    The fit is x[n + 2] = a x[n + 1] + b x[n]. Each row is weighted by the inverse of
+    its size.
     """
     rows = np.column_stack([samples[1:-1], samples[:-2]])
     size = np.linalg.norm(rows, axis=1)

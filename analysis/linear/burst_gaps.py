@@ -1,4 +1,8 @@
-"""Stability against the silence between bursts, for each hold of the target."""
+"""Stability of the robot's motion as a function of the silence between bursts of sound.
+
+The tracker can hold the target during the silence in several ways (``Hold``). Each way
+has its own results.
+"""
 
 from __future__ import annotations
 
@@ -18,26 +22,26 @@ from diagrams.scenario.scenario import Scenario
 
 @dataclass(frozen=True)
 class GapChart:
-    """How fast the motion decays, against the silence in each cycle."""
+    """Decay of P's motion as a function of the silence in each cycle of the sound."""
 
     on_s: float
-    """Sound in each cycle, s."""
+    """Duration of the sound in each cycle, s."""
     gaps_s: NDArray[np.float64]
-    """(n,) silence in each cycle, s."""
+    """(n,) durations of the silence in each cycle, s."""
     holds: tuple[Hold, ...]
-    """What the target does meanwhile."""
+    """How the tracker holds the target during the silence."""
     multiplier: NDArray[np.float64]
-    """(holds, n) largest |multiplier| of a cycle."""
+    """(holds, n) largest |multiplier| over one cycle. Below 1 the motion decays."""
     today: tuple[float, Hold]
-    """Silence, s, and hold of the scenario."""
+    """Duration of the silence, s, and hold in the scenario."""
 
     @property
     def growth_per_s(self) -> NDArray[np.float64]:
-        """(holds, n) exponent of the slowest motion, 1/s; negative: decays."""
+        """(holds, n) growth rates of the slowest motion, 1/s; negative if it decays."""
         return np.asarray(np.log(self.multiplier) / (self.on_s + self.gaps_s))
 
     def longest_stable_s(self, hold: Hold) -> float:
-        """Largest of the gaps up to which every one is stable, s."""
+        """Longest silence for which this one and all shorter ones are stable, s."""
         unstable = self.multiplier[self.holds.index(hold)] >= 1.0
         count = int(np.argmax(unstable)) if unstable.any() else len(unstable)
         return float(self.gaps_s[count - 1]) if count else 0.0
@@ -50,20 +54,23 @@ def gap_chart(
     holds: Sequence[Hold] = HOLDS,
     point: OperatingPoint | None = None,
 ) -> GapChart:
-    """Largest multipliers for many gaps from the ticks of one long cycle.
+    """Computes how the robot's motion decays, for many durations of the silence.
 
-    A tick's matrix depends on how long ago the sound was heard, and not on how
-    long the silence will be, but for the tracker's memory of velocities, which
-    does not move P where hearing is exact.
+    The source alternates between sound and silence. A multiplier is an eigenvalue of
+    the map over one such cycle. The one-period matrices of one long cycle suffice for
+    all durations. Each matrix depends on the time since the last sound, but not on the
+    length of the silence to come. The exception is the tracker's memory of velocities.
+    With exact hearing this memory does not move the robot.
 
     Args:
-        scenario: Any, see ``analysis.linear.burst_cycle.burst_cycle``.
-        gaps_s: (n,) multiples of the control period, s; by default 0 to 4 s.
-        holds: To compare.
-        point: The equilibrium, where it is known already.
+        scenario: Any scenario, see ``analysis.linear.burst_cycle.burst_cycle``.
+        gaps_s: (n,) durations of the silence, multiples of the control period, s. The
+            default is 0 to 4 s.
+        holds: Ways of holding the target to compare: ``world``, ``robot``, ``motion``.
+        point: Equilibrium, if it is already known.
 
     Returns:
-        Largest |multiplier| of a cycle for each hold and gap.
+        Largest |multiplier| for each hold and duration.
     """
     point = point or follow_equilibrium(scenario)
     gaps = np.arange(0.0, 4.01, 0.25) if gaps_s is None else np.asarray(gaps_s, float)
@@ -74,7 +81,7 @@ def gap_chart(
     rows = []
     for hold in holds:
         cycle = burst_cycle(scenario, hold, on_s=on, gap_s=longest, point=point)
-        # Over the sound, and so many ticks of silence after it.
+        # For each n: product over the sound and n ticks of silence after it.
         products = list(accumulate(cycle.matrices, lambda done, tick: tick @ done))
         rows.append([_largest(point, products[heard + n - 1]) for n in ticks])
     return GapChart(

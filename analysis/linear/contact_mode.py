@@ -1,11 +1,13 @@
-"""Contact mode: how stiff an obstacle may be, against motor lag and latency.
+"""Contact mode: largest stable stiffness of an obstacle over motor lag and latency.
 
-Near an obstacle the spring to it adds to the attraction's, and the damping is
-still the attraction's alone. What is left of it after the motors' lag, the
-sample period and the age of the echo decides. The chain from acceleration to
-motion is that of the blocks: the plant linearised by Drake and sampled exactly,
-the wheel command by AutoDiff. Velocity terms of the laws are left out: over an
-oscillation about a resting obstacle the printed ones damp nothing on average.
+Near an obstacle, the stiffnesses of the obstacle's and the attraction's spring add. The
+damping is that of the attraction alone. Motor lag, sample period, and age of the echo
+reduce the effect of the damping, and so limit the stiffness.
+
+The model from acceleration to motion uses the blocks of the diagram. Drake linearizes
+the plant and samples it exactly. AutoDiff linearizes the wheel command. The repulsion's
+dependence on speed (velocity term) is left out. Over an oscillation about an obstacle
+at rest, the printed velocity terms have no damping on average.
 """
 
 from __future__ import annotations
@@ -34,12 +36,13 @@ from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import WheelCommand_
 
-#: Springs that are tried, N/m.
+#: Stiffnesses to examine, N/m.
 _STIFFNESSES = np.geomspace(1e-3, 1e5, 400)
-#: A spectral radius above 1 by more than this is no rounding.
+#: A spectral radius above 1 by less than this is a rounding error.
 _ROUNDING = 1e-11
-#: Motor lags and latencies of the table.
+#: Motor lags of the table.
 MOTOR_LAGS_S = (0.01, 0.02, 0.05, 0.1, 0.2)
+#: Latencies of the table, in control periods.
 LATENCY_TICKS = (0, 1, 2, 3, 4)
 
 
@@ -49,21 +52,25 @@ def motion_chain(
     motor_lag_s: float | None = None,
     period_s: float | None = None,
 ) -> LinearModel:
-    """How P moves along the robot's axis, from ``acceleration_W`` on, at rest.
+    """Returns the model from the law's acceleration to the robot's forward motion.
 
-    Input: the law's acceleration at the tick, m/s^2. Outputs at the tick,
-    before its updates: position of P, m, and velocity of the virtual mass, m/s.
+    The model is linearized at rest. Input and outputs are the values before the control
+    update that begins the period.
+
+    - Input: ``acceleration_W``, m/s^2.
+    - Outputs: position of the control point P, m, and velocity of the virtual mass,
+      m/s.
 
     Args:
-        scenario: Robot and plant are used.
-        motor_lag_s: In place of ``plant.motor_lag_s``, s.
-        period_s: In place of the scenario's tick, s.
+        scenario: Scenario with robot and plant.
+        motor_lag_s: Motor lag to use instead of ``plant.motor_lag_s``, s.
+        period_s: Control period to use instead of the scenario's, s.
 
     Returns:
-        The model of one period, of as few states as the motion along the axis has.
+        Model of one period with the controllable and observable states only.
 
     Raises:
-        ValueError: The wheels can slip.
+        ValueError: The wheels can slip (``plant.friction`` is set).
     """
     plant = scenario.only.plant
     require_rolling(plant)
@@ -96,7 +103,7 @@ def _chain(
     )
     B = np.concatenate([sampled.B() @ push[w], push[v]])[:, None]
     C = np.zeros((2, len(A)))
-    C[0, 0] = C[1, -2] = 1.0  # at heading 0, P is as far along x as B
+    C[0, 0] = C[1, -2] = 1.0  # at heading 0, x of P differs from x of B by a constant
     whole = LinearModel(
         name="motion of P",
         A=A,
@@ -112,15 +119,15 @@ def _chain(
 
 
 def delayed_output(model: LinearModel, output: str, ticks: int) -> LinearModel:
-    """The same model with one of its outputs some ticks older.
+    """Returns the model with one of its outputs delayed by whole periods.
 
     Args:
-        model: Sampled.
-        output: One of its output names.
-        ticks: How much older, 0 or more periods.
+        model: Sampled model.
+        output: Name of the output.
+        ticks: Delay in periods, 0 or more.
 
     Returns:
-        A model with as many more states, ``<output>_1`` and so on.
+        Model with one more state per period of delay: ``<output>_1`` and so on.
     """
     if ticks == 0:
         return model
@@ -150,23 +157,23 @@ def contact_matrix(
     approach_damping_n_s_m: float = 0.0,
     period_s: float | None = None,
 ) -> NDArray[np.float64]:
-    """One-period matrix of the radial motion before an obstacle.
+    """Returns the one-period matrix of the robot's motion straight towards an obstacle.
 
     Args:
-        scenario: Mass, robot, plant and damping are used.
-        stiffness_n_m: All springs together, K_r + K_0, N/m.
-        damping_n_s_m: In place of D_r, N s/m.
-        motor_lag_s: In place of ``plant.motor_lag_s``, s.
-        latency_ticks: Age of the position that the springs act on; 0 in the
-            builds, where an echo drives the wheels at once.
-        approach_damping_n_s_m: Slope of a law in the obstacle's speed, which is
-            the change of that position over a tick, N s/m. For the half of an
-            oscillation in which the obstacle comes nearer.
-        period_s: In place of the scenario's tick, s.
+        scenario: Scenario with mass, robot, plant and damping.
+        stiffness_n_m: Sum of all springs, those of attraction and obstacle, N/m.
+        damping_n_s_m: Damping to use instead of the attraction's, N s/m.
+        motor_lag_s: Motor lag to use instead of ``plant.motor_lag_s``, s.
+        latency_ticks: Age of the position that the springs act on, in control periods.
+            It is 0 in the diagram, where an echo drives the wheels in the same period.
+        approach_damping_n_s_m: Slope of the repulsion in the obstacle's speed, N s/m.
+            The speed is the mean rate of the position over one period. The result is
+            valid only while the obstacle comes nearer.
+        period_s: Control period to use instead of the scenario's, s.
 
     Returns:
-        (n, n) x+ = A x; states are those of ``motion_chain``, then the aged positions,
-        m.
+        (n, n) matrix A of x+ = A x. The states are those of ``motion_chain``, then the
+        delayed positions, m.
     """
     damping = damping_n_s_m
     if damping is None:
@@ -177,7 +184,7 @@ def contact_matrix(
     if approach_damping_n_s_m == 0.0:
         return now.A + now.B @ law @ now.C
     before = delayed_output(chain, "p_WP", latency_ticks + 1)
-    # The longer chain holds the shorter one's position too, one place earlier.
+    # The longer chain contains the position of the shorter chain, one state earlier.
     period = period_s or scenario.tick_s
     speed = approach_damping_n_s_m / period / scenario.only.robot.mass_kg
     position = np.hstack([now.C[0], [0.0]])
@@ -187,7 +194,7 @@ def contact_matrix(
 
 
 class ContactOptions(TypedDict, total=False):
-    """Of ``contact_matrix``, in the place of what the scenario says."""
+    """Options of ``contact_matrix`` that replace values of the scenario."""
 
     damping_n_s_m: float | None
     motor_lag_s: float | None
@@ -198,12 +205,15 @@ class ContactOptions(TypedDict, total=False):
 def contact_spectral_radius(
     scenario: Scenario, stiffness_n_m: float, **options: Unpack[ContactOptions]
 ) -> float:
-    """Largest |z| of the radial motion; stable below 1. See ``contact_matrix``.
+    """Returns the largest |z| of the motion straight towards an obstacle.
+
+    The motion is stable if the value is below 1. ``contact_matrix`` describes the
+    model.
 
     Args:
-        scenario: Mass, robot, plant and damping are used.
-        stiffness_n_m: All springs together, N/m.
-        **options: See ``contact_matrix``.
+        scenario: Scenario with mass, robot, plant and damping.
+        stiffness_n_m: Sum of all springs, N/m.
+        **options: Options of ``contact_matrix``.
 
     Returns:
         |z| over one period, 0 or more.
@@ -215,16 +225,18 @@ def contact_spectral_radius(
 def largest_contact_stiffness(
     scenario: Scenario, **options: Unpack[ContactOptions]
 ) -> float:
-    """Sum of springs, K_r + K_0, at which the radial motion stops decaying, N/m.
+    """Returns the largest stable stiffness of the motion straight towards an obstacle.
 
-    Zero where no spring is stable, as without damping.
+    The stiffness is the sum of all springs: those of the attraction and of the
+    obstacle.
 
     Args:
-        scenario: Mass, robot, plant and damping are used.
-        **options: See ``contact_matrix``.
+        scenario: Scenario with mass, robot, plant and damping.
+        **options: Options of ``contact_matrix``.
 
     Returns:
-        N/m; infinite where every spring that is tried is stable.
+        Stiffness, N/m. It is 0 if no spring is stable, for example without damping. It
+        is infinite if all springs up to 1e5 N/m are stable.
     """
 
     def excess(stiffness: float) -> float:
@@ -242,27 +254,27 @@ def largest_contact_stiffness(
 
 @dataclass(frozen=True)
 class ContactLimits:
-    """Largest gains that do not oscillate before a resting obstacle."""
+    """Largest gains without oscillation before an obstacle at rest, as tables."""
 
     motor_lags_s: tuple[float, ...]
-    """s, one a row."""
+    """Motor lags of the rows, s."""
     latency_ticks: tuple[int, ...]
-    """A tick each, one a column."""
+    """Latencies of the columns, in control periods."""
     stiffness_n_m: NDArray[np.float64]
-    """(rows, columns) largest K_0 of the conventional law, N/m; negative where
-    the attraction alone is too stiff."""
+    """(rows, columns) largest stiffness K_0 of the conventional law, N/m. A negative
+    value means that the attraction alone is too stiff."""
     reference_stiffness_n_m: NDArray[np.float64]
-    """(rows, columns) largest k_ref of the active law, N/m, by its largest slope."""
+    """(rows, columns) largest k_ref of the active law, from its largest slope, N/m."""
     today: tuple[float, int]
-    """Motor lag, s, and latency, ticks, of the scenario."""
+    """Motor lag, s, and latency, in control periods, of the scenario."""
     stiffness_today_n_m: float
     """K_0 of the scenario, N/m."""
     reference_stiffness_today_n_m: float
     """k_ref of the scenario, N/m."""
     active_slope_today_n_m: float
-    """Largest slope -df/dc of the active law of the scenario, N/m."""
+    """Largest slope -df/dc of the active law with the scenario's gains, N/m."""
     tick_s: float
-    """Of the scenario, s."""
+    """Control period of the scenario, s."""
 
 
 def contact_limits(
@@ -271,15 +283,18 @@ def contact_limits(
     motor_lags_s: Sequence[float] = MOTOR_LAGS_S,
     latency_ticks: Sequence[int] = LATENCY_TICKS,
 ) -> ContactLimits:
-    """The table of limits; the scenario's own motor lag is one of its rows.
+    """Computes the largest stable stiffness before an obstacle for two control laws.
+
+    The results are tables over motor lag and latency. The motor lag of the scenario is
+    one of the rows.
 
     Args:
-        scenario: Mass, robot, plant and attraction are used.
-        motor_lags_s: Rows of the table, s.
-        latency_ticks: Columns of the table: ages of the position, periods.
+        scenario: Scenario with mass, robot, plant and attraction.
+        motor_lags_s: Further rows of the tables, s.
+        latency_ticks: Columns of the tables, in control periods.
 
     Returns:
-        Gains of both laws, N/m, with K_r taken off.
+        Stiffnesses of both laws, N/m. The stiffness of the attraction is subtracted.
     """
     lags = sorted({*motor_lags_s, scenario.only.plant.motor_lag_s})
     total = np.array(

@@ -1,9 +1,10 @@
-"""How much more delay the sampled loop stands: exact, in fractions of a tick.
+"""Delay margin of the sampled loop, exact to fractions of a control period.
 
-A delay of n ticks and a part e of one makes a longer one-period map, whose
-spectral radius is bisected (the recipe of semi-discretisation, without its
-approximation: signals are constant between ticks, and the plant's motion
-within one is a matrix exponential).
+For a delay of n control periods plus a fraction e, the delayed signals become
+additional states of the one-period map. Bisection finds the delay at which the spectral
+radius of this map is 1. The method is semi-discretization, but without its
+approximation: signals are constant between control updates, and a matrix exponential
+gives the motion of the plant in between.
 """
 
 from __future__ import annotations
@@ -27,35 +28,37 @@ from systems.framework.input_error import InputError
 
 DelayPlace = Literal["sensor", "wheels"]
 
-#: Where a delay can come in: estimates of the source come later than the tracker
-#: takes them to, or wheel commands reach the motors later.
+#: Places of a delay:
+#: - sensor: estimates of the source arrive later than the tracker assumes
+#: - wheels: wheel commands reach the motors later
 DELAY_PLACES: tuple[DelayPlace, ...] = ("sensor", "wheels")
 
-#: No larger delay margin is looked for, s.
+#: Largest delay margin that the search can find, s.
 _LONGEST_S = 10.0
 
 
 @dataclass(frozen=True)
 class DelayMargin:
-    """The delay at which a loop begins to oscillate."""
+    """Delay at which a loop begins to oscillate."""
 
     at: DelayPlace
-    """Where the delay comes in."""
+    """Place of the delay."""
     direction: Direction
-    """Of the motion that oscillates; the other one is not delayed."""
+    """Direction of the delayed signal and of the oscillation."""
     delay_s: float
-    """Added to what the build has, s; infinite where none destabilises."""
+    """Delay in addition to that of the diagram, s. Infinity: no delay destabilizes."""
     frequency_rad_s: float
-    """Of the oscillation, rad/s; not a number where there is none."""
+    """Frequency of the oscillation, rad/s. Without an oscillation: NaN."""
 
 
 class DelayedLoop:
-    """The sampled loop of one direction with any delay in it.
+    """Sampled loop with an arbitrary delay of one signal.
 
     Args:
-        point: The operating point.
-        at: Where the delay comes in.
-        direction: Along the line to the source, or across it.
+        point: Operating point.
+        at: Place of the delay: ``sensor`` or ``wheels``.
+        direction: Direction of the delayed signal: along the line to the source, or
+            across.
     """
 
     def __init__(
@@ -67,7 +70,7 @@ class DelayedLoop:
         own = f"{at}_{direction}"
         whole = cut_model(point, at)
         (other,) = [name for name in whole.input_names if name != own]
-        # The other direction's wire is closed; the model keeps all its states.
+        # The loop of the other direction is closed. The model keeps all its states.
         self._cut = closed(whole, (other,))
         self._column = whole.input_names.index(own)
         self._at = at
@@ -83,7 +86,11 @@ class DelayedLoop:
         self._turn = np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
 
     def _flow(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Plant state after some seconds: by its state, and by what the wheels hold."""
+        """Two derivatives of the plant's state after some seconds.
+
+        The first is by the state at the beginning, the second by the constant wheel
+        command.
+        """
         n, m = self._B_plant.shape
         block = np.zeros((n + m, n + m))
         block[:n, :n], block[:n, n:] = self._A_plant, self._B_plant
@@ -91,7 +98,7 @@ class DelayedLoop:
         return moved[:n, :n], moved[:n, n:]
 
     def period_matrix(self, delay_s: float) -> NDArray[np.float64]:
-        """One-period map of the motion and of the signals under way."""
+        """One-period map of the motion and of the delayed signals."""
         ticks, part = divmod(delay_s, self._tick_s)
         late = int(ticks)
         return (self._wheel_delay if self._at == "wheels" else self._sensor_delay)(
@@ -99,7 +106,7 @@ class DelayedLoop:
         )
 
     def _wheel_delay(self, late: int, part: float) -> NDArray[np.float64]:
-        """The wheels hold an older command until ``part`` of the period is over."""
+        """One-period map if the wheels hold an older command for ``part`` seconds."""
         cut, column = self._cut, self._column
         rest, _ = self._flow(self._tick_s - part)
         _, first = self._flow(part)
@@ -109,18 +116,18 @@ class DelayedLoop:
         return _with_delays(cut, cut.C[column], [(newer, late), (older, late + 1)])
 
     def _sensor_delay(self, late: int, part: float) -> NDArray[np.float64]:
-        """Hearing measures where the robot was, within an earlier period."""
+        """One-period map if hearing measures an earlier position of the robot."""
         cut, column = self._cut, self._column
         state, held = self._flow(self._tick_s - part)
         measured = np.zeros(len(cut.A))
         by_plant = cut.A[self._hearing, self._plant]
         measured[self._plant] = by_plant @ state
         measured += by_plant @ held @ cut.A[self._wheels]
-        # Without delay the tracker reads at a tick what was measured one before.
+        # Without a delay, the tracker reads the measurement of the tick before.
         return _with_delays(cut, measured, [(cut.B[:, column], late + 2)])
 
     def spectral_radius(self, delay_s: float) -> float:
-        """Largest |z|, neutral poles apart."""
+        """Largest |z| of a pole, without neutral poles (z = 1)."""
         return self._largest(delay_s)[0]
 
     def _largest(self, delay_s: float) -> tuple[float, complex]:
@@ -130,7 +137,7 @@ class DelayedLoop:
         return abs(largest), largest
 
     def critical_frequency(self, delay_s: float) -> float:
-        """Frequency of the pole nearest to leaving, rad/s."""
+        """Frequency of the pole with the largest |z|, rad/s."""
         return abs(float(np.angle(self._largest(delay_s)[1]))) / self._tick_s
 
 
@@ -139,9 +146,9 @@ def _with_delays(
     row: NDArray[np.float64],
     columns: list[tuple[NDArray[np.float64], int]],
 ) -> NDArray[np.float64]:
-    """x+ = A x + sum of b y of some ticks ago, y = row x, as one matrix.
+    """Matrix of x+ = A x + sum of b_i y[k - n_i], y = row x, with delays n_i.
 
-    Only what the signal moves and shows is kept.
+    The model keeps only its controllable and observable states.
     """
     B = np.column_stack([column for column, _ in columns])
     part = replace(
@@ -172,19 +179,20 @@ def delay_margin(
     at: DelayPlace = "sensor",
     direction: Direction = "along",
 ) -> DelayMargin:
-    """The smallest delay at which the loop stops decaying.
+    """Returns the smallest additional delay at which the loop becomes unstable.
 
     Args:
-        point: Operating point, at which the loop decays.
-        at: Where the delay comes in.
-        direction: Of the motion that is delayed.
+        point: Stable operating point.
+        at: Place of the delay: ``sensor`` or ``wheels``.
+        direction: Direction of the delayed signal: along the line to the source, or
+            across.
 
     Returns:
-        Delay beyond that of the build, s, infinite where none destabilises, and the
-        frequency of the oscillation, rad/s.
+        Delay margin and frequency of the oscillation. If no delay makes the loop
+        unstable, the margin is infinite.
 
     Raises:
-        InputError: The loop oscillates without any delay already.
+        InputError: The loop is unstable without any additional delay.
     """
     loop = DelayedLoop(point, at, direction)
     if loop.spectral_radius(0.0) >= 1.0:

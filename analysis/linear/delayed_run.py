@@ -1,4 +1,4 @@
-"""The all-ideal diagram simulated with a delay put into one of its wires."""
+"""Simulation of the diagram with exact sensors and an additional delay."""
 
 from __future__ import annotations
 
@@ -16,42 +16,43 @@ from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
 from systems.hearing.ideal_source_sensor import relative_position
 
-#: Kick that starts a run, m/s: far above rounding, far below what is not linear.
+#: Initial velocity that starts the motion, m/s. It is far above rounding errors, and
+#: small enough for a linear motion.
 _KICK_M_S = 1e-6
 
 
 @dataclass(frozen=True)
 class DelayedRun:
-    """How the motion about an operating point went on after a small kick."""
+    """Simulated motion about an operating point after a small initial velocity."""
 
     delay_s: float
-    """In the wire, s."""
+    """Additional delay, s."""
     duration_s: float
-    """Simulated, s."""
+    """Simulated time, s."""
     growth_per_s: float
-    """Fitted exponent of the envelope, 1/s; negative where it decays."""
+    """Fitted growth rate of the envelope, 1/s; negative if the motion decays."""
     frequency_rad_s: float
-    """Fitted, rad/s."""
+    """Fitted frequency, rad/s."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,) s."""
+    """(n,) times, s."""
     offset_m: NDArray[np.float64] = field(repr=False)
-    """(n,) of P from the operating point, in the direction of the kick, m."""
+    """(n,) deviation of P from the operating point in the direction of the kick, m."""
 
 
 @dataclass(frozen=True)
 class DelayCheck:
-    """A computed delay margin and runs on both sides of it."""
+    """Computed delay margin with two simulated runs, below and above the margin."""
 
     margin: DelayMargin
-    """As computed."""
+    """Computed delay margin."""
     below: DelayedRun
-    """With 0.95 of it: must decay."""
+    """Run with 0.95 of the delay margin. Its motion should decay."""
     above: DelayedRun
-    """With 1.05 of it: must grow."""
+    """Run with 1.05 of the delay margin. Its motion should grow."""
 
     @property
     def confirmed(self) -> bool:
-        """Whether both runs did."""
+        """Whether the run below decays and the run above grows."""
         return self.below.growth_per_s < 0.0 < self.above.growth_per_s
 
 
@@ -62,16 +63,19 @@ def check_delay_margin(
     *,
     duration_s: float = 300.0,
 ) -> DelayCheck:
-    """Simulates 0.95 and 1.05 of the computed delay margin.
+    """Simulates the loop with 0.95 and with 1.05 of the computed delay margin.
+
+    Each run begins with a small kick to the robot.
 
     Args:
-        point: Equilibrium, at rest.
-        at: Where the delay comes in.
-        direction: Of the motion, and of the kick.
-        duration_s: To simulate, s.
+        point: Equilibrium at rest.
+        at: Place of the delay: ``sensor`` or ``wheels``.
+        direction: Direction of the delayed signal and of the kick: along the line to
+            the source, or across.
+        duration_s: Simulated time of each run, s.
 
     Returns:
-        The margin, and the runs on both sides of it.
+        The margin and both runs.
 
     Raises:
         InputError: The loop has no finite delay margin.
@@ -102,21 +106,22 @@ def simulate_delayed(
     direction: Direction = "along",
     duration_s: float = 300.0,
 ) -> DelayedRun:
-    """Runs the built diagram with one wire delayed, after a kick to v_P.
+    """Simulates the diagram with one delayed signal, after a small kick to the robot.
 
-    Both elements of the wire are delayed; at rest the motions along and across
-    do not touch, so that a kick along shows the loop along.
+    The kick changes the velocity of the virtual mass. Both elements of the signal are
+    delayed. At rest, the motions along and across the line to the source are decoupled.
+    A kick along this line therefore shows only the loop along the line.
 
     Args:
-        point: At rest.
-        at: Wheel commands late at the motors, or estimates of where the
-            source was that much earlier still.
-        delay_s: Any, s.
-        direction: Of the kick.
-        duration_s: To simulate, s.
+        point: Equilibrium at rest.
+        at: Place of the delay. ``wheels``: wheel commands reach the motors later.
+            ``sensor``: estimates of the source are older.
+        delay_s: Additional delay, 0 or more, s.
+        direction: Direction of the kick.
+        duration_s: Simulated time, s.
 
     Returns:
-        Fitted growth, 1/s, and frequency, rad/s, and the way of P, m.
+        The motion of the robot's control point, with fitted growth rate and frequency.
 
     Raises:
         InputError: The operating point moves, or the delay is negative.
@@ -142,15 +147,15 @@ def simulate_delayed(
 def kicked(
     point: OperatingPoint, state: NDArray[np.float64], kick_W: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """A state after a kick to the virtual mass.
+    """Returns a state with an additional velocity of the virtual mass.
 
     Args:
-        point: Names the states.
-        state: (n,) of the diagram.
-        kick_W: (2,) m/s.
+        point: Operating point, whose loop gives the names of the states.
+        state: (n,) state of the diagram. It is not changed.
+        kick_W: (2,) velocity to add in the world frame W, m/s.
 
     Returns:
-        (n,) a copy.
+        (n,) the changed copy.
     """
     names, moved = point.loop.state_names, state.copy()
     moved[[names.index(f"command.v_WP_{k}") for k in "xy"]] += kick_W
@@ -162,15 +167,15 @@ def offsets(
     poses_WB: Sequence[NDArray[np.float64]],
     axis: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """How far P is off an equilibrium along an axis.
+    """Returns the deviation of the control point P from an equilibrium along one axis.
 
     Args:
-        point: The equilibrium.
-        poses_WB: n poses of the robot, m and rad.
+        point: Equilibrium.
+        poses_WB: n poses of the robot in the world frame W, m and rad.
         axis: (2,) unit vector in W.
 
     Returns:
-        (n,) m.
+        (n,) deviations, m.
     """
     x, y, theta = np.array(poses_WB).T
     epsilon = point.loop.scenario.only.robot.control_point_m
@@ -182,7 +187,7 @@ def offsets(
 def _wheels_late(
     point: OperatingPoint, state: NDArray[np.float64], delay_s: float, ticks: int
 ) -> list[NDArray[np.float64]]:
-    """The plant's input is cut off, and fed with older commands."""
+    """Poses of a run in which the plant's input is cut and gets older commands."""
     loop, tick_s = point.loop, point.loop.tick_s
     start = round(point.time_s / tick_s)
     late, part = divmod(delay_s, tick_s)
@@ -192,9 +197,10 @@ def _wheels_late(
     wheels, plant = loop.indices("command")[2:], loop.indices("plant")[:3]
     poses = []
     for k in range(start, start + ticks):
-        # Ticks are multiples in Drake's arithmetic too: a sum would miss them.
+        # Drake computes tick times as multiples too; a sum would miss the ticks.
         now, then = k * tick_s, (k + 1) * tick_s
-        # Newest last; until the end of ``part`` the one before the due one holds.
+        # The newest command is last. Until ``part`` has passed, the plant holds the
+        # command before the one that is due.
         run.fix(port, sent[1] if late else sent[-1])
         run.advance(now + max(part, 1e-9))
         sent.append(run.state()[wheels])
@@ -207,7 +213,7 @@ def _wheels_late(
 def _hearing_late(
     point: OperatingPoint, state: NDArray[np.float64], delay_s: float, ticks: int
 ) -> list[NDArray[np.float64]]:
-    """Hearing's state is replaced by what it would have measured earlier."""
+    """Poses of a run in which hearing's state is an earlier measurement."""
     loop, tick_s = point.loop, point.loop.tick_s
     start = round(point.time_s / tick_s)
     late, part = divmod(delay_s, tick_s)
@@ -218,10 +224,10 @@ def _hearing_late(
     measured = deque([state[hearing]] * (int(late) + 2), maxlen=int(late) + 2)
     poses = []
     for k in range(start, start + ticks):
-        # Ticks are multiples in Drake's arithmetic too: a sum would miss them.
+        # Drake computes tick times as multiples too; a sum would miss the ticks.
         then = (k + 1) * tick_s
         run.advance(then - part)
-        # Taken for the tick after the next ``late`` ones.
+        # The tracker reads this measurement ``late`` ticks later than without delay.
         pose: Any = run.state()[plant]
         measured.append(np.array(relative_position(pose, pose_WS, epsilon)))
         run.advance(then)
@@ -233,18 +239,21 @@ def _hearing_late(
 def fitted_oscillation(
     time_s: NDArray[np.float64], offset_m: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Growth and frequency of an oscillation.
+    """Fits the growth rate and the frequency of an oscillation.
 
-    Peaks between the zeros give the envelope, their spacing the frequency; the
-    first fifth, where faster modes die out, does not count.
+    The peaks between the zeros give the envelope. The spacing of the peaks gives the
+    frequency. The first fifth of the time is left out, because faster modes die out
+    there.
 
     Args:
-        time_s: (n,) ascending and evenly spaced, s.
-        offset_m: (n,) from rest, m.
+        time_s: (n,) ascending, evenly spaced times, s.
+        offset_m: (n,) deviations from rest, m.
 
     Returns:
-        Exponent of the envelope, 1/s, and frequency, rad/s; 0 rad/s with fewer than
-        three peaks.
+        Two values:
+
+        - growth rate of the envelope, 1/s
+        - frequency, rad/s; 0 if there are fewer than three peaks
     """
     later = time_s >= time_s[0] + 0.2 * (time_s[-1] - time_s[0])
     t, x = time_s[later], offset_m[later]
@@ -253,7 +262,7 @@ def fitted_oscillation(
     if len(peaks) < 3:
         slope = np.polyfit(t, np.log(np.maximum(size, 1e-300)), 1)[0]
         return float(slope), 0.0
-    # The vertex of the parabola through a peak and its neighbours.
+    # Vertex of the parabola through a peak and its neighbors.
     a, b, c = size[peaks - 1], size[peaks], size[peaks + 1]
     bend = np.maximum(2.0 * b - a - c, 1e-300)
     shift = 0.5 * (c - a) / bend

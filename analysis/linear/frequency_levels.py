@@ -1,17 +1,18 @@
-"""Frequencies at which a response reaches a level, found from its matrices.
+"""Search for the frequencies at which a frequency response reaches a level.
 
-A grid alone misses what happens between two of its points: a mode with a damping
-ratio of 1e-3 rises and falls within a thousandth of its frequency. Every level here
-is a real quadratic form of the response G,
+A frequency grid alone misses what happens between two of its points. For example, the
+peak of a mode with a damping ratio of 1e-3 is only a thousandth of its frequency wide.
+Here every level is a real quadratic form of the response G,
 
     a |G|^2 + 2 Re(b G) + c = 0,
 
-on the border of stability (s = j omega, or z = exp(j omega T)). Its left side equals a
-rational function of s or z whose zeros are the eigenvalues of a pencil of twice
-the order of G: the Hamiltonian pencil of Boyd, Balakrishnan and Kabamba (1989) in
-continuous time, the symplectic one in sampled time. The zeros on the border are the
-frequencies that are sought. Eigenvalues carry rounding errors, so they only say
-*where to look*: the callers evaluate G there and in between, and refine.
+on the border of stability (s = j omega, or z = exp(j omega T)). The left side equals a
+rational function of s or z. The zeros of this function are the eigenvalues of a matrix
+pencil of twice the order of G. In continuous time this is the Hamiltonian pencil of
+Boyd, Balakrishnan and Kabamba (1989), in sampled time the symplectic pencil. The zeros
+on the border are the wanted frequencies. Because of rounding errors, the eigenvalues
+only show *where to look*. The callers evaluate G at and between these frequencies, and
+refine the result.
 
 Sources: Boyd, Balakrishnan and Kabamba, "A bisection method for computing the
 H-infinity norm", Math. Control Signals Systems 2 (1989); Bruinsma and Steinbuch, "A
@@ -30,35 +31,38 @@ from scipy.optimize import brentq, minimize_scalar
 
 from analysis.models.linear_models import LinearModel
 
-#: Points of a grid for pictures, and of one that a search begins with.
+#: First: points of a grid for figures. Second: points of the first grid of a search.
 GRID_POINTS, SEARCH_POINTS = 1500, 100
-#: Further ones near the Nyquist frequency of a sampled response, as a share.
+#: Additional points near the Nyquist frequency of a sampled response, as a share.
 _CLOSE = 0.2
-#: The grid reaches at least so far, rad/s; a sampled one ends at Nyquist's frequency.
+#: The grid reaches at least from the first to the second frequency, rad/s. In sampled
+#: time the grid ends at the Nyquist frequency.
 _LOWEST, _HIGHEST = 1e-3, 1e3
-#: Points about the frequency of a mode, in units of its decay rate.
+#: Offsets of grid points from the frequency of a mode, in units of its decay rate.
 _ABOUT = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])
 #: Poles below this share of the fastest one count as integrators in the grid.
 _INTEGRATOR = 1e-7
-#: Shifts of the pencil are a factor of this or more apart.
+#: Smallest ratio of two neighboring shifts of the pencil.
 _SHIFT_RATIO = 30.0
-#: A peak is exact to this share.
+#: Relative accuracy of a peak.
 _PEAK = 1e-9
-#: A peak is found after two or three rounds; more would mean rounding errors.
+#: Largest number of rounds for a peak. Two or three usually suffice. More would be due
+#: to rounding errors.
 _ROUNDS = 20
 
 
 def s_plane(
     poles: NDArray[np.complex128], period_s: float | None
 ) -> NDArray[np.complex128]:
-    """Poles in the s plane; those at z = 0 (pure delays) are left out.
+    """Maps poles to the s plane and leaves out those at z = 0 (pure delays).
 
     Args:
-        poles: (n,) in the s plane, rad/s, or in the z plane where there is a period.
-        period_s: Sample period, s; none where time is continuous.
+        poles: (n,) poles: in the z plane if ``period_s`` is set, otherwise in the s
+            plane, rad/s.
+        period_s: Sample period, s. In continuous time: None.
 
     Returns:
-        (k,) rad/s.
+        (k,) poles in the s plane, rad/s.
     """
     poles = np.asarray(poles, dtype=complex)
     if not period_s:
@@ -74,16 +78,18 @@ def frequency_grid(
     lowest: float = _LOWEST,
     points: int = GRID_POINTS,
 ) -> NDArray[np.float64]:
-    """Frequencies that show every mode, for pictures and to begin a search.
+    """Returns frequencies that resolve every mode, for figures and to begin a search.
 
     Args:
-        poles: (n,) in the s plane, or in the z plane where there is a period.
-        period_s: Sample period, s; none where time is continuous.
-        lowest: The grid begins here or below the slowest mode, rad/s.
-        points: On a logarithmic scale, besides those about the modes.
+        poles: (n,) poles: in the z plane if ``period_s`` is set, otherwise in the s
+            plane.
+        period_s: Sample period, s. In continuous time: None.
+        lowest: The grid begins here, or below the slowest mode, rad/s.
+        points: Number of points on a logarithmic scale, besides those near the modes.
 
     Returns:
-        (k,) rising, rad/s, up to the Nyquist frequency or beyond the fastest mode.
+        (k,) ascending frequencies, rad/s. They end at the Nyquist frequency, or beyond
+        the fastest mode in continuous time.
     """
     s = s_plane(poles, period_s)
     size = np.abs(s)
@@ -94,7 +100,7 @@ def frequency_grid(
     )
     parts = [np.geomspace(low, high, points)]
     if period_s:
-        # Zeros near z = -1 turn the phase within the last thousandths.
+        # Zeros near z = -1 change the phase close to the Nyquist frequency.
         parts.append(high * (1.0 - np.geomspace(1e-2, 1e-7, round(_CLOSE * points))))
     middle, width = np.abs(s.imag)[:, None], np.abs(s.real)[:, None]
     parts += [(middle + width * _ABOUT).ravel(), (middle - width * _ABOUT).ravel()]
@@ -108,17 +114,18 @@ def frequency_grid(
 def level_frequencies(
     model: LinearModel, a: float, b: complex, c: float
 ) -> NDArray[np.float64]:
-    """Where a |G|^2 + 2 Re(b G) + c may vanish.
+    """Returns frequencies at which a |G|^2 + 2 Re(b G) + c may be zero.
 
     Args:
-        model: G, with one input and one output, and without poles on the border.
-        a: Weight of the squared modulus.
+        model: G, with one input and one output, and without poles on the border of
+            stability.
+        a: Weight of the squared magnitude.
         b: Weight of the response: 1 for its real part, -1j for its imaginary part.
-        c: The constant.
+        c: Constant term.
 
     Returns:
-        (k,) rising, rad/s: all frequencies at which it vanishes, to rounding, and
-        others; none outside (0, Nyquist frequency).
+        (k,) ascending frequencies between 0 and the Nyquist frequency, rad/s. All zeros
+        are among them, up to rounding errors. Not every frequency is a zero.
     """
     n, T = len(model.A), model.period_s
     if n == 0:
@@ -146,7 +153,7 @@ def level_frequencies(
         try:
             inverse = np.linalg.solve(M - at * N, N)
         except np.linalg.LinAlgError:
-            continue  # it vanishes at the shift, or everywhere
+            continue  # the form is zero at the shift, or everywhere
         mu = np.linalg.eigvals(inverse)
         points = at + 1.0 / mu[np.abs(mu) > 1e-300]
         found.append(np.abs(s_plane(points, T).imag))
@@ -157,7 +164,7 @@ def level_frequencies(
 
 
 def _balanced(model: LinearModel) -> tuple[NDArray[np.float64], ...]:
-    """A, B and C with states scaled alike."""
+    """A, B and C with the states scaled to similar magnitudes."""
     n = len(model.A)
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n], whole[:n, n:], whole[n:, :n] = model.A, model.B, model.C
@@ -166,7 +173,7 @@ def _balanced(model: LinearModel) -> tuple[NDArray[np.float64], ...]:
 
 
 def _shifts(model: LinearModel) -> list[float]:
-    """Frequencies of modes, thinned out: a shift is exact for what is near it."""
+    """Frequencies of some modes; a shift gives accurate eigenvalues near itself."""
     top = math.pi / model.period_s if model.period_s else math.inf
     size = np.sort(np.abs(s_plane(model.poles, model.period_s)))
     chosen: list[float] = []
@@ -177,13 +184,13 @@ def _shifts(model: LinearModel) -> list[float]:
 
 
 def with_middles(omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Frequencies with the geometric mean of neighbours in between.
+    """Adds the geometric mean between each two neighboring frequencies.
 
     Args:
-        omega: (k,) in any order, rad/s.
+        omega: (k,) frequencies in any order, rad/s.
 
     Returns:
-        (2 k - 1,) rising, rad/s, where no two are the same.
+        (2 k - 1,) ascending frequencies without duplicates, rad/s.
     """
     omega = np.unique(omega)
     return np.sort(np.concatenate((omega, np.sqrt(omega[:-1] * omega[1:]))))
@@ -193,15 +200,15 @@ def crossings(
     omega: NDArray[np.float64],
     function: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> list[float]:
-    """Where a function of frequency changes its sign.
+    """Returns the frequencies at which a function changes its sign.
 
     Args:
-        omega: (k,) rising, rad/s, with a point between any two zeros: those of
-            ``level_frequencies`` and their middles.
-        function: Of (m,) frequencies.
+        omega: (k,) ascending frequencies, rad/s. At least one must lie between any two
+            zeros. ``with_middles`` of ``level_frequencies`` satisfies this condition.
+        function: Function from (m,) frequencies, rad/s, to (m,) values.
 
     Returns:
-        Rising, rad/s.
+        Ascending frequencies, rad/s.
     """
     values = np.sign(function(omega))
     exact = [float(w) for w in omega[values == 0.0]]
@@ -222,18 +229,21 @@ def crossings(
 
 
 def peak(model: LinearModel, offset: float = 0.0) -> tuple[float, float]:
-    """Largest |G - offset| over all frequencies: the H-infinity norm.
+    """Returns the largest |G - offset| over all frequencies: the H-infinity norm.
 
-    Bruinsma and Steinbuch: the largest value so far is a level; where the response
-    passes it, and half way between, larger values are looked for.
+    The method is that of Bruinsma and Steinbuch. The largest value so far is a level.
+    The method then looks for larger values at the frequencies where the response
+    crosses this level, and half way between them.
 
     Args:
-        model: G, stable, with one input and one output.
-        offset: Real number that is taken off the response.
+        model: Stable G with one input and one output.
+        offset: Real number that is subtracted from the response.
 
     Returns:
-        The peak, and where it is, rad/s: 0 and infinity (a sampled response: the
-        Nyquist frequency) count too.
+        Two values:
+
+        - the peak
+        - its frequency, rad/s, from 0 to infinity or to the Nyquist frequency
     """
 
     def size(omega: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -271,7 +281,7 @@ def _refined(
     best: float,
     where: float,
 ) -> tuple[float, float]:
-    """The peak about a point of a grid."""
+    """Refines the peak near a grid point: value and frequency."""
     low, high = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
     if not low < high < math.inf:
         return best, where

@@ -1,4 +1,4 @@
-"""The four responses of a feedback loop: S, T, and those to load and to noise."""
+"""The four closed-loop responses S, T, PS and CS of a feedback loop."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model
 from analysis.models.operating_points import OperatingPoint
 
-#: Points of the frequency grid besides those of modes and peaks, and its lowest
-#: frequency, rad/s.
+#: First: points of the frequency grid, besides those at modes and peaks.
+#: Second: lowest frequency of the grid, rad/s.
 _POINTS, _LOWEST = 800, 1e-2
 
 
 @dataclass(frozen=True)
 class GangOfFour:
-    """Closed-loop responses over frequency, one direction."""
+    """Closed-loop frequency responses in one direction."""
 
     direction: Direction
     """Along the line to the source, or across it."""
     omega: NDArray[np.float64]
-    """(n,) rad/s, up to the Nyquist frequency; the modes and the peaks are in it."""
+    """(n,) frequencies with all modes and peaks, up to the Nyquist frequency, rad/s."""
     S: NDArray[np.complex128]
-    """(n,) what is left at the sensor of an error of its estimate."""
+    """(n,) sensitivity: from an estimation error to the remaining error."""
     T: NDArray[np.complex128]
-    """(n,) 1 - S."""
+    """(n,) complementary sensitivity 1 - S."""
     PS: NDArray[np.complex128]
-    """(n,) from an acceleration that disturbs P to where P is, m / (m/s^2)."""
+    """(n,) from an acceleration that disturbs P to the position of P, m / (m/s^2)."""
     CS: NDArray[np.complex128]
-    """(n,) from an error of the estimate to the acceleration, (m/s^2) / m."""
+    """(n,) from an estimation error to the acceleration, (m/s^2) / m."""
 
     @property
     def peaks(self) -> dict[str, float]:
-        """Largest size of each."""
+        """Largest magnitude of each response by name."""
         return {
             name: float(np.abs(getattr(self, name)).max())
             for name in ("S", "T", "PS", "CS")
@@ -44,14 +44,17 @@ class GangOfFour:
 
 
 def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangOfFour:
-    """Responses to errors that hearing makes and to pushes on the virtual mass.
+    """Returns the closed-loop frequency responses S, T, PS and CS in one direction.
+
+    The disturbances are errors of hearing, and accelerations of the virtual mass.
 
     Args:
-        point: The operating point.
-        direction: Of both.
+        point: Operating point.
+        direction: Direction of disturbances and responses: along the line to the
+            source, or across.
 
     Returns:
-        S, T and both others over frequency, up to the Nyquist frequency.
+        The responses, up to the Nyquist frequency.
     """
     cut = cut_model(point, "sensor", "actuator")
     whole = closed(cut, cut.input_names)
@@ -70,7 +73,7 @@ def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangO
     within = [omega for omega in peaks if 0.0 < omega <= grid[-1]]
     omega = np.union1d(grid, within)
     response = part.response(omega)
-    # What arrives at a cut is T-like: the error itself comes on top.
+    # The signal that arrives at a cut is -T times the error, without the error itself.
     T = -response[0, 0]
     return GangOfFour(
         direction=direction,

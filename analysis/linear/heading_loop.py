@@ -1,4 +1,4 @@
-"""Margins of the loop that turns a searching robot to its heading."""
+"""Stability margins of the heading loop of a robot that searches for the source."""
 
 from __future__ import annotations
 
@@ -22,20 +22,24 @@ from systems.heading.parameters import MotorDriverParameters
 
 @dataclass(frozen=True)
 class HeadingLoopMargins:
-    """Of the sampled loop, cut at the deviation; and of the same without sampling."""
+    """Margins of the loop that controls the heading, with and without sampling.
+
+    The loop is cut at the heading deviation. Fields without ``continuous`` in their
+    names belong to the sampled loop.
+    """
 
     tick_s: float
     crossover_rad_s: float
     phase_margin_deg: float
     delay_margin_s: float
-    """Time that the loop may be late besides, s."""
+    """Additional delay at which the loop becomes unstable, s."""
     delay_margin_ticks: float
     gain_margin_db: float
     continuous_phase_margin_deg: float
 
     @property
     def phase_lost_deg(self) -> float:
-        """What sampling costs, deg."""
+        """Loss of phase margin by sampling, deg."""
         return self.continuous_phase_margin_deg - self.phase_margin_deg
 
 
@@ -45,26 +49,32 @@ def heading_loop(
     lag_s: float,
     tick_s: float | None = TICK_S,
 ) -> LinearModel:
-    """The open loop from the deviation to the heading, while it drives ahead.
+    """Returns the open loop from heading deviation to heading of a driving robot.
 
-    PID (Song 2011, table 1), duties v +- 0.01 e (table 2, mended), motors with a lag,
-    and the heading that comes of the wheels' difference. Within L and all limits it is
-    linear in the deviation: what the wheels have in common does not turn.
+    The loop has these parts:
+
+    - PID controller with the output e (Song 2011, table 1)
+    - duties v +- 0.01 e of the two wheels (table 2, corrected)
+    - motors with a first-order lag
+    - heading as the integral of the difference of the wheel speeds
+
+    As long as no limit is reached, the loop is linear in the deviation. The common
+    speed of the wheels does not turn the robot.
 
     Args:
-        motors: Speed at full duty.
-        robot: Track of the wheels.
-        lag_s: Of the motors, s.
-        tick_s: Period of controller and motors, which hold their output, s; None:
-            without sampling.
+        motors: Parameters with the speed at full duty.
+        robot: Parameters with the distance between the wheels.
+        lag_s: Motor lag, s.
+        tick_s: Period in which controller and motors hold their outputs, s. With None
+            the loop is continuous.
 
     Returns:
-        One input and one output, deg; feedback is negative.
+        Loop with one input and one output, both in deg, for negative feedback.
     """
     full = min(motors.full_speed_m_s, robot.top_speed_m_s)
     turn = math.degrees(2.0 * 0.01 * full / robot.wheel_separation_m)
-    # The states are written down one by one: transfer functions of so short a tick are
-    # ill-conditioned.
+    # The matrices are written by hand, because transfer functions are ill-conditioned
+    # for such a short period.
     parts = _sampled if tick_s else _continuous
     A, B, C, D = parts(turn, lag_s, tick_s or 0.0)
     return LinearModel(
@@ -86,9 +96,10 @@ _Matrices = tuple[
 
 
 def _continuous(turn: float, lag_s: float, _: float) -> _Matrices:
-    """States: integral of the deviation, heading, and its rate where motors lag.
+    """Matrices with the states: integral of the deviation, heading, and heading rate.
 
-    The derivative of the deviation is taken into the heading or its rate.
+    Without motor lag there is no heading rate. The derivative action enters the heading
+    (or the heading rate) directly.
     """
     kp, ki, kd = PROPORTIONAL, INTEGRAL_1_S, DIFFERENTIAL_S
     one = np.ones((1, 1))
@@ -105,10 +116,10 @@ def _continuous(turn: float, lag_s: float, _: float) -> _Matrices:
 
 
 def _sampled(turn: float, lag_s: float, tick_s: float) -> _Matrices:
-    """States: integral of the PID, last deviation, heading, and its rate."""
+    """Matrices with states: integral, last deviation, heading, and heading rate."""
     kp, ki, kd = PROPORTIONAL, INTEGRAL_1_S, DIFFERENTIAL_S
     keep = math.exp(-tick_s / lag_s) if lag_s > 0.0 else 0.0
-    # Heading and rate after a tick, by the rate at its beginning and by the command.
+    # Heading and rate after one period, by the initial rate and by the command.
     coast = lag_s * (1.0 - keep)
     moved = turn * np.array([[tick_s - coast], [1.0 - keep]])
     pid = np.array([[1.0, -kd / tick_s]])
@@ -127,16 +138,16 @@ def heading_loop_margins(
     lag_s: float,
     tick_s: float = TICK_S,
 ) -> HeadingLoopMargins:
-    """Margins of ``heading_loop``.
+    """Returns the margins of ``heading_loop``.
 
     Args:
-        motors: Speed at full duty.
-        robot: Track of the wheels.
-        lag_s: Of the motors, s.
+        motors: Parameters with the speed at full duty.
+        robot: Parameters with the distance between the wheels.
+        lag_s: Motor lag, s.
         tick_s: Period of controller and motors, s.
 
     Returns:
-        The margins; the gain margin is infinite where no gain is too much.
+        The margins. If no gain makes the loop unstable, the gain margin is infinite.
     """
     parts = motors, robot, lag_s
     found = loop_margins(heading_loop(*parts, tick_s))

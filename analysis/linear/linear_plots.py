@@ -1,4 +1,4 @@
-"""Pictures of operating points, of loops, and of what uncertainty does to poles."""
+"""Figures of operating points, loops, and pole clouds of uncertain parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from analysis.models.ideal_loop import ideal_loop
 from analysis.reporting.palette import COLOURS, draw_grid
 from systems.world.geometry import rectangle_corners
 
-#: How each kind is drawn: marker, colour, title.
+#: Marker, color and title of each kind of equilibrium.
 _KINDS = {
     "sink": ("o", COLOURS["robot"], "sink"),
     "saddle": ("X", COLOURS["echo"], "saddle"),
@@ -32,7 +32,7 @@ _KINDS = {
 
 
 def plot_equilibria(search: EquilibriumSearch) -> Figure:
-    """Bodies, directions of the force on P at rest, and all equilibria."""
+    """Plots bodies, directions of the force on P at rest, and all equilibria."""
     figure = Figure(figsize=(8.2, 6.2), layout="constrained")
     axes = figure.subplots()
     x0, x1, y0, y1 = search.area_m
@@ -84,7 +84,7 @@ def plot_equilibria(search: EquilibriumSearch) -> Figure:
 
 
 def plot_step(check: StepCheck) -> Figure:
-    """Distance from the source after a small step: predicted, and in both builds."""
+    """Plots the distance from the source after a step: predicted and simulated."""
     figure = Figure(figsize=(7.5, 3.8), layout="constrained")
     axes = figure.subplots()
     if check.full_m is not None:
@@ -117,12 +117,12 @@ def plot_step(check: StepCheck) -> Figure:
 
 
 _CYCLE = ("#0072B2", "#D55E00", "#009E73", "#A8498A", "#7A5200", "#3A9AD0")
-#: Part of the plane about -1 that is shown.
+#: Limits of a Nyquist diagram.
 _NYQUIST_X, _NYQUIST_Y = (-3.2, 1.2), (-2.2, 2.2)
-#: Phases below this are beyond all that a Bode diagram is read for, deg.
+#: Lowest phase in a Bode diagram, deg.
 _LOWEST_PHASE_DEG = -720.0
-#: Closed-loop sizes, dB, and about where each is written: phase, deg, and size, dB.
-#: Left of -180 deg, where few loops pass.
+#: Contours of closed-loop magnitude, dB, with the position of each label: phase, deg,
+#: and magnitude, dB. The labels are left of -180 deg, where few loops pass.
 _CONTOURS_DB = {
     -12.0: (-330.0, -9.8),
     -6.0: (-330.0, -0.6),
@@ -136,7 +136,7 @@ _CONTOURS_DB = {
 
 
 def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
-    """Size and phase of each loop; crossovers with their phase margins."""
+    """Plots magnitude and phase of each loop, and crossovers with phase margins."""
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     lowest = -360.0
@@ -168,7 +168,7 @@ def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
 
 
 def plot_nyquist(loops: Sequence[LoopMargins]) -> Figure:
-    """Each loop about -1, with the balanced disk that it stays out of."""
+    """Plots each loop near -1, with the disk of skew 0 that the loop does not enter."""
     figure, cells = panels(len(loops), columns=3, size=(3.6, 3.8))
     for axes, loop in zip(cells, loops, strict=True):
         L = loop.response.L
@@ -200,12 +200,12 @@ def plot_nyquist(loops: Sequence[LoopMargins]) -> Figure:
 def panels(
     count: int, *, columns: int, size: tuple[float, float]
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of rows of panels; places that are left over stay empty.
+    """Creates a figure with rows of panels. Unused places of the last row stay empty.
 
     Args:
         count: Number of panels.
-        columns: Most panels in a row.
-        size: Of a panel, inches.
+        columns: Largest number of panels in a row.
+        size: Width and height of a panel, inches.
 
     Returns:
         The figure, and its panels row by row.
@@ -224,7 +224,7 @@ def _size_db(L: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 
 def _phase_deg(response: FrequencyResponse) -> NDArray[np.float64]:
-    """(n,) continuous, in the turn in which a loop's crossover is looked for."""
+    """(n,) continuous phase, shifted by full turns to the range near the crossover."""
     omega = response.omega
     phase: NDArray[np.float64] = np.degrees(np.unwrap(np.angle(response.L)))
     middle = np.interp(math.sqrt(omega[0] * omega[-1]), omega, phase)
@@ -232,13 +232,13 @@ def _phase_deg(response: FrequencyResponse) -> NDArray[np.float64]:
 
 
 def _disk_ends(alpha: float) -> tuple[float, float]:
-    """Where the disk of skew 0 meets the real axis, left and right of -1."""
+    """Points left and right of -1 at which the disk of skew 0 meets the real axis."""
     left = -(2.0 + alpha) / (2.0 - alpha) if alpha < 2.0 else -1e3
     return left, -(2.0 - alpha) / (2.0 + alpha)
 
 
 def plot_nichols(loops: Sequence[LoopMargins]) -> Figure:
-    """Size against phase, over contours of equal closed-loop size."""
+    """Plots magnitude against phase, over contours of equal closed-loop magnitude."""
     figure = Figure(figsize=(7.5, 5.6), layout="constrained")
     axes = figure.subplots()
     _contours(axes)
@@ -273,7 +273,7 @@ def _contours(axes: Axes) -> None:
 
 
 def plot_gang_of_four(gang: GangOfFour) -> Figure:
-    """Sizes of S, T, PS and CS."""
+    """Plots the magnitudes of S, T, PS and CS."""
     figure = Figure(figsize=(8.0, 5.4), layout="constrained")
     titles = {
         "S": "S: remaining error of the estimate",
@@ -288,7 +288,7 @@ def plot_gang_of_four(gang: GangOfFour) -> Figure:
         axes.loglog(gang.omega, np.maximum(size, 1e-9), color=_CYCLE[0])
         peak = int(size.argmax())
         axes.plot(gang.omega[peak], size[peak], "o", color=COLOURS["source"])
-        # To the left of a peak at the right border.
+        # The label is on the left of a peak that is near the right border.
         at_border = gang.omega[peak] > 0.3 * gang.omega[-1]
         axes.annotate(
             f"{size[peak]:.2f}",
@@ -310,12 +310,12 @@ def _cycle(loops: Sequence[LoopMargins]) -> list[str]:
     return [_CYCLE[k % len(_CYCLE)] for k in range(len(loops))]
 
 
-#: Faster poles than this do not shape the motion and are not shown, 1/s.
+#: Poles faster than this hardly affect the motion and are not shown, 1/s.
 _SLOW_1_S = 12.0
 
 
 def plot_pole_cloud(cloud: PoleCloud) -> Figure:
-    """Poles over the box, in the s plane (ln z / T), with the worst case."""
+    """Plots the poles ln(z)/T of all samples, with the nominal and the worst case."""
     figure = Figure(figsize=(8.0, 4.4), layout="constrained")
     axes = figure.subplots()
     everything = _s(cloud, np.concatenate(cloud.poles))
@@ -354,7 +354,16 @@ def _s(cloud: PoleCloud, poles: NDArray[np.complex128]) -> NDArray[np.complex128
 
 
 def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
-    """What each parameter's interval does to the slowest pole, to first order."""
+    """Plots the change of the slowest pole over each parameter's interval.
+
+    The change is computed to first order.
+
+    Args:
+        rows: Sensitivities, one per parameter.
+
+    Returns:
+        The figure.
+    """
     figure = Figure(figsize=(8.0, 0.4 * len(rows) + 1.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     ordered = sorted(rows, key=lambda row: abs(row.per_interval))

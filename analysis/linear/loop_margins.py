@@ -1,9 +1,9 @@
-"""Margins of a loop: gain, phase, modulus, disk, and delay at its crossovers.
+"""Stability margins of a loop: gain, phase, modulus, disk and delay margins.
 
-Crossovers and peaks come from the loop's matrices (``frequency_levels``), in
-continuous time or sampled alike, so none is missed between two points of a grid or
-beyond its ends. Gain and phase count in both directions: a loop whose plant is
-unstable without feedback is lost by too little gain.
+The matrices of the loop give the crossovers and peaks (``frequency_levels``), in
+continuous and in sampled time. Therefore no crossover or peak is missed between two
+points of a frequency grid or outside the grid. Gain and phase margins are two-sided,
+because a loop with an unstable plant also becomes unstable if its gain is too low.
 """
 
 from __future__ import annotations
@@ -35,39 +35,43 @@ from analysis.models.open_loops import (
 from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
 
-#: Skews of the disks: guards gain reduction, both alike, gain increase.
+#: Skews of the disk margins, for gain reduction (-1), for reduction and increase alike
+#: (0), and for gain increase (1).
 SKEWS = (-1.0, 0.0, 1.0)
-#: A response below this everywhere is no loop.
+#: If |L| is below this at all frequencies, there is no loop.
 _NO_LOOP = 1e-9
 
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """A loop over frequency."""
+    """Frequency response of a loop."""
 
     omega: NDArray[np.float64]
-    """(n,) rad/s."""
+    """(n,) frequencies, rad/s."""
     L: NDArray[np.complex128]
-    """(n,) loop transfer function."""
+    """(n,) values of the loop transfer function."""
 
 
 @dataclass(frozen=True)
 class DiskMargin:
-    """The largest disk of gain and phase changes that the loop stands.
+    """Disk margin: largest disk of gain and phase changes that keeps the loop stable.
 
-    L times any factor (1 + (1 - skew)/2 d)/(1 - (1 + skew)/2 d) with a complex
-    |d| < alpha stays stable (Seiler, Packard and Gahinet 2020).
+    The loop stays stable if L is multiplied by any factor
+
+        (1 + (1 - skew)/2 d) / (1 - (1 + skew)/2 d)
+
+    with a complex |d| < alpha (Seiler, Packard and Gahinet 2020).
     """
 
     skew: float
-    """Of the disk: 0 for gain and phase changes alike to both sides."""
+    """Skew of the disk. With 0, gain increase and gain reduction count alike."""
     alpha: float
-    """Size of the disk; 0 where the closed loop is unstable."""
+    """Size of the disk. If the closed loop is unstable: 0."""
     frequency_rad_s: float
-    """Where the loop is nearest to the disk, rad/s."""
+    """Frequency at which the loop is nearest to the disk, rad/s."""
 
     def to_dict(self) -> dict[str, float]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         names = (
             "skew", "alpha", "gain_low", "gain_high", "gain_margin_db",
             "phase_margin_deg", "frequency_rad_s",
@@ -76,23 +80,23 @@ class DiskMargin:
 
     @property
     def gain_low(self) -> float:
-        """Factor to which the gain may fall; 0 where it may vanish."""
+        """Smallest permitted gain factor; 0 if the gain may vanish."""
         return max(0.0, self._ends[0])
 
     @property
     def gain_high(self) -> float:
-        """Factor to which the gain may grow; infinite where any may."""
+        """Largest permitted gain factor; infinite without a limit."""
         return self._ends[1]
 
     @property
     def gain_margin_db(self) -> float:
-        """Gain may change by this much either way, dB: the lesser of both."""
+        """Permitted change of the gain in either direction, dB."""
         return _least_db(self.gain_low, self.gain_high)
 
     @property
     def phase_margin_deg(self) -> float:
-        """Phase may change by this much either way, deg."""
-        # Where |d| = alpha meets the factors exp(j phase).
+        """Permitted change of the phase in either direction, deg."""
+        # Phase at which the circle |d| = alpha gives the factor exp(j phase).
         if self.alpha == math.inf:
             return math.inf
         squared = self.alpha**2
@@ -102,7 +106,7 @@ class DiskMargin:
 
     @property
     def _ends(self) -> tuple[float, float]:
-        """Where the disk of factors meets the real axis."""
+        """Gain factors at which the disk meets the real axis: smallest and largest."""
         if self.alpha == math.inf:
             return -math.inf, math.inf
         less, more = self.alpha * (1.0 - self.skew), self.alpha * (1.0 + self.skew)
@@ -112,101 +116,115 @@ class DiskMargin:
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """How much a loop stands before it is unstable.
+    """Stability margins of a loop.
 
-    One that is unstable already stands nothing: factors 1, and 0 of all else.
+    If the closed loop is unstable, both gain margins are 1, and all other margins are
+    0.
     """
 
     name: str
-    """Of the loop."""
+    """Name of the loop."""
     stable: bool
-    """Whether the closed loop is."""
+    """Whether the closed loop is stable."""
     gain_increase_margin: float
-    """Factor below which the gain may grow; infinite where any may."""
+    """Gain factor above 1 at which the loop becomes unstable; infinite if none does."""
     gain_reduction_margin: float
-    """Factor above which the gain may fall; 0 where it may all but vanish."""
+    """Gain factor below 1 at which the loop becomes unstable; 0 if none does."""
     phase_lag_margin_deg: float
-    """Least lag at a gain crossover that is too much, deg; infinite without one."""
+    """Smallest destabilizing phase lag at a gain crossover, deg; infinite if none."""
     phase_lead_margin_deg: float
-    """Least lead at a gain crossover that is too much, deg; infinite without one."""
+    """Smallest destabilizing phase lead at a gain crossover, deg; infinite if none."""
     crossover_rad_s: float
-    """The gain crossover of the phase margin, rad/s; not a number without one."""
+    """Gain crossover of the phase margin, rad/s. Without a crossover: NaN."""
     delay_margin_s: float
-    """Least phase lag to -180 deg over frequency at a gain crossover, s. Exact
-    in continuous time; see ``analysis.linear.delay_margin`` for sampled loops."""
+    """Delay margin, s: smallest ratio of phase lag margin, rad, to frequency, rad/s,
+    over all gain crossovers. The value is exact in continuous time. For sampled loops
+    see ``analysis.linear.delay_margin``."""
     modulus_margin: float
-    """Least distance of L from -1."""
+    """Smallest distance of L from -1."""
     modulus_frequency_rad_s: float
-    """Where that is, rad/s."""
+    """Frequency of the modulus margin, rad/s."""
     sensitivity_peak: float
-    """M_s, largest |S|."""
+    """Largest |S| (M_s)."""
     complementary_peak: float
-    """M_t, largest |T|."""
+    """Largest |T| (M_t)."""
     disks: tuple[DiskMargin, ...]
-    """One for each of ``SKEWS``."""
+    """One disk margin for each of ``SKEWS``."""
     model: LinearModel = field(repr=False)
-    """L."""
+    """Loop transfer function L."""
 
     @cached_property
     def response(self) -> FrequencyResponse:
-        """For pictures."""
+        """Frequency response for figures."""
         return frequency_response(self.model)
 
     @property
     def gain_increase_margin_db(self) -> float:
-        """How far the gain may grow, dB."""
+        """Gain increase at which the loop becomes unstable, dB."""
         return _least_db(0.0, self.gain_increase_margin)
 
     @property
     def gain_reduction_margin_db(self) -> float:
-        """How far the gain may fall, dB; positive."""
+        """Gain reduction at which the loop becomes unstable, dB; positive."""
         return _least_db(self.gain_reduction_margin, math.inf)
 
     @property
     def gain_margin_db(self) -> float:
-        """Least change of the gain, up or down, that is too much, dB."""
+        """Smallest destabilizing change of the gain, up or down, dB."""
         return _least_db(self.gain_reduction_margin, self.gain_increase_margin)
 
     @property
     def phase_margin_deg(self) -> float:
-        """Least change of the phase, lag or lead, that is too much, deg."""
+        """Smallest destabilizing change of the phase, lag or lead, deg."""
         return min(self.phase_lag_margin_deg, self.phase_lead_margin_deg)
 
     @property
     def disk(self) -> DiskMargin:
-        """The balanced disk."""
+        """Disk margin with skew 0."""
         return next(disk for disk in self.disks if disk.skew == 0.0)
 
 
 def _least_db(low: float, high: float) -> float:
-    """The nearer end of an interval of gain factors about 1, dB."""
+    """Smaller distance from 1 to either end of an interval of gain factors, dB."""
     down = 20.0 * math.log10(1.0 / low) if low > 0.0 else math.inf
     return min(down, 20.0 * math.log10(high))
 
 
 def frequency_response(model: LinearModel) -> FrequencyResponse:
-    """Response of a loop over all frequencies that count, for pictures."""
+    """Returns the frequency response of a loop for figures.
+
+    The frequencies include all modes of the open and of the closed loop.
+
+    Args:
+        model: Loop with one input and one output.
+
+    Returns:
+        The response.
+    """
     omega = _grid(model, GRID_POINTS)
     return FrequencyResponse(omega, model.response(omega)[0, 0])
 
 
 def _grid(model: LinearModel, points: int) -> NDArray[np.float64]:
-    """Frequencies with the modes of the open and of the closed loop."""
+    """(n,) frequencies, rad/s, that show the modes of the open and the closed loop."""
     poles = np.concatenate((model.poles, np.linalg.eigvals(_closed_matrix(model))))
     return frequency_grid(poles, model.period_s, points=points)
 
 
 def is_loop(model: LinearModel) -> bool:
-    """Whether anything comes back: a response of rounding errors has no margins."""
+    """Whether any signal comes back: |L| is more than rounding errors."""
     omega = _grid(model, SEARCH_POINTS)
     return bool(np.abs(model.response(omega)[0, 0]).max() > _NO_LOOP)
 
 
 def loop_margins(model: LinearModel) -> LoopMargins:
-    """All margins of a loop with one input and one output.
+    """Computes all margins of a loop with one input and one output.
 
     Args:
-        model: L, in the convention of negative feedback.
+        model: Loop transfer function L for negative feedback.
+
+    Returns:
+        The margins.
 
     Raises:
         InputError: The model has several inputs or outputs.
@@ -223,7 +241,7 @@ def loop_margins(model: LinearModel) -> LoopMargins:
     omega = _grid(model, SEARCH_POINTS)
     upper, lower = _gain_margins(model, T, omega)
     lag, lead, crossover, delay = _phase_margins(model, T, omega)
-    # S = 1 - T, and the disk of a skew is the least of 1/|S + (skew - 1)/2|.
+    # S = 1 - T, and the disk of a skew is the smallest 1/|S + (skew - 1)/2|.
     peaks = [peak(T, (1.0 + skew) / 2.0) for skew in SKEWS]
     disks = tuple(
         DiskMargin(skew, 1.0 / largest if largest > 0.0 else math.inf, where)
@@ -249,7 +267,7 @@ def loop_margins(model: LinearModel) -> LoopMargins:
 
 
 def _nothing(model: LinearModel) -> LoopMargins:
-    """Of a closed loop that is unstable."""
+    """Margins of an unstable closed loop."""
     return LoopMargins(
         name=model.name,
         stable=False,
@@ -269,7 +287,7 @@ def _nothing(model: LinearModel) -> LoopMargins:
 
 
 def _closed_matrix(model: LinearModel) -> NDArray[np.float64]:
-    """(n, n) A of the closed loop."""
+    """(n, n) matrix A of the closed loop."""
     return model.A - model.B @ model.C / (1.0 + model.D[0, 0])
 
 
@@ -281,7 +299,7 @@ def _closed_is_stable(model: LinearModel) -> bool:
 
 
 def _complementary(model: LinearModel) -> LinearModel:
-    """T = L/(1 + L); it has no poles on the border where the loop is stable."""
+    """T = L/(1 + L). If the loop is stable, T has no poles on the stability border."""
     share = 1.0 / (1.0 + model.D[0, 0])
     return replace(
         model,
@@ -295,13 +313,16 @@ def _complementary(model: LinearModel) -> LinearModel:
 def _gain_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Least factor above 1, and greatest below, that puts a pole on the border."""
+    """Returns two gain factors that put a pole on the stability border.
+
+    The first is the smallest above 1, the second the largest below 1.
+    """
     # L is real where T is.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, -1j, 0.0))))
     at = crossings(found, lambda w: model.response(w)[0, 0].imag)
     values = list(model.response(at)[0, 0].real) if at else []
-    # At both ends of the border L is real, too. T tells a loop that integrates, and
-    # is without end at rest: no gain above 0 is too small.
+    # L is also real at both ends of the border. An integrating loop has T = 1 at zero
+    # frequency, where L is infinite: no gain above 0 is too small.
     ends = [0.0, math.pi / T.period_s] if T.period_s else [0.0]
     values += [
         t / (1.0 - t) for t in T.response(ends)[0, 0].real if abs(1.0 - t) > _NO_LOOP
@@ -321,41 +342,56 @@ def _gain_margins(
 def _phase_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """Least lag and lead, rad, where the lesser is, rad/s, and least delay, s."""
-    # |L| = 1 where the real part of T is a half.
+    """Returns phase and delay margins as four numbers.
+
+    The numbers are:
+
+    - smallest lag, rad
+    - smallest lead, rad
+    - frequency of the smaller of both, rad/s
+    - smallest delay, s
+    """
+    # |L| = 1 where the real part of T is 1/2.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))
     at = crossings(found, lambda w: np.abs(model.response(w)[0, 0]) - 1.0)
     lag, lead, where, delay = math.inf, math.inf, math.nan, math.inf
     for w, L in zip(at, model.response(at)[0, 0] if at else (), strict=True):
-        behind = float(np.angle(-L)) % math.tau  # lag that leads to -1
+        behind = float(np.angle(-L)) % math.tau  # lag that turns L to -1
         ahead = math.tau - behind
         if min(behind, ahead) < min(lag, lead):
             where = w
         lag, lead = min(lag, behind), min(lead, ahead)
         delay = min(delay, behind / w)
     if not model.period_s and abs(model.D[0, 0]) >= 1.0:
-        # Crossovers without end: no delay is short enough.
+        # There are crossovers at arbitrarily high frequencies: any delay destabilizes.
         delay = 0.0
     return lag, lead, where, delay
 
 
 @dataclass(frozen=True)
 class PointMargins:
-    """The margins of every cut loop at an operating point."""
+    """Margins of one cut loop at an operating point."""
 
     at: BreakPoint
-    """Where the loop is cut."""
+    """Signal at which the loop is cut."""
     direction: Direction
-    """Along the line to the source, or across it."""
+    """Direction of the cut: along the line to the source, or across."""
     margins: LoopMargins
-    """Of that loop; the other direction is closed."""
+    """Margins of this loop. The loop of the other direction is closed."""
 
 
 def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:
-    """Margins at sensor, actuator and wheels, along and across.
+    """Computes the stability margins with the loop cut at sensor, actuator and wheels.
 
-    Loops that do not exist are left out: at the follow distance of a law that
-    does not push, nothing pulls P to the side.
+    Each cut gives two loops: along the line to the source, and across this line. Loops
+    that do not exist are left out. For example, without repulsion no force acts across
+    the line at the follow distance.
+
+    Args:
+        point: Operating point.
+
+    Returns:
+        Margins of all existing loops.
     """
     found = []
     for at in BREAK_POINTS:

@@ -1,4 +1,4 @@
-"""What is uncertain about the robot, and the loops that it goes into."""
+"""Uncertain parameters of the robot, and the loops that they change."""
 
 from __future__ import annotations
 
@@ -20,21 +20,34 @@ from diagrams import Scenario
 from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 
-#: Temperatures between which the speed of sound is not known, deg C.
+#: Range of air temperatures, which bounds the speed of sound, deg C.
 _TEMPERATURES_C = (5.0, 35.0)
 
 
 def following_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
-    """The box of parameters of the loop that follows the source."""
+    """Returns the uncertain parameters of the loop that follows the source.
+
+    Args:
+        scenario: Scenario with the nominal values.
+
+    Returns:
+        Parameters with their intervals.
+    """
     common = (p for p in _common(scenario) if p.name != "extra_ticks")
     return (*common, _sound_speed(scenario))
 
 
 def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
-    """The box of parameters of the loop that rests against an obstacle.
+    """Returns the uncertain parameters of the loop that rests against an obstacle.
+
+    Args:
+        scenario: Scenario with the nominal values.
+
+    Returns:
+        Parameters with their intervals.
 
     Raises:
-        InputError: The law has no spring to obstacles.
+        InputError: The repulsion does not grow as the obstacle comes nearer.
     """
     stiffness = law_stiffness(scenario)
     if stiffness <= 0.0:
@@ -63,7 +76,7 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
         ),
     )  # fmt: skip
     return (
-        # What is absent is not uncertain.
+        # Zero means that the robot has no such spring, damper or lag.
         *(_share(*row) for row in shares if row[3] > 0.0),
         UncertainParameter(
             "wheel_radius_share",
@@ -109,18 +122,23 @@ def _sound_speed(scenario: Scenario) -> UncertainParameter:
 
 
 def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
-    """The scenario with uncertain parameters at given values.
+    """Returns the scenario with uncertain parameters at given values.
 
-    Names with a dot are fields. ``wheel_radius_share`` acts as negative slip,
-    which the encoders do not see; ``sound_speed_m_s`` on the slope of the range
-    and so on the attraction's spring. Others are not the scenario's.
+    The name of a parameter determines its effect:
+
+    - A name with a dot is a field of the scenario.
+    - ``wheel_radius_share`` acts as negative slip of the wheels, which the encoders do
+      not measure.
+    - ``sound_speed_m_s`` changes the slope of the estimated range, and so the stiffness
+      of the attraction's spring.
+    - All other names are ignored here.
 
     Args:
-        scenario: The nominal one; it stays as it is.
-        values: By name of the parameter, in its SI unit.
+        scenario: Scenario with the nominal values. It is not changed.
+        values: Values by name of the parameter, in SI units.
 
     Returns:
-        A copy, validated.
+        A validated copy.
     """
     data = scenario.model_dump()
     for name, value in values.items():
@@ -139,18 +157,22 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
 
 
 def range_slope(scenario: Scenario, true_speed: float) -> float:
-    """d(estimated range)/d(true range) at the follow distance, straight ahead.
+    """Returns the slope d(estimated range)/d(true range) for a source straight ahead.
 
-    With l the half length of the row, R the range and h^2 = R^2 + l^2, a delay
-    that is read with k times the true speed of sound gives the range
-    l^2/(2 k (h - R)) - k (h - R)/2, whose slope is ((h + R)/k + k (h - R))/(2 h).
+    The slope is that at the follow distance. Let l be half the length of the microphone
+    row, R the range, h^2 = R^2 + l^2, and k the believed over the true speed of sound.
+    From the measured delay the estimator computes the range
+
+        l^2/(2 k (h - R)) - k (h - R)/2.
+
+    The slope of this range is ((h + R)/k + k (h - R))/(2 h).
 
     Args:
-        scenario: Its speed of sound is the believed one.
-        true_speed: Of the air, m/s.
+        scenario: Scenario with the believed speed of sound.
+        true_speed: True speed of sound, m/s.
 
     Returns:
-        A ratio; 1 where the believed speed is the true one.
+        The slope, without unit. It is 1 if the believed speed is the true speed.
     """
     k = scenario.believed_sound_speed_m_s / true_speed
     half = max(abs(y) for _, y in scenario.only.robot.microphones_m)
@@ -160,12 +182,22 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
 
 
 def law_stiffness(scenario: Scenario) -> float:
-    """Largest slope -df/dc of the law at rest, N/m."""
+    """Returns the largest slope -df/dc of the law for an obstacle at rest, N/m."""
     return float(np.max(-np.diff(radial_law(scenario).forces_n)) / DISTANCE_STEP_M)
 
 
 def contact_poles(scenario: Scenario) -> PoleFunction:
-    """Poles of the radial motion where the law is stiffest, in the z plane."""
+    """Returns a function for the z-plane poles of the motion towards an obstacle.
+
+    The motion is straight towards the obstacle (contact mode), at the distance where
+    the repulsion is stiffest.
+
+    Args:
+        scenario: Scenario with the nominal values.
+
+    Returns:
+        Function from parameter values to poles.
+    """
 
     def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:
         changed = with_values(scenario, values)
@@ -181,14 +213,18 @@ def contact_poles(scenario: Scenario) -> PoleFunction:
 
 
 def following_poles(at: OperatingPoint) -> PoleFunction:
-    """Poles of P's motion about an equilibrium, as it moves with the parameters.
+    """Returns a function for the z-plane poles of the motion about an equilibrium.
 
-    Those that are neutral are left out. A latency of hearing is no parameter
-    here: odometry places what is heard, so that it delays the source's motion
-    and not the loop's own.
+    The equilibrium moves with the parameters. Neutral poles (z = 1) are left out. The
+    latency of hearing is not a parameter here. Odometry assigns each measurement to the
+    pose at which the sound was heard. A latency therefore delays the source's motion,
+    but not the motion of the loop.
 
     Args:
-        at: The equilibrium at the nominal values.
+        at: Equilibrium at the nominal values.
+
+    Returns:
+        Function from parameter values to poles.
     """
 
     def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:

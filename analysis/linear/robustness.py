@@ -1,8 +1,8 @@
-"""What uncertain parameters do to the poles of a sampled loop.
+"""Effects of uncertain parameters on the poles of a sampled loop.
 
-The loop is given as a function from parameter values to poles in the z plane,
-so that the same code serves every operating point. Nothing here knows what the
-parameters mean.
+A function from parameter values to poles in the z plane represents the loop. The same
+code therefore serves every operating point, and does not depend on the meaning of the
+parameters.
 """
 
 from __future__ import annotations
@@ -15,31 +15,31 @@ from numpy.typing import NDArray
 
 from systems.framework.input_error import InputError
 
-#: Poles in the z plane at given values of the parameters, by name; those that are
-#: neutral whatever the values are (the heading at rest) are left out.
+#: Function from parameter values by name to poles in the z plane. Poles that are
+#: neutral at all values (the heading at rest) are left out.
 PoleFunction = Callable[[Mapping[str, float]], NDArray[np.complex128]]
 
-#: Step of a difference quotient, as a share of the parameter's interval.
+#: Step of the finite differences, as a share of the parameter's interval.
 _STEP = 1e-3
 
 
 @dataclass(frozen=True)
 class UncertainParameter:
-    """A number that is known within an interval."""
+    """Parameter that is known only to lie in an interval."""
 
     name: str
-    """Field of the scenario, or what else it is."""
+    """Field of the scenario, or another name that the pole function knows."""
     symbol: str
     unit: str
     nominal: float
     low: float
-    """Least value; not above the nominal one."""
+    """Smallest value; not above the nominal value."""
     high: float
-    """Greatest value; not below the nominal one."""
+    """Largest value; not below the nominal value."""
     reason: str
-    """Why the interval is as it is."""
+    """Reason for the width of the interval."""
     whole: bool = False
-    """Whether it is a whole number."""
+    """Whether the parameter is a whole number."""
 
     def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high or self.low == self.high:
@@ -52,72 +52,81 @@ class UncertainParameter:
 
 @dataclass(frozen=True)
 class PoleCloud:
-    """Poles over the box of all uncertain parameters."""
+    """Poles over all combinations of uncertain parameters."""
 
     period_s: float
-    """From which to which state the poles lead, s."""
+    """Sampling period, s."""
     parameters: tuple[UncertainParameter, ...]
     nominal_poles: NDArray[np.complex128]
-    """z plane."""
+    """Poles at the nominal values, in the z plane."""
     values: NDArray[np.float64]
-    """(samples, parameters)."""
+    """(samples, parameters) random values."""
     poles: tuple[NDArray[np.complex128], ...]
-    """z plane, for each sample."""
+    """Poles of each sample, in the z plane."""
     worst_values: dict[str, float]
-    """Where the slowest decay, or the fastest growth, was found."""
+    """Values with the slowest decay, or the fastest growth, that was found."""
     worst_poles: NDArray[np.complex128]
 
     @property
     def radii(self) -> NDArray[np.float64]:
-        """(samples,) largest modulus of a pole."""
+        """(samples,) largest |z| of each sample."""
         return np.array([np.abs(poles).max() for poles in self.poles])
 
     @property
     def nominal_radius(self) -> float:
-        """Largest modulus of a pole at the nominal values."""
+        """Largest |z| at the nominal values."""
         return float(np.abs(self.nominal_poles).max())
 
     @property
     def worst_radius(self) -> float:
-        """Largest modulus of a pole that was found; below 1: robustly stable."""
+        """Largest |z| that was found. If it is below 1, no unstable case was found."""
         return float(np.abs(self.worst_poles).max())
 
     @property
     def stable_share(self) -> float:
-        """Of the samples."""
+        """Share of stable samples, 0 to 1."""
         return float(np.mean(self.radii < 1.0))
 
     @property
     def worst_damping_ratio(self) -> float:
-        """Of the slowest pole in the worst case."""
+        """Damping ratio of the slowest pole in the worst case."""
         return damping_ratio(slowest_pole(self.worst_poles), self.period_s)
 
 
 @dataclass(frozen=True)
 class PoleSensitivity:
-    """How the slowest pole answers to one parameter."""
+    """Sensitivity of the slowest pole to one parameter."""
 
     parameter: UncertainParameter
     pole: complex
-    """The pole at the nominal values, 1/s: ln(z)/T."""
+    """Slowest pole ln(z)/T at the nominal values, 1/s."""
     derivative: complex
-    """d(pole)/d(parameter), in 1/s over the parameter's unit."""
+    """d(pole)/d(parameter), in 1/s per unit of the parameter."""
     per_interval: complex
-    """Change of the pole over the whole interval, to first order, 1/s."""
+    """First-order change of the pole over the whole interval, 1/s."""
 
 
 def slowest_pole(poles: NDArray[np.complex128]) -> complex:
-    """The pole of largest modulus; of a pair the one in the upper half plane."""
+    """Returns the pole with the largest |z|.
+
+    Of a conjugate pair, the pole in the upper half plane is returned.
+
+    Args:
+        poles: (n,) poles in the z plane.
+
+    Returns:
+        The pole in the z plane.
+    """
     pole = complex(poles[np.argmax(np.abs(poles))])
     return pole if pole.imag >= 0.0 else pole.conjugate()
 
 
 def continuous(pole: complex, period: float) -> complex:
-    """A pole in the z plane as one in the s plane.
+    """Maps a pole from the z plane to the s plane.
 
     Args:
-        pole: z, not 0.
-        period: T, s.
+        pole: Pole z, not 0.
+        period: Sampling period T, s.
 
     Returns:
         ln(z)/T, 1/s.
@@ -126,14 +135,14 @@ def continuous(pole: complex, period: float) -> complex:
 
 
 def damping_ratio(pole: complex, period: float) -> float:
-    """Of a pole in the z plane; negative where it grows.
+    """Returns the damping ratio of a pole in the z plane.
 
     Args:
-        pole: z, neither 0 nor 1.
+        pole: Pole z, neither 0 nor 1.
         period: Sampling period, s.
 
     Returns:
-        -1 to 1.
+        Damping ratio, -1 to 1; negative for a growing motion.
     """
     s = continuous(pole, period)
     return -s.real / abs(s)
@@ -147,22 +156,23 @@ def pole_cloud(
     samples: int,
     seed: int,
 ) -> PoleCloud:
-    """Poles at random points of the box, and at the worst corner.
+    """Computes the poles at random parameter values and searches for the worst values.
 
-    The points are a Latin hypercube. The corner is found by changing one
-    parameter after the other to the other end of its interval while that
-    slows the decay, from the nominal point on: the worst corner wherever each
-    parameter acts in one direction. The worst of it and of the points counts.
+    The random values are a Latin hypercube. The search for the worst corner begins at
+    the nominal values. It moves one parameter after the other to the other end of its
+    interval, as long as this slows the decay. It finds the worst corner if each
+    parameter acts in one direction only. The worst case is the worse of this corner and
+    the worst sample.
 
     Args:
-        poles: The loop.
-        parameters: The box.
+        poles: Loop, as function from parameter values to poles.
+        parameters: Uncertain parameters.
         period: Sampling period, s.
-        samples: Number of random points.
-        seed: Of these.
+        samples: Number of random samples.
+        seed: Seed of the random numbers.
 
     Returns:
-        Poles in the z plane: nominal, of every point, and the worst.
+        Poles in the z plane: nominal, of every sample, and of the worst case.
     """
     from scipy.stats import qmc
 
@@ -217,19 +227,20 @@ def _worst_corner(
 def pole_sensitivities(
     poles: PoleFunction, parameters: Sequence[UncertainParameter], *, period: float
 ) -> tuple[PoleSensitivity, ...]:
-    """Derivatives of the slowest pole, by central differences.
+    """Computes the derivatives of the slowest pole by finite differences.
 
-    At an end of its interval a parameter is varied to the inside only, and a
-    whole number over its whole interval. The pole is followed as the nearest
-    one, which holds for simple poles.
+    The differences are central, with two exceptions. If the nominal value is an end of
+    the interval, the parameter varies towards the inside only. A whole number varies
+    over its whole interval. After the variation, the pole nearest to the nominal pole
+    counts as the same pole. This is valid for simple poles.
 
     Args:
-        poles: The loop.
-        parameters: The box.
+        poles: Loop, as function from parameter values to poles.
+        parameters: Uncertain parameters.
         period: Sampling period, s.
 
     Returns:
-        One a parameter, in their order; poles in 1/s.
+        One sensitivity per parameter, in the order of ``parameters``.
     """
     nominal = {p.name: p.nominal for p in parameters}
     pole = slowest_pole(poles(nominal))

@@ -1,4 +1,4 @@
-"""Poles against one gain at a time: of the target loop, and in contact."""
+"""Root loci: poles as functions of one gain, in the target loop and in contact."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 
-#: Gains that are tried, over today's.
+#: Factors on the scenario's gain.
 _FACTORS = np.geomspace(0.05, 20.0, 121)
 #: Distances at which a law's slopes are taken, m.
 _DISTANCES_M = np.linspace(0.02, 2.0, 397)
@@ -24,42 +24,41 @@ _DISTANCES_M = np.linspace(0.02, 2.0, 397)
 
 @dataclass(frozen=True)
 class ContactSlopes:
-    """The spring and the damper that a law is to P before an obstacle at rest."""
+    """Stiffness and damping of a law, as P sees them before an obstacle at rest."""
 
     distance_m: float
-    """Where the spring is stiffest, m."""
+    """Distance from the obstacle at which the law is stiffest, m."""
     stiffness_n_m: float
-    """-df/dc there, N/m."""
+    """Stiffness -df/dc at this distance, N/m."""
     approach_damping_n_s_m: float
-    """df/ds there at s = 0, for an obstacle that comes nearer, N s/m."""
+    """Damping df/ds there for an approaching obstacle, at s = 0, N s/m."""
 
 
 @dataclass(frozen=True)
 class RootLocus:
-    """Poles of the sampled motion along one line against one gain."""
+    """Poles of the sampled motion along one line, as functions of one gain."""
 
     parameter: str
-    """Field of the scenario."""
+    """Field of the scenario that is varied."""
     loop: str
-    """``target`` away from obstacles, ``contact`` before one at rest, while it
-    comes nearer."""
+    """``target``: far from obstacles. ``contact``: approaching an obstacle at rest."""
     values: NDArray[np.float64]
-    """(n,) of the gain, ascending, SI units."""
+    """(n,) ascending values of the gain in SI units."""
     poles: NDArray[np.complex128]
-    """(n, m) in the s plane, ln(z)/T, rad/s; delays left out as -infinity."""
+    """(n, m) poles ln(z)/T in the s plane, rad/s. Pure delays (z = 0) are -infinity."""
     today: float
-    """The scenario's value."""
+    """Gain in the scenario."""
     poles_today: NDArray[np.complex128]
-    """(m,) with it."""
+    """(m,) poles at the gain of the scenario."""
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """(n,) whether all decay."""
+        """(n,) whether all poles decay."""
         return np.asarray((self.poles.real < 0.0).all(axis=1))
 
     @property
     def limit(self) -> float | None:
-        """Largest of the values above today's up to which all are stable."""
+        """Largest value above the scenario's up to which all values are stable."""
         above = np.flatnonzero((self.values >= self.today) & ~self.stable)
         if not len(above):
             return None
@@ -67,10 +66,18 @@ class RootLocus:
 
 
 def contact_slopes(scenario: Scenario) -> ContactSlopes:
-    """Slopes of the scenario's law where it is stiffest, from its controller.
+    """Returns the slopes of the repulsion at the distance where it is stiffest.
+
+    The forces are those of the scenario's controller block.
+
+    Args:
+        scenario: Scenario with the control law.
+
+    Returns:
+        Distance, stiffness and damping.
 
     Raises:
-        InputError: The law does not push, so that there is no contact.
+        InputError: The control law does not push the robot away from obstacles.
     """
     field = ForceField(ideal_loop(frozen_scenario(ideal_scenario(scenario))))
     forces = field.law(_DISTANCES_M)
@@ -87,7 +94,17 @@ def contact_slopes(scenario: Scenario) -> ContactSlopes:
 
 
 def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
-    """Against K_r and D_r, and the gains of the law's two terms, if it has them."""
+    """Returns root loci over the stiffness K_r and the damping D_r of the attraction.
+
+    If the repulsion has a spring term and a damping term, the result also has a root
+    locus over the gain of each term.
+
+    Args:
+        scenario: Scenario with gains, robot and plant.
+
+    Returns:
+        Two or four root loci.
+    """
     attraction = scenario.follower.attraction
     K, D = attraction.stiffness_n_m, attraction.damping_n_s_m
 

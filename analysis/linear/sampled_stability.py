@@ -1,4 +1,4 @@
-"""Sampling: closed-form conditions, poles against period, stability charts."""
+"""Effects of sampling: stability conditions, poles by period, stability charts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from systems.framework.signals import TICK_S
 
 Scheme = Literal["held acceleration", "held velocity", "held velocity, one tick late"]
 
-#: Ways to sample a double integrator; the second is the built one without lag.
+#: Ways to sample a double integrator. The second is that of the diagram without motor
+#: lag.
 SCHEMES: tuple[Scheme, ...] = (
     "held acceleration",
     "held velocity",
@@ -28,12 +29,13 @@ _CONDITIONS: dict[Scheme, str] = {
     "held velocity": "D > 0 and 2 D T + K T^2 < 4",
     "held velocity, one tick late": "K T < D and 2 D T - K T^2 < 4",
 }
-#: A motor lag that counts as none at the default tick, s; a shorter one costs the
-#: exponential digits. The stiffest springs that are tried go with 1/tick^2.
+#: A motor lag that counts as zero at the default tick, s. A shorter lag would reduce
+#: the accuracy of the matrix exponential. The stiffest springs of the test are
+#: proportional to 1/tick^2.
 _NO_LAG_S = 1e-7
-#: Sample periods that are tried, s.
+#: Sample periods to compute, s.
 _PERIODS_S = np.geomspace(0.002, 4.0, 160)
-#: Springs and dampers of the attraction's chart, and springs of the delay's.
+#: Axes of the charts: K_r and D_r of ``gain_chart``, stiffness of ``gain_delay_chart``.
 _SPRINGS_N_M = np.geomspace(0.1, 400.0, 60)
 _DAMPERS_N_S_M = np.geomspace(0.05, 400.0, 60)
 _ALL_SPRINGS_N_M = np.geomspace(0.2, 100.0, 50)
@@ -41,35 +43,35 @@ _ALL_SPRINGS_N_M = np.geomspace(0.2, 100.0, 50)
 
 @dataclass(frozen=True)
 class ConditionCheck:
-    """A closed-form condition against eigenvalues, at random gains."""
+    """Comparison of a closed-form stability condition with eigenvalues."""
 
     scheme: Scheme
     """How the double integrator of unit mass is sampled."""
     condition: str
-    """Stable exactly if this holds."""
+    """Necessary and sufficient condition on stiffness K, damping D and period T."""
     pairs: int
-    """Random pairs (K, D)."""
+    """Number of random pairs (K, D)."""
     stable: int
-    """Of them, stable by eigenvalues."""
+    """Number of pairs that are stable by their eigenvalues."""
     mismatches: int
-    """Of them, in which the condition says otherwise."""
+    """Number of pairs for which condition and eigenvalues disagree."""
 
 
 def check_conditions(
     pairs: int = 10_000, seed: int = 1, *, tick_s: float = TICK_S
 ) -> tuple[ConditionCheck, ...]:
-    """Tests the three conditions on random pairs about their boundaries.
+    """Tests the three stability conditions on random gains near their boundaries.
 
-    The matrices are those of the blocks (without motor lag), and of
-    ``control.sample_system`` for the held acceleration.
+    The matrices of the held velocity are those of the blocks without motor lag. The
+    matrices of the held acceleration come from ``control.sample_system``.
 
     Args:
-        pairs: For each scheme.
-        seed: Of the pairs.
-        tick_s: The period, s.
+        pairs: Number of random pairs (K, D). All schemes use the same pairs.
+        seed: Seed of the random numbers.
+        tick_s: Control period, s.
 
     Returns:
-        One a scheme, with the number of pairs on which both disagree.
+        One comparison for each of ``SCHEMES``.
     """
     rng, T = np.random.default_rng(seed), tick_s
     K = 10.0 ** rng.uniform(-1.0, math.log10(8.0 / T**2), pairs)
@@ -93,13 +95,13 @@ def check_conditions(
 
 
 def _chain(scheme: Scheme, tick_s: float) -> LinearModel:
-    """From the acceleration of a unit mass to what the law sees of it."""
+    """Sampled model from the acceleration of a unit mass to position and velocity."""
     no_lag_s = _NO_LAG_S * (tick_s / TICK_S) ** 2
     built = motion_chain(Scenario(), motor_lag_s=no_lag_s, period_s=tick_s)
     if scheme == "held velocity":
         return built
     if scheme == "held velocity, one tick late":
-        return delayed_output(built, "p_WP", 1)  # the velocity is the mass's own
+        return delayed_output(built, "p_WP", 1)  # the velocity has no delay
     import control
 
     double = control.ss([[0, 1], [0, 0]], [[0], [1]], np.eye(2), np.zeros((2, 1)))
@@ -110,20 +112,20 @@ def _chain(scheme: Scheme, tick_s: float) -> LinearModel:
 
 @dataclass(frozen=True)
 class PolesAgainstPeriod:
-    """Poles of the target loop for other sample periods."""
+    """Poles of the target loop as a function of the sample period."""
 
     periods_s: NDArray[np.float64]
-    """(n,) s."""
+    """(n,) sample periods, s."""
     poles: NDArray[np.complex128]
-    """(n, m) in the z plane."""
+    """(n, m) poles in the z plane."""
     today_s: float
-    """The control period, s."""
+    """Control period of the scenario, s."""
     longest_stable_s: float
-    """Largest of the periods below which all are stable, s."""
+    """Largest of the periods up to which all are stable, s."""
 
     @property
     def growth_per_s(self) -> NDArray[np.float64]:
-        """(n,) exponent of the slowest mode, 1/s; negative where it decays."""
+        """(n,) growth rate of the slowest mode, 1/s; negative if it decays."""
         radius = np.abs(self.poles).max(axis=1)
         return np.asarray(np.log(radius) / self.periods_s, dtype=float)
 
@@ -134,18 +136,19 @@ def poles_against_period(
     stiffness_n_m: float | None = None,
     periods_s: ArrayLike = _PERIODS_S,
 ) -> PolesAgainstPeriod:
-    """Poles along the line to the source, sampled at other periods.
+    """Computes the poles along the line to the source for other sample periods.
 
-    Hearing's tick does not count in it, for the odometry makes up for it, and
-    an echo drives the wheels at once.
+    The loop has no latency: odometry compensates the latency of hearing, and an echo
+    drives the wheels in the same control period.
 
     Args:
-        scenario: Attraction, robot and plant are used.
-        stiffness_n_m: In place of K_r, as with an obstacle's spring, N/m.
-        periods_s: (n,) sample periods, s, ascending.
+        scenario: Scenario with attraction, robot and plant.
+        stiffness_n_m: Stiffness to use instead of the attraction's, for example with
+            the spring of an obstacle, N/m.
+        periods_s: (n,) ascending sample periods, s.
 
     Returns:
-        Up to three poles a period, z plane, and the longest stable period, s.
+        Up to three poles per period in the z plane, and the longest stable period.
     """
     periods = np.asarray(periods_s, dtype=float)
     stiffness = stiffness_n_m
@@ -154,7 +157,8 @@ def poles_against_period(
     poles = np.zeros((len(periods), 3), dtype=complex)
     for row, period in zip(poles, periods, strict=True):
         matrix = contact_matrix(scenario, stiffness, period_s=float(period))
-        row[: len(matrix)] = np.linalg.eigvals(matrix)  # a lag may have gone by then
+        # In a long period the motor lag may vanish, and with it one pole.
+        row[: len(matrix)] = np.linalg.eigvals(matrix)
     unstable = np.abs(poles).max(axis=1) >= 1.0
     first = int(np.argmax(unstable)) if unstable.any() else len(periods)
     return PolesAgainstPeriod(
@@ -167,26 +171,26 @@ def poles_against_period(
 
 @dataclass(frozen=True)
 class StabilityChart:
-    """Exponent of the slowest mode over two parameters."""
+    """Growth rate of the slowest mode over two parameters."""
 
     title: str
-    """What is shown."""
+    """Title of the chart."""
     x_name: str
     """Name and unit of the horizontal parameter."""
     y_name: str
     """Name and unit of the vertical parameter."""
     x: NDArray[np.float64]
-    """(nx,)"""
+    """(nx,) values of the horizontal parameter."""
     y: NDArray[np.float64]
-    """(ny,)"""
+    """(ny,) values of the vertical parameter."""
     growth_per_s: NDArray[np.float64]
-    """(ny, nx) 1/s; negative where all decays."""
+    """(ny, nx) growth rates, 1/s; negative where all modes decay."""
     today: tuple[float, float]
-    """(x, y) of the scenario."""
+    """Values (x, y) in the scenario."""
 
     @property
     def stable_share(self) -> float:
-        """Part of the chart's points that is stable."""
+        """Share of the chart's points that are stable, 0 to 1."""
         return float(np.mean(self.growth_per_s < 0.0))
 
 
@@ -196,7 +200,7 @@ def _growth(
     y: NDArray[np.float64],
     tick_s: float,
 ) -> NDArray[np.float64]:
-    """(ny, nx) exponents of the slowest mode of ``matrix(x, y)``, 1/s."""
+    """(ny, nx) growth rates of the slowest mode of ``matrix(x, y)``, 1/s."""
 
     def growth(a: Any, b: float) -> float:
         radius = float(np.abs(np.linalg.eigvals(matrix(a, b))).max())
@@ -211,15 +215,18 @@ def gain_chart(
     stiffnesses_n_m: ArrayLike = _SPRINGS_N_M,
     dampings_n_s_m: ArrayLike = _DAMPERS_N_S_M,
 ) -> StabilityChart:
-    """Over K_r and D_r: sampled, with the motors' lag, away from obstacles.
+    """Computes the stability of the sampled loop over two gains of the attraction.
+
+    The gains are stiffness K_r and damping D_r. The loop has motor lag, and no obstacle
+    is near.
 
     Args:
-        scenario: Robot and plant are used; its gains are marked.
-        stiffnesses_n_m: (nx,) K_r, N/m; by default 0.1 to 400.
-        dampings_n_s_m: (ny,) D_r, N s/m; by default 0.05 to 400.
+        scenario: Scenario with robot and plant. The chart marks its gains.
+        stiffnesses_n_m: (nx,) values of K_r, N/m; by default 0.1 to 400.
+        dampings_n_s_m: (ny,) values of D_r, N s/m; by default 0.05 to 400.
 
     Returns:
-        Growth of the slowest mode, (ny, nx) 1/s.
+        Chart with the growth rate of the slowest mode.
     """
     K, D = (
         scenario.follower.attraction.stiffness_n_m,
@@ -246,17 +253,19 @@ def gain_delay_chart(
     delays_s: ArrayLike | None = None,
     stiffnesses_n_m: ArrayLike = _ALL_SPRINGS_N_M,
 ) -> StabilityChart:
-    """Over the age of the position that the springs act on, and their stiffness.
+    """Computes the stability over stiffness and age of the measured position.
 
-    Delays are taken in whole ticks.
+    The stiffness is the sum of all springs that act on this position.
 
     Args:
-        scenario: Robot, plant and damping are used; its spring is marked.
-        delays_s: (nx,) ages, s; by default 0 to 1 s.
-        stiffnesses_n_m: (ny,) all springs together, N/m; by default 0.2 to 100.
+        scenario: Scenario with robot, plant and damping. The chart marks the
+            attraction's stiffness.
+        delays_s: (nx,) ages of the position, s; by default 0 to 1 s. They are rounded
+            to whole control periods.
+        stiffnesses_n_m: (ny,) sums of all springs, N/m; by default 0.2 to 100.
 
     Returns:
-        Growth of the slowest mode, (ny, nx) 1/s.
+        Chart with the growth rate of the slowest mode.
     """
     tick_s = scenario.tick_s
     delays = np.arange(0.0, 1.0, 2 * tick_s) if delays_s is None else delays_s

@@ -1,4 +1,4 @@
-"""The linear prediction against runs: frequency and damping of a small step."""
+"""Comparison of linear prediction and simulation: frequency and damping of a step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from systems.world.geometry import control_point
 
 @dataclass(frozen=True)
 class Oscillation:
-    """A damped oscillation."""
+    """Damped oscillation."""
 
     frequency_rad_s: float
     """Natural frequency, rad/s."""
@@ -31,33 +31,36 @@ class Oscillation:
 
 @dataclass(frozen=True)
 class StepCheck:
-    """A step along the line to the source: predicted, and in two builds."""
+    """Response to a step along the line to the source: predicted and simulated.
+
+    The simulation uses exact sensors and, if requested, the scenario's sensors.
+    """
 
     predicted: Oscillation
-    """By the sampled linear model."""
+    """Oscillation of the sampled linear model."""
     ideal: Oscillation
-    """Of the all-ideal build."""
+    """Oscillation fitted to the simulation with exact sensors."""
     full: Oscillation | None
-    """Of the build as the scenario has it, where that was run."""
+    """Oscillation fitted to the simulation with the scenario's sensors, or None."""
     step_m: float
     """Size of the step, m."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,) s."""
+    """(n,) times, s."""
     predicted_m: NDArray[np.float64] = field(repr=False)
-    """(n,) distance of P from the source by the linear model, m."""
+    """(n,) distance of P from the source, by the linear model, m."""
     ideal_m: NDArray[np.float64] = field(repr=False)
-    """The same in the all-ideal build, m."""
+    """(n,) distance of P from the source, with exact sensors, m."""
     full_m: NDArray[np.float64] | None = field(repr=False)
-    """The same in the full build, m."""
+    """(n,) distance of P from the source, with the scenario's sensors, m."""
 
     @property
     def frequency_error(self) -> float:
-        """Of the prediction, relative to the ideal build."""
+        """Relative error of the predicted frequency, compared to exact sensors."""
         return self.predicted.frequency_rad_s / self.ideal.frequency_rad_s - 1.0
 
     @property
     def damping_error(self) -> float:
-        """Of the prediction, relative to the ideal build."""
+        """Relative error of the predicted damping ratio, compared to exact sensors."""
         return self.predicted.damping_ratio / self.ideal.damping_ratio - 1.0
 
 
@@ -68,19 +71,20 @@ def check_step(
     duration_s: float = 25.0,
     full: bool = False,
 ) -> StepCheck:
-    """Starts the robot a small step away from the equilibrium, and fits its way.
+    """Simulates a start near the equilibrium and compares it with the linear model.
 
     Args:
-        scenario: Any; its bodies rest where they are at time zero.
-        step_m: Towards the source, m.
-        duration_s: To simulate, s.
-        full: Whether to run the scenario's own sensors too.
+        scenario: Any scenario. Its bodies rest where they are at 0 s.
+        step_m: Distance of the start from the equilibrium towards the source, m.
+        duration_s: Simulated time, s.
+        full: Whether to simulate the scenario's own sensors too.
 
     Returns:
-        Frequency and damping ratio: predicted, and fitted to the runs.
+        Frequencies and damping ratios, predicted and fitted, with the motions.
 
     Raises:
-        InputError: There is no stable equilibrium, or nothing oscillates there.
+        InputError: There is no stable equilibrium, or its linear model does not
+            oscillate.
     """
     point = follow_equilibrium(scenario)
     modes = [mode for mode in point.modes if mode.eigenvalue.imag > 1e-6]
@@ -102,7 +106,7 @@ def check_step(
 
 
 def _along(point: OperatingPoint, modes: list[Any]) -> Any:
-    """The oscillation along the line to the source: the stiffest."""
+    """Mode along the line to the source: the oscillation with the highest frequency."""
     if not modes:
         raise InputError(
             "attraction",
@@ -115,7 +119,7 @@ def _along(point: OperatingPoint, modes: list[Any]) -> Any:
 def _predicted(
     point: OperatingPoint, step_m: float, time_s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(n,) distance of P from the source by the one-period matrix, m."""
+    """(n,) distance of P from the source, from the one-period matrix, m."""
     loop = point.loop
     A = loop.period_derivatives(point.state, point.time_s).A
     ahead = point.axes[0]
@@ -134,12 +138,12 @@ def _predicted(
 def _run(
     scenario: Scenario, point: OperatingPoint, step_m: float, duration_s: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Time, s, and distance of P from the source, m, after a start off the point."""
+    """Times, s, and distances of P from the source, m, after a start near the point."""
     ahead = np.array([math.cos(point.theta_WB), math.sin(point.theta_WB)])
     epsilon = scenario.only.robot.control_point_m
     x, y = control_point((*(point.p_WP + step_m * ahead), point.theta_WB), -epsilon)
     start = {"position_m": [x, y], "heading_deg": math.degrees(point.theta_WB)}
-    # No stop rules: a small step is slow enough to count as rest.
+    # No stop rules: the robot is so slow after a small step that it counts as at rest.
     follower = build_sound_follower(changed(scenario, {"start": start}), log=True)
     simulator = make_simulator(follower)
     simulator.Initialize()
@@ -158,24 +162,25 @@ def _run(
 def fitted_step(
     time_s: NDArray[np.float64], distance_m: NDArray[np.float64], guess_rad_s: float
 ) -> Oscillation:
-    """Least squares of a damped oscillation about a constant.
+    """Fits a damped oscillation about a constant by least squares.
 
-    A bias and a second harmonic that decay with it are fitted too: the norm of
-    a velocity, in the laws' velocity terms, makes both and no damping.
+    The fit also has a bias and a second harmonic that decay with the oscillation. The
+    repulsion depends on the norm of a velocity. This norm causes a bias and a second
+    harmonic, but no damping.
 
     Args:
-        time_s: (n,) s; the first two seconds do not count.
-        distance_m: (n,) m.
-        guess_rad_s: Frequency to start from, rad/s.
+        time_s: (n,) times, s. The first two seconds are left out.
+        distance_m: (n,) distances, m.
+        guess_rad_s: Initial guess of the frequency, rad/s.
 
     Returns:
-        Natural frequency, rad/s, and damping ratio.
+        Natural frequency and damping ratio.
     """
     later = time_s >= 2.0
     t, x = time_s[later] - 2.0, distance_m[later]
 
     def waves(rate: float, omega: float) -> NDArray[np.float64]:
-        """(n, 6) rest, bias, fundamental and second harmonic."""
+        """(n, 6) constant, bias, fundamental and second harmonic."""
         fade = np.exp(-rate * t)
         harmonics = [f(k * omega * t) * fade for k in (1, 2) for f in (np.cos, np.sin)]
         return np.column_stack([np.ones_like(t), fade, *harmonics])

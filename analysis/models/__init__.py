@@ -1,1 +1,1 @@
-"""The loop as equations: operating points, linear models, point masses."""
+"""Equations of the control loop: operating points, linear models, point mass."""

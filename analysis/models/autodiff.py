@@ -1,4 +1,4 @@
-"""Seeds and gradients of vectors of AutoDiffXd."""
+"""Conversion between vectors of floats and of Drake's AutoDiffXd."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoD
 
 
 def seed(values: Any) -> Any:
-    """The values as AutoDiffXd, each its own variable; (n,)."""
+    """(n,) values as AutoDiffXd, each an independent variable."""
     column: Any = np.asarray(values, dtype=float)
     return InitializeAutoDiff(column).ravel()
 
@@ -18,14 +18,17 @@ def seed(values: Any) -> Any:
 def value_and_gradient(
     values: Any, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values and gradients of AutoDiffXd.
+    """Splits a vector of AutoDiffXd into values and derivatives.
 
     Args:
         values: (k,) floats or AutoDiffXd.
-        count: Number n of variables; a value without derivatives has zeros.
+        count: Number n of independent variables.
 
     Returns:
-        (k,) values and (k, n) derivatives, in the units of the values.
+        Two arrays:
+
+        - (k,) values
+        - (k, n) derivatives by the variables; zero for a value without derivatives
     """
     if len(values) == 0:
         return np.empty(0), np.empty((0, count))

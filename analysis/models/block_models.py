@@ -1,8 +1,9 @@
-"""The closed loop put together from its blocks, each linearised alone.
+"""Closed loop joined from blocks that are linearized alone.
 
-The second route to the one-period matrix, beside AutoDiff through the whole
-diagram: it shares the blocks with it, and neither the wiring, nor the order of
-updates, nor the integration of the joined system.
+The joined blocks give the matrix of one control period. AutoDiff through the whole
+diagram gives the same matrix in another way. Both ways use the same blocks. Wiring,
+order of updates, and integration of the joined system are independent, so that each way
+checks the other.
 """
 
 from __future__ import annotations
@@ -21,26 +22,27 @@ from analysis.models.ideal_loop import IdealLoop
 from analysis.models.linear_models import LinearModel
 from diagrams.running.simulation import simulator_config
 
-#: Appended to the name of a signal as it is after the updates of its tick.
+#: Suffix of a signal's name for its value after the control update.
 AFTER = "_after"
 
 
 def sampled_blocks(
     loop: IdealLoop, state: NDArray[np.float64], time_s: float = 0.0
 ) -> tuple[LinearModel, ...]:
-    """Every block with inputs, linearised alone.
+    """Linearizes every block that has inputs, each block alone.
 
-    A block that holds its output over the period feeds continuous ones with
-    what it is after the tick's updates: it has such outputs beside those that
-    the other blocks read at the tick, before them.
+    At the control update that begins a period, sampled blocks read each other's outputs
+    before the update. Continuous blocks read outputs after the update, because these
+    are held over the period. A block that feeds a continuous block therefore has some
+    outputs twice: before and after the update.
 
     Args:
-        loop: The all-ideal build.
-        state: (n,) operating point, just before the updates of a tick.
-        time_s: Its time, s.
+        loop: Control loop with exact sensors.
+        state: (n,) operating point, just before a control update.
+        time_s: Time of this control update, s.
 
     Returns:
-        A model of one period for each, in the order of the build's blocks.
+        One model per block over one period, in the order of ``SoundFollower.blocks``.
     """
     after = loop.period_map(state, time_s)
     continuous = [role for role in loop.follower.blocks if _is_continuous(loop, role)]
@@ -57,7 +59,7 @@ def sampled_blocks(
         model = block_model(
             sampled_twin(loop, role) if flows else loop.block(role, twin=True),
             state[loop.indices(role)],
-            # What a continuous block reads is held from after the tick's updates.
+            # A continuous block reads held signals, as they are after the update.
             _input_values(loop, role, after if flows else state, time_s),
             period_s=loop.tick_s,
             ports=block,
@@ -84,7 +86,7 @@ def _ports(block: Any, kind: str) -> list[Any]:
 def _input_values(
     loop: IdealLoop, role: str, state: NDArray[np.float64], time_s: float
 ) -> list[NDArray[np.float64]]:
-    """What a block's input ports read in the diagram at a state."""
+    """Values at the input ports of a block, in the diagram at a given state."""
     block = loop.block(role)
     own = block.GetMyContextFromRoot(loop.context(state, time_s))
     return [port.Eval(own).copy() for port in _ports(block, "input")]
@@ -101,20 +103,22 @@ def block_model(
     held: Collection[str] = (),
     read_after: bool = False,
 ) -> LinearModel:
-    """One sampled block about an operating point, by its AutoDiff twin alone.
+    """Linearizes one sampled block about an operating point.
 
     Args:
-        twin: The block as LeafSystem_[AutoDiffXd].
-        state: (n,) its state, just before its update.
-        values: Of its input ports, in order.
-        period_s: Of its updates, s.
-        ports: The block whose ports have the names to use, if not ``twin``.
-        time_s: The time, s.
-        held: Output ports that continuous blocks read, after the update.
-        read_after: Whether it reads such signals itself.
+        twin: Block as LeafSystem_[AutoDiffXd].
+        state: (n,) state of the block, just before its update.
+        values: Values at the input ports, in their order.
+        period_s: Period of the updates, s.
+        ports: Block with the names of the ports. By default the names are those of
+            ``twin``.
+        time_s: Time of the update, s.
+        held: Names of output ports that continuous blocks read after the update.
+        read_after: Whether this block reads its inputs after the update of other
+            blocks.
 
     Returns:
-        A model of one period; inputs and outputs are named by port and element.
+        A model over one period. Inputs and outputs have the names ``port[element]``.
     """
     ports = ports or twin
     count = len(state)
@@ -162,14 +166,16 @@ def _context(block: Any, time_s: float, state: Any) -> Any:
 
 
 def sampled_twin(loop: IdealLoop, role: str) -> Any:
-    """A continuous block's AutoDiff twin as a map of one period, made once.
+    """Returns a continuous block as a discrete block over one period, for AutoDiffXd.
+
+    The block is converted at the first call, and then kept in ``loop.sampled_twins``.
 
     Args:
-        loop: The all-ideal build; it keeps the twin.
+        loop: Control loop with exact sensors.
         role: A key of ``SoundFollower.blocks``.
 
     Returns:
-        The block as a discrete one, for AutoDiffXd.
+        The discrete block.
     """
     if role not in loop.sampled_twins:
         config = simulator_config(loop.scenario)
@@ -190,17 +196,17 @@ def join_blocks(
     inputs: tuple[str, ...] = (),
     outputs: tuple[str, ...] = (),
 ) -> LinearModel:
-    """Joins the outputs to the inputs of the same name, by ``control``.
+    """Joins linearized blocks: connects each output to all inputs of the same name.
 
     Args:
-        models: Linearised blocks, of one period.
-        state_names: The order of states to return.
-        name: Of the joined model.
-        inputs: Signals to feed from outside.
-        outputs: Signals to return.
+        models: Linearized blocks with the same period.
+        state_names: Names of the states in the order of the result.
+        name: Name of the joined model.
+        inputs: Names of signals that are fed from outside.
+        outputs: Names of signals that the joined model returns.
 
     Returns:
-        One model with the states of all of them.
+        A model with the states of all blocks.
     """
     import control
 

@@ -1,4 +1,4 @@
-"""A diagram's whole state as one vector, and runs that begin from it."""
+"""State of a diagram as one vector, and runs that begin at a given state."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ Port = tuple[str, str]
 
 
 class Runner:
-    """A simulation whose state and cut inputs can be changed between steps.
+    """Simulation whose state and cut inputs can be changed between steps.
 
-    It shares its context with other uses of the same loop: finish one first.
+    The run uses the context of its simulator. Finish the run before you use the same
+    loop for anything else.
 
     Args:
-        simulator: Its context is used.
-        fix: ``fix(context, port, value)`` sets what a cut input reads.
-        state: (n,) just before the updates of the tick at ``time_s``.
-        time_s: A multiple of the period, s.
-        tick_s: The period, s.
+        simulator: Simulator whose context the run uses.
+        fix: Function ``fix(context, port, value)`` that sets the value of a cut input.
+        state: (n,) state just before the control update at ``time_s``.
+        time_s: Time of the first control update, a multiple of the period, s.
+        tick_s: Control period, s.
     """
 
     def __init__(
@@ -36,7 +37,7 @@ class Runner:
     ) -> None:
         self._simulator, self._fix = simulator, fix
         self._context = simulator.get_mutable_context()
-        # Objects by which Python sees the parts: to make them anew costs a tenth.
+        # Python's views of the parts. Creating them each time costs a tenth of the run.
         self._parts = [
             self._context.get_continuous_state_vector(),
             *map(
@@ -47,29 +48,29 @@ class Runner:
         begin(simulator, state, time_s, tick_s)
 
     def fix(self, port: Port, value: NDArray[np.float64]) -> None:
-        """What a cut input reads from now on.
+        """Sets the value of a cut input from now on.
 
         Args:
             port: Role of the block, and name of its input port.
-            value: (size of the port,), in its unit.
+            value: (size of the port,) value in the unit of the port.
         """
         self._fix(self._context, port, value)
 
     def advance(self, time_s: float) -> None:
-        """Simulates until then; a tick at that moment is still to come."""
+        """Simulates up to ``time_s``, without a control update at that time."""
         if time_s > self._context.get_time():
             self._simulator.AdvanceTo(time_s)
 
     def state(self) -> NDArray[np.float64]:
-        """(n,) now."""
+        """Returns the present state (n,)."""
         return np.concatenate([part.CopyToVector() for part in self._parts])
 
     def set_state(self, indices: Sequence[int], values: NDArray[np.float64]) -> None:
-        """Replaces elements of the state.
+        """Replaces some elements of the state.
 
         Args:
-            indices: k places in the state.
-            values: (k,) their new values.
+            indices: Indices of k elements.
+            values: (k,) new values of these elements.
         """
         state = self.state()
         state[list(indices)] = values
@@ -79,28 +80,29 @@ class Runner:
 def run_periods(
     simulator: Any, state: Any, time_s: float, periods: int, tick_s: float
 ) -> None:
-    """Simulates whole periods from a state, to just before the next tick.
+    """Simulates whole control periods, up to just before the next control update.
 
     Args:
-        simulator: Its context is changed.
-        state: (n,) just before the updates of the tick at ``time_s``.
-        time_s: A multiple of the period, s.
-        periods: How many, 0 or more.
-        tick_s: The period, s.
+        simulator: Simulator whose context is changed.
+        state: (n,) state just before the control update at ``time_s``.
+        time_s: Time of the first control update, a multiple of the period, s.
+        periods: Number of periods, 0 or more.
+        tick_s: Control period, s.
     """
     begin(simulator, state, time_s, tick_s)
-    # Ticks are multiples in Drake's arithmetic: a sum could miss the next one.
+    # Drake computes tick times as multiples; a sum of periods could miss the next tick.
     simulator.AdvanceTo((round(time_s / tick_s) + periods) * tick_s)
 
 
 def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
-    """Puts a simulator just before the updates of the tick at ``time_s``.
+    """Puts a simulator into a given state just before a control update.
 
     Args:
-        simulator: Its context is changed.
-        state: (n,) just before the updates of the tick.
-        time_s: Of the tick; rounded to a multiple of the period, s.
-        tick_s: The period, s.
+        simulator: Simulator whose context is changed.
+        state: (n,) state just before the control update.
+        time_s: Time of the control update, s. It is rounded to a multiple of the
+            period.
+        tick_s: Control period, s.
     """
     context = simulator.get_mutable_context()
     context.SetTime(round(time_s / tick_s) * tick_s)
@@ -111,11 +113,12 @@ def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
 
 
 def set_state(context: Any, state: Any) -> None:
-    """Sets the whole state: continuous first, then the discrete groups.
+    """Sets the whole state of a diagram.
 
     Args:
-        context: Of a diagram, changed.
-        state: (n,) floats, or AutoDiffXd where the context is of these.
+        context: Context of the diagram. It is changed.
+        state: (n,) continuous states, then the discrete groups. The elements are
+            floats, or AutoDiffXd for an AutoDiffXd context.
     """
     start = context.num_continuous_states()
     context.SetContinuousState(state[:start])
@@ -123,11 +126,11 @@ def set_state(context: Any, state: Any) -> None:
 
 
 def set_discrete_state(context: Any, state: Any) -> None:
-    """Sets the discrete groups from one vector.
+    """Sets all discrete groups of a context from one vector.
 
     Args:
-        context: Of a diagram, changed.
-        state: (m,) one group after the other.
+        context: Context of a diagram or block. It is changed.
+        state: (m,) values of the groups, one group after the other.
     """
     start = 0
     for group in range(context.num_discrete_state_groups()):
@@ -137,7 +140,7 @@ def set_discrete_state(context: Any, state: Any) -> None:
 
 
 def get_state(context: Any) -> Any:
-    """(n,) the whole state, in the order of ``set_state``."""
+    """Returns the whole state (n,), in the order of ``set_state``."""
     groups = [
         context.get_discrete_state(k).CopyToVector()
         for k in range(context.num_discrete_state_groups())

@@ -1,4 +1,4 @@
-"""All equilibria of the closed loop at rest, in a whole workspace."""
+"""Search for all equilibria of the closed loop at rest in a workspace."""
 
 from __future__ import annotations
 
@@ -32,69 +32,71 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, rectangle_corners
 
-#: Roots nearer to each other than this are one, m.
+#: Equilibria nearer to each other than this are the same, m.
 _SAME_M = 1e-6
-#: Starts of Newton's method in a group of cells, beside those round which the
-#: force turns.
+#: Starts of Newton's method in the weakest cells of a group.
 _MOST_STARTS = 6
-#: At most about so many of the latter, and groups of cells after the first round.
+#: First: approximate number of further starts in cells around which the force turns.
+#: Second: largest number of groups of cells after the first round.
 _MOST_TURNED, _MOST_GROUPS = 12, 12
-#: Newton's method gives up so far from its start, m.
+#: Newton's method gives up at this distance from its start, m.
 _NEWTON_REACH_M = 0.5
 #: Edge of the smallest cells, m.
 _SMALLEST_M = 0.002
-#: A point of rest is known to so many smallest cells: what is left over farther from
-#: all that were found is quartered on.
+#: Remaining cells within this many smallest cells of a found equilibrium count as
+#: explained. Other remaining cells are divided further.
 _KNOWN_CELLS = 3
-#: So many times, and while there are no more cells than this.
+#: First: largest number of rounds of this division.
+#: Second: number of cells above which the division stops.
 _ROUNDS, _MOST_CELLS = 10, 60_000
-#: Width of a line of sight, m.
+#: Half width of the path in the test for a free line of sight, m.
 _LINE_M = 1e-3
-#: Offsets from the follow distance that differ by less are equal, m.
+#: Offsets from the follow distance that differ by less than this are equal, m.
 _SAME_OFFSET_M = 1e-6
 
 
 @dataclass(frozen=True)
 class EquilibriumSearch:
-    """All equilibria in a workspace, and what the search vouches for."""
+    """All equilibria found in a workspace, and how complete the search was."""
 
     scenario: Scenario = field(repr=False)
-    """All ideal, with bodies at rest."""
+    """Scenario with exact sensors and bodies at rest."""
     points: tuple[OperatingPoint, ...]
-    """Nearest to the source first."""
+    """Equilibria, the nearest to the source first."""
     switching: tuple[SwitchingPoint, ...]
-    """See ``SwitchingPoint``."""
+    """Places of rest where several bodies are equally near, see ``SwitchingPoint``."""
     area_m: SearchArea
-    """Smallest x, largest x, smallest y, largest y of P."""
+    """Searched area of P in W: smallest x, largest x, smallest y, largest y."""
     cell_m: float
-    """Edge of the smallest cells, m."""
+    """Edge of the smallest cells of the first round, m."""
     cells: int
-    """Cells looked at, of all sizes."""
+    """Number of cells of all sizes that were examined."""
     unresolved: tuple[tuple[float, float], ...]
-    """Middles of groups of cells that could neither be left out nor be traced to a
-    listed point of rest, m."""
+    """One point, m, of each group of cells that the search could neither exclude nor
+    explain by a listed place of rest."""
     empty_outside: bool
-    """Whether attraction exceeds every repulsion beyond the area."""
+    """Whether the attraction exceeds every repulsion outside the area."""
 
     moving: tuple[str, ...]
-    """Bodies that move in the scenario that was asked about."""
+    """Names of the bodies that move in the given scenario."""
 
     @property
     def complete(self) -> bool:
-        """Whether every place of rest lies within three cells of one that is listed."""
+        """Whether all places of rest lie within three cells of a listed place."""
         return not self.unresolved and self.empty_outside
 
     def way_m(self, point: OperatingPoint) -> float:
-        """Length of the shortest free way of P from the start to a point.
+        """Returns the length of the shortest free path from the start to a point.
 
-        The way is kept half the robot's width from every body, or as far as the
-        start and the point are themselves.
+        The path is that of the control point P. The path keeps a distance of half the
+        robot's width from every body. If the start or the point itself is nearer to a
+        body, the path may come as near as this.
 
         Args:
             point: One of ``points``.
 
         Returns:
-            m; infinite where there is no way.
+            Length of the path, m; infinite if there is no path.
         """
         return self._way(point, self.scenario.only.robot.width_m / 2.0)
 
@@ -105,15 +107,24 @@ class EquilibriumSearch:
 
     @property
     def _start(self) -> NDArray[np.float64]:
-        """(2,) P at the start, m."""
+        """(2,) position of P at the start in W, m."""
         epsilon = self.scenario.only.robot.control_point_m
         return np.array(control_point(self.scenario.only.start.pose, epsilon))
 
     def follow_point(self) -> OperatingPoint:
-        """The stable equilibrium nearest to the follow distance, in free reach.
+        """Returns the stable equilibrium at which the robot should follow the source.
 
-        Of several at the same distance from the follow point it is the one nearest to
-        the start. Where no free way leads to any, it is the best of all the same.
+        The choice has these rules:
+
+        - Equilibria with a free path from the start come first. If no equilibrium has a
+          free path, all stable equilibria are candidates.
+        - The method returns the candidate whose distance from the source is nearest to
+          the follow distance.
+        - If several candidates are equally near, the method returns the one nearest to
+          the start.
+
+        Returns:
+            One of ``points``.
 
         Raises:
             InputError: There is no stable equilibrium.
@@ -138,7 +149,7 @@ class EquilibriumSearch:
 
     @property
     def statement(self) -> str:
-        """What was searched, and how completely, in a sentence or two."""
+        """What was searched, and how completely, in one or two sentences."""
         x0, x1, y0, y1 = self.area_m
         where = f"[{x0:g}, {x1:g}] m x [{y0:g}, {y1:g}] m"
         text = (
@@ -154,7 +165,7 @@ class EquilibriumSearch:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader must know before the numbers about ``follow_point``."""
+        """Warnings that a reader needs before the numbers about ``follow_point``."""
         found = []
         at = self.follow_point()
         x, y = at.p_WP
@@ -209,14 +220,16 @@ def find_equilibria(
     """Searches a workspace for all equilibria of the closed loop at rest.
 
     Args:
-        scenario: Its sensors are taken to be ideal; bodies rest where they are
-            at time zero (``frozen_scenario`` for another moment).
-        area_m: Of P; by default all bodies and the start with the follow distance and
-            1 m around.
-        smallest_m: Edge below which cells are not quartered, m.
+        scenario: Any scenario. The search takes its sensors as exact, and its bodies as
+            at rest where they are at 0 s. Use ``frozen_scenario`` for another time.
+        area_m: Area in which to search for positions of the control point P. By default
+            the area contains all bodies and the start, with a margin of the follow
+            distance plus 1 m.
+        smallest_m: Cells whose edge is not longer than this are not divided any more,
+            m.
 
     Returns:
-        All points of rest that were found, and what is left unresolved.
+        All equilibria that were found, and the groups of cells that remain unresolved.
 
     Raises:
         InputError: The area is empty, or the law has no derivative.
@@ -241,8 +254,8 @@ def find_equilibria(
     for round_ in range(_ROUNDS):
         groups = search.groups(left, finest)
         if round_:
-            # Many are left over along a circle that is nearly one of equilibria; what
-            # is passed over has its turn among the quarters.
+            # Many groups remain along a circle that is nearly a continuum of
+            # equilibria. Skipped groups are examined again after their division.
             groups = sorted(groups, key=lambda group: group.strengths.min())
             groups = groups[:_MOST_GROUPS]
         for group in groups:
@@ -273,15 +286,15 @@ def find_equilibria(
 
 @dataclass
 class _Found:
-    """Points of rest that are known so far."""
+    """Places of rest that have been found so far."""
 
     roots: list[NDArray[np.float64]]
     """Isolated equilibria."""
     flat: list[NDArray[np.float64]]
-    """One of each continuum."""
+    """One equilibrium of each continuum."""
     switching: list[SwitchingPoint]
     start: NDArray[np.float64]
-    """(2,) of the robot, m."""
+    """(2,) start of the robot in W, m."""
 
     def add(
         self,
@@ -292,9 +305,10 @@ class _Found:
         *,
         first: bool,
     ) -> None:
-        """Looks for points of rest in and about a group of cells.
+        """Searches for places of rest in and near a group of cells.
 
-        Of a continuum the point nearest to the robot's start stands for all.
+        If the equilibria form a continuum, the equilibrium nearest to the robot's start
+        represents the continuum.
         """
         near = np.linalg.norm(group.centres - self.start, axis=1).argmin()
         turned = np.flatnonzero(group.winding)
@@ -324,7 +338,7 @@ class _Found:
                 self.switching.append(point)
 
     def _add_flat(self, search: CellSearch, root: NDArray[np.float64]) -> None:
-        """Keeps of each circle round the source the point nearest to the start."""
+        """Keeps the point nearest to the start of each circle around the source."""
 
         def radius(p: NDArray[np.float64]) -> float:
             return float(np.linalg.norm(p - search.p_WS))
@@ -341,13 +355,13 @@ class _Found:
     def explain(
         self, search: CellSearch, cells: NDArray[np.float64], known_m: float
     ) -> NDArray[np.bool_]:
-        """(n,) whether cells lie about a point of rest that is known."""
+        """(n,) whether each cell lies near a known place of rest."""
         near = np.zeros(len(cells), dtype=bool)
         for place in (*self.roots, *(point.p_WP for point in self.switching)):
             near |= np.linalg.norm(cells - place, axis=1) <= known_m
         for place in self.flat:
             near |= np.linalg.norm(cells - place, axis=1) <= known_m
-            # Without a push P is free to move round the source.
+            # Without a push, P is free to move around the source.
             to = cells - search.p_WS
             radius = float(np.linalg.norm(place - search.p_WS))
             close = np.abs(np.linalg.norm(to, axis=1) - radius) <= 0.5 * known_m
@@ -380,14 +394,14 @@ def _near(root: NDArray[np.float64], roots: list[NDArray[np.float64]]) -> bool:
 def nearest_equilibrium(
     field_: ForceField, begin: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Where no force acts on P, by Newton's method.
+    """Finds a point without force on the robot by Newton's method.
 
     Args:
-        field_: The force on P at rest.
-        begin: (2,) where to begin, in W, m.
+        field_: Force on the control point P of the robot at rest.
+        begin: (2,) start of the iteration in the world frame W, m.
 
     Returns:
-        (2,) in W, m, or None where none was found.
+        (2,) position of P in W, m, or None if the method did not converge.
     """
     p = begin.copy()
     for _ in range(30):
@@ -403,9 +417,15 @@ def nearest_equilibrium(
 
 
 def follow_equilibrium(scenario: Scenario) -> OperatingPoint:
-    """The stable equilibrium at rest that the robot can follow the source at.
+    """Returns the stable equilibrium at rest where the robot should follow the source.
 
-    See ``EquilibriumSearch.follow_point``.
+    ``EquilibriumSearch.follow_point`` describes the choice.
+
+    Args:
+        scenario: Any scenario, see ``find_equilibria``.
+
+    Returns:
+        The equilibrium.
 
     Raises:
         InputError: There is no stable equilibrium.

@@ -1,28 +1,39 @@
-"""Where forces cancel: a search that leaves out no part of the workspace.
+"""Exhaustive search for the places in a workspace where the control point P can rest.
 
-P can rest where some mean of the forces on the two sides of a switch is zero
-(Filippov's convex definition): at a point p whose nearest body is k alone, where
-F_k(p) = pull(p) + push_k(p) = 0; and where several bodies are equally near, wherever
-the convex hull of their F_k(p) holds the origin. The workspace is cut into square
-cells. A cell is left out only if it holds no such point; any other one is quartered.
+P lies ahead of the wheel axle. The source pulls P, and body k pushes P, so that the
+nearest body k gives the force F_k(p) = pull(p) + push_k(p) at a point p. P can rest in
+two cases (Filippov's convex definition):
 
-Why none can be lost. Let c be the middle of a cell, r half its diagonal, and d_k the
-distances from the bodies. Distances change by at most r within the cell, so the nearest
-body of each of its points is one with d_k(c) <= min d(c) + 2 r: these *count*. Within
-the cell F_k changes by at most ``change``: the Lipschitz bound of pull and push
-times r, and the error of the law's table. If there is a unit vector u with
-F_k(c) . u > change for every body that counts, then F_k(p) . u > 0 for all of them at
-every p of the cell, hence for every mean of them, and no hull holds the origin. Where
-one body counts, F_k = 0 needs |pull| = |push_k| as well, so the cell is left out
-where these sizes differ by more than their own changes. Where several count this says
-nothing: two pushes can cancel one another (the middle of a corridor). With
-``aggregation: sum`` the same holds for the sums of pushes of the nearest three.
-Cells are left out as wholes, and the quarters of a cell cover it, so by induction
-every point of rest lies in a cell that is left over.
+- Only body k is nearest at p, and F_k(p) = 0.
+- Several bodies are equally near, and the convex hull of their F_k(p) contains the
+  origin.
 
-What the bound takes for granted: the law is convex or concave between two samples, a
-millimetre apart. The bound is then that of the samples joined by chords, and the law
-leaves a chord by at most twice as much as half way.
+The search divides the workspace into square cells. It excludes a cell if the cell
+contains no place of rest. It divides every other cell into quarters.
+
+Why the search loses no place of rest: let c be the center of a cell, r half of its
+diagonal, and d_k the distances from the bodies.
+
+- Distances change by at most r within the cell. The nearest body of any point of the
+  cell therefore satisfies d_k(c) <= min d(c) + 2 r. These bodies *count*.
+- Within the cell, F_k changes by at most ``change``. This bound is r times the
+  Lipschitz bound of pull and push, plus the error of the law's table.
+- Suppose that a unit vector u satisfies F_k(c) . u > change for every body that counts.
+  Then F_k(p) . u > 0 for all of them at every p of the cell. Hence no convex hull
+  contains the origin, and the cell is excluded.
+- If only one body counts, F_k = 0 also requires |pull| = |push_k|. The cell is excluded
+  if these magnitudes differ by more than they can change within the cell. If several
+  bodies count, this test does not apply, because two pushes can cancel each other (in
+  the middle of a corridor).
+- With ``aggregation: sum``, the same holds for the sums of the pushes of the nearest
+  three bodies.
+
+Only whole cells are excluded, and the quarters of a cell cover the cell. By induction,
+every place of rest lies in one of the remaining cells.
+
+The bound assumes that the law is convex or concave between two samples, 1 mm apart. The
+deviation of the law from the chord between two samples is then at most twice the
+deviation at the middle. The bound is the slope of the chords plus this deviation.
 """
 
 from __future__ import annotations
@@ -44,18 +55,18 @@ _SAMPLE_M = 1e-3
 #: Edge of the first cells, m.
 _FIRST_CELL_M = 0.25
 
-#: Nearer to a body than this is contact, and not searched, m: there the direction to
-#: the nearest point turns within a cell.
+#: Points nearer to a body than this count as contact and are not searched, m. There
+#: the direction to the nearest point turns too much within a cell.
 CONTACT_M = 4e-3
-#: Bodies whose pushes are added with ``aggregation: sum``.
+#: Number of bodies whose pushes are added with ``aggregation: sum``.
 _SLOTS = 3
-#: Steps towards the point of the hull that is nearest to the origin.
+#: Number of steps towards the point of the hull that is nearest to the origin.
 _HULL_STEPS = 6
-#: Steps of Newton's method to a switching point.
+#: Number of steps of Newton's method to a switching point.
 _NEWTON_STEPS = 25
-#: At most so many starts in a group of cells.
+#: Largest number of starts of Newton's method in a group of cells.
 _MOST_STARTS = 200
-#: A length that counts as none, m.
+#: Distances that differ by less than this are equal, m.
 _SAME_M = 1e-9
 
 #: Smallest x, largest x, smallest y, largest y, m.
@@ -68,9 +79,10 @@ def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _sampled(field: ForceField, farthest: float) -> tuple[NDArray[np.float64], ...]:
-    """Distances, m, law, N, and by how much it leaves the chord after each, N.
+    """Distances, m, law, N, and deviation of the law from its chord, N.
 
-    A corner of the law within an interval is made an end of it.
+    The deviation belongs to the interval after each distance. If the law has a corner
+    inside an interval, one end of the interval is moved to the corner.
     """
 
     def law(c: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -95,40 +107,45 @@ def _sampled(field: ForceField, farthest: float) -> tuple[NDArray[np.float64], .
     if moved:
         f = law(c)
         off = law(0.5 * (c[:-1] + c[1:])) - 0.5 * (f[:-1] + f[1:])
-    # A function that is convex or concave between two samples leaves the chord by at
-    # most twice as much as half way.
+    # If a function is convex or concave between two samples, its deviation from the
+    # chord is at most twice the deviation at the middle.
     return c, f, np.append(2.0 * np.abs(off), 0.0)
 
 
 @dataclass(frozen=True)
 class SwitchingPoint:
-    """Where several bodies are equally near, and a mean of their forces is zero."""
+    """Place of rest where several bodies are equally near.
+
+    Each body would give another force if it alone were the nearest. A weighted mean of
+    these forces is zero.
+    """
 
     p_WP: NDArray[np.float64]
-    """(2,) m."""
+    """(2,) position of P in W, m."""
     attractive: bool
-    """All forces drive P there: it stays about there, chattering."""
+    """Whether all forces drive P to this point, so that P chatters near the point."""
 
 
 @dataclass(frozen=True)
 class Leftover:
-    """Neighbouring smallest cells that may hold an equilibrium."""
+    """Group of neighboring smallest cells that may contain an equilibrium."""
 
     centres: NDArray[np.float64]
-    """(n, 2) m."""
+    """(n, 2) centers of the cells in W, m."""
     strengths: NDArray[np.float64]
-    """(n,) force in the middle, N."""
+    """(n,) magnitude of the force at each center, N."""
     winding: NDArray[np.int64]
-    """(n,) turns of the force around each cell: the index of what it holds."""
+    """(n,) number of turns of the force direction along the edge of each cell. It is
+    nonzero around an isolated equilibrium."""
     switches: NDArray[np.bool_]
     """(n,) whether the nearest body changes within the cell."""
 
 
 class CellSearch:
-    """Bounds of the force in cells, and the cells that they leave over.
+    """Bounds the force in each cell and excludes cells without equilibria.
 
     Args:
-        field: The force.
+        field: Force on the control point P of the robot at rest.
     """
 
     def __init__(self, field: ForceField) -> None:
@@ -147,15 +164,19 @@ class CellSearch:
     def left_over(
         self, area: SearchArea, smallest_m: float
     ) -> tuple[NDArray[np.float64], int, float]:
-        """Cells that cannot be left out.
+        """Returns the cells of an area that may contain an equilibrium.
 
         Args:
-            area: To search.
-            smallest_m: Edge below which cells are not quartered any more, m.
+            area: Area to search.
+            smallest_m: Cells whose edge is not longer than this are not divided any
+                more, m.
 
         Returns:
-            Their centres (n, 2), m, number of cells that were looked at, edge of the
-            last cells, m.
+            Three values:
+
+            - (n, 2) centers of these cells, m
+            - number of cells of all sizes that were examined
+            - edge of these cells, m
         """
         edge = _FIRST_CELL_M
         x = np.arange(area[0] + edge / 2, area[1] + edge / 2, edge)
@@ -171,14 +192,17 @@ class CellSearch:
     def quartered(
         self, cells: NDArray[np.float64], edge: float
     ) -> tuple[NDArray[np.float64], float]:
-        """Quarters of cells that cannot be left out.
+        """Divides cells into quarters, and returns those with a possible equilibrium.
 
         Args:
-            cells: (n, 2) centres, m.
-            edge: Of the cells, m.
+            cells: (n, 2) centers of the cells, m.
+            edge: Edge of the cells, m.
 
         Returns:
-            Centres (k, 2), m, and the edge of the quarters, m.
+            Two values:
+
+            - (k, 2) centers of these quarters, m
+            - edge of the quarters, m
         """
         edge /= 2.0
         corners = edge / 2.0 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
@@ -186,7 +210,7 @@ class CellSearch:
         return cells[~self._excluded(cells, edge)], edge
 
     def outside_is_empty(self, area: SearchArea) -> bool:
-        """Whether beyond the area the attraction exceeds every repulsion."""
+        """Whether the attraction exceeds every repulsion outside the area."""
         x, y = self.p_WS
         gap = min(x - area[0], area[1] - x, y - area[2], area[3] - y)
         d_f = self._attraction.follow_distance_m
@@ -200,7 +224,7 @@ class CellSearch:
         return pull > push * self._slots
 
     def forces(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, 2) force at points (n, 2), from the law's samples, N."""
+        """(n, 2) forces in W at points (n, 2), from the samples of the law, N."""
         vectors, distances = self._vectors(points)
         pushes = self._pushes(vectors, distances)
         rank = distances.argsort(axis=0).argsort(axis=0)
@@ -216,7 +240,7 @@ class CellSearch:
     def _vectors(
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """To the nearest points of the bodies: (k, n, 2) and lengths (k, n), m."""
+        """Vectors to the nearest points of bodies (k, n, 2), and lengths (k, n), m."""
         vectors = (nearest_point_on_rectangle(points.T, body) for body in self._bodies)
         stacked = np.array([np.stack(vector, axis=-1) for vector in vectors])
         return stacked, np.linalg.norm(stacked, axis=-1)
@@ -228,7 +252,10 @@ class CellSearch:
         return -vectors * (force / np.maximum(distances, 1e-12))[..., None]
 
     def _excluded(self, cells: NDArray[np.float64], edge: float) -> NDArray[np.bool_]:
-        """Cells without a point of rest; see the top of this module."""
+        """(n,) whether each cell certainly contains no equilibrium.
+
+        The proof is at the top of this module.
+        """
         radius = edge * np.sqrt(0.5)
         vectors, distances = self._vectors(cells)
         pull, pushes = self._pull(cells), self._pushes(vectors, distances)
@@ -236,8 +263,8 @@ class CellSearch:
         bent = np.maximum(steep, self._in_cell(self._bend, distances, radius))
         error = self._in_cell(self._error, distances, radius)
         own = self._pull_slope(cells, radius)
-        # Bodies that may be among the nearest ones somewhere in the cell, and those
-        # that are among them in all of it.
+        # counts: bodies that are among the nearest somewhere in the cell.
+        # surely: bodies that are among the nearest everywhere in the cell.
         ordered = np.sort(distances, axis=0)
         counts = distances <= ordered[self._slots - 1] + 2.0 * radius
         if self._slots < len(ordered):
@@ -266,10 +293,11 @@ class CellSearch:
         surely: NDArray[np.bool_],
         change: NDArray[np.float64],
     ) -> NDArray[np.bool_]:
-        """(n,) whether all forces of a cell exceed their change along one direction.
+        """(n,) whether all forces of a cell exceed their change along some direction.
 
-        Gilbert's method: the direction is that of a point of the forces' hull,
-        taken nearer to the origin step by step.
+        The change is the largest that is possible within a cell. Gilbert's method tries
+        several directions. Each is the direction of a point in the convex hull of the
+        forces. The point moves nearer to the origin at each step.
         """
         fixed = pull + np.where(surely[..., None], pushes, 0.0).sum(axis=0)
         missing = self._slots - surely.sum(axis=0)
@@ -277,7 +305,7 @@ class CellSearch:
             return np.asarray(np.linalg.norm(fixed, axis=1) > change)
 
         def least(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-            """(n, 2) the force that is least along a direction (n, 2)."""
+            """(n, 2) force with the smallest component along a direction (n, 2)."""
             along = np.einsum("knj,nj->kn", pushes, direction)
             rank = np.where(maybe, along, np.inf).argsort(axis=0).argsort(axis=0)
             chosen = maybe & (rank < missing)
@@ -300,7 +328,7 @@ class CellSearch:
         return clear
 
     def _depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points lie inside some body, m; negative outside."""
+        """(n,) depth of points inside a body, m; negative outside all bodies."""
         depth = np.full(len(points), -np.inf)
         for x, y, theta, length, width in self._bodies:
             u, v = rotate(-theta, points[:, 0] - x, points[:, 1] - y)
@@ -311,7 +339,7 @@ class CellSearch:
     def _pull_slope(
         self, cells: NDArray[np.float64], radius: float
     ) -> NDArray[np.float64]:
-        """Largest slope of the attraction within each cell, N/m."""
+        """(n,) largest slope of the attraction within each cell, N/m."""
         distance = np.linalg.norm(self.p_WS - cells, axis=1) - radius
         d_f = self._attraction.follow_distance_m
         bent = np.where(distance > 0.0, d_f / np.maximum(distance, 1e-12) - 1.0, np.inf)
@@ -322,7 +350,7 @@ class CellSearch:
     def _in_cell(
         samples: NDArray[np.float64], distances: NDArray[np.float64], radius: float
     ) -> NDArray[np.float64]:
-        """(k, n) largest of a function of distance within each cell."""
+        """(k, n) largest value of a function of distance within each cell."""
         # Samples may be moved by half their spacing.
         window = 2 * int(np.ceil(radius / _SAMPLE_M)) + 5
         largest = maximum_filter1d(samples, window)
@@ -330,19 +358,19 @@ class CellSearch:
         return np.asarray(largest[index])
 
     def groups(self, cells: NDArray[np.float64], edge: float) -> list[Leftover]:
-        """Cells in groups of neighbours.
+        """Divides cells into groups of neighbors.
 
         Args:
-            cells: (n, 2) centres, m.
-            edge: Of the cells, m.
+            cells: (n, 2) centers of the cells, m.
+            edge: Edge of the cells, m.
 
         Returns:
-            The groups.
+            The groups. Each cell belongs to one group.
         """
         if not len(cells):
             return []
         index = np.rint((cells - cells.min(axis=0)) / edge).astype(int)
-        # Few cells over a large area: neighbours from a sorted list, not from a grid.
+        # The cells are few and far apart: a tree finds neighbors faster than a grid.
         tree = cKDTree(index)
         pairs = tree.query_pairs(1.5, p=np.inf, output_type="ndarray")
         joined = coo_array(
@@ -373,15 +401,15 @@ class CellSearch:
         )
 
     def switching_points(self, group: Leftover, edge: float) -> list[SwitchingPoint]:
-        """Where two or three bodies are equally near and their forces cancel.
+        """Finds places of rest where two or three bodies are equally near.
 
         Args:
-            group: Cells to begin in.
-            edge: Of the cells, m.
+            group: Cells in which the search begins.
+            edge: Edge of the cells, m.
 
         Returns:
-            One for each such point in or next to the group; none with
-            ``aggregation: sum``, whose switches lie between sums.
+            All such points in or next to the group. With ``aggregation: sum`` the list
+            is empty, because the force then switches between sums.
         """
         starts = group.centres[group.switches]
         if not len(starts) or self._slots > 1:
@@ -401,7 +429,7 @@ class CellSearch:
     def _each(
         self, points: NDArray[np.float64], bodies: NDArray[np.int64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Distances (size, n) and forces (size, n, 2) of bodies (size, n)."""
+        """Distances (size, n) of bodies (size, n), m, and forces (size, n, 2), N."""
         vectors, distances = self._vectors(points)
         row = np.arange(points.shape[0])
         forces = self._pull(points) + self._pushes(vectors, distances)
@@ -410,7 +438,10 @@ class CellSearch:
     def _newton(
         self, starts: NDArray[np.float64], bodies: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        """(n, 2) where the bodies are equally near; of two: and forces parallel."""
+        """(n, 2) points at which the bodies are equally near, by Newton's method, m.
+
+        With two bodies, their forces are also parallel at these points.
+        """
 
         def residual(points: NDArray[np.float64]) -> NDArray[np.float64]:
             distances, forces = self._each(points, bodies)
@@ -437,7 +468,7 @@ class CellSearch:
         return p
 
     def _cancels(self, p: NDArray[np.float64], bodies: NDArray[np.int64]) -> bool:
-        """Whether the bodies are nearest at p and the hull holds the origin."""
+        """Whether the bodies are the nearest at p and the hull contains the origin."""
         distances, forces = self._each(p[None], bodies[:, None])
         least = self._vectors(p[None])[1].min()
         if np.ptp(distances) > _SAME_M or abs(distances[0, 0] - least) > _SAME_M:
@@ -453,13 +484,14 @@ class CellSearch:
         return bool(min(turns) > 0.0 or max(turns) < 0.0)
 
     def _attracts(self, p: NDArray[np.float64], bodies: NDArray[np.int64]) -> bool:
-        """Whether P is driven to a switching point.
+        """Whether the forces drive the control point P to a switching point.
 
-        With the nearest body alone the force is that of a potential U = pull's +
-        Phi(nearest distance), and its directional derivative at p is the largest of
-        -F_k . u where the bodies push: not negative, as the hull holds the origin. Only
-        along the line on which two bodies stay equally near it may be zero; there
-        the force of sliding must lead back.
+        The nearest body alone pushes P. The force is then that of a potential: the
+        potential of the pull plus Phi(smallest distance). If the bodies push, the
+        directional derivative of the potential at p along u is the largest -F_k . u.
+        This derivative is not negative, because the hull contains the origin. The
+        derivative can be zero only along the line on which two bodies stay equally
+        near. Along this line the force must lead back to p.
         """
         distances, _ = self._each(p[None], bodies[:, None])
         if np.interp(distances[0, 0], self._c, self._f, right=0.0) <= 0.0:
@@ -478,11 +510,11 @@ class CellSearch:
     def _sliding(
         self, p: NDArray[np.float64], bodies: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        """(2,) mean of two forces that keeps P on the line between their bodies, N."""
+        """(2,) mean of two forces that keeps P equally near to their bodies, N."""
         vectors, distances = (x[bodies, 0] for x in self._vectors(p[None]))
         away = -vectors / distances[:, None]
         normal = away[0] - away[1]
-        # Back onto the line, on which the distances are equal.
+        # Move p back to the line on which the distances are equal.
         p = p - normal * (distances[0] - distances[1]) / (normal @ normal)
         forces = self._each(p[None], bodies[:, None])[1][:, 0]
         across = forces @ normal

@@ -1,4 +1,8 @@
-"""The force on P at rest, from the controller and the ideal obstacle sensor."""
+"""Force on the control point of a robot at rest, as a function of position.
+
+The controller and the exact obstacle sensor of the simulation compute the force. P is
+the control point ahead of the wheel axle.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +21,21 @@ from systems.framework.input_error import InputError
 
 
 class ForceField:
-    """Force against position, of a robot at rest.
+    """Force on the control point P of a robot at rest, as a function of position.
 
-    With exact sensing it does not depend on the heading, but for a source straight
-    behind, which pulls a little aside; here the robot has it ahead. An obstacle's
-    speed is zero, as the controller has it where a body is seen for the first time.
+    With exact sensors, the force does not depend on the robot's heading, with one
+    exception: a source straight behind the robot pulls slightly sideways. This class
+    therefore turns the robot so that the source is ahead. The controller takes the
+    speed of every obstacle as zero, as in the control period in which it first sees the
+    obstacle.
 
     Args:
-        loop: The all-ideal build.
-        time_s: The moment, s, of a scenario in which bodies move.
+        loop: The control loop with exact sensors.
+        time_s: Time at which moving bodies are frozen, s. It may be None if no body
+            moves.
 
     Raises:
-        InputError: A body moves, and no moment is given.
+        InputError: A body moves, and no time is given.
     """
 
     def __init__(self, loop: IdealLoop, time_s: float | None = None) -> None:
@@ -48,23 +55,23 @@ class ForceField:
 
     @property
     def p_WS(self) -> NDArray[np.float64]:
-        """(2,) the source in W, m."""
+        """(2,) position of the source in W, m."""
         return self._pose_WS[:2]
 
     def force(self, p_WP: ArrayLike) -> NDArray[np.float64]:
-        """(2,) attraction and repulsion together, in W, N."""
+        """(2,) sum of attraction and repulsion at ``p_WP`` in W, N."""
         forces = self._forces(np.asarray(p_WP, dtype=float), twin=False)
         return np.asarray(forces[:2] + forces[2:], dtype=float)
 
     def gradient(
         self, p_WP: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Force (2,), N, and its derivative by position (2, 2), N/m."""
+        """Returns the force (2,), N, and its derivative by position (2, 2), N/m."""
         forces = self._forces(seed(p_WP), twin=True)
         return value_and_gradient(forces[:2] + forces[2:], 2)
 
     def damping(self, p_WP: ArrayLike) -> float:
-        """Minus the force's slope in the virtual mass's own speed, N s/m."""
+        """Damping along x at ``p_WP``: -dF_x/dv_x of the virtual mass, N s/m."""
         self._forces(np.asarray(p_WP, dtype=float), twin=True)
         block, context = self._controller(twin=True)
         port = block.GetInputPort("v_WP")
@@ -76,11 +83,11 @@ class ForceField:
 
     @cached_property
     def reach_m(self) -> float:
-        """Beyond this distance no body is seen, m."""
+        """Largest distance at which the sensor sees a body, m."""
         return self.loop.scenario.follower.ultrasonic.maximum_range_m
 
     def law(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) repulsion of one body at rest at distances in m, N."""
+        """(n,) repulsion by one body at rest, N, at distances (n,), m."""
         block, context = self._controller(twin=False)
         self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
         port, read = (
@@ -95,14 +102,15 @@ class ForceField:
         return forces
 
     def approach_damping(self, distance: float, speed: float = 1e-4) -> float:
-        """Slope of the push in the speed of an obstacle that comes nearer, N s/m.
+        """Returns the slope of the repulsion in the speed of an approaching obstacle.
 
         Args:
-            distance: Of the obstacle, m.
-            speed: Its speed for the difference, m/s.
+            distance: Distance of the obstacle, m.
+            speed: Speed of the obstacle for the finite difference, m/s.
 
         Returns:
-            N s/m; positive: the push grows with the speed.
+            Derivative of the repulsion by the approach speed, N s/m. A positive value
+            means that the repulsion grows with the speed.
         """
         block, context = self._controller(twin=False)
         self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
@@ -148,7 +156,7 @@ class ForceField:
         block.GetInputPort("features").FixValue(context, np.asarray(features))
 
     def _forces(self, p_WP: Any, *, twin: bool) -> Any:
-        # With the source ahead: straight behind, it would pull aside.
+        # The robot faces the source: a source straight behind would pull sideways.
         theta = 0.0 if float_of(p_WP[0]) <= self.p_WS[0] else math.pi
         offset = self.loop.scenario.only.robot.control_point_m
         x, y = p_WP[0] - offset * math.cos(theta), p_WP[1] - offset * math.sin(theta)

@@ -1,8 +1,8 @@
-"""The all-ideal build as a map of one period, with its derivatives.
+"""The control loop with exact sensors as a map over one period, with derivatives.
 
-The diagram is the one that simulates: its builder, its blocks, its integrator.
-Only hearing and obstacle sensing are exact, and wheel angles are not rounded,
-so that every block converts to AutoDiffXd.
+The diagram has the same builder, blocks and integrator as the simulation. Only the
+sensors differ: hearing and obstacle sensing are exact, and wheel angles are not
+rounded. Therefore every block can be converted to Drake's AutoDiffXd.
 """
 
 from __future__ import annotations
@@ -36,40 +36,47 @@ from diagrams.scenario.own_code import loaded_digests
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
-#: The tracker's slowest mode decays as 0.27 a tick where hearing is exact.
+#: Periods after which the tracker has settled. With exact hearing, its slowest mode
+#: decays by a factor of 0.27 per period.
 SETTLING_TICKS = 40
 
 
 @dataclass(frozen=True)
 class PeriodDerivatives:
-    """One period about a state: x+ = f(x, u), y = g(x, u) at its first tick."""
+    """Linearization of one control period about a state.
+
+    The period maps state x and held inputs u to the next state x+ = f(x, u). The
+    outputs y = g(x, u) are those at the beginning of the period, before the control
+    update.
+    """
 
     next_state: NDArray[np.float64]
-    """(n,) state a period later."""
+    """(n,) state one period later."""
     A: NDArray[np.float64]
-    """(n, n) its derivative by the state."""
+    """(n, n) derivative of the next state by the state."""
     B: NDArray[np.float64]
-    """(n, m) its derivative by the inputs that are held over the period."""
+    """(n, m) derivative of the next state by the inputs, held over the period."""
     y: NDArray[np.float64]
-    """(p,) outputs at the tick that begins the period, before its updates."""
+    """(p,) outputs at the beginning of the period, before the control update."""
     C: NDArray[np.float64]
-    """(p, n) their derivative by the state."""
+    """(p, n) derivative of the outputs by the state."""
     D: NDArray[np.float64]
-    """(p, m) their derivative by the inputs."""
+    """(p, m) derivative of the outputs by the inputs."""
 
 
 class IdealLoop:
-    """The all-ideal build, and its AutoDiff twin: converted once, used again.
+    """Closed control loop with exact sensors, as a float and an AutoDiffXd diagram.
 
-    The state is the diagram's, named by ``state_names``: continuous
-    first, then the discrete groups. A period begins just before the updates of
-    a tick and ends just before those of the next.
+    The AutoDiffXd diagram is converted once and used again. The state is that of the
+    diagram: first the continuous states, then the discrete groups. ``state_names``
+    names its elements. A period begins just before one control update and ends just
+    before the next.
 
     Args:
-        scenario: All ideal, see ``ideal_scenario``.
+        scenario: Scenario with exact sensors, see ``ideal_scenario``.
 
     Raises:
-        InputError: The scenario, or a law of the user's, has no derivative.
+        InputError: The scenario, or a user's own law, has no derivative.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -94,17 +101,17 @@ class IdealLoop:
         self._try_law()
         self.state_names: tuple[str, ...] = self._names()
         self.sampled_twins: dict[str, Any] = {}
-        """Continuous blocks as maps of one period, see
+        """Continuous blocks as AutoDiffXd maps over one period, by role. See
         ``analysis.models.block_models``."""
         self._simulators: dict[Any, Any] = {}
 
     @property
     def tick_s(self) -> float:
-        """The period, s."""
+        """Control period, s."""
         return self.scenario.tick_s
 
     def _require_forces(self) -> None:
-        """Refuses a law whose loop is another than that of the virtual mass."""
+        """Raises an error if the law does not push a virtual mass."""
         block = self.follower.blocks["controller"]
         for port in ("acceleration_W", "forces_W"):
             if not block.HasOutputPort(port):
@@ -116,7 +123,7 @@ class IdealLoop:
                 )
 
     def _try_law(self) -> None:
-        """Lets a law that is a user's own meet a variable before all else does."""
+        """Evaluates a user's own law with AutoDiffXd, to report errors early."""
         if ":" not in self.scenario.only.law:
             return
         block = self.block("controller", twin=True)
@@ -145,21 +152,21 @@ class IdealLoop:
             ) from error
 
     def block(self, role: str, *, twin: bool = False) -> Any:
-        """A block by its role in ``SoundFollower.blocks``, float or AutoDiffXd.
+        """Returns a block of the diagram.
 
         Args:
             role: A key of ``SoundFollower.blocks``.
-            twin: Whether the one for AutoDiffXd is meant.
+            twin: Whether to return the AutoDiffXd form of the block.
 
         Returns:
-            A LeafSystem of float, or of AutoDiffXd.
+            The block as a LeafSystem of float, or of AutoDiffXd if ``twin`` is true.
         """
         return self._twin_blocks[role] if twin else self.follower.blocks[role]
 
     def _names(self) -> tuple[str, ...]:
-        """``part.element`` of every state: continuous first, then discrete.
+        """Names ``part.element`` of all states: continuous first, then discrete.
 
-        What a block does not name, as a user's own law, is numbered.
+        States without a name, such as those of a user's own law, are numbered.
         """
         context = self.follower.diagram.CreateDefaultContext()
         continuous: list[str] = []
@@ -174,19 +181,21 @@ class IdealLoop:
         return (*continuous, *discrete)
 
     def indices(self, role: str) -> list[int]:
-        """Where a block's state stands in the state vector."""
+        """Indices of the states of a block in the state vector."""
         prefix = f"{role}."
         return [k for k, n in enumerate(self.state_names) if n.startswith(prefix)]
 
     def context(self, state: NDArray[np.float64], time_s: float = 0.0) -> Any:
-        """The float diagram's context at a state; valid until the next call.
+        """Returns the context of the float diagram at a state.
+
+        The context is valid until the next call of any method.
 
         Args:
-            state: (n,) of the diagram.
-            time_s: Its time, s.
+            state: (n,) state of the diagram.
+            time_s: Time, s.
 
         Returns:
-            The root context.
+            Root context of the diagram.
         """
         simulator = self._simulator(frozenset(), twin=False)
         context = simulator.get_mutable_context()
@@ -202,16 +211,17 @@ class IdealLoop:
         fixed: Mapping[Port, Sequence[float]] | None = None,
         periods: int = 1,
     ) -> NDArray[np.float64]:
-        """The state some periods later.
+        """Returns the state after some whole periods.
 
         Args:
-            state: (n,) just before the updates of the tick at ``time_s``.
-            time_s: A multiple of the period, s.
-            fixed: Values of input ports that are cut off from their source.
+            state: (n,) state just before the control update at ``time_s``.
+            time_s: Time of the first control update, a multiple of the period, s.
+            fixed: Constant values of input ports. These ports are cut off from their
+                source.
             periods: Number of periods.
 
         Returns:
-            (n,) just before the updates of the tick that many periods later.
+            (n,) state just before the control update that follows the last period.
         """
         fixed = fixed or {}
         simulator = self._simulator(frozenset(fixed), twin=False)
@@ -229,14 +239,14 @@ class IdealLoop:
         inputs: Mapping[tuple[Port, ...], Sequence[float]] | None = None,
         outputs: Sequence[Port] = (),
     ) -> PeriodDerivatives:
-        """One period's derivatives, by AutoDiff through the whole diagram.
+        """Differentiates one period with AutoDiff through the whole diagram.
 
         Args:
-            state: (n,) just before the updates of the tick at ``time_s``.
-            time_s: A multiple of the period, s.
-            inputs: Input ports that are cut off from their source and held over
-                the period; those of one key share a value and its derivative.
-            outputs: Output ports to differentiate at the first tick.
+            state: (n,) state just before the control update at ``time_s``.
+            time_s: Time of the control update, a multiple of the period, s.
+            inputs: Values of input ports that are cut off from their source and held
+                over the period. The ports of one key share a value and its derivative.
+            outputs: Output ports to read and differentiate before the control update.
 
         Returns:
             The next state, the outputs, and the derivatives of both.
@@ -273,15 +283,16 @@ class IdealLoop:
     def runner(
         self, state: NDArray[np.float64], time_s: float, fixed: Sequence[Port] = ()
     ) -> Runner:
-        """A run of the float diagram from a state, to be stopped at any moment.
+        """Prepares a run of the float diagram that can be stopped at any time.
 
         Args:
-            state: (n,) just before the updates of the tick at ``time_s``.
-            time_s: A multiple of the period, s.
-            fixed: Input ports that are cut off, and fed by ``Runner.fix``.
+            state: (n,) state just before the control update at ``time_s``.
+            time_s: Time of the first control update, a multiple of the period, s.
+            fixed: Input ports that are cut off from their source. ``Runner.fix`` sets
+                their values.
 
         Returns:
-            The run, before its first tick.
+            The run, before its first control update.
         """
         simulator = self._simulator(frozenset(fixed), twin=False)
         return Runner(simulator, self.fix, state, time_s, self.tick_s)
@@ -292,18 +303,25 @@ class IdealLoop:
         v_WP: tuple[float, float] = (0.0, 0.0),
         begin_s: float = 0.0,
     ) -> tuple[NDArray[np.float64], float]:
-        """State in which all that remembers has seen a steady motion for long.
+        """Returns the state of the diagram after a long steady motion.
 
-        The robot moves at a constant velocity along its heading, or rests; the
-        source does what its path says; forces do not act meanwhile.
+        The robot rests or moves at constant velocity along its heading, and the source
+        follows its path. The law's acceleration is zero meanwhile. At the end, the
+        tracker and the controller's memory have settled.
 
         Args:
-            pose_WB: Pose at ``begin_s``, m and rad.
-            v_WP: Velocity of P in W, m/s, along the heading.
-            begin_s: A multiple of the period, s: when the source's motion is steady.
+            pose_WB: (3,) pose of the robot in the world frame W at ``begin_s``, m and
+                rad.
+            v_WP: Velocity of the robot's control point P in W, m/s. It points along the
+                heading.
+            begin_s: Time from which on the source moves steadily, s. It is a multiple
+                of the period.
 
         Returns:
-            State and its time in s.
+            Two values:
+
+            - (n,) state just before a control update
+            - time of this control update, s
         """
         context = self.follower.diagram.CreateDefaultContext()
         state = get_state(context)
@@ -318,14 +336,14 @@ class IdealLoop:
         no_force = {("command", "acceleration_W"): (0.0, 0.0)}
         state = self.period_map(state, begin_s, fixed=no_force, periods=SETTLING_TICKS)
         time_s = begin_s + SETTLING_TICKS * self.tick_s
-        # An obstacle's speed of rounding errors alone would have a slope.
+        # Rounding errors would otherwise give obstacles a speed, and this a slope.
         remembered = self.period_map(state, time_s, fixed=no_force)
         controller = self.indices("controller")
         state[controller] = remembered[controller]
         return state, time_s
 
     def _simulator(self, fixed: frozenset[Port], *, twin: bool) -> Any:
-        """A simulator whose context has these ports fixed, made once."""
+        """A simulator whose context has these ports fixed, created at the first use."""
         key = (fixed, twin)
         if key not in self._simulators:
             make, diagram = (
@@ -339,13 +357,14 @@ class IdealLoop:
         return self._simulators[key]
 
     def fix(self, context: Any, port: Port, value: Any, *, twin: bool = False) -> None:
-        """Cuts an input port off from its source and sets what it reads.
+        """Cuts an input port off from its source and sets its value.
 
         Args:
-            context: Root context of the diagram, changed.
+            context: Root context of the diagram. It is changed.
             port: Role of the block, and name of its input port.
-            value: (size of the port,), in its unit; AutoDiffXd for the twin.
-            twin: Whether the context is that of the AutoDiff diagram.
+            value: (size of the port,) value in the unit of the port. The AutoDiffXd
+                diagram takes AutoDiffXd values.
+            twin: Whether the context belongs to the AutoDiffXd diagram.
         """
         role, name = port
         block = self.block(role, twin=twin)
@@ -364,10 +383,16 @@ def _cached_loop(key: str, _own_code: str) -> IdealLoop:
 
 
 def ideal_loop(scenario: Scenario) -> IdealLoop:
-    """The loop of a scenario, built and converted once in a process.
+    """Returns the control loop of a scenario with exact sensors.
 
-    Drake never frees blocks written in Python, so that a build should be used
-    again.
+    Each process builds and converts the loop of a scenario only once, because Drake
+    never frees blocks that are written in Python.
+
+    Args:
+        scenario: Scenario with exact sensors, see ``ideal_scenario``.
+
+    Returns:
+        The loop. Callers with the same scenario share it.
 
     Raises:
         InputError: The scenario has no linear model.

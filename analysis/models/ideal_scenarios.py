@@ -1,4 +1,4 @@
-"""Scenarios that have a linear model: exact sensors, bodies at rest."""
+"""Scenarios that can be linearized: exact sensors, and bodies at rest."""
 
 from __future__ import annotations
 
@@ -19,30 +19,36 @@ _ALL_IDEAL: dict[str, Any] = {
         "range_noise_fraction": 0.0,
     },
     "odometry": {"rounding": False},
-    # One that passes what the law wants changes nothing.
+    # A guard that passes the law's command does not change the loop.
     "guard": None,
 }
 
 
 def ideal_scenario(scenario: Scenario) -> Scenario:
-    """The same scenario with exact sensors and a sound that never stops.
+    """Returns the scenario with exact sensors and a sound without pauses.
+
+    Args:
+        scenario: Any scenario. It is not changed.
+
+    Returns:
+        A copy with exact sensors.
 
     Raises:
-        ValueError: Its wheels can slip.
+        ValueError: The wheels can slip (``plant.friction`` is set).
     """
     require_rolling(scenario.only.plant)
     return changed(scenario, _ALL_IDEAL)
 
 
 def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
-    """The same scenario with source and obstacles at rest, where they are then.
+    """Returns the scenario with source and obstacles at rest.
 
     Args:
-        scenario: Any scenario.
-        time_s: The moment, s.
+        scenario: Any scenario. It is not changed.
+        time_s: The bodies rest at the poses that they have at this time, s.
 
     Returns:
-        A copy.
+        A copy in which no body moves.
     """
     x, y, theta = scenario.source.path().pose(time_s)
     source = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
@@ -55,21 +61,22 @@ def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
 
 
 def moving_bodies(scenario: Scenario) -> tuple[str, ...]:
-    """Names of the bodies that move, what is followed last."""
+    """Names of the bodies that move; the source, if it moves, is last."""
     moving = [body.name for body in scenario.obstacles if body.path().moves]
     moving += ["source"] if scenario.source.path().moves else []
     return tuple(moving)
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """A copy with other values, validated.
+    """Returns a validated copy of a scenario with other values.
 
     Args:
-        scenario: It stays as it is.
-        changes: By field; a mapping changes fields of a group, in their units.
+        scenario: Any scenario. It is not changed.
+        changes: New values by field name, in the units of the fields. If a value is a
+            mapping, it changes single fields of a group.
 
     Returns:
-        The copy.
+        The changed copy.
     """
     data = scenario.model_dump()
     for key, value in changes.items():
@@ -78,7 +85,10 @@ def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 
 
 def require_rolling(plant: PlantParameters) -> None:
-    """Raises what to do instead where the wheels can slip.
+    """Raises an error if the wheels can slip.
+
+    Args:
+        plant: Parameters of the robot's plant.
 
     Raises:
         InputError: ``plant.friction`` is set.
@@ -93,10 +103,14 @@ def require_rolling(plant: PlantParameters) -> None:
 
 
 def require_ideal(scenario: Scenario) -> None:
-    """Raises what to do instead where a scenario has no linear model.
+    """Raises an error if a scenario cannot be linearized.
+
+    Args:
+        scenario: The scenario to check.
 
     Raises:
-        InputError: Some block has no derivative.
+        InputError: The scenario has several robots or sampling rates, or a block
+            without a derivative.
     """
     scenario.require_one_robot("a linear model")
     scenario.require_one_rate("a linear model")

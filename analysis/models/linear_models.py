@@ -1,4 +1,4 @@
-"""Linear models: matrices with named signals, and their modes."""
+"""Linear models as matrices with named signals, and their modes."""
 
 from __future__ import annotations
 
@@ -11,25 +11,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Sampled poles nearer to z = 1 than this are neutral. Rounding of 1e-10 in a
-#: matrix moves a double pole by its square root, 1e-5.
+#: A sampled pole nearer to z = 1 than this counts as neutral. A rounding error of
+#: 1e-10 in a matrix moves a double pole by the square root, 1e-5.
 NEUTRAL = 1e-5
-#: Poles nearer to z = 0 than this are delays, which have no s-plane image.
+#: A pole nearer to z = 0 than this counts as a delay, which has no pole in the s plane.
 _DELAY = 1e-6
-#: Elements of the matrices that are solved at once.
+#: Number of matrix elements that are solved at once.
 _CHUNK = 100_000
 
 
 @dataclass(frozen=True)
 class Mode:
-    """One pole, or one of a conjugate pair with a positive frequency."""
+    """One real pole, or one conjugate pair of poles.
+
+    The pole with the positive imaginary part represents the pair.
+    """
 
     z: complex | None
-    """Pole in the z plane; none in a continuous model."""
+    """Pole in the z plane. In a continuous model: None."""
     eigenvalue: complex
-    """Pole in the s plane, rad/s: ln(z)/T in a sampled model."""
+    """Pole in the s plane, rad/s. In a sampled model: ln(z)/T."""
     participation: dict[str, float]
-    """Share of each state in the mode, largest first, of those above 1 %."""
+    """Share of each state in the mode, largest first; only shares above 1 %."""
 
     @property
     def frequency_rad_s(self) -> float:
@@ -38,31 +41,33 @@ class Mode:
 
     @property
     def damping_ratio(self) -> float:
-        """-Re s / |s|; not a number for a pole at the origin."""
+        """Damping ratio -Re s / |s|; NaN for a pole at the origin."""
         size = abs(self.eigenvalue)
         return -self.eigenvalue.real / size if size > 0.0 else math.nan
 
     @property
     def time_constant_s(self) -> float:
-        """Time in which the mode falls to 1/e, s; negative where it grows."""
+        """Time in which the mode decays to 1/e, s; negative for a growing mode."""
         rate = -self.eigenvalue.real
         return 1.0 / rate if rate != 0.0 else math.inf
 
     @property
     def settling_s(self) -> float:
-        """Time to 2 %, s; infinite where the mode does not decay."""
+        """Settling time to 2 %, s; infinite for a mode that does not decay."""
         return 4.0 * self.time_constant_s if self.eigenvalue.real < 0.0 else math.inf
 
 
 @dataclass(frozen=True)
 class LinearModel:
-    """x' = A x + B u, y = C x + D u; or x+ = ... where there is a period.
+    """Linear state-space model in continuous or sampled time, with named signals.
 
-    All quantities are deviations from the operating point, in SI units.
+    Continuous time: x' = A x + B u, y = C x + D u. Sampled time, if ``period_s`` is
+    set: x+ = A x + B u, y = C x + D u. All quantities are deviations from the operating
+    point, in SI units.
     """
 
     name: str
-    """What it is a model of."""
+    """Name for reports and files."""
     A: NDArray[np.float64]
     """(n, n)"""
     B: NDArray[np.float64]
@@ -78,10 +83,10 @@ class LinearModel:
     output_names: tuple[str, ...]
     """p names."""
     period_s: float | None = None
-    """Sample period, s; none where time is continuous."""
+    """Sample period, s. In continuous time: None."""
 
     def to_control(self) -> Any:
-        """The same as ``control.StateSpace`` with named signals."""
+        """Returns the model as a ``control.StateSpace`` with named signals."""
         import control
 
         return control.ss(
@@ -98,12 +103,12 @@ class LinearModel:
 
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
-        """(n,) eigenvalues of A: s plane, or z plane where there is a period."""
+        """(n,) eigenvalues of A, in the z plane (sampled) or s plane (continuous)."""
         return np.linalg.eigvals(self.A).astype(np.complex128)
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """The eigenvalue table, slowest first, without pure delays (z = 0)."""
+        """Modes of the model, slowest first, without pure delays (z = 0)."""
         from scipy.linalg import eig
 
         values, left, right = eig(self.A, left=True, right=True)
@@ -124,7 +129,7 @@ class LinearModel:
         return {self.state_names[k]: float(share[k]) for k in order if share[k] > 0.01}
 
     def response(self, omega: Sequence[float] | NDArray[np.float64]) -> Any:
-        """(p, m, k) complex frequency response at ``omega`` in rad/s."""
+        """(p, m, k) complex frequency response at k frequencies ``omega``, rad/s."""
         omega = np.asarray(omega, dtype=float)
         points = np.exp(1j * omega * self.period_s) if self.period_s else 1j * omega
         eye, many = np.eye(len(self.A)), max(1, _CHUNK // max(len(self.A), 1) ** 2)
@@ -135,14 +140,14 @@ class LinearModel:
         return np.moveaxis(np.concatenate(rows), 0, -1) + self.D[:, :, None]
 
     def part(self, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
-        """The same with some of its inputs and outputs.
+        """Returns the model with only some of its inputs and outputs.
 
         Args:
-            inputs: Names of inputs, in the order that is wanted.
-            outputs: Names of outputs, in the order that is wanted.
+            inputs: Names of the inputs to keep, in their new order.
+            outputs: Names of the outputs to keep, in their new order.
 
         Returns:
-            With all of its states.
+            A model with the same states.
         """
         columns = [self.input_names.index(name) for name in inputs]
         rows = [self.output_names.index(name) for name in outputs]
@@ -157,16 +162,16 @@ class LinearModel:
 
 
 def simple_poles(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """The poles that are neither zero nor within 1e-4 of another one.
+    """Returns the poles that are neither near zero nor within 1e-4 of another pole.
 
-    Others move by the root of a perturbation of the matrix: two computations
-    that agree to rounding need not agree in them.
+    A multiple pole moves by a root of a perturbation of the matrix. Two computations
+    whose matrices agree up to rounding can therefore differ in their multiple poles.
 
     Args:
-        poles: (n,) in the z plane.
+        poles: (n,) poles in the z plane.
 
     Returns:
-        (k,) of them, in their order.
+        (k,) simple poles with magnitude above 1e-3, in the order of ``poles``.
     """
     distances = np.abs(poles[:, None] - poles[None, :])
     np.fill_diagonal(distances, np.inf)

@@ -1,8 +1,9 @@
-"""Linear models of the closed loop at an operating point, by two routes.
+"""Linear models of the closed loop at an operating point.
 
-Sampled: AutoDiff through one whole period of the built diagram, and the blocks
-linearised one by one and joined by ``control``. Continuous: the same blocks in
-the limit of a period that goes to zero.
+The sampled model is computed in two independent ways. The first is AutoDiff through one
+whole period of the diagram. The second linearizes each block alone and joins the blocks
+with the ``control`` package. The continuous model uses the same blocks in the limit of
+a period that goes to zero.
 """
 
 from __future__ import annotations
@@ -34,11 +35,21 @@ _READ: tuple[Port, ...] = (
 
 
 def sampled_model(point: OperatingPoint) -> LinearModel:
-    """The closed loop over a tick, by AutoDiff of one period of the diagram.
+    """Returns the sampled closed loop, by AutoDiff through one period of the diagram.
 
-    Inputs: pose of the source at the tick. Outputs, at the tick before its
-    updates: position of P, heading, what hearing says, and the law's
-    acceleration. All states of the diagram.
+    Inputs and outputs are the values at the control update that begins the period.
+    Outputs are read before the update. The model has these signals:
+
+    - Input: pose of the source, m and rad.
+    - Outputs: position of the control point P, heading, source position that hearing
+      reports, and acceleration from the law.
+    - States: all states of the diagram.
+
+    Args:
+        point: Operating point.
+
+    Returns:
+        The model.
     """
     loop = point.loop
     found = loop.period_derivatives(
@@ -62,7 +73,16 @@ def sampled_model(point: OperatingPoint) -> LinearModel:
 
 
 def blockwise_model(point: OperatingPoint) -> LinearModel:
-    """The same from blocks that are linearised alone and joined by ``control``."""
+    """Returns the sampled closed loop, joined from blocks that are linearized alone.
+
+    The signals are those of ``sampled_model``.
+
+    Args:
+        point: Operating point.
+
+    Returns:
+        The model.
+    """
     loop = point.loop
     joined = join_blocks(
         sampled_blocks(loop, point.state, point.time_s),
@@ -86,7 +106,7 @@ def blockwise_model(point: OperatingPoint) -> LinearModel:
 
 
 def _control_point(point: OperatingPoint) -> NDArray[np.float64]:
-    """(7, 7) from pose_WB and what follows to p_WP and what follows."""
+    """(7, 7) matrix that replaces the robot's position in the outputs by p_WP."""
     epsilon = point.loop.scenario.only.robot.control_point_m
     matrix = np.eye(len(_OUTPUTS))
     matrix[0, 2] = -epsilon * math.sin(point.theta_WB)
@@ -96,20 +116,27 @@ def _control_point(point: OperatingPoint) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class RouteComparison:
-    """How far the two routes to the sampled model are apart."""
+    """Differences between ``sampled_model`` and ``blockwise_model``."""
 
     matrix_difference: float
     """Largest difference of an element of A, B, C or D."""
     pole_difference: float
-    """Largest distance of a simple nonzero pole to the other route's nearest."""
+    """Largest distance of a simple nonzero pole from the other model's nearest pole."""
     simple_poles: NDArray[np.complex128]
-    """Poles in the z plane that were compared."""
+    """Compared poles in the z plane."""
     states: int
     """Number of states."""
 
 
 def compare_routes(point: OperatingPoint) -> RouteComparison:
-    """AutoDiff of a whole period against blocks joined by ``control``."""
+    """Compares the models of ``sampled_model`` and ``blockwise_model``.
+
+    Args:
+        point: Operating point.
+
+    Returns:
+        Differences of matrices and poles.
+    """
     whole, joined = sampled_model(point), blockwise_model(point)
     pairs = [(getattr(whole, m), getattr(joined, m)) for m in ("A", "B", "C", "D")]
     poles = simple_poles(whole.poles)
@@ -124,33 +151,34 @@ def compare_routes(point: OperatingPoint) -> RouteComparison:
 
 @dataclass(frozen=True)
 class GradientCheck:
-    """AutoDiff against finite differences of the period map."""
+    """Comparison of AutoDiff with finite differences of the map over one period."""
 
     step: float
-    """Step in each state, in its SI unit."""
+    """Step in each state for the differences, in its SI unit."""
     largest_difference: float
-    """Between AutoDiff and central differences, over all elements of A."""
+    """Largest difference of an element of A: AutoDiff minus central differences."""
     largest_at: tuple[str, str]
-    """Names of the state that changed and of the one that was stepped."""
+    """Names of two states: the one that changed, and the one that was stepped."""
     kink: float
-    """Largest difference of the two one-sided slopes: where it does not vanish
-    the loop has a corner, as where an obstacle's speed is the norm |dC/dt|."""
+    """Largest difference between the two one-sided slopes. If this is not near
+    zero, the loop has a corner, for example because an obstacle's speed is the norm
+    |dC/dt|."""
     kink_at: tuple[str, str]
-    """As ``largest_at``."""
+    """Names of the state that changed and of the state that was stepped there."""
 
 
 def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:
-    """Compares A with differences of the float diagram, state by state.
+    """Compares A with finite differences of the float diagram, state by state.
 
-    The tracker's covariances are left out: they are zero where hearing is
-    exact, and a step would make them negative on one side.
+    The covariances of the tracker are left out. They are zero with exact hearing, and a
+    step to one side would make them negative.
 
     Args:
-        point: Where to compare.
-        step: Of each state, in its SI unit.
+        point: Operating point.
+        step: Step in each state, in its SI unit.
 
     Returns:
-        Largest differences, with the names of their states.
+        Largest differences, with the names of the states.
     """
     loop, state, time_s = point.loop, point.state, point.time_s
     A = loop.period_derivatives(state, time_s).A
@@ -178,7 +206,7 @@ def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:
 
 
 def _can_step(name: str) -> bool:
-    """Whether a small step of a state to either side leaves the map as it is."""
+    """Whether a small step of a state in both directions leaves the map smooth."""
     role, _, element = name.partition(".")
     if role == "controller":
         return "feature" not in element
@@ -186,13 +214,21 @@ def _can_step(name: str) -> bool:
 
 
 def continuous_model(point: OperatingPoint) -> LinearModel:
-    """The closed loop in continuous time: no sampling, no tick of latency.
+    """Returns the closed loop in continuous time, without sampling and latency.
 
-    States: pose and wheel speeds of the plant, velocity of the virtual mass.
-    Inputs: position of the source, m, and a push on the virtual mass, m/s^2.
-    Outputs: position of P, m, and heading, rad. The blocks are the sampled
-    ones; odometry and hearing are exact and at once in this limit, and the
-    virtual mass integrates.
+    The blocks are those of the sampled model. In this limit, odometry and hearing are
+    exact and without delay, and the virtual mass becomes an integrator.
+
+    - States: pose and wheel speeds of the plant, velocity of the virtual mass.
+    - Inputs: position of the source, m, and an acceleration added to that of the
+      virtual mass, m/s^2.
+    - Outputs: position of the control point P, m, and heading, rad.
+
+    Args:
+        point: Operating point.
+
+    Returns:
+        The model.
     """
     loop = point.loop
     models = sampled_blocks(loop, point.state, point.time_s)
@@ -201,7 +237,7 @@ def continuous_model(point: OperatingPoint) -> LinearModel:
         for role in ("collision", "controller", "command")
     )
     A_plant, B_plant = plant_jacobians(point)
-    moving = [0, 1, 2, 5, 6]  # the wheels' angles move nothing
+    moving = [0, 1, 2, 5, 6]  # without wheel angles, which affect nothing else
     A_plant, B_plant = A_plant[np.ix_(moving, moving)], B_plant[moving]
     read, vectors = "acceleration_W", "collision_vectors_B"
     by_vectors = _slope(controller, read, vectors)
@@ -240,7 +276,7 @@ def _signals(names: Sequence[str], port: str) -> list[int]:
 
 
 def _slope(model: LinearModel, of: str, by: str) -> NDArray[np.float64]:
-    """How an output port follows an input port at once."""
+    """Derivative of an output port by an input port in the same period."""
     rows, columns = _signals(model.output_names, of), _signals(model.input_names, by)
     return model.D[np.ix_(rows, columns)]
 
@@ -248,9 +284,19 @@ def _slope(model: LinearModel, of: str, by: str) -> NDArray[np.float64]:
 def plant_jacobians(
     point: OperatingPoint,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A (7, 7) and B (7, 2) of the plant in continuous time.
+    """Returns A (7, 7) and B (7, 2) of the plant in continuous time.
 
-    They do not change along the operating point: it rests or goes straight.
+    The matrices are constant, because the robot rests or drives straight at an
+    operating point.
+
+    Args:
+        point: Operating point.
+
+    Returns:
+        Two matrices:
+
+        - A: derivative of the state's rate by the state
+        - B: derivative of the state's rate by the two commanded wheel speeds
     """
     loop = point.loop
     plant = loop.block("plant", twin=True)

@@ -1,4 +1,4 @@
-"""Linear models as files that other programs read."""
+"""Export of linear models to MATLAB and CSV files."""
 
 from __future__ import annotations
 
@@ -16,16 +16,19 @@ from analysis.reporting.file_names import distinct_names
 
 
 def write_models(models: Sequence[LinearModel], directory: Path) -> None:
-    """Writes ``models.mat`` and ``models/NAME_A.csv``, ``_B``, ``_C``, ``_D``.
+    """Writes linear models to ``models.mat`` and to CSV files in ``models/``.
 
-    In the .mat file each model is a struct with the fields A, B, C, D, Ts (s; 0
-    where time is continuous, as in MATLAB's ``ss``), StateName, InputName and
-    OutputName. A .csv file has the names of its columns in the first row and
-    those of its rows in the first column.
+    In ``models.mat`` each model is a struct with the fields A, B, C, D, Ts, StateName,
+    InputName and OutputName. Ts is the sample period in s. In continuous time Ts is 0,
+    as in MATLAB's ``ss``.
+
+    Each matrix also has a CSV file: ``models/NAME_A.csv``, ``_B``, ``_C`` and ``_D``.
+    The first row has the names of the columns, the first column the names of the rows.
 
     Args:
-        models: Of those with one name the second gets a 2 after it, and so on.
-        directory: Exists.
+        models: Models to write. If several have the same name, the second gets the
+            suffix ``_2``, and so on.
+        directory: An existing directory.
     """
     names = distinct_names([_identifier(m.name) for m in models], joint="_")
     structs = {name: _struct(model) for name, model in zip(names, models, strict=True)}
@@ -45,7 +48,7 @@ def write_models(models: Sequence[LinearModel], directory: Path) -> None:
 
 
 def _identifier(name: str) -> str:
-    """A name that MATLAB takes for a variable's."""
+    """Turns a name into a valid name of a MATLAB variable."""
     return re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
 
 

@@ -1,4 +1,4 @@
-"""The part of a linear model that its inputs move and its outputs show."""
+"""Reduction of a linear model to its controllable and observable part."""
 
 from __future__ import annotations
 
@@ -9,29 +9,30 @@ from numpy.typing import NDArray
 
 from analysis.models.linear_models import LinearModel
 
-#: A direction shorter than this, of a unit vector's image, is rounding.
+#: A new direction of a unit vector counts as rounding error if its length is below.
 _NEGLIGIBLE = 1e-9
 
 
 def minimal_model(model: LinearModel) -> LinearModel:
-    """The same response with the states that can be both moved and seen.
+    """Returns the controllable and observable part of a model.
 
-    The closed loop has many others: where odometry believes that W lies, how
-    far the wheels have turned, what the tracker knows of its own errors. They
-    rest at z = 1 or 0 and make polynomials of the whole model useless.
+    The frequency response stays the same. The closed loop has many states outside this
+    part: the error of odometry, the angles of the wheels, and the covariances of the
+    tracker. Their poles are at z = 1 or z = 0. With these states, transfer polynomials
+    of the model would be useless.
 
     Args:
         model: Any model.
 
     Returns:
-        A model in other coordinates (orthonormal combinations of states).
+        A model whose states are orthonormal combinations of the states of ``model``.
     """
     moved = _on(model, _span(model.A, model.B))
     return _on(moved, _span(moved.A.T, moved.C.T))
 
 
 def _span(A: NDArray[np.float64], B: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, k) orthonormal basis of all that A makes of the columns of B."""
+    """(n, k) orthonormal basis of the controllable subspace of A and B."""
     basis = np.empty((len(A), 0))
     waiting = list(B.T)
     while waiting:
@@ -40,7 +41,7 @@ def _span(A: NDArray[np.float64], B: NDArray[np.float64]) -> NDArray[np.float64]
         if size == 0.0:
             continue
         vector = vector / size
-        for _ in range(2):  # once more, against what rounding leaves
+        for _ in range(2):  # twice, to remove rounding errors of the first time
             vector = vector - basis @ (basis.T @ vector)
         size = np.linalg.norm(vector)
         if size > _NEGLIGIBLE:

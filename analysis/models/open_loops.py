@@ -1,7 +1,7 @@
-"""The loop cut open where it can be disturbed: at a sensor or an actuator.
+"""Open-loop models of the control loop, cut at a sensor or an actuator.
 
-Loop transfer functions are in the convention of negative feedback: the closed
-loop has the poles of 1 + L = 0.
+Loop transfer functions L follow the convention of negative feedback: the poles of the
+closed loop are the roots of 1 + L = 0.
 """
 
 from __future__ import annotations
@@ -27,13 +27,16 @@ from systems.framework.input_error import InputError
 BreakPoint = Literal["sensor", "actuator", "wheels"]
 Direction = Literal["along", "across"]
 
-#: Where the loop can be cut: at what hearing says of the source, at the law's
-#: acceleration, at the commanded wheel speeds.
+#: Signals at which the loop can be cut:
+#: - sensor: source position that hearing reports
+#: - actuator: acceleration from the control law
+#: - wheels: commanded wheel speeds
 BREAK_POINTS: tuple[BreakPoint, ...] = ("sensor", "actuator", "wheels")
-#: Along the line from P to the source, and across it.
+#: Directions relative to the line from the control point P to the source.
 DIRECTIONS: tuple[Direction, ...] = ("along", "across")
 
-#: The input port that is fed from outside, and the output port that fed it.
+#: For each cut: the input port to feed from outside, and the output port that feeds
+#: this input in the closed loop.
 _WIRES: dict[BreakPoint, tuple[Port, Port]] = {
     "sensor": (("tracker", "p_PS_B"), ("hearing", "p_PS_B")),
     "actuator": (("command", "acceleration_W"), ("controller", "acceleration_W")),
@@ -42,18 +45,19 @@ _WIRES: dict[BreakPoint, tuple[Port, Port]] = {
 
 
 def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
-    """The sampled loop with wires cut: from what is fed in to what arrives.
+    """Returns the sampled linear model of the control loop with some signals cut.
 
-    Inputs ``<place>_<direction>`` replace the signals, outputs of the same
-    names are the signals as their sources have them. The heading at the
-    operating point is towards the source, so that along is ahead.
+    A signal is cut between the block that produces the signal and the block that reads
+    it. At each cut, the input ``<place>_<direction>`` feeds the reading block. The
+    output of the same name is the signal from the producing block. At the operating
+    point the robot faces the source, so that "along" means ahead.
 
     Args:
         point: The operating point.
-        *places: Wires to cut; none gives the closed loop.
+        *places: Signals to cut. Without any, the model is that of the closed loop.
 
     Returns:
-        Two inputs and two outputs a place, along and across, in SI units.
+        A model in SI units with two inputs and two outputs per cut, along and across.
     """
     loop = point.loop
     now = loop.context(point.state, point.time_s)
@@ -75,7 +79,7 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
     )
     C, D = found.C, found.D
     if "wheels" in places:
-        # The wheels hold what the command is after the tick's updates.
+        # The wheels receive the command as updated in the same control period.
         at = 2 * places.index("wheels")
         C = np.insert(C, [at, at], found.A[wheels], axis=0)
         D = np.insert(D, [at, at], found.B[wheels], axis=0)
@@ -95,7 +99,7 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
 
 
 def _axes(point: OperatingPoint, place: BreakPoint) -> NDArray[np.float64]:
-    """(2, 2) rows: what is along and what is across, of a signal's two values."""
+    """(2, 2) rotation of a signal's two values to along (row 0) and across (row 1)."""
     if place == "wheels":
         return np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
     if place == "sensor":
@@ -104,11 +108,14 @@ def _axes(point: OperatingPoint, place: BreakPoint) -> NDArray[np.float64]:
 
 
 def closed(model: LinearModel, signals: tuple[str, ...]) -> LinearModel:
-    """Wires joined again; what enters is added to them.
+    """Closes the loop again at some cut signals of a model.
+
+    The inputs of these signals remain. Each remaining input is added to its signal.
 
     Args:
-        model: Cut at ``signals`` at least.
-        signals: Names of inputs, and of outputs that feed them again.
+        model: A model that is cut at ``signals`` at least.
+        signals: Names of the cut signals. Each names both an input and the output that
+            is connected to this input.
 
     Returns:
         The model with the same inputs and outputs.
@@ -127,15 +134,17 @@ def open_loop(
     at: BreakPoint = "sensor",
     direction: Direction = "along",
 ) -> LinearModel:
-    """L of one direction, sampled; the other direction stays closed.
+    """Returns the sampled loop transfer function L of one direction.
+
+    The loop of the other direction stays closed.
 
     Args:
-        point: The operating point.
-        at: Where the loop is cut.
-        direction: Which of the two signals.
+        point: Operating point.
+        at: Signal at which the loop is cut: ``sensor``, ``actuator`` or ``wheels``.
+        direction: Direction of the cut: along the line to the source, or across.
 
     Returns:
-        One input and one output in the same unit; feedback is negative.
+        L for negative feedback, with one input and one output in the same unit.
     """
     whole = cut_model(point, at)
     own = f"{at}_{direction}"
@@ -146,21 +155,23 @@ def open_loop(
 
 
 def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
-    """L of the ideal target loop: no obstacle, no lag, no sampling.
+    """Returns the loop transfer function L of the ideal target loop.
 
-    A point mass with the attraction's spring and damper along the line to a
-    source at rest; both slopes are the controller's own. Cut at the sensor the
-    damper stays closed; at the actuator both are cut.
+    The target loop has no obstacle, no motor lag and no sampling. It is a point mass
+    that the attraction's spring and damper act on, along the line to a source at rest.
+    Stiffness and damping are the slopes of the controller's force. If the loop is cut
+    at the sensor, the damping loop stays closed. If it is cut at the actuator, spring
+    and damper are both cut.
 
     Args:
-        scenario: Attraction, mass and controller are used.
+        scenario: Scenario with attraction, mass and controller.
         at: ``sensor`` or ``actuator``.
 
     Returns:
-        In continuous time; states are position, m, and velocity, m/s.
+        A model in continuous time. The states are position, m, and velocity, m/s.
 
     Raises:
-        InputError: There is no spring, hence no target loop.
+        InputError: The stiffness of the attraction is zero.
     """
     if scenario.follower.attraction.stiffness_n_m == 0.0:
         raise InputError(
@@ -188,7 +199,7 @@ def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
 
 
 def _attraction_slopes(scenario: Scenario) -> tuple[float, float]:
-    """Stiffness, N/m, and damping, N s/m, towards a lone source at rest."""
+    """Stiffness, N/m, and damping, N s/m, towards a source at rest, no obstacles."""
     distance = scenario.follower.attraction.follow_distance_m + 2.0
     alone = {
         "law": "none",

@@ -1,7 +1,8 @@
-"""Operating points: equilibria of the closed loop, at rest and following.
+"""Operating points: equilibria of the closed loop at rest and while following.
 
-At rest the heading can be anything: equilibria are continua with one pole at
-z = 1, which the models here leave out by looking at the motion of P alone.
+At rest, the robot may have any heading. Equilibria at rest therefore form continua with
+one pole at z = 1. The models here describe the motion of the control point P alone, and
+so do not contain this pole.
 """
 
 from __future__ import annotations
@@ -26,53 +27,54 @@ from systems.world.geometry import control_point, nearest_point_on_rectangle
 
 Kind = Literal["sink", "saddle", "source"]
 
-#: Force that counts as none, N.
+#: A force below this counts as zero, N.
 NO_FORCE_N = 1e-9
-#: A stiffness below this share of the largest is that of a continuum.
+#: If the smallest stiffness is below this share of the largest, the equilibrium is
+#: part of a continuum.
 FLAT = 1e-6
-#: By then the source has started, and drives straight on to rounding errors, s.
+#: Time after which the source has started and drives straight up to rounding errors, s.
 _STEADY_S = 20.0
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """An equilibrium, at rest or at the source's constant velocity."""
+    """Equilibrium of the closed loop, at rest or at the source's constant velocity."""
 
     loop: IdealLoop = field(repr=False)
-    """The all-ideal build that it belongs to."""
+    """Control loop with exact sensors."""
     p_WP: NDArray[np.float64]
-    """(2,) m; of a moving one at ``time_s``."""
+    """(2,) position of the control point P in W at ``time_s``, m."""
     theta_WB: float
-    """Heading, rad: towards the source; any other is an equilibrium too at rest."""
+    """Heading, rad: towards the source. At rest, any other is an equilibrium too."""
     v_WS: NDArray[np.float64]
-    """(2,) velocity of source and robot, m/s."""
+    """(2,) velocity of both source and robot in W, m/s."""
     force_n: float
-    """Force that is left, N."""
+    """Remaining force at the equilibrium, N."""
     stiffness_n_m: NDArray[np.float64]
-    """(2, 2) minus the force's derivative by position, N/m."""
+    """(2, 2) negative derivative of the force by position, N/m."""
     state: NDArray[np.float64] = field(repr=False)
-    """(n,) of the diagram, just before the updates of a tick."""
+    """(n,) state of the diagram, just before a control update."""
     time_s: float
-    """Time of that tick, s."""
+    """Time of this control update, s."""
 
     @property
     def moves(self) -> bool:
-        """Whether it is the state of following a moving source."""
+        """Whether the robot follows a moving source."""
         return bool(np.any(self.v_WS))
 
     @property
     def p_WS(self) -> NDArray[np.float64]:
-        """(2,) source at ``time_s``, m."""
+        """(2,) position of the source at ``time_s`` in W, m."""
         return np.array(self.loop.scenario.source.path().pose(self.time_s)[:2])
 
     @property
     def source_distance_m(self) -> float:
-        """Between P and the source, m."""
+        """Distance between P and the source, m."""
         return float(np.linalg.norm(self.p_WS - self.p_WP))
 
     @property
     def offset_m(self) -> float:
-        """How much farther from the source than ``follow_distance_m``, m."""
+        """Distance between P and the source, minus ``follow_distance_m``, m."""
         return (
             self.source_distance_m
             - self.loop.scenario.follower.attraction.follow_distance_m
@@ -80,29 +82,30 @@ class OperatingPoint:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """(2, 2) rows: along the line to the source, and across it, in W."""
+        """(2, 2) unit vectors in W: row 0 towards the source, row 1 across."""
         c, s = math.cos(self.theta_WB), math.sin(self.theta_WB)
         return np.array([[c, s], [-s, c]])
 
     @property
     def continuum(self) -> bool:
-        """Whether P is free to move along a curve, as round the source."""
+        """Whether P is free to move along a curve, for example around the source."""
         sizes = np.abs(np.linalg.eigvals(self.stiffness_n_m))
         return bool(sizes.min() < FLAT * max(sizes.max(), 1.0)) and not self.moves
 
     @cached_property
     def motion(self) -> LinearModel:
-        """The sampled closed loop as far as P's motion shows it.
+        """Sampled model of the motion of the control point P in the closed loop.
 
-        Inputs: a kick to the velocity of the virtual mass, m/s. Outputs:
-        position of P, m; and the heading, rad, where the robot moves.
+        - Inputs: change of the velocity of the virtual mass along x and y of the world
+          frame W, m/s.
+        - Outputs: position of P in W, m. If the robot moves, also the heading, rad.
         """
         A = self.loop.period_derivatives(self.state, self.time_s).A
         return motion_model(self, A, self.loop.tick_s)
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """Modes of the motion, slowest first, without the neutral ones."""
+        """Modes of the motion, slowest first, without neutral modes (z = 1)."""
         return tuple(
             mode
             for mode in self.motion.modes
@@ -111,22 +114,23 @@ class OperatingPoint:
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
-        """Poles of the motion in the s plane, ln(z)/T, rad/s; no neutral ones."""
+        """Poles ln(z)/T of the motion in the s plane, rad/s, without neutral ones."""
         poles = self.motion.poles
         poles = poles[(np.abs(poles - 1.0) > NEUTRAL) & (np.abs(poles) > 1e-6)]
         return np.asarray(np.log(poles) / self.loop.tick_s, dtype=complex)
 
     @property
     def stable(self) -> bool:
-        """Whether every motion about it decays, neutral ones apart."""
+        """Whether all motions about the point decay, apart from neutral modes."""
         return bool((self.eigenvalues.real < 0.0).all())
 
     @property
     def kind(self) -> Kind:
-        """By the number of directions in which P goes away from it.
+        """Kind of the equilibrium, by the number of growing modes of the motion.
 
-        A growing oscillation counts as one direction, as does a growing
-        exponential.
+        Without a growing mode the point is a sink, with one a saddle, with two or more
+        a source. A growing oscillation counts as one mode, as a growing exponential
+        does.
         """
         growing = self.eigenvalues[self.eigenvalues.real >= 0.0]
         directions = int(np.sum(growing.imag >= -1e-9))
@@ -135,7 +139,7 @@ class OperatingPoint:
 
     @property
     def clearance_m(self) -> float:
-        """From P to the nearest body, m."""
+        """Distance from P to the nearest body, m."""
         return min(distance for _, distance in self._distances())
 
     @property
@@ -160,16 +164,16 @@ class OperatingPoint:
 def motion_model(
     point: OperatingPoint, A: NDArray[np.float64], period_s: float
 ) -> LinearModel:
-    """What a matrix of the whole state says of P's motion.
+    """Returns a model of the motion of the control point P.
 
     Args:
-        point: The operating point.
-        A: (n, n) map of the whole state over a period.
+        point: Operating point.
+        A: (n, n) map of the loop's whole state over one period.
         period_s: The period, s.
 
     Returns:
-        A model with as few states as the motion has; see
-        ``OperatingPoint.motion`` for its signals.
+        A model with the controllable and observable states only. Its signals are those
+        of ``OperatingPoint.motion``.
     """
     names = point.loop.state_names
     kick = [names.index(f"command.v_WP_{axis}") for axis in "xy"]
@@ -195,17 +199,17 @@ def motion_model(
 
 
 def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> OperatingPoint:
-    """The state of rest with P at a place where no force acts.
+    """Returns the equilibrium at rest at a given position without force.
 
     Args:
-        loop: The all-ideal build, bodies at rest.
-        p_WP: (2,) place of P in W, m.
+        loop: Control loop with exact sensors and bodies at rest.
+        p_WP: (2,) position of the control point P in the world frame W, m.
 
     Returns:
         The equilibrium in which the robot heads towards the source.
 
     Raises:
-        InputError: A force acts there, or a body moves.
+        InputError: A force acts at ``p_WP``, or a body moves.
     """
     field_ = ForceField(loop)
     force, slope = field_.gradient(p_WP)
@@ -236,20 +240,23 @@ def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> Operating
 def moving_equilibrium(
     scenario: Scenario, velocity_W: tuple[float, float] | None = None
 ) -> OperatingPoint:
-    """Following a source that moves on and on at a constant velocity.
+    """Returns the equilibrium of following a source at constant velocity.
 
-    Obstacles are left out: none moves along. The robot follows behind the
-    source on its line, heading as it drives.
+    The source drives straight on. The robot follows on the line behind the source and
+    heads in the direction of motion. Obstacles are left out, because none moves with
+    the robot.
 
     Args:
-        scenario: Its sensors are taken to be ideal.
-        velocity_W: Of the source, m/s; by default ``source.speed_m_s`` along x.
+        scenario: Any scenario. Its sensors are taken as exact.
+        velocity_W: Velocity of the source in the world frame W, m/s. By default
+            ``source.speed_m_s`` along x.
 
     Returns:
-        The equilibrium, with its state at a tick.
+        The equilibrium, with its state just before a control update.
 
     Raises:
-        InputError: The source is too fast or at rest, or no distance balances.
+        InputError: The source is too fast or at rest, or the forces balance at no
+            distance.
     """
     vx, vy = velocity_W or (scenario.source.speed_m_s, 0.0)
     speed, top = math.hypot(vx, vy), scenario.only.robot.top_speed_m_s
@@ -273,7 +280,7 @@ def moving_equilibrium(
         return loop.settled_state(pose, (vx, vy), _STEADY_S)
 
     def pull(distance: float) -> float:
-        """Acceleration along the line, m/s^2."""
+        """Acceleration of P towards the source, m/s^2."""
         state, time_s = settled(distance)
         read = [("controller", "acceleration_W")]
         return float(loop.period_derivatives(state, time_s, outputs=read).y @ heading)
@@ -296,7 +303,7 @@ def moving_equilibrium(
 
 
 def _steady_scenario(scenario: Scenario, vx: float, vy: float) -> Scenario:
-    """Ideal, without obstacles, the source driving 900 m from the origin."""
+    """Ideal scenario without obstacles, with a source that drives 900 m straight on."""
     speed = math.hypot(vx, vy)
     source = {
         "waypoints_m": [[0.0, 0.0], [900.0 * vx / speed, 900.0 * vy / speed]],

@@ -1,10 +1,14 @@
-"""The model of the certificates: P as a point mass in continuous time.
+"""Point-mass model of the robot, for energy bounds and safety certificates.
+
+The control point P, ahead of the wheel axle, is a point mass in continuous time:
 
     M p'' = F_m + sum of f(c, s) u,   |p'| <= top speed
 
-with exact nearest points in all directions, obstacles at rest, no motor lag
-and no sampling. Force and energy of the law are those of ``RadialLaw``, the
-attraction is that of ``systems.laws.impedance.attraction_force``.
+F_m is the attraction, c the distance from an obstacle, s the relative speed, and u the
+direction of the push. The model takes the nearest point of every body as exactly known.
+Obstacles rest, and there is neither motor lag nor sampling. Force and energy of the law
+are those of ``RadialLaw``. The attraction is that of
+``systems.laws.impedance.attraction_force``.
 """
 
 from __future__ import annotations
@@ -23,25 +27,25 @@ from systems.world.geometry import control_point, nearest_point_on_rectangle
 
 VelocityTermModel = Literal["none", "printed", "closing"]
 _TERMS = {"none": 0, "printed": 1, "closing": 2}
-#: Runge-Kutta step of ``PointMass.run``, s: a twentieth of a radian in the
-#: stiffest contact mode that margins allow.
+#: Runge-Kutta step of ``PointMass.run``, s. In this time the stiffest contact mode
+#: that the margins allow advances by a twentieth of a radian.
 STEP_S = 0.02
-#: Slower than this after a run is at rest, m/s.
+#: A robot slower than this at the end of a run counts as at rest, m/s.
 REST_M_S = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class PointMassRuns:
-    """What became of n starts."""
+    """Results of n runs of the point-mass model."""
 
     starts: NDArray[np.float64]
-    """(n, 4): x, y in m, vx, vy in m/s."""
+    """(n, 4) initial states: x, y in m and vx, vy in m/s."""
     contact_times_s: NDArray[np.float64]
-    """(n,) when P came as near as the contact distance; infinity: never."""
+    """(n,) times of the first contact with a body, s. Without contact: infinity."""
     closest_m: NDArray[np.float64]
-    """(n,) least distance between P and a body."""
+    """(n,) smallest distances between P and a body, m."""
     energy_rises_j: NDArray[np.float64]
-    """(n,) largest rise of V above its least value so far."""
+    """(n,) largest rises of the energy V above its smallest earlier value, J."""
 
     @property
     def collided(self) -> NDArray[np.bool_]:
@@ -51,28 +55,28 @@ class PointMassRuns:
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """The scenario's world and gains, frozen at t = 0."""
+    """Point-mass model of a scenario's gains, with the bodies as they are at 0 s."""
 
     law: RadialLaw
-    """Tabulated law."""
+    """Repulsion, tabulated by distance."""
     rectangles: NDArray[np.float64]
-    """(n, 5) bodies in W, the source last: x, y, theta, length, width."""
+    """(n, 5) bodies in W: x, y, theta, length, width, in m and rad; the source last."""
     p_WS: NDArray[np.float64]
-    """(2,) the source, m."""
+    """(2,) position of the source in W, m."""
     p_WP: NDArray[np.float64]
-    """(2,) the control point at the start, m."""
+    """(2,) control point P at the start in W, m."""
     stiffness_n_m: float
-    """K_r."""
+    """Stiffness K_r of the attraction."""
     damping_n_s_m: float
-    """D_r."""
+    """Damping D_r."""
     follow_distance_m: float
-    """d_f."""
+    """Follow distance d_f."""
     mass_kg: float
-    """M."""
+    """Virtual mass M."""
     top_speed_m_s: float
-    """Largest |v|."""
+    """Largest speed |v| of P."""
     all_bodies: bool
-    """Forces of all bodies, or of the nearest one alone."""
+    """Whether all bodies push P. If false, only the nearest one pushes."""
 
     @property
     def top_kinetic_energy_j(self) -> float:
@@ -86,11 +90,11 @@ class PointMass:
         return np.array([np.hypot(x, y) for x, y in nearest]).T
 
     def clearances(self, points: ArrayLike) -> NDArray[np.float64]:
-        """(n,) distances from the nearest body, m."""
+        """(n,) distances of points (n, 2) from the nearest body, m."""
         return self.distances(points).min(axis=1)
 
     def obstacle_energy(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) energy of the repulsion at (n, bodies) distances, J."""
+        """(n,) potential energies of the repulsion at (n, bodies) distances, J."""
         energies = self.law.energy(distances)
         return energies.sum(axis=1) if self.all_bodies else energies.max(axis=1)
 
@@ -106,20 +110,22 @@ class PointMass:
         return self.attraction_energy(r) + self.obstacle_energy(self.distances(points))
 
     def energy(self, states: ArrayLike) -> NDArray[np.float64]:
-        """(n,) V of states (n, 4), J."""
+        """(n,) energies V of states (n, 4), J: kinetic plus potential."""
         states = np.asarray(states, dtype=float)
         kinetic = 0.5 * self.mass_kg * np.sum(states[:, 2:] ** 2, axis=1)
         return kinetic + self.potential(states[:, :2])
 
     def force(self, states: ArrayLike, term: VelocityTermModel) -> NDArray[np.float64]:
-        """Sum of all forces on P.
+        """Returns the sum of all forces on the point mass.
 
         Args:
-            states: (n, 4) x, y, vx, vy, m and m/s.
-            term: The velocity term: none (s = 0), or as the laws offer it.
+            states: (n, 4) states x, y, vx, vy in the world frame W, in m and m/s.
+            term: Dependence of the repulsion on speed. ``none`` takes the speed as
+                zero, ``printed`` takes the speed |dC/dt|, ``closing`` the speed of
+                approach. C is the vector to the nearest point of a body.
 
         Returns:
-            (n, 2) in W, N.
+            (n, 2) forces in W, N.
         """
         states = np.ascontiguousarray(states, dtype=float)
         return kernels.forces(states, self._world(term))
@@ -132,19 +138,21 @@ class PointMass:
         duration_s: float = 40.0,
         term: VelocityTermModel,
     ) -> PointMassRuns:
-        """Integrates every start until contact or the end.
+        """Integrates from each start until contact or until the end of the time.
 
-        Classical Runge-Kutta with fixed steps of STEP_S; after each step |v| is
-        cut to the top speed, which is the clamp in the limit of short steps.
+        The method is classical Runge-Kutta with fixed steps of STEP_S. After each step,
+        |v| is limited to the top speed. In the limit of short steps this equals the
+        speed limit of the model.
 
         Args:
-            starts: (n, 4) x, y, vx, vy, m and m/s.
-            contact_m: P touches a body that is nearer, m.
+            starts: (n, 4) initial states x, y, vx, vy in the world frame W, in m and
+                m/s.
+            contact_m: Distance at which the point mass touches a body, m.
             duration_s: Simulated time, s.
-            term: The velocity term: none (s = 0), or as the laws offer it.
+            term: Dependence of the repulsion on speed, see ``force``.
 
         Returns:
-            Contact times, s, least distances, m, and rises of V, J.
+            Contact times, smallest distances and energy rises of all starts.
         """
         starts = np.ascontiguousarray(starts, dtype=float)
         steps = round(duration_s / STEP_S)
@@ -156,15 +164,17 @@ class PointMass:
     def trajectory(
         self, start: ArrayLike, *, duration_s: float, term: VelocityTermModel
     ) -> NDArray[np.float64]:
-        """States of one start; contact is ignored.
+        """Integrates the point mass from one start and returns all states.
+
+        Contact with a body does not end the run.
 
         Args:
-            start: (4,) x, y, vx, vy, m and m/s.
+            start: (4,) initial state x, y, vx, vy in the world frame W, in m and m/s.
             duration_s: Simulated time, s.
-            term: The velocity term: none (s = 0), or as the laws offer it.
+            term: Dependence of the repulsion on speed, see ``force``.
 
         Returns:
-            (steps + 1, 4) x, y, vx, vy, STEP_S apart.
+            (steps + 1, 4) states x, y, vx, vy at intervals of STEP_S.
         """
         start = np.ascontiguousarray(start, dtype=float)
         steps = round(duration_s / STEP_S)
@@ -184,19 +194,25 @@ class PointMass:
         return self._bodies(), self.p_WS, gains, tables
 
     def _bodies(self) -> NDArray[np.float64]:
-        """(n, 6) centre, cosine and sine of the heading, half extents."""
+        """(n, 6) bodies: center, cosine and sine of the heading, half extents."""
         x, y, theta, length, width = self.rectangles.T
         half = 0.5 * np.array([length, width])
         return np.stack([x, y, np.cos(theta), np.sin(theta), *half], axis=1)
 
 
 def point_mass(scenario: Scenario) -> PointMass:
-    """The point-mass model of a scenario, its bodies at rest where they are at 0 s.
+    """Builds the point-mass model of a scenario, with the bodies as they are at 0 s.
+
+    Args:
+        scenario: Scenario with gains, bodies and start.
+
+    Returns:
+        The model.
 
     Raises:
-        InputError: The law is not known.
-        InputError: The law has no radial force, or ``aggregation: sum`` meets
-            more bodies than the controller takes.
+        InputError: The law is not known or has no radial force. The error also occurs
+            if the pushes of all bodies are added (``aggregation: sum``) and there are
+            more than three bodies.
     """
     bodies = scenario.bodies()
     all_bodies = scenario.follower.collision_vector.aggregation == "sum"

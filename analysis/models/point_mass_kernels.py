@@ -1,9 +1,12 @@
 """Compiled loops of the point-mass model of ``analysis.models.point_mass``.
 
-Bodies are rows (x, y, cos, sin, half length, half width); gains are (K_r, D_r,
-d_f, M, top speed, whether all bodies push, number of the velocity term); tables
-are those of ``RadialLaw``: forces, energies and increments. A world is bodies
-(k, 6), place of the source (2,) in W, m, gains, and tables.
+A world has four parts:
+
+- bodies: (k, 6) rows x, y, cosine and sine of the heading, half length, half width
+- position of the source: (2,) in the world frame W, m
+- gains: stiffness K_r, damping D_r, follow distance d_f, mass M, top speed, whether all
+  bodies push (0 or 1), and velocity term (0: none, 1: printed, 2: closing)
+- tables of ``RadialLaw``: forces, energies, increments
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ _Gains = tuple[float, ...]
 _Tables = tuple[_Array, _Array, _Array]
 _World = tuple[_Array, _Array, _Gains, _Tables]
 
-#: A step across which the nearest body changes is done in so many parts.
+#: Number of parts of an integration step in which the nearest body changes.
 _SWITCH_PARTS = 32
 
 
@@ -32,7 +35,7 @@ _SWITCH_PARTS = 32
 def _nearest(
     x: float, y: float, body: _Array
 ) -> tuple[float, float, float, bool]:  # pragma: no cover  (compiled)
-    """Vector to the nearest point, its length, and whether that is a corner."""
+    """Vector to the nearest point, its length, and whether the point is a corner."""
     dx, dy = x - body[0], y - body[1]
     u, v = body[2] * dx + body[3] * dy, -body[3] * dx + body[2] * dy
     du, dv = -beyond(u, body[4]), -beyond(v, body[5])
@@ -43,7 +46,7 @@ def _nearest(
 
 @njit(cache=True)
 def _lookup(table: _Array, c: float) -> float:  # pragma: no cover  (compiled)
-    """Linear interpolation; 0 beyond the table."""
+    """Interpolates a table linearly; beyond the table the value is 0."""
     place = c / DISTANCE_STEP_M
     index = int(place)
     if index >= table.shape[0] - 1:
@@ -56,7 +59,7 @@ def _lookup(table: _Array, c: float) -> float:  # pragma: no cover  (compiled)
 def _increment(
     table: _Array, c: float, s: float
 ) -> float:  # pragma: no cover  (compiled)
-    """f(c, s) - f(c, 0): that of the nearest distance, linear in s."""
+    """f(c, s) - f(c, 0): nearest row of the table in c, linear interpolation in s."""
     row = int(c / INCREMENT_STEPS[0] + 0.5)
     if row >= table.shape[0]:
         return 0.0
@@ -70,7 +73,7 @@ def _increment(
 def _radial_force(
     vector: _Vector, v_WP: tuple[float, float], term: float, tables: _Tables
 ) -> float:  # pragma: no cover
-    """f(c, s), N; s of a body at rest is |dC/dt|, or the speed of approach."""
+    """Repulsion f(c, s), N; s is 0, |dC/dt| or the speed of approach, by ``term``."""
     cx, cy, c, corner = vector
     vx, vy = v_WP
     f = _lookup(tables[0], c)
@@ -90,7 +93,7 @@ def _radial_force(
 def _force(
     state: _State, world: _World
 ) -> tuple[float, float, float, float, int]:  # pragma: no cover
-    """(Fx, Fy, potential energy, least distance, nearest body)."""
+    """Fx, Fy, potential energy, smallest distance, and index of the nearest body."""
     x, y, vx, vy = state
     bodies, p_WS, gains, tables = world
     stiffness, damping, follow, _, _, every, term = gains
@@ -119,14 +122,14 @@ def _force(
 
 @njit(cache=True)
 def forces(states: _Array, world: _World) -> _Array:  # pragma: no cover  (compiled)
-    """Sum of all forces at some states.
+    """Returns the sum of all forces on the point mass at each state.
 
     Args:
-        states: (n, 4) x, y, vx, vy, m and m/s.
-        world: See the module.
+        states: (n, 4) states x, y, vx, vy in the world frame W, in m and m/s.
+        world: World as described at the top of the module.
 
     Returns:
-        (n, 2) in W, N.
+        (n, 2) forces in W, N.
     """
     out = np.empty((states.shape[0], 2))
     for i in range(states.shape[0]):
@@ -138,7 +141,7 @@ def forces(states: _Array, world: _World) -> _Array:  # pragma: no cover  (compi
 
 @njit(cache=True)
 def _step(state: _State, h: float, world: _World) -> _State:  # pragma: no cover
-    """State after one Runge-Kutta step; |v| is cut to the top speed."""
+    """State after one Runge-Kutta step, with |v| limited to the top speed."""
     x, y, vx, vy = state
     gains = world[2]
     m, g = 1.0 / gains[3], 0.5 * h
@@ -166,10 +169,11 @@ def _step(state: _State, h: float, world: _World) -> _State:  # pragma: no cover
 def _advance(
     state: _State, h: float, world: _World
 ) -> tuple[_State, float, float]:  # pragma: no cover  (compiled)
-    """State, V and least distance one step on.
+    """State, energy V and smallest distance after one step.
 
-    Where another body becomes the nearest the force steps; there the step is
-    done again in parts, lest the energy show the integrator's error.
+    The force jumps where another body becomes the nearest. A step across such a jump is
+    repeated in small parts. Otherwise the integration error would appear as a change of
+    the energy.
     """
     _, _, _, _, before = _force(state, world)
     new = _step(state, h, world)
@@ -187,18 +191,21 @@ def _advance(
 def run(
     starts: _Array, steps: int, h: float, contact: float, world: _World
 ) -> tuple[_Array, _Array, _Array]:  # pragma: no cover
-    """Integrates starts until contact or the end.
+    """Integrates the point mass from each start until contact or until the last step.
 
     Args:
-        starts: (n, 4) x, y, vx, vy, m and m/s.
-        steps: Most steps.
-        h: Step, s.
-        contact: P nearer to a body is contact, m.
-        world: See the module.
+        starts: (n, 4) initial states x, y, vx, vy in the world frame W, in m and m/s.
+        steps: Largest number of steps.
+        h: Integration step, s.
+        contact: Distance at which the point mass touches a body, m.
+        world: World as described at the top of the module.
 
     Returns:
-        Times of contact (n,), s, infinite without; least distances (n,), m; and
-        largest rises of V above its least value so far (n,), J.
+        Three arrays:
+
+        - (n,) times of contact, s; infinity for a run without contact
+        - (n,) smallest distances, m
+        - (n,) largest rises of the energy above its smallest earlier value, J
     """
     count = starts.shape[0]
     times, closest = np.full(count, np.inf), np.full(count, np.inf)
@@ -221,16 +228,18 @@ def run(
 def trajectory(
     start: _Array, steps: int, h: float, world: _World
 ) -> _Array:  # pragma: no cover
-    """States from one start; contact is ignored.
+    """Integrates the point mass from one start and returns all states.
+
+    Contact with a body does not end the run.
 
     Args:
-        start: (4,) x, y, vx, vy, m and m/s.
+        start: (4,) initial state x, y, vx, vy in the world frame W, in m and m/s.
         steps: Number of steps.
-        h: Step, s.
-        world: See the module.
+        h: Integration step, s.
+        world: World as described at the top of the module.
 
     Returns:
-        (steps + 1, 4), h apart.
+        (steps + 1, 4) states x, y, vx, vy at intervals of h.
     """
     out = np.empty((steps + 1, 4))
     out[0] = start

@@ -1,1 +1,1 @@
-"""What they do not: velocity terms, oscillations, equilibria, portraits."""
+"""Results from nonlinear models: velocity terms, oscillations, equilibria, phases."""

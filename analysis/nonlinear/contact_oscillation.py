@@ -1,7 +1,7 @@
-"""Oscillation before an obstacle: harmonic balance against the simulated blocks.
+"""Oscillation before an obstacle: harmonic balance compared with simulation.
 
-The simulation is the all-ideal build of the same builder, head-on to a wide box;
-``analysis.nonlinear.harmonic_balance`` predicts.
+In the simulation, the robot has exact sensors and drives head-on towards a wide box.
+``analysis.nonlinear.harmonic_balance`` computes the prediction.
 """
 
 from __future__ import annotations
@@ -22,38 +22,39 @@ from analysis.nonlinear.harmonic_balance import (
 from analysis.nonlinear.velocity_terms import VARIANTS, Variant
 from diagrams import Scenario, simulate
 
-#: Depth and width of the box, m: wider than P ever strays.
+#: Depth and width of the box, m. P never moves as far sideways as the box is wide.
 _BOX_M = (0.1, 1.0)
-#: Follow distance of the run, m: behind the box and clear of the master robot.
+#: Smallest distance of the source behind the box, m. This distance keeps the leader
+#: robot, which carries the source, clear of the box.
 _ROOM_BEHIND_M = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class OscillationRun:
-    """Clearance in the simulated build, cycle by cycle."""
+    """Simulated clearance, with the properties of each cycle."""
 
     times_s: NDArray[np.float64]
-    """(n,) ticks, s."""
+    """(n,) times of the control periods, s."""
     clearances_m: NDArray[np.float64]
-    """(n,) distance of P from the box, m."""
+    """(n,) distances of P from the box, m."""
     cause: str
-    """How the run ended."""
+    """Why the run ended."""
     amplitudes_m: NDArray[np.float64]
-    """(cycles,) half the swing, m."""
+    """(cycles,) amplitudes: half of the difference between peak and trough, m."""
     centres_m: NDArray[np.float64]
-    """(cycles,) mean over the cycle, m."""
+    """(cycles,) mean clearances over each cycle, m."""
     growth_per_s: NDArray[np.float64]
-    """(cycles,) growth of the amplitude from cycle to cycle, 1/s."""
+    """(cycles,) growth rates of the amplitude, 1/s."""
     frequencies_rad_s: NDArray[np.float64]
-    """(cycles,) rad/s."""
+    """(cycles,) frequencies, rad/s."""
 
     @property
     def settled_amplitude_m(self) -> float:
-        """Mean amplitude of the last three cycles, m; 0 without cycles."""
+        """Mean amplitude of the last three cycles, m. Without cycles: 0."""
         return float(np.mean(self.amplitudes_m[-3:])) if len(self.amplitudes_m) else 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         every_tick = ("times_s", "clearances_m")
         cycles = {k: v for k, v in vars(self).items() if k not in every_tick}
         return cycles | {"settled_amplitude_m": self.settled_amplitude_m}
@@ -61,17 +62,17 @@ class OscillationRun:
 
 @dataclass(frozen=True, eq=False)
 class ContactOscillation:
-    """Prediction and simulation of both velocity terms."""
+    """Prediction and simulation of the oscillation for both velocity terms."""
 
     contact: HeadOn
-    """The approach."""
+    """The head-on approach."""
     predictions: dict[str, OscillationPrediction]
-    """By velocity term."""
+    """Predictions by velocity term."""
     runs: dict[str, OscillationRun]
-    """By velocity term."""
+    """Simulations by velocity term."""
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         return {
             "law": self.contact.law.name,
             "to_go_m": self.contact.to_go_m,
@@ -92,15 +93,18 @@ def contact_oscillation(
 ) -> ContactOscillation:
     """Predicts and simulates the oscillation before an obstacle.
 
+    The results are given for each velocity term. A velocity term is the dependence of
+    the law's force on the speed of the obstacle.
+
     Args:
-        scenario: Law, gains and robot.
-        to_go_m: See ``head_on``.
-        start_m: Clearance from which the run starts at rest, m; none: 0.2 m
-            beyond the equilibrium.
+        scenario: Scenario with law, gains and robot.
+        to_go_m: Distance from the obstacle's face to the goal, m, see ``head_on``.
+        start_m: Clearance at which the run starts at rest, m. With None the start is
+            0.2 m farther than the equilibrium.
         duration_s: Simulated time, s.
 
     Returns:
-        Both by velocity term.
+        Prediction and simulation by velocity term.
 
     Raises:
         InputError: The law is not known.
@@ -121,17 +125,19 @@ def contact_oscillation(
 def simulate_oscillation(
     contact: HeadOn, term: Variant, start_m: float, duration_s: float
 ) -> OscillationRun:
-    """Runs the all-ideal build head-on from rest, and takes its cycles apart.
+    """Simulates a head-on approach to an obstacle, and divides the motion into cycles.
+
+    The robot starts at rest and has exact sensors.
 
     Args:
-        contact: Law, gains and distance to go.
-        term: Velocity term.
-        start_m: Clearance from which the run starts, m.
+        contact: Head-on approach with law, gains and distance to the goal.
+        term: Velocity term of the law: ``printed`` or ``closing``.
+        start_m: Clearance at the start, m.
         duration_s: Simulated time, s.
 
     Returns:
-        Clearance at each tick, m; amplitude, m, growth, 1/s, and frequency, rad/s, of
-        each cycle.
+        Clearance over time, and amplitude, center, growth rate and frequency of each
+        cycle.
 
     Raises:
         InputError: The law is not known.
@@ -146,7 +152,7 @@ def simulate_oscillation(
 def _head_on_scenario(
     contact: HeadOn, term: Variant, start_m: float, duration_s: float
 ) -> Scenario:
-    """P at rest ``start_m`` before a box, the goal ``to_go_m`` behind its face."""
+    """Scenario with P ``start_m`` before a box, the goal ``to_go_m`` behind it."""
     scenario = contact.scenario
     face = scenario.only.robot.control_point_m + start_m
     follow = max(
@@ -171,7 +177,7 @@ def _head_on_scenario(
 def _cycles(
     times: NDArray[np.float64], clearances: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], ...]:
-    """Amplitude, centre, growth and frequency of each cycle, peak to peak."""
+    """Amplitude, center, growth rate and frequency of each cycle from peak to peak."""
     inner = clearances[1:-1]
     peaks = np.flatnonzero((inner >= clearances[:-2]) & (inner > clearances[2:])) + 1
     peaks = peaks[clearances[peaks] > np.median(clearances[-len(times) // 4 :])]

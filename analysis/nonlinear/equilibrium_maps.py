@@ -1,8 +1,9 @@
-"""Where the laws jam: rest points over gap width, obstacle offset, k_ref/K_0.
+"""Maps of places where the robot rests before obstacles, over gap width or box offset.
 
-With exact nearest points the point mass has an energy, and it rests where that
-is least: local minima on a grid, which finds kinks between two bodies as well
-as smooth ones. With cones there is no energy; there the diagram itself is run.
+With exact nearest points, the point mass has an energy and rests at a local minimum of
+this energy. A grid search finds smooth minima, and also minima at kinks between two
+bodies. With the cones of ultrasonic sensors there is no energy. In this case the
+diagram is simulated.
 """
 
 from __future__ import annotations
@@ -21,17 +22,17 @@ from analysis.models.point_mass import PointMass, point_mass
 from diagrams import Scenario, simulate
 from systems.framework.input_error import InputError
 
-#: Footprint of the boxes, m: along and across the line to the source; printed.
+#: Size of the boxes along and across the line to the source, as printed, m.
 BOX_M = (0.05, 0.1)
-#: Place of the boxes, and what is left to go behind them, m.
+#: First: x of the boxes, m. Second: distance from the boxes to the goal, m.
 BOX_X_M, TO_GO_M = 2.0, 2.0
-#: Spacing of the grid on which energies are compared, m: of gaps, and of offsets,
-#: where what holds P is as narrow as a box.
+#: Spacing of the energy grid, m. First: for gaps. Second: for offsets, where the
+#: energy minimum is as narrow as a box.
 _GAP_CELL_M, _OFFSET_CELL_M = 0.02, 0.01
-#: Follow distance of the maps, m: as printed the attraction would end in the
-#: master robot, which repels as well.
+#: Follow distance of the maps, m. With the printed value the goal would be inside the
+#: leader robot, which repels P too.
 _FOLLOW_M = 1.2
-#: Ways to sense the boxes, as fields of a scenario.
+#: Fields of the scenario for each way to sense the boxes.
 _SENSING: dict[str, dict[str, Any]] = {
     "exact nearest": {"collision_vector": {"aggregation": "nearest"}},
     "exact sum": {"collision_vector": {"aggregation": "sum"}},
@@ -41,21 +42,21 @@ _SENSING: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class RestPoint:
-    """A place where P comes to rest."""
+    """Place where P comes to rest."""
 
     value: float
-    """The parameter that is varied."""
+    """Value of the varied parameter, m."""
     x_m: float
-    """m."""
+    """x of P in W, m."""
     y_m: float
-    """m."""
+    """y of P in W, m."""
     outcome: str
-    """``goal``, ``jam`` (held before the boxes), or ``collision``."""
+    """``goal``, ``jam`` (P is held before the boxes), or ``collision``."""
 
 
 @dataclass(frozen=True, eq=False)
 class EquilibriumMap:
-    """Rest points over one parameter."""
+    """Places of rest over one parameter."""
 
     law: str
     """The scenario's law."""
@@ -64,41 +65,41 @@ class EquilibriumMap:
     sensing: str
     """``exact nearest``, ``exact sum`` or ``cones``."""
     values: tuple[float, ...]
-    """Values that were tried."""
+    """Values of the parameter, m."""
     points: tuple[RestPoint, ...]
-    """By value; with cones the end of each run."""
+    """Places of rest, ordered by value. With cones: the end of each run."""
 
     @property
     def jams(self) -> tuple[float, ...]:
-        """Values at which there is a jam."""
+        """Values at which P jams."""
         return self._values("jam")
 
     @property
     def collisions(self) -> tuple[float, ...]:
-        """Values at which the robot hits a box; with cones alone."""
+        """Values at which the robot hits a box. Only cones can lead to collisions."""
         return self._values("collision")
 
     def _values(self, outcome: str) -> tuple[float, ...]:
         return tuple(sorted({p.value for p in self.points if p.outcome == outcome}))
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         return vars(self) | {"jams": self.jams, "collisions": self.collisions}
 
 
 def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
-    """Cells whose potential is no higher than that of any neighbour.
+    """Returns the grid cells whose potential is not higher than that of any neighbor.
 
-    Complete up to the grid: a minimum whose basin is narrower than two cells
-    may be missed. The ring of follow points, where nothing else pushes, is one
-    flat minimum; its cells are all found.
+    The grid can miss a minimum whose basin is narrower than two cells. Where no body
+    pushes, the points at the follow distance form one flat minimum. All cells of this
+    minimum are returned.
 
     Args:
-        model: Bodies, source and gains.
+        model: Point mass with bodies, source and gains.
         cell_m: Side of the square cells, m.
 
     Returns:
-        (n, 2) their places in W, m.
+        (n, 2) positions of the cells in the world frame W, m.
     """
     points = np.concatenate([model.rectangles[:, :2], [model.p_WP]])
     margin = model.follow_distance_m + 0.5
@@ -109,7 +110,7 @@ def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
     potential = np.where(
         model.clearances(flat) > 0.0, model.potential(flat), np.inf
     ).reshape(grid.shape[:2])
-    # Beyond the grid lies a wall that is lower than all.
+    # The border counts as lower than all cells, so that no cell beside it is a minimum.
     least = potential <= minimum_filter(potential, 3, mode="constant", cval=-np.inf)
     return np.asarray(grid[least & np.isfinite(potential)])
 
@@ -117,9 +118,10 @@ def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
 def _refined(
     model: PointMass, point: NDArray[np.float64], cell_m: float
 ) -> tuple[float, float]:
-    """Compass search from a cell: halves its step where no neighbour is lower.
+    """Refines a minimum of the potential by compass search.
 
-    The first step is short, lest it leave a basin of a few cells.
+    The search moves to a lower neighbor, and halves its step if there is none. The
+    first step is short, so that the search does not leave a small basin.
     """
     step, here = 0.125 * cell_m, point.copy()
     angle = 2.0 * np.pi * np.arange(16) / 16
@@ -142,19 +144,21 @@ def gap_map(
     *,
     sensing: str = "exact nearest",
 ) -> EquilibriumMap:
-    """Rest points before two boxes on either side of the line to the source.
+    """Finds the places of rest before two boxes, for several gaps between the boxes.
+
+    The boxes stand on both sides of the line to the source.
 
     Args:
-        scenario: Law and gains.
-        gaps_m: Distances between the boxes' facing sides, m.
+        scenario: Scenario with law and gains.
+        gaps_m: Distances between the facing sides of the boxes, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
 
     Returns:
-        Places of rest in W, m, by gap.
+        Places of rest for each gap.
 
     Raises:
-        InputError: The law is not known.
-        InputError: The law has no radial force, or ``sensing`` is unknown.
+        InputError: The law is not known or has no radial force, or ``sensing`` is
+            unknown.
     """
 
     def boxes(gap: float) -> list[tuple[float, float]]:
@@ -170,19 +174,19 @@ def offset_map(
     *,
     sensing: str = "cones",
 ) -> EquilibriumMap:
-    """Rest points before one box beside the line to the source.
+    """Finds the places of rest before one box beside the line to the source.
 
     Args:
-        scenario: Law and gains.
-        offsets_m: Distances of its centre from the line, m.
+        scenario: Scenario with law and gains.
+        offsets_m: Distances of the box's center from the line, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
 
     Returns:
-        Places of rest in W, m, by offset.
+        Places of rest for each offset.
 
     Raises:
-        InputError: The law is not known.
-        InputError: The law has no radial force, or ``sensing`` is unknown.
+        InputError: The law is not known or has no radial force, or ``sensing`` is
+            unknown.
     """
 
     def box(offset: float) -> list[tuple[float, float]]:
@@ -199,7 +203,7 @@ def _map(
     ],
     sensing: str,
 ) -> EquilibriumMap:
-    """Of (parameter, values, boxes by value, cell of the grid)."""
+    """Map over a parameter: its name, values, boxes by value, and cell size, m."""
     parameter, numbers, boxes, cell_m = varied
     if sensing not in _SENSING:
         words = ", ".join(repr(word) for word in _SENSING)
@@ -214,14 +218,14 @@ def _map(
 
 
 def _minima(case: Scenario, cell_m: float) -> list[tuple[float, float, str]]:
-    """The minima before the boxes, and the lowest one beyond."""
+    """Minima before the boxes, and the lowest minimum behind the boxes."""
     model = point_mass(case)
     minima = local_minima(model, cell_m=cell_m)
     held = minima[:, 0] < BOX_X_M + BOX_M[0]
     jams: list[tuple[float, float]] = []
     for cell in minima[held]:
         place = _refined(model, cell, cell_m)
-        # A search may leave a shallow cell for the goal, or for another jam.
+        # From a shallow minimum, the search may move to the goal or to another jam.
         if place[0] < BOX_X_M + BOX_M[0] and all(
             math.dist(place, other) > cell_m for other in jams
         ):
@@ -234,7 +238,7 @@ def _minima(case: Scenario, cell_m: float) -> list[tuple[float, float, str]]:
 
 
 def _end_of_run(case: Scenario) -> list[tuple[float, float, str]]:
-    """Where P is at the end, and what became of the run."""
+    """Position of P at the end of a run, and the outcome."""
     result = simulate(case)
     x, y = (float(result.columns[f"p_WP_{axis}"][-1]) for axis in "xy")
     if result.cause == "collision":
@@ -248,16 +252,16 @@ def boxes_scenario(
     sensing: str,
     size_m: tuple[float, float] = BOX_M,
 ) -> Scenario:
-    """A start at rest, boxes in the way, the source behind them on the x axis.
+    """Returns a scenario with boxes between the start and the source, on the x axis.
 
     Args:
-        scenario: Law and gains.
-        places: Centres of the boxes, m.
+        scenario: Scenario with law and gains.
+        places: Centers of the boxes in the world frame W, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
-        size_m: Extents of each box along and across, m.
+        size_m: Size of each box along and across the x axis, m.
 
     Returns:
-        Scenario of 60 s with exact hearing.
+        Scenario of 60 s with exact hearing and a start at rest.
     """
     far = BOX_X_M + TO_GO_M + _FOLLOW_M
     boxes = [

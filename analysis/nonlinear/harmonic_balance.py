@@ -1,9 +1,11 @@
-"""Oscillation before an obstacle, predicted by harmonic balance.
+"""Prediction of the oscillation before an obstacle by harmonic balance.
 
-The clearance is taken as c_0 + A exp(g t) sin(w t). Mean and first harmonic of
-the law's own f(c, s) over a cycle, closed through the sampled chain from
-acceleration to motion (``analysis.linear.contact_mode``), give centre c_0, growth g
-and frequency w by amplitude A. A limit cycle is where g falls through zero.
+The robot's clearance is assumed to be c_0 + A exp(g t) sin(w t). The repulsion f(c, s)
+then has a mean and a first harmonic over a cycle. Both must agree with the motion that
+they cause according to the sampled model of the robot
+(``analysis.linear.contact_mode``). For each amplitude A, this balance gives the center
+c_0, the growth rate g and the frequency w. The amplitude at which g changes from
+positive to negative is that of a limit cycle.
 """
 
 from __future__ import annotations
@@ -20,28 +22,28 @@ from analysis.linear.contact_mode import motion_chain
 from analysis.models.linear_models import LinearModel
 from analysis.nonlinear.velocity_terms import Variant, sensed_speeds
 
-#: Phases of a cycle at which the law is evaluated.
+#: Number of phases of a cycle at which the law is evaluated.
 _PHASES = 64
 
 
 @dataclass(frozen=True, eq=False)
 class OscillationPrediction:
-    """Harmonic balance by amplitude."""
+    """Predicted oscillation as a function of its amplitude."""
 
     amplitudes_m: NDArray[np.float64]
-    """(n,) A, m, as far as a balance was found."""
+    """(n,) amplitudes A up to the largest for which a balance was found, m."""
     centres_m: NDArray[np.float64]
-    """(n,) c_0, m."""
+    """(n,) centers c_0 of the oscillation, m."""
     growth_per_s: NDArray[np.float64]
-    """(n,) g of the amplitude, 1/s; negative: it decays."""
+    """(n,) growth rates g of the amplitude, 1/s; negative if the oscillation decays."""
     frequencies_rad_s: NDArray[np.float64]
-    """(n,) w."""
+    """(n,) frequencies w, rad/s."""
     clamp_amplitude_m: float
-    """Above it A w passes the top speed, which the balance leaves out, m."""
+    """Largest amplitude whose speed A w does not exceed the top speed, m."""
 
     @property
     def limit_cycle(self) -> tuple[float, float, float] | None:
-        """(A, c_0, w) where growth turns to decay, m, m, rad/s; none: nowhere."""
+        """(A, c_0, w) of the limit cycle in m, m and rad/s, or None without one."""
         g = self.growth_per_s
         falls = np.flatnonzero((g[:-1] > 0.0) & (g[1:] <= 0.0))
         if len(falls) == 0:
@@ -55,7 +57,7 @@ class OscillationPrediction:
         return a, c, w
 
     def at(self, amplitude: float) -> tuple[float, float, float]:
-        """(centre, growth, frequency) at an amplitude, by interpolation."""
+        """(c_0, g, w) at an amplitude, m, by interpolation: m, 1/s and rad/s."""
         centre, growth, frequency = (
             float(np.interp(amplitude, self.amplitudes_m, v))
             for v in (self.centres_m, self.growth_per_s, self.frequencies_rad_s)
@@ -63,7 +65,7 @@ class OscillationPrediction:
         return centre, growth, frequency
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         names = ("amplitude_m", "centre_m", "frequency_rad_s")
         cycle = self.limit_cycle and dict(zip(names, self.limit_cycle, strict=True))
         return vars(self) | {"limit_cycle": cycle}
@@ -72,16 +74,19 @@ class OscillationPrediction:
 def predict_oscillation(
     contact: HeadOn, term: Variant, *, largest_m: float = 0.4, points: int = 20
 ) -> OscillationPrediction:
-    """Harmonic balance up to an amplitude.
+    """Predicts the oscillation before an obstacle for several amplitudes.
+
+    The method is harmonic balance.
 
     Args:
-        contact: Law and gains.
-        term: Velocity term.
+        contact: Head-on approach to the obstacle, with law and gains.
+        term: Velocity term of the law: ``printed`` or ``closing``.
         largest_m: Largest amplitude, m.
         points: Number of amplitudes.
 
     Returns:
-        Centre, m, growth, 1/s, and frequency, rad/s, by amplitude, m.
+        Center, growth rate and frequency for each amplitude. If an amplitude has no
+        balance, the results end before this amplitude.
     """
     chain = motion_chain(contact.scenario)
     mass = contact.scenario.only.robot.mass_kg
@@ -115,7 +120,7 @@ def _imbalance(
     amplitude: float,
     x: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Mean force, and what the first harmonic lacks to go round the loop."""
+    """Residual of the balance: mean force, then real and imaginary first harmonic."""
     centre, growth, frequency = x
     tick_s = contact.scenario.tick_s
     turn = frequency * tick_s

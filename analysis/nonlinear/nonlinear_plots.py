@@ -1,4 +1,4 @@
-"""Pictures of velocity terms, phase planes, and of where the laws jam."""
+"""Figures of velocity terms, phase planes, and places where robots jam."""
 
 from __future__ import annotations
 
@@ -20,9 +20,15 @@ _STYLES = {"printed": (COLOURS["robot"], "-"), "closing": (COLOURS["source"], "-
 
 
 def plot_velocity_terms(analysis: VelocityTermAnalysis) -> Figure:
-    """One-sided poles, and bias and damping by speed amplitude.
+    """Plots one-sided poles, and bias and damping by speed amplitude.
 
-    Dots: the controller's own difference over a tick.
+    Dots show the values with the speed that the controller computes over one period.
+
+    Args:
+        analysis: Models of both velocity terms.
+
+    Returns:
+        The figure.
     """
     figure = Figure(figsize=(10.0, 3.6), layout="constrained")
     plane, bias, damping = figure.subplots(1, 3)
@@ -60,7 +66,7 @@ def plot_velocity_terms(analysis: VelocityTermAnalysis) -> Figure:
 
 
 def plot_contact_oscillation(oscillation: ContactOscillation) -> Figure:
-    """Simulated clearance; growth and centre by amplitude, predicted and simulated."""
+    """Plots the clearance over time, and growth rate and center by amplitude."""
     figure = Figure(figsize=(10.0, 3.6), layout="constrained")
     motion, growth, centre = figure.subplots(1, 3)
     largest = 0.0
@@ -98,7 +104,7 @@ def _label(axes: Axes, x: str, y: str, title: str) -> None:
 
 
 def _fit(axes: Axes, oscillation: ContactOscillation, name: str, reach: float) -> None:
-    """Limits of y by what lies within the limits of x."""
+    """Sets the limits of y to the values within the limits of x."""
     values = [getattr(run, name) for run in oscillation.runs.values()]
     for prediction in oscillation.predictions.values():
         near = prediction.amplitudes_m <= reach
@@ -110,7 +116,7 @@ def _fit(axes: Axes, oscillation: ContactOscillation, name: str, reach: float) -
 
 
 def plot_phase_portrait(portrait: PhasePortrait) -> Figure:
-    """Flow, basin of contact, certified region, equilibria and some runs."""
+    """Plots flow, basin of contact, certified region, equilibria and some runs."""
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     axes = figure.subplots()
     c, rate = portrait.clearances_m, portrait.rates_m_s
@@ -176,9 +182,15 @@ _NAMES = {
 
 
 def plot_equilibrium_maps(maps: Sequence[EquilibriumMap]) -> Figure:
-    """x of the rest points by the parameter, a panel a map.
+    """Plots x of the places of rest over the parameter, with one panel per map.
 
-    The line is where the boxes stand.
+    A line shows x of the boxes.
+
+    Args:
+        maps: Maps to plot.
+
+    Returns:
+        The figure.
     """
     figure = Figure(figsize=(3.4 * len(maps), 3.6), layout="constrained")
     panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
@@ -201,7 +213,7 @@ def plot_equilibrium_maps(maps: Sequence[EquilibriumMap]) -> Figure:
 
 
 def plot_ratio_map(found: RatioMap) -> Figure:
-    """Head-on equilibria of the active law over k_ref/K_0."""
+    """Plots the head-on equilibria of the active law over k_ref/K_0."""
     figure = Figure(figsize=(6.0, 3.8), layout="constrained")
     axes = figure.subplots()
     outer = "held along the line, not to the side: saddle"

@@ -1,4 +1,4 @@
-"""The head-on approach in its phase plane: basin and certified region."""
+"""Phase plane of the head-on approach, with basin of contact and certified region."""
 
 from __future__ import annotations
 
@@ -12,46 +12,46 @@ from analysis.laws.head_on import HeadOn, head_on
 from analysis.models.point_mass import PointMass, VelocityTermModel
 from diagrams import Scenario
 
-#: Half the width of the obstacle's face, m, and its depth.
+#: First: half width of the obstacle's face, m. Second: depth of the obstacle, m.
 _FACE_M = (4.0, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
 class PhasePortrait:
-    """Clearance c and its rate c' over a grid of starts."""
+    """Phase plane of clearance c and its rate c', over a grid of starts."""
 
     contact: HeadOn
-    """The approach."""
+    """The head-on approach."""
     velocity_term: str
     """``none``, ``printed`` or ``closing``."""
     contact_m: float
-    """P nearer to the face is contact, m."""
+    """Distance from the face at which P touches the face, m."""
     clearances_m: NDArray[np.float64]
-    """(n,) c of the starts, m."""
+    """(n,) clearances c of the starts, m."""
     rates_m_s: NDArray[np.float64]
-    """(m,) c' of the starts, m/s."""
+    """(m,) rates c' of the starts, m/s."""
     accelerations_m_s2: NDArray[np.float64]
-    """(n, m) c'' there."""
+    """(n, m) accelerations c'' at the starts, m/s^2."""
     collides: NDArray[np.bool_]
-    """(n, m) whether the start leads to contact, by simulation."""
+    """(n, m) whether the simulation from the start leads to contact."""
     certified_speed_m_s: NDArray[np.float64]
-    """(n,) speeds below this are certified, m/s; NaN: not even rest."""
+    """(n,) speeds below which a start is certified, m/s; NaN: not even rest is."""
     trajectories: tuple[NDArray[np.float64], ...]
-    """(k, 2) c and c' of some runs."""
+    """(k, 2) c, m, and c', m/s, of some runs."""
 
     @property
     def certified(self) -> NDArray[np.bool_]:
-        """(n, m) whether the energy certifies the start."""
+        """(n, m) whether the energy certifies that the start leads to no contact."""
         limit = np.nan_to_num(self.certified_speed_m_s, nan=-1.0)
         return np.abs(self.rates_m_s)[None, :] < limit[:, None]
 
     @property
     def ratio(self) -> float:
-        """Certified starts by starts that do not collide."""
+        """Number of certified starts over the number of starts without contact."""
         return float(self.certified.sum() / np.count_nonzero(~self.collides))
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         return {
             "law": self.contact.law.name,
             "velocity_term": self.velocity_term,
@@ -67,9 +67,16 @@ class PhasePortrait:
 
 
 def head_on_model(contact: HeadOn) -> PointMass:
-    """The point mass before a wide face at x = 0, the goal ``to_go_m`` behind it.
+    """Returns the point-mass model of a head-on approach to an obstacle.
 
-    P is at x = -c, y = 0.
+    The obstacle has a wide face at x = 0. The goal lies ``to_go_m`` behind the face.
+    The point mass is at x = -c, y = 0, with the clearance c.
+
+    Args:
+        contact: Head-on approach with law and gains.
+
+    Returns:
+        The model.
     """
     scenario = contact.scenario
     follow = max(scenario.follower.attraction.follow_distance_m, 1.0)
@@ -96,16 +103,19 @@ def phase_portrait(
     velocity_term: VelocityTermModel | None = None,
     points: int = 41,
 ) -> PhasePortrait:
-    """The phase plane up to 1.5 m and the top speed.
+    """Computes the phase plane of a head-on approach to an obstacle.
+
+    The clearances reach to 1.5 m, and the speeds to the top speed.
 
     Args:
-        scenario: Law and gains.
-        to_go_m: See ``head_on``.
-        velocity_term: Another one than the scenario's.
-        points: Starts along either axis.
+        scenario: Scenario with law and gains.
+        to_go_m: Distance from the obstacle's face to the goal, m, see ``head_on``.
+        velocity_term: Velocity term to use instead of the scenario's: ``none``,
+            ``printed`` or ``closing``.
+        points: Number of starts along each axis.
 
     Returns:
-        Accelerations, m/s^2, contact and certified speeds, m/s, over the grid.
+        Accelerations, contacts and certified speeds over the grid of starts.
 
     Raises:
         InputError: The law is not known.
@@ -139,19 +149,25 @@ def phase_portrait(
 def certified_speeds(
     model: PointMass, clearances: NDArray[np.float64], least: float
 ) -> NDArray[np.float64]:
-    """Speed whose energy does not reach contact from each clearance.
+    """Returns the speed below which a robot cannot reach an obstacle, from its energy.
 
-    NaN where not even rest is certified. On the line the highest level on the
-    way to contact is the greatest of the potential between; beyond a place that
-    even the top speed cannot pass every speed is certified.
+    On the way to contact, the point mass must pass the largest potential between its
+    clearance and contact. The kinetic energy at the certified speed is the difference
+    between this largest potential and the potential at the clearance. Two cases are
+    special:
+
+    - If the potential at the clearance itself is the largest, not even rest is
+      certified.
+    - If even the top speed does not suffice to pass, every speed is certified.
 
     Args:
-        model: Head-on approach along x: P at -c before a face at 0.
-        clearances: (n,) ascending, m.
-        least: P nearer than this is contact, m.
+        model: Head-on approach along x: the point mass is at -c, the obstacle's face at
+            0.
+        clearances: (n,) ascending clearances c, m.
+        least: Clearance at which the point mass touches the face, m.
 
     Returns:
-        (n,) m/s.
+        (n,) speeds, m/s; NaN where not even rest is certified.
     """
     fine = np.arange(least, clearances[-1] + 1e-3, 1e-3)
     points = np.column_stack([-fine, np.zeros_like(fine)])
@@ -160,7 +176,7 @@ def certified_speeds(
     walled = np.maximum.accumulate(spare) > model.top_kinetic_energy_j
     speed = np.sqrt(2.0 * spare / model.mass_kg)
     speed = np.where(spare > 0.0, speed, np.nan)
-    # The largest speed itself is allowed where nothing can be reached.
+    # Behind such a barrier the top speed itself is certified too.
     speed[walled] = np.nextafter(model.top_speed_m_s, np.inf)
     below = np.searchsorted(fine, clearances, side="right") - 1
     above = np.minimum(below + 1, len(fine) - 1)

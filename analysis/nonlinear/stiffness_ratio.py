@@ -1,4 +1,8 @@
-"""Head-on equilibria of the active law as k_ref/K_0 varies."""
+"""Head-on equilibria of the active law as functions of the stiffness ratio k_ref/K_0.
+
+k_ref is the reference stiffness of the law, and K_0 its matched stiffness. In a head-on
+approach, the robot moves straight towards an obstacle that lies before the goal.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,7 @@ from analysis.laws.head_on import head_on
 from diagrams import Scenario
 from systems.laws.active import active_force
 
-#: Spacing of the distances at which forces are compared, m.
+#: Spacing of the distances at which push and pull are compared, m.
 _RATIO_STEP_M = 2e-3
 
 
@@ -22,15 +26,17 @@ class RatioMap:
     """Head-on equilibria of the active law over k_ref/K_0."""
 
     ratios: NDArray[np.float64]
-    """(n,) k_ref/K_0, K_0 and reach as in the scenario."""
+    """(n,) values of k_ref/K_0. K_0 and reach are those of the scenario."""
     outer_m: NDArray[np.float64]
-    """(n,) where P is held up, m; NaN: nowhere. A saddle: it slips sideways."""
+    """(n,) distances at which the obstacle stops the robot, m, or NaN. This equilibrium
+    is a saddle, because the robot can slip sideways."""
     inner_m: NDArray[np.float64]
-    """(n,) nearer in, where the vanishing force gives way, m. A source."""
+    """(n,) smaller distances at which the decreasing push no longer holds the robot, m,
+    or NaN. This equilibrium is a source."""
     to_go_m: float
-    """What is left to go behind the obstacle, m."""
+    """Distance from the obstacle's face to the goal behind the obstacle, m."""
     today: float
-    """The scenario's ratio."""
+    """Ratio k_ref/K_0 in the scenario."""
 
 
 def stiffness_ratio_map(
@@ -39,15 +45,16 @@ def stiffness_ratio_map(
     *,
     to_go_m: float | None = None,
 ) -> RatioMap:
-    """Head-on equilibria of the active law as k_ref/K_0 varies.
+    """Computes the head-on equilibria of the active law over the ratio k_ref/K_0.
 
     Args:
-        scenario: Its active law's K_0, reach and velocity term.
-        ratios: k_ref/K_0, above 1.
-        to_go_m: See ``head_on``.
+        scenario: Scenario with stiffness K_0 and reach of the active law.
+        ratios: Ratios k_ref/K_0 of the active law's two stiffnesses, above 1.
+        to_go_m: Distance from the obstacle's face to the goal, m, see ``head_on``.
 
     Returns:
-        Distances at which P is held, m, by ratio; NaN: nowhere.
+        Distances of the equilibria from the obstacle for each ratio, m. If there is no
+        equilibrium, the distance is NaN.
     """
     contact = head_on(scenario.with_robot(law="active"), to_go_m=to_go_m)
     gains = scenario.follower.laws.active
@@ -74,7 +81,7 @@ def stiffness_ratio_map(
 def _crossings(
     x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> dict[str, list[float]]:
-    """Where y passes through zero on its way up and down, by interpolation."""
+    """Zeros of y on the way up and on the way down, by linear interpolation."""
     at = np.flatnonzero(np.diff(np.sign(y)))
     places = x[at] - y[at] * (x[at + 1] - x[at]) / (y[at + 1] - y[at])
     up = y[at + 1] > y[at]

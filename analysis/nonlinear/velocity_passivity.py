@@ -1,11 +1,16 @@
-"""What energy a velocity term can feed into the loop, and whether D_r takes it.
+"""Energy that a velocity term feeds into the loop, compared with the damping D_r.
 
-A velocity term adds g = f(c, s) - f(c, 0) along u, away from the obstacle. For
-a body at rest |u.v| <= s <= |v|, since the nearest point of a convex body
-moves no faster than P. Hence the power of g is at most L |v|^2, with L the
-steepest |g|/s on the side that does harm: upwards while P recedes (printed
-term only), downwards while it approaches. With L <= D_r the whole loop
-dissipates, and its energy function proves what it proves without the term.
+A velocity term is the dependence of the law's force f(c, s) on the speed s. It adds the
+force g = f(c, s) - f(c, 0) along u, away from the obstacle. The robot's control point
+has the velocity v. For a body at rest, |u.v| <= s <= |v|, because the nearest point of
+a convex body moves no faster than the control point. Hence the power of g is at most L
+|v|^2. L is the largest |g|/s for the sign of g that adds energy:
+
+- g > 0 while the robot moves away (printed term only)
+- g < 0 while the robot approaches
+
+If L <= D_r, the whole loop dissipates energy. All conclusions from its energy function
+without the velocity term then remain valid.
 """
 
 from __future__ import annotations
@@ -24,22 +29,22 @@ from diagrams import Scenario
 
 @dataclass(frozen=True)
 class VelocityTermPassivity:
-    """The sector of a velocity term beside the damping of the attraction."""
+    """Bounds of a velocity term, compared with the damping of the attraction."""
 
     velocity_term: str
     """``printed`` or ``closing``."""
     rise_n_s_m: float
-    """Largest (f(c, s) - f(c, 0))/s, and 0 if it never rises, N s/m."""
+    """Largest (f(c, s) - f(c, 0))/s, N s/m. If the force never increases with s: 0."""
     fall_n_s_m: float
-    """Largest (f(c, 0) - f(c, s))/s, and 0 if it never falls, N s/m."""
+    """Largest (f(c, 0) - f(c, s))/s, N s/m. If the force never decreases with s: 0."""
     bodies: int
-    """How many bodies may push at once."""
+    """Largest number of bodies that push at the same time."""
     attraction_damping_n_s_m: float
-    """D_r, N s/m."""
+    """Damping D_r of the attraction, N s/m."""
 
     @property
     def largest_injection_n_s_m(self) -> float:
-        """Largest power that the term gives, by |v|^2, N s/m."""
+        """Largest power of the velocity term over |v|^2, N s/m."""
         harm = self.fall_n_s_m
         if self.velocity_term == "printed":
             harm = max(harm, self.rise_n_s_m)
@@ -47,16 +52,16 @@ class VelocityTermPassivity:
 
     @property
     def passive_alone(self) -> bool:
-        """Whether the term never gives energy."""
+        """Whether the term never adds energy."""
         return self.largest_injection_n_s_m <= 0.0
 
     @property
     def covered(self) -> bool:
-        """Whether D_r takes all that the term may give."""
+        """Whether D_r dissipates at least the energy that the term can add."""
         return self.largest_injection_n_s_m <= self.attraction_damping_n_s_m
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         names = (
             "velocity_term", "rise_n_s_m", "fall_n_s_m", "largest_injection_n_s_m",
             "attraction_damping_n_s_m", "passive_alone", "covered",
@@ -66,23 +71,23 @@ class VelocityTermPassivity:
 
 @dataclass(frozen=True, eq=False)
 class EnergyBalance:
-    """Where the energy of one run of the point mass goes."""
+    """Energies along one run of the point mass."""
 
     passivity: VelocityTermPassivity
-    """The bound."""
+    """Bounds of the velocity term."""
     times_s: NDArray[np.float64]
-    """(n,) s."""
+    """(n,) times, s."""
     energies_j: NDArray[np.float64]
-    """(n,) V."""
+    """(n,) energies V: kinetic plus potential."""
     injected_j: NDArray[np.float64]
-    """(n,) work of the velocity term so far; negative: it took energy."""
+    """(n,) work of the velocity term so far. If negative, the term removed energy."""
     dissipated_j: NDArray[np.float64]
-    """(n,) work of D_r so far."""
+    """(n,) energy that D_r has dissipated so far."""
     clearances_m: NDArray[np.float64]
-    """(n,) distance of P from the nearest body."""
+    """(n,) distances of P from the nearest body."""
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         rate = np.diff(self.injected_j)
         return {
             **self.passivity.to_dict(),
@@ -96,14 +101,17 @@ class EnergyBalance:
 def velocity_term_passivity(
     scenario: Scenario, velocity_term: str | None = None
 ) -> VelocityTermPassivity:
-    """The sector of the scenario's velocity term, or of another one.
+    """Computes how much power the velocity term of a law can add.
+
+    A velocity term is the dependence of the law's force on the speed of the obstacle.
 
     Args:
-        scenario: Law, gains and bodies.
-        velocity_term: ``printed`` or ``closing``; None: the scenario's.
+        scenario: Scenario with law, gains and bodies.
+        velocity_term: ``printed`` or ``closing``. With None: the scenario's.
 
     Returns:
-        Largest slopes of the push in the obstacle's speed beside D_r, N s/m.
+        Largest slopes of the push in the obstacle's speed, and the damping of the
+        attraction.
 
     Raises:
         InputError: The law is not known.
@@ -125,15 +133,18 @@ def velocity_term_passivity(
 def energy_balance(
     scenario: Scenario, *, duration_s: float = 30.0, velocity_term: str | None = None
 ) -> EnergyBalance:
-    """Energies along a run of the point mass from the scenario's start.
+    """Computes the energies along a run of the point mass from the scenario's start.
+
+    A velocity term is the dependence of the law's force on the speed of the obstacle.
 
     Args:
-        scenario: Law, gains, bodies and start.
+        scenario: Scenario with law, gains, bodies and start.
         duration_s: Simulated time, s.
-        velocity_term: ``printed`` or ``closing``; None: the scenario's.
+        velocity_term: ``printed`` or ``closing``. With None: the scenario's.
 
     Returns:
-        At every step V, what was fed in and what D_r took, J.
+        Energy, work of the velocity term, and energy that the damping dissipates, at
+        every step.
 
     Raises:
         InputError: The law is not known.

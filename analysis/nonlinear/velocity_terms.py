@@ -1,8 +1,10 @@
-"""Velocity terms about a contact equilibrium: one-sided models, describing functions.
+"""Velocity terms of the laws near an obstacle: one-sided models, describing functions.
 
-The laws see s = |dC/dt|, which has a corner at rest: a linearisation exists for
-either direction alone. Over an oscillation of speed amplitude A the printed term
-damps nothing (its force is the same on the way in and out) and leaves a bias.
+A velocity term is the dependence of the law's force on the obstacle's speed s. The
+printed laws use s = |dC/dt|, where C is the vector to the nearest point. At rest this
+norm has a corner. Therefore a linearization exists only for each direction separately.
+In an oscillation the printed term has no damping, because its force is the same on the
+way in and on the way out. It adds a bias.
 """
 
 from __future__ import annotations
@@ -21,45 +23,45 @@ from systems.laws.impedance_controller import obstacle_speed
 
 Variant = Literal["printed", "closing"]
 VARIANTS: tuple[Variant, ...] = get_args(Variant)
-#: Points of a cycle in the describing function's integrals.
+#: Points of a cycle in the integrals of the describing function.
 _CYCLE_POINTS = 240
-#: Ticks of the cycle by which the blocks' own functions are measured.
+#: Control periods of a cycle for the sampled describing function.
 _CYCLE_TICKS = 24
 
 
 @dataclass(frozen=True)
 class OneSidedModel:
-    """The linear model on one side of rest: M x'' + D x' + K x = 0."""
+    """Linear model on one side of rest: M x'' + D x' + K x = 0."""
 
     direction: str
     """``approaching`` or ``receding``."""
     stiffness_n_m: float
-    """K_r - df/dc, N/m."""
+    """Stiffness K_r - df/dc, N/m."""
     damping_n_s_m: float
-    """D_r plus what the velocity term adds on this side, N s/m."""
+    """D_r plus the damping of the velocity term on this side, N s/m."""
     mass_kg: float
-    """M."""
+    """Virtual mass M."""
 
     @property
     def poles(self) -> NDArray[np.complex128]:
-        """(2,) 1/s."""
+        """(2,) poles, 1/s."""
         roots = np.roots([self.mass_kg, self.damping_n_s_m, self.stiffness_n_m])
         return roots.astype(complex)
 
     @property
     def natural_frequency_rad_s(self) -> float:
-        """sqrt(K/M); 0 where the stiffness is not positive."""
+        """sqrt(K/M); 0 if the stiffness is not positive."""
         return math.sqrt(max(self.stiffness_n_m, 0.0) / self.mass_kg)
 
     @property
     def damping_ratio(self) -> float | None:
-        """D / (2 sqrt(K M)); none without a positive stiffness."""
+        """D / (2 sqrt(K M)), or None if the stiffness is not positive."""
         if self.stiffness_n_m <= 0.0:
             return None
         return self.damping_n_s_m / (2.0 * math.sqrt(self.stiffness_n_m * self.mass_kg))
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         return {
             "direction": self.direction,
             "stiffness_n_m": self.stiffness_n_m,
@@ -72,39 +74,44 @@ class OneSidedModel:
 
 @dataclass(frozen=True, eq=False)
 class DescribingFunction:
-    """What a velocity term does to c = c_0 + (A/w) sin(w t), by speed amplitude A."""
+    """Describing function of a velocity term over the speed amplitude A.
+
+    A velocity term is the dependence of the law's force on the obstacle's speed. The
+    clearance oscillates as c = c_0 + (A/w) sin(w t).
+    """
 
     amplitudes_m_s: NDArray[np.float64]
-    """(n,) A, m/s."""
+    """(n,) speed amplitudes A, m/s."""
     bias_n: NDArray[np.float64]
-    """(n,) mean of f - f(c, 0), away from the obstacle, N."""
+    """(n,) mean of f(c, s) - f(c, 0), N. Positive: away from the obstacle."""
     damping_n_s_m: NDArray[np.float64]
-    """(n,) damping by the first harmonic, N s/m; negative drives."""
+    """(n,) damping by the first harmonic, N s/m. If negative, energy is added."""
     sampled_bias_n: NDArray[np.float64]
-    """(n,) the same bias of the controller's own difference over a tick, N."""
+    """(n,) bias with the speed s that the controller computes, N."""
     sampled_damping_n_s_m: NDArray[np.float64]
-    """(n,) the same damping of the controller's own difference, N s/m."""
+    """(n,) damping with the speed s that the controller computes, N s/m."""
 
 
 @dataclass(frozen=True, eq=False)
 class VelocityTermVariant:
-    """One of the two readings of s."""
+    """Models of one velocity term: ``printed`` or ``closing``."""
 
     velocity_term: Variant
-    """``printed`` or ``closing``."""
+    """``printed``: s = |dC/dt|. ``closing``: s is the speed of approach."""
     approaching: OneSidedModel
-    """c falls."""
+    """Model while the clearance c decreases."""
     receding: OneSidedModel
-    """c grows."""
+    """Model while the clearance c increases."""
     describing: DescribingFunction
-    """At the equilibrium distance."""
+    """Describing function at the equilibrium distance."""
 
     @property
     def amplitude_ratio(self) -> float | None:
-        """How an infinitesimal oscillation shrinks in a cycle; none: it is none.
+        """Ratio of successive amplitudes of a very small oscillation.
 
-        The sides meet at rest, half a cycle each: exp(-pi z/sqrt(1 - z^2)) of
-        each side's damping ratio z.
+        The models ``approaching`` and ``receding`` are each valid for half a cycle. A
+        model with the damping ratio z multiplies the amplitude by exp(-pi z/sqrt(1 -
+        z^2)) in this half. Without an oscillation the ratio is None.
         """
         ratio = 1.0
         for side in (self.approaching, self.receding):
@@ -115,7 +122,7 @@ class VelocityTermVariant:
         return ratio
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         return {
             "velocity_term": self.velocity_term,
             "sides": [self.approaching, self.receding],
@@ -126,23 +133,23 @@ class VelocityTermVariant:
 
 @dataclass(frozen=True, eq=False)
 class VelocityTermAnalysis:
-    """Both readings beside each other."""
+    """Models of both velocity terms for one head-on approach."""
 
     contact: HeadOn
-    """Where the models hold."""
+    """Head-on approach that the models belong to."""
     variants: dict[str, VelocityTermVariant]
-    """By velocity term."""
+    """Models by velocity term."""
 
     @property
     def bias_shift_m(self) -> dict[str, float]:
-        """How far the oscillation at the top speed shifts the centre, m."""
+        """Shift of an oscillation's center at the top speed, m, by velocity term."""
         return {
             name: float(v.describing.bias_n[-1]) / self.contact.stiffness_n_m
             for name, v in self.variants.items()
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Values for the JSON document."""
         return {
             "law": self.contact.law.name,
             "to_go_m": self.contact.to_go_m,
@@ -155,14 +162,16 @@ class VelocityTermAnalysis:
 def velocity_term_analysis(
     scenario: Scenario, *, to_go_m: float | None = None
 ) -> VelocityTermAnalysis:
-    """One-sided models and describing functions of both velocity terms.
+    """Computes one-sided models and describing functions of both velocity terms.
+
+    A velocity term is the dependence of the law's force on the speed of the obstacle.
 
     Args:
-        scenario: Law, attraction and mass.
-        to_go_m: See ``head_on``.
+        scenario: Scenario with law, attraction and mass.
+        to_go_m: Distance from the obstacle's face to the goal, m, see ``head_on``.
 
     Returns:
-        By velocity term: stiffness, N/m, and damping, N s/m, of both sides.
+        Models by velocity term.
 
     Raises:
         InputError: The law is not known.
@@ -193,15 +202,17 @@ def velocity_term_analysis(
 def describe_velocity_term(
     contact: HeadOn, term: Variant, *, points: int = 36
 ) -> DescribingFunction:
-    """Describing function of a velocity term up to the top speed.
+    """Computes the describing function of a velocity term up to the top speed.
+
+    A velocity term is the dependence of the law's force on the obstacle's speed.
 
     Args:
-        contact: Law and equilibrium distance.
-        term: Which s.
-        points: Amplitudes up to the top speed.
+        contact: Head-on approach to an obstacle, with law and equilibrium distance.
+        term: Velocity term: ``printed`` or ``closing``.
+        points: Number of speed amplitudes.
 
     Returns:
-        Bias, N, and damping, N s/m, by amplitude of the speed, m/s.
+        Bias and damping by speed amplitude.
     """
     top = contact.scenario.only.robot.top_speed_m_s
     amplitudes = top * (np.arange(points) + 1.0) / points
@@ -222,7 +233,7 @@ def describe_velocity_term(
 def _speeds(
     amplitude: float, phase: NDArray[np.float64], term: Variant
 ) -> NDArray[np.float64]:
-    """s of c' = A cos(phase)."""
+    """Speeds s of an oscillation with c' = A cos(phase)."""
     rate = amplitude * np.cos(phase)
     return np.abs(rate) if term == "printed" else np.maximum(-rate, 0.0)
 
@@ -233,7 +244,7 @@ def _harmonics(
     phase: NDArray[np.float64],
     amplitude: float,
 ) -> tuple[float, float]:
-    """(bias, damping) of a force over one cycle; the phase is that of c'."""
+    """(bias, damping) of a force over one cycle, where the phase is that of c'."""
     force = np.array([added(s) for s in speeds.tolist()])
     return float(force.mean()), -2.0 * float(np.mean(force * np.cos(phase))) / amplitude
 
@@ -241,11 +252,11 @@ def _harmonics(
 def _sampled_harmonics(
     contact: HeadOn, added: Callable[[float], float], amplitude: float, term: Variant
 ) -> tuple[float, float]:
-    """The same of the controller's difference of C over a tick."""
+    """(bias, damping) with the speed s that the controller computes over one period."""
     tick_s = contact.scenario.tick_s
     omega = 2.0 * np.pi / (_CYCLE_TICKS * tick_s)
     turn = omega * tick_s
-    # Ticks fall between those of the exact integral's symmetric grid.
+    # The phases are shifted against the symmetric grid of the exact integral.
     phase = turn * (np.arange(_CYCLE_TICKS, dtype=float) + 0.25)
     c = contact.equilibrium_m + amplitude / omega * np.sin(phase)
     before = contact.equilibrium_m + amplitude / omega * np.sin(phase - turn)
@@ -258,16 +269,17 @@ def sensed_speeds(
     term: Variant,
     tick_s: float,
 ) -> NDArray[np.float64]:
-    """The controller's s of an obstacle straight ahead.
+    """Returns the speed that the controller computes for an obstacle straight ahead.
 
     Args:
-        now_m: (n,) distances at a tick, m.
-        before_m: (n,) distances a tick before, m.
-        term: Velocity term.
-        tick_s: The period, s.
+        now_m: (n,) distances of the obstacle, m.
+        before_m: (n,) distances one control period earlier, m.
+        term: Definition of the speed. ``printed``: magnitude of the distance's rate.
+            ``closing``: speed of approach, 0 if the distance grows.
+        tick_s: Control period, s.
 
     Returns:
-        (n,) m/s.
+        (n,) speeds, m/s, at least 0.
     """
     pairs = zip(now_m.tolist(), before_m.tolist(), strict=True)
     closing = term == "closing"
