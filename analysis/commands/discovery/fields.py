@@ -39,12 +39,13 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(options: Namespace, take: Take) -> Job[list[Field]]:
     from diagrams.scenario.fields.field_list import fields_of_law, find_fields
     from diagrams.scenario.fields.shipped import scenario_schema, schema_text
-    from diagrams.scenario.suggestions import unknown_law
-    from systems.laws.catalogue import LAWS
 
     schema = scenario_schema()
     found = find_fields(schema, options.pattern)
     if options.law is not None:
+        from diagrams.scenario.suggestions import unknown_law
+        from systems.laws.catalogue import LAWS
+
         if options.law not in LAWS:
             raise unknown_law(options.law, LAWS)
         found = fields_of_law(found, options.law, LAWS[options.law].robot)

@@ -210,7 +210,7 @@ MEET = {
     "guarded, with faults": 1.8,
     "guarded law, lidar": 1.6,
     "dwa": 1.3,
-    "mppi": 1.3,
+    "mppi": 1.4,
     "four on routes": 1.5,
     "adaptive": 1.0,
     "by beams": 1.0,
