@@ -40,7 +40,7 @@ class OscillationRun:
     cause: str
     """Why the run ended."""
     amplitudes_m: NDArray[np.float64]
-    """(cycles,) amplitudes: half of the difference between peak and trough, m."""
+    """(cycles,) amplitudes: half of the difference between maximum and minimum, m."""
     centres_m: NDArray[np.float64]
     """(cycles,) mean clearances over each cycle, m."""
     growth_per_s: NDArray[np.float64]
