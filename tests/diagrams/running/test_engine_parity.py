@@ -159,7 +159,7 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
         "default",
         {
             **MEETING,
-            "duration_s": 2.0,
+            "duration_s": 2.5,
             "hearing": "ideal",
             "law": "mppi",
             "laws.mppi.turn_spread_rad_s": 1.3,
@@ -210,7 +210,7 @@ MEET = {
     "guarded, with faults": 1.8,
     "guarded law, lidar": 1.6,
     "dwa": 1.3,
-    "mppi": 1.4,
+    "mppi": 1.3,
     "four on routes": 1.5,
     "adaptive": 1.0,
     "by beams": 1.0,
