@@ -26,7 +26,8 @@ from systems.laws.trajectory.trajectory_impedance_controller import (
 from tests.systems.laws.trajectory.point_robot import ROBOT, TICK_S, along, run
 from tests.systems.laws.trajectory.state_space import state_matrices
 
-#: As the paper has it, but for signs: K_e = K, S of table 1; and gains that rest.
+#: The law of the paper with restored signs: K_e = K and S of table 1. The gains are
+#: constant.
 CONVENTIONAL = AdaptiveTrajectoryParameters(rate=0.0)
 #: The same with damping that fades.
 FADING = CONVENTIONAL.model_copy(update={"rule": "sensitivity"})
