@@ -325,7 +325,7 @@ class CrossPowerEstimator(FrameBlock):
         self._none = no_powers(facts)
         frame = np.zeros((facts.channels, facts.samples))
         blank = _Memory(_NOTHING, frame, self._none, self._none, self._values())
-        self.declare_frames(blank, microphones)
+        self.declare_frames(blank, blank, microphones)
 
     def hear(
         self,

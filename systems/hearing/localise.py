@@ -223,10 +223,10 @@ class Localiser:
         """Returns the memory before the first frame."""
         return HearingMemory(0.0, 0.0)
 
-    @property
-    def echo_shape(self) -> tuple[int, int]:
-        """Shape of ``HearingMemory.echoes``."""
-        return self._sizes.shape
+    def full(self) -> HearingMemory:
+        """Returns an example of the memory in which nothing is None."""
+        echoes = np.zeros(self._sizes.shape, np.float32)
+        return HearingMemory(0.0, 0.0, echoes)
 
     def localise(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory

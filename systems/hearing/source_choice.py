@@ -174,6 +174,14 @@ class SourceChoice:
         """Returns the memory before anything is heard."""
         return ChoiceMemory(_Line(np.zeros(2), np.zeros(2)), (None,) * _OTHERS)
 
+    @staticmethod
+    def full() -> ChoiceMemory:
+        """Returns an example of the memory in which nothing is None."""
+        line = _Line(np.zeros(2), np.zeros(2))
+        place = _Place(np.zeros(2), np.zeros((2, 2)), line)
+        other = _Other(place, 0.0, 0, together=False)
+        return ChoiceMemory(line, (other,) * _OTHERS)
+
     def choose(
         self,
         candidates: Sequence[Candidate],

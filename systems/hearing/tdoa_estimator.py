@@ -204,13 +204,16 @@ class TDOAEstimator(FrameBlock):
         )
         self.set_name("tdoa_estimator")
         self._choice = None
+        blank = _Memory(self._localiser.blank(), None)
+        example = _Memory(self._localiser.full(), None)
         if parameters.choose == "followed":
             self._choice = robot_choice(
                 self._localiser, robot, self._p_PA_B, microphones.frame_s
             )
             self.inputs = (*self.inputs, *_BELIEF)
-        choice = None if self._choice is None else self._choice.blank()
-        self.declare_frames(_Memory(self._localiser.blank(), choice), microphones)
+            blank = blank._replace(choice=self._choice.blank())
+            example = example._replace(choice=self._choice.full())
+        self.declare_frames(blank, example, microphones)
 
     def hear(
         self,
