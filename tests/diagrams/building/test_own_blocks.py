@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def run(*blocks: str, engine: str = "drake") -> RunResult:
+def run(*blocks: str, engine: Literal["drake", "compiled"] = "drake") -> RunResult:
     settings = [*PUSHED_BACK, f"blocks=[{', '.join(blocks)}]"]
     return simulate(load_scenario("default", settings), engine=engine)
 
