@@ -102,8 +102,8 @@ class SourceRobotParameters(Parameters):
 def driven_path(source: SourceRobotParameters) -> DrivenPath:
     """Returns the motion of a leader robot, which carries the sound source.
 
-    The function keeps the motions of the last 16 leaders in a cache. A run and the runs
-    of a sweep use the same motion many times.
+    A cache keeps the motions of the last 16 leaders, because many runs use the same
+    motion.
 
     Args:
         source: Path and size of the leader.

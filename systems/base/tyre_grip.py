@@ -55,12 +55,15 @@ def grip_accelerations(
 ) -> tuple[Any, Any, Any]:
     """Computes the acceleration that the tire forces give to the body.
 
-    All forces are divided by the mass of the robot. First, the function computes the
-    forces that prevent all slip. If both forces are within the limit ``traction_m_s2``
-    of a wheel, they are the result. Otherwise, projected gradient descent finds the
-    forces within the limit whose motion is nearest to motion without slip (Gauss'
-    principle of least constraint). The tire of a sliding wheel then pushes along its
-    slip with the full limit. The force across the slip is zero.
+    All forces are divided by the mass of the robot. The function first computes the
+    forces that prevent all slip. If the force of each wheel is within its limit
+    ``traction_m_s2``, these forces are the result.
+
+    Otherwise some slip is inevitable. According to Gauss' principle of least
+    constraint, the forces are those within the limit whose motion is nearest to motion
+    without slip. Projected gradient descent finds these forces. On a sliding wheel, the
+    force then has the full limit and opposes the slip. The force across the slip is
+    zero.
 
     Args:
         motion: Forward and leftward speed of the middle of the axle, m/s, and yaw rate,
