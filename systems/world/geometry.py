@@ -68,7 +68,7 @@ def safe_norm(x: Any, y: Any) -> Any:
 
 @register_jitable
 def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[Any, Any]:
-    """Computes the velocity of the control point P, which is ahead of the body's origin.
+    """Computes the velocity of the control point P, which is ahead of the body origin.
 
     Args:
         theta: Heading of the body in the world frame W, rad; a number or an array.

@@ -39,7 +39,7 @@ def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
 
 
 def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
-    """Computes the position of the control point P, which is ahead of the body's origin.
+    """Computes the position of the control point P, which is ahead of the body origin.
 
     Args:
         pose: (x, y, theta) of the body in the world frame W, m and rad; floats or
