@@ -43,7 +43,7 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
-    """Raises an error if the sample rate of a frame is not the expected rate.
+    """Raises an error if the sample rate of a frame differs from the expected rate.
 
     Args:
         audio: The frame.
@@ -80,8 +80,8 @@ class FrameBlock(Block):
     The first input port of a subclass is ``audio``. All other ports carry numbers. A
     subclass defines the method ``hear``.
 
-    State: the memory of ``hear`` is an abstract state. The values of the output ports
-    are a discrete state. They change one control period after the end of a frame.
+    The memory of ``hear`` is an abstract state. The values of the output ports are a
+    discrete state, which changes one control period after the end of a frame.
     """
 
     def declare_frames(self, memory: Any, microphones: MicArrayParameters) -> None:
@@ -146,13 +146,13 @@ class FrameBlock(Block):
         discrete_state.set_value(0, heard.values)
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step of the block for the frames of a compiled simulation loop.
+        """Returns the step of the block for a compiled simulation loop.
 
         Args:
             run: Facts about the run, which provide the frames.
 
         Returns:
-            The step, which calls Python.
+            The step, which calls ``hear`` at the end of each frame.
 
         Raises:
             InputError: No block with a step publishes audio.
