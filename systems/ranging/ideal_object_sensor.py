@@ -71,10 +71,9 @@ def _see(
 ) -> None:  # pragma: no cover  (compiled)
     """Fills the slot of one body.
 
-    The function reports a body at rest as its nearest point. The function reports a
-    moving body as a disc around its center. There are two exceptions: if the moving
-    body is long, or if the disc contains the control point P, the function reports the
-    nearest point of the body.
+    The function reports a body at rest as its nearest point, and a moving body as a
+    disc around its center. In two cases, it reports the nearest point of a moving body
+    instead: if the body is long, or if the disc contains the control point P.
 
     Args:
         slot: (OBJECT_SIZE,) zeros that the function fills.
@@ -112,10 +111,10 @@ def _see(
 def _is_hidden(
     number: int, p_WP: Any, slot: Any, poses: Any, sizes: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether other bodies hide a body from the control point P.
+    """Returns whether other bodies hide a body from the control point P.
 
-    A body is hidden if five lines are blocked: the line from P to the reported point of
-    the body, and the lines from P to all four corners of the body.
+    A body is hidden if other bodies block five lines: the line from P to the reported
+    point of the body, and the lines from P to its four corners.
 
     Args:
         number: Index of the body.
@@ -159,20 +158,11 @@ def _is_blocked(
 def _seen(
     state: Any, pose: Any, poses: Any, sizes: Any, numbers: ObjectNumbers
 ) -> Any:  # pragma: no cover  (compiled)
-    """Lists the objects in range without noise and latency.
+    """Returns the objects in range without noise and latency, nearest first.
 
-    The function also stores the present poses for the next control period.
-
-    Args:
-        state: State of the block. The first element is 1 if poses are stored, otherwise
-            0. The poses of one control period ago follow.
-        pose: Pose (x, y, theta) of the robot, m and rad.
-        poses: (3 n,) poses of all bodies, m and rad.
-        sizes: (2 n,) lengths and widths of all bodies, m.
-        numbers: ``ObjectNumbers``.
-
-    Returns:
-        (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
+    The function also stores the present poses for the next control period. The first
+    element of the state is 1 if poses are stored, otherwise 0. The poses of one control
+    period ago follow.
     """
     count = len(sizes) // 2
     p_WP = control_point(pose, numbers.control_point_m)
@@ -196,9 +186,9 @@ def ideal_object_step(
 ) -> None:
     """Computes the objects that the sensor reports in one control period.
 
-    The state has three parts. The first part is a flag that is 1 after the first
-    period. The second part is the poses of the bodies one period ago. With a latency,
-    the third part is the objects that are not reported yet, oldest first.
+    The state has up to three parts: a flag that is 1 after the first period; the poses
+    of the bodies one period ago; and, with a latency, the objects that are not reported
+    yet, oldest first.
     """
     pose, poses, sizes = inputs
     seen = _seen(state, pose, poses, sizes, numbers)
@@ -222,11 +212,12 @@ def ideal_object_step(
 
 
 class IdealObjectSensor(Block):
-    """Gives the positions and velocities of the bodies around P, in all directions.
+    """Gives the positions and velocities of the bodies around the robot.
 
-    P is the control point of the robot. The output has the eight nearest bodies within
-    the range of the sensor. ``X`` and ``Y`` of a slot are the vector from P to a point
-    of the body. The block represents a body in one of these ways:
+    Let P be the control point of the robot. The output has the eight nearest bodies
+    within the range of the sensor, in all directions. ``X`` and ``Y`` of a slot are the
+    vector from P to a point of the body. The block represents a body in one of these
+    ways:
 
     - A body at rest is its nearest point. The point is on the rectangle of the body.
     - A moving body is a disc that contains the body and has the same center. ``X`` and
@@ -244,8 +235,8 @@ class IdealObjectSensor(Block):
     there is no latency. The block draws noise once per period.
 
     Args:
-        parameters: Range and errors, ``ObjectSensorParameters``.
-        robot: Parameters of the robot, for the position of P.
+        parameters: Range, errors and latency.
+        robot: Distance of P ahead of the axle.
         bodies: Number of bodies on the ports ``poses_WO`` and ``sizes``.
         robots: Indices of the bodies that are robots.
         seed: Seed of the noise.
@@ -255,8 +246,8 @@ class IdealObjectSensor(Block):
         InputError: The latency is not a multiple of the control period.
 
     Reference: our own work. The block replaces the scan of Engelbrecht, Steyn and
-    Djouani (2021). Their paper prints neither how beams become obstacles nor how the
-    velocities are obtained.
+    Djouani (2021). Their paper states neither how beams become obstacles nor how
+    velocities are measured.
     """
 
     part, stage = "objects", "obstacle sensing"
