@@ -261,7 +261,7 @@ _STAGES = (
 def advance(
     state: Any, h: Any, commanded: Any, derivatives: Any, of_plant: Any
 ) -> None:
-    """Advances the state by one step of the Dormand-Prince method, like Drake.
+    """Advances the state by one step of the Dormand-Prince method, as Drake does.
 
     Args:
         state: (n,) state, which the function overwrites with the new state.

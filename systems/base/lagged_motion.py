@@ -38,8 +38,9 @@ class LaggedMotion(NamedTuple):
     s."""
     least_share: float
     """Factor kappa in the error bound of the encoders. If a wheel reverses within a
-    control period, its path is longer than its net distance. Therefore the bound counts
-    at least kappa times the steady part. See docs/results_guard.md, "Encoders"."""
+    control period, its path is longer than the encoder shows. Therefore the bound uses
+    a path of at least kappa times the steady part. See docs/results_guard.md,
+    "Encoders"."""
     nodes: tuple[tuple[float, float, float, float], ...]
     """Nodes of the quadrature, four numbers per node. The first two numbers are the
     shares of the steady part and of the lagged part that are complete at the node. The

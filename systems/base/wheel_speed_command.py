@@ -39,7 +39,7 @@ def integrate_velocity(
     The function limits the velocity to ``top_speed``. Without this limit, the integral
     would wind up: it would grow until the damping of the control law balances the pull
     of the target. With the default gains, this is a speed of 2 m/s per meter of
-    distance.
+    distance to the target.
 
     Args:
         v_WP: Velocity (vx, vy) of the control point P in the world frame W, m/s; floats

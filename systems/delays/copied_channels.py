@@ -148,8 +148,8 @@ def copied_pairs(
 
     The function compares each pair at the lag of its highest correlation. A pair
     repeats if the two channels differ only by rounding in the loudest section of the
-    recording. If the recording has a pause, the function also finds pairs that are two
-    inputs of one microphone.
+    recording. If the recording has a pause, the function also finds pairs that record
+    one microphone through two inputs.
 
     Args:
         samples: (n, samples) channels that are not silent, without NaN.

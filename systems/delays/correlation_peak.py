@@ -166,12 +166,14 @@ def _arrival_variances(
 
     1. The coherences r of the pairs give the share of signal in each channel. The share
        and the energy give the signal power s_i and the noise power n_i of channel i.
-    2. The peak of the correlation of the channels i and j has the variance sum w^2 W^2
-       (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2. The sums are over the bins,
-       with the angular frequency w, the weight W, and s = sqrt(s_i s_j). For equal
-       weights and much signal, this is the bound of Knapp and Carter (1976).
-    3. The variance of each pair is divided between its two channels, according to their
-       noise.
+    2. The position of the peak of the pair (i, j) has the variance
+
+           sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2.
+
+       The sums are over the bins, with the angular frequency w, the weight W, and s =
+       sqrt(s_i s_j). For equal weights and much signal, this variance is the bound of
+       Knapp and Carter (1976).
+    3. Each channel gets the part of this variance that its noise causes.
     """
     channels = energy.size
     # Share q of signal in the energy of each channel, from the coherences r.

@@ -2,7 +2,7 @@
 
 The correlation of a pair of channels is the sum of the correlations of the independent
 sounds. Each sound has a peak in the correlation of every pair. The height of the peak
-is the share of the sound in the power.
+is the sound's share of the power.
 
 In a room, each channel contains the direct sound and its echoes. Each of these arrivals
 in one channel correlates with each arrival in the other channel. The correlation of a

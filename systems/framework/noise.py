@@ -251,7 +251,7 @@ def _normal_pairs(
 def _fill_with_normals(
     seed: np.uint64, tick: np.uint64, out: NDArray[np.float32]
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out (n,) with normal numbers, one block of ``_PAIRS`` pairs at a time."""
+    """Fills ``out`` (n,) with normal numbers, ``_PAIRS`` pairs at a time."""
     state, block = _tick_word(seed, tick), 2 * _PAIRS
     uniform = np.empty(_PAIRS, dtype=np.float32)
     angle = np.empty(_PAIRS, dtype=np.float32)

@@ -430,8 +430,8 @@ class Localiser:
         """Returns whether two channels of an audio frame repeat each other.
 
         Without noise, microphones at equal distances from the source record equal
-        samples. In frames without noise, the function therefore does not compare pairs
-        of microphones at equal distances from the centroid at lag 0.
+        samples. If two microphones have equal distances from the centroid, the function
+        therefore does not compare their channels at lag 0 in frames without noise.
         """
         shape = self.plan.shape
         # A fix without range has the delays of a plane wave. They may differ from those

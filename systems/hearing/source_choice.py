@@ -315,7 +315,7 @@ class SourceChoice:
         turn: NDArray[np.float64],
         line: _Line,
     ) -> _Place:
-        """Returns the position of a sound in W. The arguments are as of ``_array``."""
+        """Returns the position of a sound in W, given the results of ``_array``."""
         fix = candidate.fix
         p, covariance = turn @ fix.p_AS, turn @ fix.covariance @ turn.T
         if fix.range_valid:

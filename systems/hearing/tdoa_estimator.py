@@ -240,7 +240,7 @@ class TDOAEstimator(FrameBlock):
 
 
 def _belief(values: NDArray[np.float64]) -> Belief:
-    """Converts the values of the ports ``_BELIEF``, in order."""
+    """Converts the values of the ports ``_BELIEF`` to a ``Belief``."""
     return Belief(
         values[:2].copy(),
         values[2:6].reshape(2, 2).copy(),

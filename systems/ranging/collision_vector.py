@@ -26,8 +26,8 @@ PAIR_SEPARATION_M = 0.5
 def echo_point(range_: Any, axis: Any, position: Any) -> Any:
     """Computes the position of an echo, as if it came from the axis of the sensor.
 
-    The function corrects two equations of Han 2019. Eq. 11 prints a minus sign and
-    mixes d with r. Eq. 13 swaps the axes.
+    The function corrects two equations of Han 2019. Eq. 11 has a wrong sign and
+    confuses the symbols d and r. Eq. 13 swaps the axes.
 
     Args:
         range_: Range r_i of sensor i, m; float or AutoDiffXd.

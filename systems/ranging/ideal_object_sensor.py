@@ -216,15 +216,15 @@ class IdealObjectSensor(Block):
 
     Let P be the control point of the robot. The output has the eight nearest bodies
     within the range of the sensor, in all directions. ``X`` and ``Y`` of a slot are the
-    vector from P to a point of the body. The block represents a body in one of these
-    ways:
+    vector from P to a point, which depends on the body:
 
-    - A body at rest is its nearest point. The point is on the rectangle of the body.
-    - A moving body is a disc that contains the body and has the same center. ``X`` and
-      ``Y`` lead to the nearest point of the disc. The velocity is that of the center.
-    - A long moving body is its nearest point, with the velocity of this point.
-      ``RADIUS`` is then half of the width of the body. The same rule applies to a
-      moving body whose disc contains P.
+    - Body at rest: the point is the nearest point of the body. The velocity is zero.
+    - Moving body: the block replaces the body by the smallest disc that contains it and
+      has the same center. The point is the nearest point of the disc. The velocity is
+      that of the center.
+    - Moving body that is long, or whose disc contains P: the point is the nearest point
+      of the body. The velocity is that of this point. ``RADIUS`` is half of the width
+      of the body.
 
     The block computes velocities from the present and the previous poses. Therefore
     velocities are known from the second control period on.

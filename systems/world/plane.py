@@ -153,7 +153,7 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
 def side_normals(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> tuple[tuple[float, float, float, float], ...]:
-    """Returns the unit normals of the sides of two rectangles, with distances on them.
+    """Returns the unit normals of the sides of two rectangles, each with two distances.
 
     The first two normals are those of a. The last two normals are those of b.
 
@@ -163,9 +163,9 @@ def side_normals(
 
     Returns:
         One tuple (x, y, ahead, touching) per normal (x, y). ``ahead`` is the signed
-        distance along the normal from the center of a to the center of b, m.
-        ``touching`` is the distance between the centers at which the projections of
-        both rectangles just touch, m.
+        distance from the center of a to the center of b along the normal, m.
+        ``touching`` is the value of this distance at which the projections of both
+        rectangles onto the normal just touch, m.
     """
     ca, sa, cb, sb = math.cos(a[2]), math.sin(a[2]), math.cos(b[2]), math.sin(b[2])
     c, s = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)

@@ -65,8 +65,8 @@ class TrackerNumbers(NamedTuple):
     microphones: _Microphones
     settings: FilterSettings
     older: NDArray[np.float64]
-    """(n,) vector that is added to the memory of the filter in each control period. It
-    contains the period, s, for each age, and zeros for all other elements."""
+    """(n,) vector that the step adds to the memory of the filter, so that ages grow. It
+    has the control period, s, for each age, and 0 for all other elements."""
 
 
 def tracker_numbers(
