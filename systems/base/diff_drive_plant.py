@@ -174,7 +174,7 @@ def saturated(value: Any, limit: Any) -> Any:
 
     Returns:
         The value, if its magnitude is at most the limit. Otherwise the limit with the
-        sign of the value. The derivatives of the limit are zero.
+        sign of the value; its derivatives are zero.
     """
     if value > limit:
         return value * 0.0 + limit

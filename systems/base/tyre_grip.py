@@ -59,11 +59,11 @@ def grip_accelerations(
     forces that prevent all slip. If the force of each wheel is within its limit
     ``traction_m_s2``, these forces are the result.
 
-    Otherwise some slip is inevitable. According to Gauss' principle of least
-    constraint, the forces are those within the limit whose motion is nearest to motion
-    without slip. Projected gradient descent finds these forces. On a sliding wheel, the
-    force then has the full limit and opposes the slip. The force across the slip is
-    zero.
+    Otherwise some slip is inevitable. Among all forces within the limit, the function
+    chooses those that bring the motion nearest to motion without slip (Gauss' principle
+    of least constraint). Projected gradient descent finds these forces. The force on a
+    sliding wheel then opposes the slip with the full limit, and has no component
+    across the slip.
 
     Args:
         motion: Forward and leftward speed of the middle of the axle, m/s, and yaw rate,

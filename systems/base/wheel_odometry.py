@@ -55,7 +55,7 @@ def odometry_step(
     The state has five numbers: the pose and the two encoder angles at the last control
     period. The step computes the actual path length and turn from the new angles. It
     also computes the path length and turn that the held command would give without
-    motor lag. From both, ``advance_pose`` computes the new pose.
+    motor lag. From these values, ``advance_pose`` computes the new pose.
     """
     left, right = inputs[0][0], inputs[0][1]
     if numbers.pulses > 0:

@@ -19,8 +19,9 @@ from systems.framework.compiling import njit
 def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
     """Returns the number of rows to transform for a number of channels.
 
-    The library transforms rows of single precision four at a time. It transforms three
-    remaining rows one by one. A fourth row of zeros then saves a third of the time.
+    The library rocket_fft transforms rows of single precision four at a time. It
+    transforms three remaining rows one by one. A fourth row of zeros then saves a third
+    of the time.
 
     Args:
         channels: Number of channels.

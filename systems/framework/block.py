@@ -105,8 +105,9 @@ class Step(NamedTuple):
     The fields of the named tuple are arrays or named tuples of arrays. The step changes
     the arrays in place."""
     publish: Callable[..., None] | None = None
-    """Function ``publish(state, outputs, numbers)``, for a block whose outputs depend
-    only on its state. It fills the outputs instead of the step."""
+    """Function ``publish(state, outputs, numbers)`` that fills the outputs. Only blocks
+    whose outputs depend on nothing but the state have this function. Their step does
+    not fill the outputs."""
     host: Any = None
     """``HostCall`` of a step that calls Python. This reference keeps the address of the
     function valid during the loop."""

@@ -9,7 +9,7 @@ code of other versions and other clones, until nobody has used it for 30 days.
 
 No function uses the option ``fastmath`` of numba. With this option, the compiler may
 reorder sums. The last bit of a sum would then depend on the machine, on the caller and
-on the order of compilation. In a run of 40 s, such a difference grows to centimeters
+on the order of compilation. In a run of 40 s, this difference grows to centimeters
 (``tests/evals/test_compiled_code.py``). The exact order of sums costs time. It slows
 the compiled simulation loop of a robot that listens by 10 to 15 %, and the loop of
 Drake by 5 %.
@@ -83,7 +83,7 @@ def cache_folder() -> Path:
 
 
 def njit(*arguments: Any, **options: Any) -> Any:
-    """Calls ``numba.njit``, with a cache key that depends on all imported files.
+    """Calls ``numba.njit``, with a cache key for the source file and all its imports.
 
     Args:
         *arguments: Positional arguments of ``numba.njit``.
@@ -163,11 +163,10 @@ def _remove_unused(folder: Path) -> None:
 
 
 def source_digest(*files: Path) -> str:
-    """Computes a hash of Python files and of all files that they import.
+    """Computes a hash of Python files and of all files of this repository they import.
 
-    Imported files outside this repository are ignored. A process reads each file of
-    this repository only once, because later changes do not affect the code that is
-    loaded.
+    A process reads each file of this repository only once, because later changes do not
+    affect the code that is loaded.
 
     Args:
         *files: Files of this repository, or files of a user.
@@ -197,8 +196,9 @@ def _place(file: Path) -> str:
 def _read(file: Path) -> tuple[str, tuple[Path, ...]]:
     """Returns the hash of a file, and the files of this repository that it imports.
 
-    A text search finds the imports, even those in functions and in comments. A file too
-    many costs only a compilation. A file too few would give wrong results.
+    A text search finds the imports, even those in functions and in comments. A
+    superfluous file costs only a compilation, but a missing file would give wrong
+    results.
     """
     try:
         text = file.read_bytes()

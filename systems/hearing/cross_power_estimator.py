@@ -172,14 +172,11 @@ class ArrayListener:
         return Direction(bearing, status, place, ambiguous, found.other)
 
     def bearing_of(self, steered: float, interpolated: float) -> float:
-        """Returns the bearing of a sound, chosen from two estimates, rad.
+        """Returns the bearing to report, rad, which is ``steered`` in this class.
 
-        Args:
-            steered: Bearing of the position with the largest sum of correlations, rad.
-            interpolated: Bearing from the delays of the peaks, rad.
-
-        Returns:
-            Bearing, rad.
+        ``steered`` is the bearing of the position with the largest sum of correlations,
+        rad. ``interpolated`` is the bearing from the delays of the peaks, rad. A
+        subclass may report ``interpolated``.
         """
         return steered
 
@@ -272,9 +269,9 @@ class CrossPowerEstimator(FrameBlock):
     The block reads the input ``audio`` only while ``listening`` requests noise or
     sound.
 
-    State: the outputs, the last frame, and the sums of spectra. Rate and latency: the
-    block updates every ``frame_s`` of the microphones. The outputs change one control
-    period later.
+    The state has the outputs, the last frame, and the sums of spectra. The block
+    updates the state every ``frame_s`` of the microphones. The outputs change one
+    control period later.
 
     Args:
         robot: Positions of the microphones.

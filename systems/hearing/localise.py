@@ -105,11 +105,12 @@ class HearingMemory(NamedTuple):
     """Values that the localizer keeps from one frame to the next one."""
 
     energy: float
-    """Average energy of a frame without a sound, without rumble (low frequencies), in
-    units of the frame squared. It is 0 before the first frame without a sound."""
+    """Average energy of a frame without a sound, in units of the frame squared. Rumble
+    (low frequencies) is excluded. The value is 0 before the first frame without a
+    sound."""
     noise_energy: float
-    """Average energy of one channel of a frame without a sound, within the band, in
-    units of the frame squared. It is computed at the sample rate of the plan."""
+    """Average energy of one channel of a frame without a sound, in units of the frame
+    squared. It is the energy within the band, at the sample rate of the plan."""
     echoes: NDArray[np.float32] | None = None
     """(n, bins) memory of past power in ``systems.delays.precedence``. None if the
     memory is below the noise."""

@@ -63,8 +63,8 @@ def source_from_delays(
 
     Returns:
         Three values: bearing in [-pi/2, pi/2], rad, positive to the left; range, m; and
-        status of the range (``range_status``). If there is no range, it is 0, and the
-        bearing is that of a source far away.
+        status of the range (``range_status``). Without a range, the second value is 0,
+        and the bearing is that of a source far away.
     """
     a, b = c * tau_12, c * tau_13
     status, r1, r2, r3 = _ranges(a, b, spacing)

@@ -7,7 +7,8 @@ position at which it was last heard.
 The method has three steps:
 
 1. Convert the position of each source to expected delays by third-degree cubature
-   (Arasaratnam and Haykin 2009). An unknown range is a range with a large variance.
+   (Arasaratnam and Haykin 2009). An unknown range is treated as a range with a large
+   variance.
 2. Compare the expected delays with the delays of each sound. Positions on both sides of
    a row of microphones have the same delays, so the mirror image of each position is
    compared, too.

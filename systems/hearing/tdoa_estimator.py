@@ -153,10 +153,10 @@ class TDOAEstimator(FrameBlock):
     ``SourceTracker`` publishes the first three, and ``WheelOdometry`` publishes the
     pose. The four ports affect only the state, so there is no algebraic loop.
 
-    State: ``HearingMemory``, the outputs, and with ``choose: followed`` also
-    ``ChoiceMemory``. Rate and latency: the block updates once per ``frame_s`` of the
-    microphones (25 ms). It then processes the frame that ends at this moment. The
-    outputs change one control period later, which models the computing time.
+    The state has ``HearingMemory``, the outputs, and with ``choose: followed`` also
+    ``ChoiceMemory``. The block updates the state every ``frame_s`` of the microphones
+    (25 ms). It then processes the frame that ends at this moment. The outputs change
+    one control period later, which models the computing time.
 
     Args:
         parameters: Method, band and rate of false alarms.

@@ -32,8 +32,8 @@ def radio_level(distance: float) -> float:
         distance: Distance d between the antennas, m.
 
     Returns:
-        Received level -(10 n lg d + A), dBm. Here n is the exponent of the path loss,
-        and -A is the level at 1 m.
+        Received level -(10 n log10(d) + A), dBm. Here n is the exponent of the path
+        loss, and -A is the level at 1 m.
     """
     return _LEVEL_AT_1_M_DBM - 10.0 * _EXPONENT * math.log10(max(distance, _LEAST_M))
 

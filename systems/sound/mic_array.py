@@ -222,9 +222,9 @@ class MicArray(Block):
     def step_for(self, run: RunFacts) -> Step:
         """Returns the step of the block for a compiled simulation loop.
 
-        The step stores the motion of the robot. Its function in ``carries`` returns the
-        audio frame that ends at a given tick (control period). This function computes a
-        frame only when another block reads it.
+        The step stores the motion of the robot. It also provides a function that
+        returns the audio frame that ends at a given tick (control period). This
+        function computes a frame only when another block reads it.
 
         Args:
             run: Seed and period of the run, and emissions of the sources.

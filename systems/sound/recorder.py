@@ -47,8 +47,8 @@ def record_frame(
         emissions: Sounds of the sources. The noise level is relative to the first
             sound.
         time: Present time, s.
-        before: Pose (3,) and velocity (3,) of the robot one frame ago, in the world
-            frame W; m, m/s and rad.
+        before: Pose (3,), m and rad, and velocity (3,), m/s and rad/s, of the robot in
+            the world frame W one frame ago.
         now: Present pose and velocity of the robot, in the form of ``before``.
         array: True array, from ``real_array``.
         parameters: Microphones, amplifier, converter and length of the frame.

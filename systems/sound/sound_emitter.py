@@ -266,9 +266,9 @@ class SoundEmitter(Block):
     def step_for(self, run: RunFacts) -> Step:
         """Returns the step of the block for a compiled simulation loop.
 
-        The step stores the motion of the source. Its function in ``carries`` returns
-        the emission at a given tick (control period). This function makes an emission
-        only when another block reads it.
+        The step stores the motion of the source. It also provides a function that
+        returns the emission at a given tick (control period). This function makes an
+        emission only when another block reads it.
 
         Args:
             run: Seed and period of the run.

@@ -82,8 +82,8 @@ def read_played(
 
     Args:
         path: Sound file.
-        low_hz: Lower end of the band of the listeners, Hz. The sample rate must be at
-            least twice this frequency.
+        low_hz: Lower end of the band of the sound, Hz. The sample rate must be at least
+            twice this frequency.
         field: Name of the parameter with the path, for the messages.
 
     Returns:

@@ -336,9 +336,9 @@ def first_overlap(
 
     1. Compute the clearance between the rectangles, or use 0.1 mm if the clearance is
        less.
-    2. Divide it by the largest speed at which points of the two rectangles can approach
-       each other. The rectangles cannot overlap by more than 0.1 mm before this time
-       has passed.
+    2. Divide this distance by the largest speed at which points of the two rectangles
+       can approach each other. The rectangles cannot overlap by more than 0.1 mm
+       before this time has passed.
     3. Advance by this time and repeat.
 
     The function therefore finds every overlap deeper than 0.1 mm, at any speed.

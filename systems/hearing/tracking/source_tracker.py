@@ -31,10 +31,10 @@ def SourceTracker_(T):
         (``systems.hearing.tracking.target_filter``). Each new estimate of the position
         was measured ``measurement_age_s`` ago. The block converts the estimate to W
         with the odometry pose at the time of the measurement. An estimate without a
-        range corrects the position only across the bearing. If the source cannot have
-        moved to the position of an estimate, the block rejects the estimate. If several
-        consecutive rejected estimates agree with each other, the block accepts them
-        nevertheless.
+        range corrects the position only perpendicular to the bearing. If the source
+        cannot have moved to an estimated position, the block rejects the estimate. If
+        several consecutive rejected estimates agree with each other, the block accepts
+        them nevertheless.
 
         Between bursts, the position of the target follows one of three rules, which
         ``hold`` selects. The target stays at its place in W, moves with the robot, or

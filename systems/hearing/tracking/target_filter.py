@@ -372,9 +372,9 @@ def _inherit(
     ahead (0) or behind (1). Either previous hypothesis may lead to the updated
     hypothesis, so there are two histories. The function continues the likelier history.
 
-    If the sighting is an outlier to both histories, it updates the track of the
-    outliers instead. After enough consecutive outliers that agree, their track replaces
-    the track of the hypothesis.
+    If the sighting is an outlier to both histories, the function updates the track of
+    the outliers instead. After enough consecutive outliers that agree, their track
+    replaces the track of the hypothesis.
 
     Args:
         memory: Memory of the filter. The function changes the hypothesis ``index``.

@@ -118,7 +118,7 @@ def blank_track(numbers: TrackerNumbers, pose: Sequence[float]) -> NDArray[np.fl
 
     Args:
         numbers: Constants of the tracker.
-        pose: (3,) odometry pose of the robot now and before, m and rad.
+        pose: (3,) odometry pose of the robot until now, m and rad.
 
     Returns:
         (n,) state of ``track_step``, in the order of ``track_names``.
@@ -170,7 +170,7 @@ def _for_scalars(function: Any) -> Any:
 
 @register_jitable
 def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
-    """Returns the odometry pose of some control periods (ticks) ago.
+    """Returns the odometry pose at a past time, given in control periods (ticks) ago.
 
     Between two ticks, the function interpolates linearly.
 
@@ -178,7 +178,7 @@ def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
         pose: (3,) present x, y, theta in the world frame W, m and rad; floats or
             AutoDiffXd.
         past: (3 n,) x, y, theta at the last n ticks, most recent first, m and rad.
-        ticks: Number of ticks, 0 to n, not necessarily whole.
+        ticks: Number of ticks ago, 0 to n, not necessarily whole.
 
     Returns:
         x, y, theta in W, m and rad.
