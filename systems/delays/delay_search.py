@@ -243,8 +243,8 @@ def _judge(
 def weakest_sound(plan: DelayPlan, rate: float) -> float:
     """Computes the level of the weakest sound that can be distinguished from noise.
 
-    Of all sounds with the same energy, a sound with the spectrum of the noise has the
-    highest correlation relative to noise (Cauchy-Schwarz inequality). The weakest sound
+    A sound with the spectrum of the noise has the highest correlation relative to noise
+    of all sounds with the same energy (Cauchy-Schwarz inequality). The weakest sound
     therefore has this spectrum.
 
     Args:

@@ -111,9 +111,9 @@ def signal_powers(
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """Computes the cross powers of the sound alone, and which bins the sound occupies.
 
-    A pair of channels is occupied in a bin if its cross power exceeds three limits. The
-    limits are shares of the power of both channels, of the power of the noise, and of
-    the cross power of the strongest bin.
+    The sound occupies a bin of a pair of channels if the cross power exceeds three
+    limits. The limits are shares of the power of both channels, of the power of the
+    noise, and of the cross power of the strongest bin.
 
     Args:
         facts: Sizes of audio frames and spectra.

@@ -52,7 +52,7 @@ rectangle_clearance = njit(cache=True)(plane.rectangle_clearance)
 def safe_norm(x: Any, y: Any) -> Any:
     """Computes the length of a vector (x, y), with a gradient of zero at (0, 0).
 
-    The gradient of the exact length would be NaN there. The length differs from the
+    The gradient of the exact length would be NaN there. The result differs from the
     exact length by at most 1e-12.
 
     Args:

@@ -118,7 +118,8 @@ def blank_track(numbers: TrackerNumbers, pose: Sequence[float]) -> NDArray[np.fl
 
     Args:
         numbers: Constants of the tracker.
-        pose: (3,) odometry pose of the robot until now, m and rad.
+        pose: (3,) odometry pose x, y, theta, at which the robot has been at rest, m and
+            rad.
 
     Returns:
         (n,) state of ``track_step``, in the order of ``track_names``.
