@@ -243,9 +243,9 @@ def _judge(
 def weakest_sound(plan: DelayPlan, rate: float) -> float:
     """Computes the level of the weakest sound that can be distinguished from noise.
 
-    A sound with the spectrum of the noise has the highest correlation relative to noise
-    of all sounds with the same energy (Cauchy-Schwarz inequality). The weakest sound
-    therefore has this spectrum.
+    Let sounds have equal energy but different spectra. The sound with the spectrum of
+    the noise then has the highest correlation relative to noise (Cauchy-Schwarz
+    inequality). The weakest sound therefore has this spectrum.
 
     Args:
         plan: Rates, band and array.

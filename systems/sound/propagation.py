@@ -215,7 +215,7 @@ def _sample_delays(
     ``samples`` has the time of the first emitted sample, s, and the sample rate, Hz.
 
     Returns:
-        Four values: the (m,) position of the first time of each channel among the
+        Four values: the (m,) first time of each channel, as a position among the
         emitted samples; (m, k) delays, samples; (m, k) rates of change of the delays;
         and the position of the earliest sample that is heard.
     """

@@ -110,7 +110,7 @@ def read_played(
 def read_noise(
     path: str | Path, count: int, field: str
 ) -> tuple[NDArray[np.float64], int]:
-    """Reads the ego noise, which each of several microphones hears without end.
+    """Reads ego noise, which is repeated without end at each of several microphones.
 
     Args:
         path: Sound file.
@@ -239,7 +239,7 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
 
 
 def _data_size(file: BinaryIO) -> int | None:
-    """Reads the stated number of bytes of the samples of a WAV file.
+    """Reads from a WAV file how many bytes its samples have according to the header.
 
     The result is None if no samples follow. Afterwards, the position in the file is the
     beginning of the samples.

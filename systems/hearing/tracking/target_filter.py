@@ -236,7 +236,7 @@ def _robust_innovation(
     """Computes the innovation that the filter uses, and limits the effect of outliers.
 
     A squared normalized innovation above ``GATE`` does not agree with the model. If the
-    innovation remains above ``GATE`` with the additional standard deviation
+    innovation remains above ``GATE`` even with the additional standard deviation
     ``GATE_FLOOR_M``, the filter rejects the sighting. Otherwise the sighting gets a
     larger covariance, so that its effect stays bounded (Huber's weight).
 
