@@ -102,14 +102,8 @@ class SourceRobotParameters(Parameters):
 def driven_path(source: SourceRobotParameters) -> DrivenPath:
     """Returns the motion of a leader robot, which carries the sound source.
 
-    A cache keeps the motions of the last 16 leaders, because many runs use the same
-    motion.
-
-    Args:
-        source: Path and size of the leader.
-
-    Returns:
-        The motion. Equal parameters give the same object.
+    Equal parameters give the same object. A cache keeps the motions of the last 16
+    leaders, because many runs use the same motion.
     """
     return DrivenPath(
         source.plan(),

@@ -60,15 +60,7 @@ class PlantNumbers(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotParameters, plant: PlantParameters) -> PlantNumbers:
-        """Computes the constants from the parameters of the robot.
-
-        Args:
-            robot: Dimensions of the wheels, and top speed.
-            plant: Motor lag, and shares of the rim speeds that the wheels lose by slip.
-
-        Returns:
-            The constants. Slip reduces ``left_rim_m`` and ``right_rim_m``.
-        """
+        """Computes the constants. Slip reduces ``left_rim_m`` and ``right_rim_m``."""
         left, right = plant.slip
         return cls(
             robot.wheel_radius_m * (1.0 - left),

@@ -48,17 +48,10 @@ class LaggedMotion(NamedTuple):
 
 
 def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
-    """Computes the constants of ``LaggedMotion``.
+    """Computes the constants of ``LaggedMotion`` for a duration and a motor lag in s.
 
     The quadrature divides the period into panels that are no longer than the motor lag.
     This keeps its error below 1e-10 of the path length.
-
-    Args:
-        duration_s: Duration of the period, s.
-        lag_s: Time constant of the wheel speeds, s.
-
-    Returns:
-        The constants.
     """
     panels = math.ceil(max(duration_s / lag_s, duration_s / _LONGEST_PANEL_S) - 1e-9)
     at, weight = np.polynomial.legendre.leggauss(_NODES)

@@ -31,13 +31,8 @@ class GripNumbers(NamedTuple):
     def of(cls, robot: RobotParameters, friction: float) -> GripNumbers:
         """Computes the constants for a uniform rectangle on two equally loaded wheels.
 
-        Args:
-            robot: Length and width of the rectangle.
-            friction: Coefficient of friction between tires and floor.
-
-        Returns:
-            The two constants. ``traction_m_s2`` is friction * gravity / 2.
-            ``gyration_m2`` is (length^2 + width^2) / 12.
+        With the coefficient of friction mu, ``traction_m_s2`` is mu * gravity / 2.
+        ``gyration_m2`` is (length^2 + width^2) / 12.
         """
         return cls(
             friction * GRAVITY_M_S2 / 2.0,

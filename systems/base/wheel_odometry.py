@@ -22,15 +22,7 @@ from systems.framework.signals import TICK_S
 
 @register_jitable
 def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
-    """Rounds a wheel angle down to whole encoder pulses.
-
-    Args:
-        angle: Angle of the wheel since the start, rad, positive or negative.
-        pulses_per_revolution: Pulses of the encoder per revolution.
-
-    Returns:
-        Largest whole number of pulses that is not above the angle, as an angle in rad.
-    """
+    """Rounds a wheel angle, rad, down to whole encoder pulses, even below zero."""
     pulse = math.tau / pulses_per_revolution
     return math.floor(angle / pulse) * pulse
 

@@ -187,14 +187,11 @@ def _block(
     sample_rate_hz: float,
     choose: Callable[[NDArray[np.float64]], np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Chooses a section of a recording by its power.
+    """Returns a section (n, size) of a recording, and the (n,) powers of its channels.
 
     The function ``choose`` gets the powers of all sections and returns the index of the
     chosen section. Sections in which a channel is constant (digital silence) do not
     take part.
-
-    Returns:
-        (n, size) samples of the section, and the (n,) powers of its channels.
     """
     size = min(round(seconds * sample_rate_hz), samples.shape[1])
     count = samples.shape[1] // size
@@ -225,9 +222,8 @@ def _difference(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Computes how much the second channel differs from the first channel.
 
-    Returns:
-        Three variances: of the difference that remains after the best gain, of the
-        second channel, and of the first channel.
+    The function returns the variances of the difference that remains after the best
+    gain, of the second channel, and of the first channel.
     """
     begin, end = max(0, lag), min(second.size, second.size + lag)
     count = end - begin

@@ -206,9 +206,8 @@ def _reconcile(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Computes the arrivals that fit the delays of all pairs best by least squares.
 
-    Returns:
-        Two values, samples: the largest change of an arrival, and the largest
-        disagreement between a delay and the arrivals.
+    The function returns the largest change of an arrival, and the largest disagreement
+    between a delay and the arrivals, both in samples.
     """
     moved, closure = 0.0, 0.0
     reconciled[0] = 0.0

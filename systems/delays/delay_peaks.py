@@ -20,11 +20,9 @@ def _pair_spectra(
 ) -> tuple[
     NDArray[np.complex64], NDArray[np.float32], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Computes the cross-spectra of pairs of channels.
+    """Returns the cross-spectra of pairs, their weights, and the channel energies.
 
-    Returns:
-        Three arrays: (p, bins) cross-spectra; (p, bins) weights, all 1; and (n,)
-        energies of the channels.
+    The shapes are (p, bins), (p, bins) and (n,). All weights are 1.
     """
     channels, bins = spectra.shape
     energy = np.zeros(channels)

@@ -143,9 +143,8 @@ def _gated_peak(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Finds the highest peak of a correlation among the lags from -gate to gate.
 
-    Returns:
-        Lag of the highest peak, samples; ratio of the second peak to the highest peak;
-        and height of the highest peak.
+    The function returns the lag of the peak, samples; the ratio of the second peak to
+    the highest peak; and the height of the highest peak.
     """
     gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
     for k in range(gate):

@@ -91,10 +91,9 @@ def _remove_peak(correlation: NDArray[np.float32], column: int) -> None:
 def _correlations(
     frame: NDArray[np.float32], plan: DelayPlan, band: slice
 ) -> tuple[NDArray[np.float32], int]:
-    """Computes the whitened correlations of all pairs on the grid of the plan.
+    """Returns the whitened correlations of all pairs, and the column m of lag 0.
 
-    Returns:
-        (p, 2 m + 1) correlations, and m, the index of the column of lag 0.
+    The correlations (p, 2 m + 1) are on the grid of the plan.
     """
     spectra = transform_rows(frame, plan.length)[:, band]
     i, j = plan.shape.pairs.T

@@ -56,16 +56,7 @@ class EchoMemory:
         self.taper = (np.sin(np.pi * phase) * math.sqrt(0.5)).astype(np.float32)
 
     def faded(self, memory: NDArray[np.float32], samples: int) -> NDArray[np.float32]:
-        """Returns the memory of past power after a silence.
-
-        Args:
-            memory: (n, bins) power that echoes may still have, units of the audio frame
-                squared.
-            samples: Length of the silence, samples.
-
-        Returns:
-            (n, bins) memory after the decay during the silence.
-        """
+        """Returns the (n, bins) memory of past power after some silent samples."""
         return memory * np.float32(self.decay_a_hop ** (samples / self.hop))
 
     def least(self, noise_density: float) -> float:

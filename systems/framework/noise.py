@@ -147,9 +147,9 @@ def tick_normals(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes in compiled code what ``standard_normals`` computes in Python.
 
-    The numbers have double precision. With single precision, the results of compiled
-    code and Drake would differ: the product of a single-precision number and a Python
-    float has single precision in numpy, but double precision in compiled code.
+    The numbers have double precision. Single precision would make compiled code and
+    Drake differ. The product of a single-precision number and a Python float has single
+    precision in numpy, but double precision in compiled code.
 
     Args:
         noise: Seed and table from ``tick_noise``.

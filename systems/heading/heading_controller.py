@@ -93,8 +93,11 @@ def heading_controller_step(
 ) -> None:
     """Computes the duties of the two motors in one tick (control period).
 
-    The state has three numbers: the integral part, deg; the deviation of the heading at
-    the last tick, deg; and whether the robot moved at the last tick, 0 or 1.
+    The state has three numbers, in this order:
+
+    - the integral part, deg;
+    - the deviation of the heading at the last tick, deg;
+    - whether the robot moved at the last tick, 0 or 1.
     """
     expected, heading, move = inputs
     duty = outputs[0]

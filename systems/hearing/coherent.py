@@ -179,9 +179,13 @@ def _pair_sums(
         rest: (n,) delays to remove, samples.
 
     Returns:
-        Four sums over the bins, where z = X_m X_j^* are the products of the channels m
-        and j: the (n, n) sums of Re(z), of w Im(z), and of w^2 Re(z); and the sum of
-        w^2.
+        Four sums over the bins. With the products z = X_m X_j^* of the channels m and
+        j, they are:
+
+        - (n, n) sums of Re(z);
+        - (n, n) sums of w Im(z);
+        - (n, n) sums of w^2 Re(z);
+        - sum of w^2.
     """
     n, bins = spectra.shape
     aligned = np.empty((bins, n), dtype=np.complex128)

@@ -110,13 +110,9 @@ class ArrayListener:
         )
 
     def lost(self, sound: CrossPowers) -> list[int]:
-        """Returns the channels that are silent while the source sounds, counted from 0.
+        """Returns the numbers of the silent channels, counted from 0.
 
-        Args:
-            sound: Sums of spectra from the time in which the source sounded.
-
-        Returns:
-            Numbers of the silent channels.
+        ``sound`` has the sums of spectra from the time in which the source sounded.
         """
         power = sound.own.sum(axis=1)
         return np.flatnonzero(power <= _DEAF * np.median(power)).tolist()

@@ -81,16 +81,9 @@ def gather_frame(
     before: NDArray[np.float64],
     now: NDArray[np.float64],
 ) -> CrossPowers:
-    """Adds the spectra of an audio frame and of the previous frame to the sums.
+    """Adds the joined spectra of two successive frames to the sums.
 
-    Args:
-        facts: Sizes of audio frames and spectra.
-        sums: Sums so far.
-        before: (channels, samples) previous frame.
-        now: (channels, samples) present frame.
-
-    Returns:
-        The new sums.
+    ``before`` and ``now`` are the previous and the present frame, (channels, samples).
     """
     joined = np.concatenate((before, now), axis=1)
     joined = (joined - joined.mean(axis=1, keepdims=True)) * _window(facts.length)

@@ -456,11 +456,8 @@ def _search(
     """Finds the two positions that fit the delays best.
 
     The function refines each start by ``_descend_within``. The plane wave comes last,
-    and is omitted if another start already fits.
-
-    Returns:
-        (2, d) directions, (2,) inverse ranges and (2,) chi-squares. The best position
-        is first.
+    and is omitted if another start already fits. The results are (2, d) directions,
+    (2,) inverse ranges and (2,) chi-squares. The best position is first.
     """
     n, dim = problem.p.shape
     unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
@@ -500,9 +497,11 @@ def _covariance(
             nothing is known.
 
     Returns:
-        Three values: the (k + 1, k + 1) covariance of the coordinates of u and of w;
-        the (d, 3) derivatives of u with respect to its coordinates; and the number k of
-        coordinates.
+        Three values:
+
+        - (k + 1, k + 1) covariance of the coordinates of u and of w;
+        - (d, 3) derivatives of u with respect to its coordinates;
+        - number k of coordinates.
     """
     bound = _is_bound(problem)
     basis, k = _coordinates(problem, u, bound)

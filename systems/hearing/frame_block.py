@@ -43,15 +43,9 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
-    """Raises an error if the sample rate of a frame differs from the expected rate.
+    """Raises an ``InputError`` if the sample rate of a frame is not ``rate_hz``, Hz.
 
-    Args:
-        audio: The frame.
-        rate_hz: Sample rate that the block expects, Hz.
-        block: Name of the block, for messages.
-
-    Raises:
-        InputError: The rates differ.
+    ``block`` is the name of the block for the message.
     """
     if audio.sample_rate_hz != rate_hz:
         raise InputError(

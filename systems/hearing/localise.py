@@ -312,8 +312,8 @@ class Localiser:
         3. If the frame is the first frame of a sound, all channels must contain the
            sound.
 
-        Returns:
-            Two values: the detected sound, or None if a test fails; and the new memory.
+        The function returns the detected sound, or None if a test fails, and the new
+        memory.
         """
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):

@@ -110,9 +110,9 @@ def _locate(
 ]:  # pragma: no cover  (compiled)
     """Computes the position of the source in the axes of the array, with errors.
 
-    Returns:
-        Six values: position; covariance of the position; standard deviation of the
-        bearing; range; status of the range; and standard deviation of the range.
+    The function returns the position; its covariance; the standard deviation of the
+    bearing; the range; the status of the range; and the standard deviation of the
+    range.
     """
     tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
     tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]

@@ -327,13 +327,10 @@ class SourceChoice:
 def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
     """Assigns sounds to sources with the smallest total cost.
 
-    Args:
-        costs: (sounds, sources) costs. A cost is infinite if the sound cannot come from
-            the source.
-
-    Returns:
-        One entry per sound: the index of its source, or None if the sound belongs to no
-        known source. Each source has at most one sound.
+    ``costs`` has one row per sound and one column per source. A cost is infinite if the
+    sound cannot come from the source. For each sound, the result has the index of its
+    source, or None if the sound belongs to no known source. Each source has at most one
+    sound.
     """
     sounds, places = costs.shape
     finite = np.where(np.isfinite(costs), costs, 1e9)
@@ -407,14 +404,8 @@ def _expected_delays(
     """Computes mean and covariance of the range differences for an uncertain source.
 
     The range difference of a microphone is its range minus the range of microphone 0.
-
-    Args:
-        p: (2,) position of the source in the world frame W, m.
-        covariance: (2, 2) covariance of the position, m^2.
-        microphones: (n, 2) positions in W, m.
-
-    Returns:
-        (n - 1,) mean, m, and (n - 1, n - 1) covariance, m^2.
+    The positions ``p`` and ``microphones`` are in the world frame W, m. The results are
+    the (n - 1,) mean, m, and the (n - 1, n - 1) covariance, m^2.
     """
     root = math.sqrt(2.0) * np.linalg.cholesky(covariance + 1e-12 * np.eye(2))
     points = np.vstack((p + root.T, p - root.T))

@@ -61,7 +61,8 @@ def _is_open(
 ) -> bool:  # pragma: no cover  (compiled)
     """Returns whether a surface may continue beyond its outer hit.
 
-    The beam beside the outer hit decides:
+    The beam ``other`` beside the beam ``own`` of the outer hit decides. ``apart`` is
+    the angle between the two beams, rad, or 0 if there is no beam beside the outer hit.
 
     - If there is no such beam, the surface may continue.
     - If this beam has a nearer hit, a nearer object may hide the surface, so the
@@ -69,18 +70,6 @@ def _is_open(
     - If this beam has a farther hit, the surface ends.
     - If this beam has no echo, the surface may continue only if the beam could not
       reach it.
-
-    Args:
-        ranges: (n,) ranges of the beams, m.
-        heard: (n,) 1 if the beam has an echo, otherwise 0.
-        own: Index of the beam of the outer hit.
-        other: Index of the beam beside the outer hit.
-        apart: Angle between the two beams, rad; 0 if there is no beam beside the outer
-            hit.
-        beams: Directions and ranges of the beams.
-
-    Returns:
-        True if the surface may continue.
     """
     if apart == 0.0:
         return True
@@ -97,15 +86,8 @@ def _describe(
     """Fills the row of one group of hits.
 
     The nearest point of the group is on a line segment between two adjacent hits.
-
-    Args:
-        row: (GROUP_SIZE,) row that the function fills.
-        hits: (n, 2) vectors (x, y) from the control point P to the hits, m.
-        ranges: (n,) ranges of the beams, m.
-        heard: (n,) 1 if the beam has an echo, otherwise 0.
-        ends: Indices of the first and the last beam of the group. Indices of n or more
-            wrap around.
-        beams: Directions and ranges of the beams.
+    ``ends`` has the indices of the first and the last beam of the group. Indices of n
+    or more wrap around.
     """
     count = len(ranges)
     first, last = ends[0] % count, ends[1] % count

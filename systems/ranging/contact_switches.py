@@ -46,16 +46,9 @@ def _feel(
 ) -> tuple[bool, bool]:  # pragma: no cover  (compiled)
     """Returns whether a body closes the left switch, and whether it closes the right.
 
-    Args:
-        pose: Pose (x, y, theta) of the robot, m and rad.
-        body: Five numbers: pose (x, y, theta) of the body in the world frame W, m and
-            rad, and length and width of the body, m.
-        points: (n, 2) test points of the front edge in the axes of the robot, m.
-        middle: A touch within this distance of the robot's x axis closes both switches,
-            m.
-
-    Returns:
-        Two flags, for the left and the right switch.
+    ``body`` has the pose (x, y, theta) of the body in W, m and rad, and its length and
+    width, m. ``points`` are the test points of the front edge in B, m. A touch within
+    the distance ``middle`` of the robot's x axis closes both switches, m.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     # Skip a body whose circumscribed circle no switch can reach. The first test point,

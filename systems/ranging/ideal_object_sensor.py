@@ -69,19 +69,12 @@ class ObjectNumbers(NamedTuple):
 def _see(
     slot: Any, p_WP: Any, before: Any, now: Any, size: Any, tick_s: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills the slot of one body.
+    """Fills the slot of one body, whose elements are zero before.
 
     The function reports a body at rest as its nearest point, and a moving body as a
     disc around its center. In two cases, it reports the nearest point of a moving body
     instead: if the body is long, or if the disc contains the control point P.
-
-    Args:
-        slot: (OBJECT_SIZE,) zeros that the function fills.
-        p_WP: Position (x, y) of P in the world frame W, m.
-        before: (3,) pose of the body one control period ago, m and rad.
-        now: (3,) present pose of the body, m and rad.
-        size: Length and width of the body, m.
-        tick_s: Control period, s; 0 if the velocity is unknown.
+    ``tick_s`` is 0 if the velocity is unknown.
     """
     rectangle = now[0], now[1], now[2], size[0], size[1]
     x, y = nearest_point_on_rectangle(p_WP, rectangle)
@@ -111,20 +104,10 @@ def _see(
 def _is_hidden(
     number: int, p_WP: Any, slot: Any, poses: Any, sizes: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether other bodies hide a body from the control point P.
+    """Returns whether other bodies hide the body ``number`` from the control point P.
 
     A body is hidden if other bodies block five lines: the line from P to the reported
     point of the body, and the lines from P to its four corners.
-
-    Args:
-        number: Index of the body.
-        p_WP: Position (x, y) of P in the world frame W, m.
-        slot: (OBJECT_SIZE,) slot of the body.
-        poses: (3 n,) poses of all bodies, m and rad.
-        sizes: (2 n,) lengths and widths of all bodies, m.
-
-    Returns:
-        True if the body is hidden.
     """
     x, y, theta = poses[3 * number], poses[3 * number + 1], poses[3 * number + 2]
     c, s = 0.5 * math.cos(theta), 0.5 * math.sin(theta)
@@ -186,9 +169,11 @@ def ideal_object_step(
 ) -> None:
     """Computes the objects that the sensor reports in one control period.
 
-    The state has up to three parts: a flag that is 1 after the first period; the poses
-    of the bodies one period ago; and, with a latency, the objects that are not reported
-    yet, oldest first.
+    The state has these parts, in this order:
+
+    - a flag that is 1 after the first period;
+    - the poses of the bodies one period ago;
+    - with a latency, the objects that are not reported yet, oldest first.
     """
     pose, poses, sizes = inputs
     seen = _seen(state, pose, poses, sizes, numbers)

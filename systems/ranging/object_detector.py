@@ -53,14 +53,6 @@ def _keep_hits(
 
     A beam without a new range keeps its last hit. If the range of a beam is too old,
     the beam counts as a beam without an echo.
-
-    Args:
-        kept: (n, _BEAM_SIZE) state of the beams, changed in place.
-        ranges: (n,) ranges, m.
-        echo: (n,) 1 if the sensor has an echo, otherwise 0.
-        ages: (n,) times since each sensor fired, s.
-        pose: Pose (x, y, theta) of the robot, m and rad.
-        numbers: Constants of the block.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(ranges)):

@@ -109,11 +109,8 @@ def _correct(
 ) -> None:  # pragma: no cover  (compiled)
     """Corrects a track by one scalar measurement of its position (Kalman update).
 
-    Args:
-        track: (TRACK_SIZE,) track, changed in place.
-        off: Measured position minus predicted position along ``h``, m.
-        h: Unit vector (x, y) of the measured direction in the world frame W.
-        variance: Variance of the measurement, m^2.
+    ``off`` is the measured position minus the predicted position along the unit vector
+    ``h``, m. ``variance`` is that of the measurement, m^2.
     """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     gain = p[:, 0] * h[0] + p[:, 1] * h[1]
@@ -134,14 +131,8 @@ def _turn_surface(
     The noise of the ranges moves the nearest point along the surface by more than the
     spacing of the beams. Therefore only the distance from the control point P shows a
     motion. The function keeps this distance and rotates its variance to the new
-    direction. The position along the surface becomes unknown. The sensors do not
-    measure the velocity along the surface, so this velocity decays to zero.
-
-    Args:
-        track: (TRACK_SIZE,) track, changed in place.
-        p_WP: Position (x, y) of P in the world frame W, m.
-        along: Unit vector (x, y) in W from P to the present nearest point.
-        own: Constants of the tracking.
+    direction ``along``. The position along the surface becomes unknown. The sensors do
+    not measure the velocity along the surface, so this velocity decays to zero.
     """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     x, y = state[0] - p_WP[0], state[1] - p_WP[1]
@@ -196,12 +187,6 @@ def _take_in(
       the distance of the middle minus that of the nearest point. Both coordinates count
       as measured. The noise perpendicular to the direction is larger by the spacing of
       the beams.
-
-    Args:
-        track: (TRACK_SIZE,) track, changed in place.
-        group: (GROUP_SIZE,) row of ``group_beams``.
-        p_WP: Position (x, y) of P in the world frame W, m.
-        own: Constants of the tracking.
     """
     wide = _hides_motion(group, own)
     sure = group[CHORD] < _COARSE_M and (not wide or group[EXTENT] > 0.0)

@@ -173,13 +173,9 @@ class UltrasonicParameters(Parameters):
         return tuple(sensor.position_m for sensor in self.sensors)
 
     def each(self, field: str) -> NDArray[np.float64]:
-        """Returns the values of one field for all sensors.
+        """Returns the values of one field of ``RangeSensorParameters`` for all n sensors.
 
-        Args:
-            field: Name of a field of ``RangeSensorParameters``.
-
-        Returns:
-            (n,) array with one value per sensor, or (n, 2) array for ``position_m``.
+        The shape is (n,), or (n, 2) for ``position_m``.
         """
         return np.array([getattr(sensor, field) for sensor in self.sensors])
 

@@ -187,11 +187,9 @@ def mark_shared(schema: dict[str, Any]) -> None:
 
 
 def add_shorthand(schema: dict[str, Any], model: type[Parameters]) -> None:
-    """Adds the short forms to the JSON Schema of ``UltrasonicParameters``.
+    """Adds the short forms to the JSON Schema of ``UltrasonicParameters``, in place.
 
-    Args:
-        schema: JSON Schema, changed in place.
-        model: Model of a sensor.
+    ``model`` is the model of a sensor.
     """
     properties, told = schema["properties"], meanings(model)
     own = model.model_json_schema()["properties"]

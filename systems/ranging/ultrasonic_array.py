@@ -127,14 +127,9 @@ class RangeErrors(NamedTuple):
 
 
 def range_errors(parameters: UltrasonicParameters, stretch: float = 1.0) -> RangeErrors:
-    """Collects the errors and limits of all sensors.
+    """Collects the errors and limits of all sensors, with one element per sensor.
 
-    Args:
-        parameters: Parameters of the sensors.
-        stretch: Ratio of the assumed speed of sound to the true speed of sound.
-
-    Returns:
-        Errors and limits, with one element per sensor.
+    ``stretch`` is the ratio of the assumed speed of sound to the true speed of sound.
     """
     from scipy.special import ndtri  # takes longer to load than all parameters
 

@@ -36,14 +36,8 @@ def microphone_reach(room: RoomParameters | None, sound_speed_m_s: float) -> flo
     """Returns the longest distance that sound travels to the microphones, m.
 
     A loudspeaker must store the sound that it emits for the travel time of this
-    distance.
-
-    Args:
-        room: Room whose reflections are also heard; None for the free field.
-        sound_speed_m_s: Speed of sound, m/s.
-
-    Returns:
-        Distance, m, at least ``MAXIMUM_RANGE_M``.
+    distance. The result is ``MAXIMUM_RANGE_M`` in the free field (no room), and larger
+    if reflections need it.
     """
     if room is None:
         return MAXIMUM_RANGE_M

@@ -234,8 +234,8 @@ class RoomParameters(Parameters):
     """Time in which sound decays by 60 dB according to Sabine's formula, s.
 
     The simulated decay agrees with this time in compact rooms that absorb little. For
-    example, a room of 7 x 7 x 3 m with 0.25, 0.4 or 0.6 s has a decay from -5 to -35 dB
-    that corresponds to 0.25, 0.45 or 0.72 s.
+    example, take a room of 7 x 7 x 3 m and the settings 0.25, 0.4 and 0.6 s. The decay
+    from -5 to -35 dB then corresponds to 0.25, 0.45 and 0.72 s.
     """
     absorption: float | None = Field(default=None, gt=0.0, le=1.0)
     """Share of the energy that the walls, floor and ceiling absorb at each reflection.

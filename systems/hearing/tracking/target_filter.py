@@ -326,9 +326,8 @@ def _follow(
 ) -> tuple[bool, Any]:
     """Updates one track with a sighting (estimate of the position) that it accepts.
 
-    Returns:
-        Whether the track accepts the sighting, and the cost that the sighting adds. A
-        track that rejects the sighting does not change.
+    The function returns whether the track accepts the sighting, and the cost that the
+    sighting adds. A track that rejects the sighting does not change.
     """
     moved = track.copy()
     seconds = track[0] - settings.measurement_age

@@ -114,15 +114,11 @@ def tracker_numbers(
 
 
 def blank_track(numbers: TrackerNumbers, pose: Sequence[float]) -> NDArray[np.float64]:
-    """Returns the state of the tracker before anything is heard.
+    """Returns the (n,) state of ``track_step`` before anything is heard.
 
-    Args:
-        numbers: Constants of the tracker.
-        pose: (3,) odometry pose x, y, theta, at which the robot has been at rest, m and
-            rad.
-
-    Returns:
-        (n,) state of ``track_step``, in the order of ``track_names``.
+    ``pose`` is the odometry pose x, y, theta, at which the robot has been at rest, m
+    and rad. The function ``track_names`` returns the names of the elements of the
+    state.
     """
     poses = np.tile(np.asarray(pose, dtype=float), numbers.past_ticks + 1)
     return np.concatenate((poses, blank_memory(_hypotheses(numbers))))
@@ -272,11 +268,12 @@ def track_step(
     """Updates the target of the tracker in one control period (tick).
 
     The step converts a new estimate to the world frame W and updates the filter. The
-    outputs follow from the chosen track of the filter and the rule of ``hold``.
+    outputs follow from the chosen track of the filter and the rule of ``hold``. The
+    state has three parts, in this order:
 
-    The state has three parts, in this order: the odometry poses at the last ticks, most
-    recent first; the pose at the moment of the last accepted estimate; and the memory
-    of the filter.
+    - the odometry poses at the last ticks, most recent first;
+    - the pose at the moment of the last accepted estimate;
+    - the memory of the filter.
     """
     p_PS_B, covariance, detected, range_valid, pose = inputs
     position, velocity, covariance_W, age, valid = outputs
