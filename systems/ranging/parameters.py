@@ -173,7 +173,7 @@ class UltrasonicParameters(Parameters):
         return tuple(sensor.position_m for sensor in self.sensors)
 
     def each(self, field: str) -> NDArray[np.float64]:
-        """Returns the values of one field of ``RangeSensorParameters`` for all n sensors.
+        """Returns the values of one field of ``RangeSensorParameters`` for all sensors.
 
         The shape is (n,), or (n, 2) for ``position_m``.
         """

@@ -135,8 +135,8 @@ def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParam
         on_since_s: Time of the call, s; None before the call.
 
     Returns:
-        The sound with the start time of its first burst. Before the call, this time is
-        one day, so that the loudspeaker stays silent.
+        The sound, with the time of its first burst in ``start_s``. Before the call,
+        this time is one day, so that the loudspeaker stays silent.
     """
     since = _NEVER_S if on_since_s is None else on_since_s + sound.start_s
     return sound.model_copy(update={"start_s": since})

@@ -116,8 +116,8 @@ def tracker_numbers(
 def blank_track(numbers: TrackerNumbers, pose: Sequence[float]) -> NDArray[np.float64]:
     """Returns the (n,) state of ``track_step`` before anything is heard.
 
-    ``pose`` is the odometry pose x, y, theta, at which the robot has been at rest, m
-    and rad. The function ``track_names`` returns the names of the elements of the
+    ``pose`` is the odometry pose (x, y, theta), m and rad, at which the robot has been
+    at rest. The function ``track_names`` returns the names of the elements of the
     state.
     """
     poses = np.tile(np.asarray(pose, dtype=float), numbers.past_ticks + 1)
