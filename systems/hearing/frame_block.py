@@ -44,15 +44,9 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
-    """Raises an error if the sample rate of a frame is not the expected rate.
+    """Raises an ``InputError`` if the sample rate of a frame is not ``rate_hz``, Hz.
 
-    Args:
-        audio: The frame.
-        rate_hz: Sample rate that the block expects, Hz.
-        block: Name of the block, for messages.
-
-    Raises:
-        InputError: The rates differ.
+    ``block`` is the name of the block for the message.
     """
     if audio.sample_rate_hz != rate_hz:
         raise InputError(
@@ -138,13 +132,13 @@ class FrameBlock(Block):
         discrete_state.set_value(1, self._packing.pack(memory))
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step of the block for the frames of a compiled simulation loop.
+        """Returns the step of the block for a compiled simulation loop.
 
         Args:
             run: Facts about the run, which provide the frames.
 
         Returns:
-            The step, which calls Python.
+            The step, which calls ``hear`` at the end of each frame.
 
         Raises:
             InputError: No block with a step publishes audio.
