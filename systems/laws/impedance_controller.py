@@ -321,8 +321,7 @@ def _slot_names(round_ticks: int) -> tuple[str, ...]:
 
 
 def _define(name: str, block_name: str, documentation: str, **fixed: Any) -> Any:
-    """Defines a variant of ``ImpedanceController_`` with the arguments ``fixed``
-    set."""
+    """Defines a variant of ``ImpedanceController_`` that sets some arguments."""
 
     @define_for_scalars(f"{name}_", __name__)
     def template(T):

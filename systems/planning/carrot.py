@@ -21,10 +21,9 @@ def find_carrot(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Finds the point of a route toward which the robot may drive straight.
 
-    The function chooses the farthest point that a straight line reaches at little extra
-    cost. The cost of the straight line is its length times the mean price of the cells
-    under the line. The function compares this cost with the cost of the route to the
-    same point. The straight line may cost 10 % more.
+    The function chooses the farthest point of the route for which a straight line costs
+    at most 10 % more than the route. The cost of a straight line is its length times
+    the mean price of the cells under it.
 
     Args:
         way: Route from ``find_way``.

@@ -158,8 +158,8 @@ def choose_in_window(
 
     The window contains all speeds and yaw rates that the robot can reach in one period.
     The function tries a grid of these motions. It rejects a motion if the robot could
-    not brake to rest before it covers an occupied cell. Of the other motions, it
-    chooses the one with the largest weighted sum of three terms:
+    not brake to rest before it covers an occupied cell. From the remaining motions, it
+    chooses the motion with the largest weighted sum of three terms:
 
     - heading: small angle between the robot and the target after the motion
     - distance: long way to the first contact
