@@ -79,8 +79,8 @@ def parts_of(diagram: Diagram) -> Parts:
 def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ...]]:
     """Returns the names of the columns in the log of a robot, in order.
 
-    ``blocks`` has the blocks by part, which is the role of a block, such as ``plant``.
-    The keys of the result are the part and the name of an output port.
+    The keys of ``blocks`` are parts; a part is the role of a block, such as ``plant``.
+    The keys of the result are pairs of a part and the name of an output port.
     """
     return {
         (part, port): names
@@ -412,8 +412,9 @@ def connect_by_name(
     Args:
         builder: Builder that already contains the blocks.
         blocks: Blocks to connect.
-        outside: Names of quantities that become inputs of the diagram. A name also
-            selects all inputs that begin with the name and an underscore.
+        outside: Names of quantities that become inputs of the diagram. The name
+            ``emission``, for example, also selects all inputs whose names begin with
+            ``emission_``.
 
     Raises:
         InputError: Several blocks publish a quantity that a block needs.

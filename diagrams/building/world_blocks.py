@@ -24,9 +24,9 @@ def world_blocks(scenario: Scenario, seeds: Mapping[str, int]) -> dict[str, Any]
     """Makes the blocks that all robots share: wind, odor plume, radio and sink.
 
     The sink is the computer of the operator, which receives radio frames. ``seeds`` has
-    the random seeds of the blocks, by name. The blocks of the result are not yet in a
-    diagram. Its keys are their parts (roles, such as ``radio``). It is empty if no
-    robot needs these blocks.
+    the random seeds of the blocks, by name of the block. The keys of the result are the
+    parts (roles) of the blocks, such as ``radio``. The result is empty if no robot
+    needs these blocks. The blocks are not yet in a diagram.
     """
     blocks: dict[str, Any] = {}
     nodes, tick_s = radio_nodes(scenario), scenario.tick_s

@@ -118,7 +118,7 @@ class Referee:
         return "unsettled" if been_in_goal else "timeout"
 
     def ended(self, name: str) -> float:
-        """Returns the number of the ending of a robot's search.
+        """Returns how the search of a robot ended, as a number.
 
         ``systems.search.search_ending`` lists the numbers. The result is 0 if the
         search has not ended, or if the robot does not search.
@@ -126,8 +126,7 @@ class Referee:
         return float(self.steps[name].state.ended[0])
 
     def collision(self, name: str) -> Collision | None:
-        """Returns the collision of a robot, and who is at fault; None without a
-        collision.
+        """Returns the collision of a robot and who is at fault, or None.
 
         The method compares two motions since the last tick (control period): that of
         the robot alone, and that of the body alone. The robot is at fault if its motion

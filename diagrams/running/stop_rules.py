@@ -372,10 +372,9 @@ def _first_touched(
 ) -> tuple[int, float]:
     """Returns the first body that a robot has touched in the last control period.
 
-    The function skips bodies that are too far away, judged by the distance of the
-    centers, half the diagonals, and the motions since the last period. For all other
-    bodies, ``first_overlap`` checks several instants within the period. The poses of
-    other robots are interpolated. Those of all other bodies are known in advance.
+    The function skips bodies that are too far away. For the other bodies,
+    ``first_overlap`` checks several instants within the period. The poses of robots at
+    these instants are interpolated. The poses of all other bodies are known in advance.
 
     Returns:
         Number of the body (-1 for none), and elapsed part of the period (0 to 1).

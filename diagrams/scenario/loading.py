@@ -32,10 +32,11 @@ def load_scenario(
     Args:
         source: A name from the library (``phonotaxis scenarios``), or the path of a
             file.
-        overrides: Fields to change, as a mapping of dotted paths to values, such as
-            ``{"source.speed_m_s": 0.2}``, or as a list of texts ``path=value`` with a
-            YAML value, such as ``source.speed_m_s=0.2``. A path names an obstacle by
-            its name or its index: ``obstacles.cart.size_m`` or ``obstacles.0.size_m``.
+        overrides: Fields to change. One form is a mapping of dotted paths to values:
+            ``{"source.speed_m_s": 0.2}``. The other form is a list of texts
+            ``path=value``, where the value is YAML: ``["source.speed_m_s=0.2"]``. A
+            path names an obstacle by its name or its index: ``obstacles.cart.size_m``
+            or ``obstacles.0.size_m``.
 
     Returns:
         The validated scenario.
@@ -89,8 +90,8 @@ def write_scenario(scenario: Scenario, directory: Path) -> None:
     """Writes a whole scenario and a copy of its JSON Schema to an existing directory.
 
     The files are ``scenario.yaml`` and ``scenario.schema.json``. Text editors use the
-    schema to check and complete fields. Because of the copy, they find it even if the
-    directory moves.
+    schema to check and complete fields. With the copy, they find the schema even after
+    the directory was moved.
     """
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
     (directory / "scenario.yaml").write_text(first + dump_scenario(scenario), "utf-8")

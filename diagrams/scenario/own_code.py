@@ -171,8 +171,8 @@ def loaded_digests(scenario: Scenario) -> dict[str, str]:
 def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[None]:
     """Makes a scenario run with the user's code from the start of a sweep.
 
-    A sweep is a series of runs. If all loaded code is that from the start of the sweep,
-    Python does not load changed files again within this context.
+    A sweep is a series of runs. Within this context, Python does not load changed files
+    again if all loaded code is the code from the start of the sweep.
 
     Args:
         scenario: The scenario to run.

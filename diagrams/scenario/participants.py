@@ -345,11 +345,11 @@ KINDS: Mapping[str, type[Robot]] = {
 
 
 def kind_of(robot: Any) -> str:
-    """Returns the kind of a robot, a key of ``KINDS``, from its control law.
+    """Returns the kind of a robot, a key of ``KINDS``.
 
-    A robot with a user's own law is a router (which drives on a route) if its fields
-    contain a route. ``robot`` is the fields of the robot, as a model or as plain
-    values.
+    The kind follows from the control law in the robot's fields, which are a model or
+    plain values. With a user's own law, the robot is a router if its fields contain a
+    route. A router drives on a route.
     """
     if isinstance(robot, Robot):
         return robot.kind

@@ -360,16 +360,17 @@ class Scenario(RunParameters):
         return self.goal_radius(moves=self.source.path().moves)
 
     def goal_radius(self, *, moves: bool) -> NonNegative:
-        """Greatest distance of the control point P from the target in the goal, m.
+        """Radius of the goal around the target, m.
 
-        The distance is the follow distance plus a margin. The margin is the following
-        band if the target moves, and the goal margin otherwise.
+        The robot is in its goal if its control point P is within this radius. The
+        radius is the follow distance plus a margin. The margin is the following band if
+        the target moves, and the goal margin otherwise.
 
         Args:
             moves: Whether the target moves.
 
         Returns:
-            The distance, m.
+            The radius, m.
         """
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
         return self.only.follow_distance_m + margin

@@ -9,10 +9,10 @@ from systems.framework.input_error import InputError
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """Returns a text that suggests at most ``most`` of the known names.
+    """Returns a text that suggests similar names, for the end of an error message.
 
-    The text is for the end of an error message. It is empty if no known name is similar
-    to ``name``.
+    The text suggests up to ``most`` of the names ``known``. It is empty if none is
+    similar to ``name``.
     """
     by_folded = {each.casefold(): each for each in known}
     near = get_close_matches(name.casefold(), by_folded, n=most)

@@ -28,8 +28,9 @@ def matched_decay(limit: float, ratio: float) -> float:
 def matched_share(limit: float, decay: float) -> float:
     """Computes the ratio exp(-limit/(2 decay)) of the smaller gain to the larger gain.
 
-    The result is 1/``ratio`` of ``matched_decay``, which explains the gains. ``limit``
-    and ``decay`` have the same unit, m or m/s.
+    The gain is exp(x/decay) or exp(-x/decay). It changes by this ratio when x changes
+    by half of ``limit``. Therefore the result is 1/``ratio``, where ``ratio`` is the
+    argument of ``matched_decay``. ``limit`` and ``decay`` have the same unit, m or m/s.
     """
     return math.exp(-limit / (2.0 * decay))
 
@@ -38,12 +39,10 @@ class ActiveParameters(Parameters):
     """Gains of a law whose stiffness and damping vary (Han 2019, eq. 20-22).
 
     The stiffness depends on the distance of the obstacle, and the damping depends on
-    its speed. The decay constants alpha and beta follow from the other fields:
+    its speed. The decay constants alpha and beta follow from two requirements:
 
-    - At the distance rho_0/2, the spring term is as large as with the constant
-      stiffness K_0.
-    - At the speed mu_0/2, the velocity term is as large as with the constant damping
-      D_0.
+    - At the distance rho_0/2, the spring term is K_0 rho_0/2.
+    - At the speed mu_0/2, the velocity term is D_0 mu_0/2.
     """
 
     reference_stiffness_n_m: Stiffness = 84.5
@@ -97,8 +96,8 @@ def active_force(c: Any, s: Any, gains: ActiveParameters) -> Any:
     at c = alpha and zero at contact (c = 0). The second term is the velocity term. For
     an obstacle at rest (s = 0), it is d_ref mu_0 at any distance.
 
-    Eq. 19-b of the paper has another factor (rho_0 - c) at K_0(c). This function
-    follows eq. 20, because only eq. 20 agrees with table 4.
+    Eq. 19-b of the paper has two more factors: (rho_0 - c) in the first term, and s in
+    the second. This function follows eq. 20, because table 4 agrees with eq. 20.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.

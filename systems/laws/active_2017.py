@@ -41,7 +41,7 @@ def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
     - D_a is D_0 below mu_1, and D_0 mu_1/s above mu_1.
 
     According to the paper, the gain K_a increases while c falls to rho_1. With our
-    choice, K_a is constant there, and only the push K_a/c increases.
+    choice, K_a is constant in this range, and only the push K_a/c increases.
 
     The push has no limit of reach. At twice the distance, it is half as large.
 

@@ -22,7 +22,7 @@ class ConventionalParameters(Parameters):
 def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
     """Computes the force K_0 (rho_0 - c) + D_0 s (Han 2019, eq. 19-a).
 
-    From the distance rho_0 on, the force is 0. At c = rho_0, it jumps by D_0 s.
+    If c is rho_0 or more, the force is 0. Therefore it jumps by D_0 s at c = rho_0.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.

@@ -44,12 +44,12 @@ class GuardedController(Block):
     every heading. An unknown cell of the map costs a little more than a free cell. A
     cell with echoes costs much more.
 
-    The robot drives straight toward a point of the route: the farthest point that costs
-    little more than the route itself. The speed depends on the remaining distance. The
-    robot weaves from side to side, so that its narrow sensor cones also see the space
-    beside it.
+    The robot drives straight toward a point of the route. This is the farthest point
+    for which the straight line costs little more than the route. The speed depends on
+    the remaining distance. The robot weaves from side to side, so that its narrow
+    sensor cones also see the space beside it.
 
-    Four rules prevent that the robot gets stuck:
+    Four rules keep the robot from getting stuck:
 
     - Before the robot first moves, it looks to both sides.
     - If the guard stops the robot, the robot looks past both sides of the cell that
@@ -143,8 +143,8 @@ def hazard_sensors(
     """Collects the sensor properties that the tracker of moving bodies needs.
 
     These are the positions, directions, ranges, and errors of the range sensors.
-    ``robot`` gives the position of the control point P. ``tick_s`` is the control
-    period, s.
+    ``robot`` has the position of the control point P. ``tick_s`` is the control period,
+    s.
     """
     axes, places, half_angles = sensors.beams
     return HazardSensors(

@@ -52,8 +52,11 @@ def attraction_force(
 ) -> Any:
     """Computes the force that pulls the virtual mass toward the follow distance.
 
-    With the target at p_S, the mass at p, and its velocity v, the force is K_r (p_S -
-    p) (1 - d_f/|p_S - p|) - D_r v. Without a target, the force only brakes the mass.
+    The target is at p_S. The mass is at p and has the velocity v. The force is::
+
+        K_r (p_S - p) (1 - d_f/|p_S - p|) - D_r v
+
+    Without a target, the force only brakes the mass.
 
     Args:
         p_WP: Position (x, y) of the control point P in the world frame W, m; floats or

@@ -110,8 +110,8 @@ class Law:
     def controller(self) -> type | None:
         """Class of the law's block, or None if the law names no class.
 
-        Reading the property imports the class. Therefore the check of a scenario needs
-        neither Drake nor compiled code.
+        The class is imported only when the property is read, so that a scenario can be
+        checked without Drake and without compiled code.
 
         The constructor of the class may take any of these arguments:
 
@@ -132,9 +132,9 @@ class Law:
     def arguments(self, gains: Any, least_range_m: float) -> tuple[Any, ...]:
         """Returns the arguments that the function ``force`` takes after c and s.
 
-        The first argument is the gains: ``gains`` or else the default gains (None for a
-        law without gains). If the field ``least_range`` is true, the second argument is
-        the least range of the sensors, m.
+        The first argument is ``gains``. If ``gains`` is None, it is the default gains
+        of the law, or None for a law without gains. If the field ``least_range`` is
+        true, the second argument is the least range of the sensors, m.
         """
         if gains is None and self.gains is not None:
             gains = self.gains()

@@ -133,7 +133,7 @@ def concentration(
     """Computes the concentration of odor at a point of the floor.
 
     The result is the sum over all puffs, plus the background. A puff is a Gaussian
-    distribution of odor around its center on the floor, which reflects the odor. A
+    distribution of odor around its center on the floor. The floor reflects the odor. A
     steady plume has no puffs; its concentration follows from an equation.
 
     Args:

@@ -61,7 +61,7 @@ def wind_velocity(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Computes the velocity of the wind at a point of the floor.
 
-    Only in the jet of a fan does the velocity depend on the point:
+    The velocity depends on the point only in the jet of a fan:
 
     - Upwind of the outlet of the fan, there is no wind.
     - On the axis of the jet, the speed is constant along ``_CORE`` diameters of the

@@ -21,9 +21,10 @@ def find_carrot(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Finds the point of a route toward which the robot may drive straight.
 
-    The function chooses the farthest point of the route for which a straight line costs
-    at most 10 % more than the route. The cost of a straight line is its length times
-    the mean price of the cells under it.
+    A straight line to the point may cost at most 10 % more than the route to the same
+    point. The function chooses the farthest point of the route that satisfies this
+    condition. The cost of a line is its length times the mean price of the cells under
+    it.
 
     Args:
         way: Route from ``find_way``.

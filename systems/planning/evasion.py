@@ -263,13 +263,16 @@ def find_threats(
 def watch_of(threats: Threats, heading: float) -> float:  # pragma: no cover  (compiled)
     """Computes how much of the threats is out of view at a heading.
 
+    For each threat, the function multiplies the number of bodies by the angle between
+    the threat and the field of view, rad. The angle counts up to 1 rad. The result is
+    the sum over all threats.
+
     Args:
         threats: Threats from ``find_threats``.
         heading: Heading of the robot, rad.
 
     Returns:
-        Sum over all threats of the number of bodies times the angle by which the threat
-        is out of view, rad. No angle counts more than 1 rad.
+        The sum, rad.
     """
     total = 0.0
     for n in range(len(threats.watched)):
@@ -295,8 +298,8 @@ def choose_motion(
     - a price for the threats that are out of view at its heading
     - a price for the bodies that come near within 4 s
 
-    The weaving heading swings around the heading of the route. The function tries every
-    speed of a list at nine headings: five around the heading of the route, the present
+    The weaving heading oscillates around the heading of the route. The function tries
+    several speeds at nine headings: five around the heading of the route, the present
     heading, the weaving heading, and two toward the threats. The fourth term takes long
     to compute. The function skips it if the other terms already exceed the lowest price
     so far.

@@ -208,8 +208,8 @@ def drive_guarded(
 ) -> None:
     """Decides which speed and yaw rate the robot wants in one control period.
 
-    The function writes both to ``speed`` and ``turn`` of the memory. It works in these
-    steps:
+    The function writes the results to the fields ``speed`` and ``turn`` of
+    ``DriveMemory``. It works in these steps:
 
     1. Update the tracks of moving bodies with the new echoes.
     2. Plan a route every 0.5 s. Compute the wanted speed and the heading error.
@@ -304,8 +304,8 @@ def _remember_held(
 def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untyped-def]
     """Replaces the wanted speed and yaw rate if a moving body may come near.
 
-    The weaving heading for ``choose_motion`` follows from the present yaw rate. If the
-    robot has to evade, it breaks off a look at a blocked place, but not the first look.
+    If the robot has to evade during a look at a blocked place, the look ends. The first
+    look goes on. The present yaw rate gives the weaving heading for ``choose_motion``.
     """
     m = state.memory
     bodies = pick_hazards(state.hazards, time, pose, _NEAR_M)
@@ -346,8 +346,8 @@ def _find_heading(  # type: ignore[no-untyped-def]
        at little extra cost. The heading error is the angle from the robot's heading to
        the carrot.
     3. Compute the remaining distance, which is normally the length of the route. If the
-       route is almost straight and avoids nothing, it is the straight distance. Then a
-       robot close to the target drives toward the target itself.
+       route is almost straight and avoids nothing, the straight distance counts
+       instead, and a robot close to the target drives directly toward it.
     4. Compute the wanted speed from the remaining distance, the follow distance, and
        the speed at which the target moves away.
 
@@ -441,7 +441,7 @@ def _look(time, pose, report, state):  # type: ignore[no-untyped-def]
 def _blocking(
     space: FreeSpace, x: float, y: float, theta: float, radius: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Finds the cell that is not free and nearest to a point 0.1 m ahead of the axle.
+    """Finds the non-free cell that is nearest to a point 0.1 m ahead of the axle.
 
     Returns:
         Middle (x, y) of the cell, m, or the point itself if no such cell is near.
@@ -465,11 +465,10 @@ def _drive(  # type: ignore[no-untyped-def]
     """Drives toward the carrot, the point of the route for which the robot heads.
 
     The heading weaves around the direction of the carrot, so that the range sensors
-    sweep the floor beside the route. The robot weaves more widely if a body moved near
-    it within the last ``_MOVES_S``, or if the target moves and the route is not narrow.
-    It then weaves less the farther it lags behind the target.
-
-    If the heading error is large, the robot only turns.
+    sweep the floor beside the route. The robot weaves more widely after the detection
+    of a moving body, and also while the target moves and the route is not narrow. If
+    the robot lags far behind the target, it weaves less. If the heading error is large,
+    it only turns.
     """
     m = state.memory
     if there:

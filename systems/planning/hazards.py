@@ -371,9 +371,9 @@ def _weigh(
 def _pull(
     p: Particles, n: int, look: Look, distance: float, gap: float, tick_s: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves particle ``n`` to the measured range.
+    """Moves particle ``n`` to the measured range, which is ``gap`` farther away.
 
-    A part of the change, divided by the time, also corrects the velocity of the
+    The gap per control period, times a small factor, also changes the velocity of the
     particle.
     """
     ux = (p.x[n] - look.x) / max(distance, 1e-6)
@@ -403,9 +403,9 @@ def _begin(
        with a random error.
     3. The tangential speed is unknown. It is uniformly distributed over all values with
        which the total speed does not exceed ``TOP_SPEED_M_S``.
-    4. A body that begins to echo was out of view shortly before. If an earlier reading
-       shows that the body would have been seen (``_was_visible``), draw the particle
-       again, up to 12 times.
+    4. A body that begins to echo was out of view shortly before. If a sensor would have
+       seen the particle earlier (``_was_visible``), draw the particle again, up to 12
+       times.
     """
     random, top = hazards.random, TOP_SPEED_M_S
     look, then = look_of(hazards.looks, 0, k), look_of(hazards.looks, 1, k)
@@ -443,12 +443,12 @@ def _was_visible(
     oldest_s: float,
     sensors: HazardSensors,
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether earlier readings of the sensors contradict particle ``n``.
+    """Checks whether a sensor would have seen a body at particle ``n`` earlier.
 
-    The function moves the particle back to the time of the oldest stored reading of
-    each sensor. The reading contradicts the particle if the sensor would have seen a
-    body there: at least 3 cm inside the aperture and at least 3 cm nearer than the
-    reading. Readings older than ``oldest_s`` do not count.
+    For each sensor, the function moves the particle back to the time of the oldest
+    stored reading. The sensor would have seen the particle if it was at least 3 cm
+    inside the aperture, and at least 3 cm nearer than the reading. Readings older than
+    ``oldest_s`` do not count.
     """
     for k in range(len(sensors.directions)):
         look, half = look_of(hazards.looks, 2, k), sensors.directions[k, 1]

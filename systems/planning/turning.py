@@ -31,10 +31,14 @@ def turn_rate(error: float) -> float:
 
 @register_jitable
 def slowed_by(error: float, speed: float) -> float:
-    """Reduces a forward speed, m/s, while the robot turns by the heading error, rad.
+    """Reduces the forward speed of a robot that has to turn.
 
-    If the error is large, the result is 0: the robot turns before it drives. A negative
-    speed does not change.
+    Args:
+        error: Wanted heading minus present heading, rad.
+        speed: Wanted speed, m/s. A negative speed does not change.
+
+    Returns:
+        Speed, m/s; 0 if the error is so large that the robot first has to turn.
     """
     if speed > 0.0:
         speed *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0
@@ -43,11 +47,15 @@ def slowed_by(error: float, speed: float) -> float:
 
 @register_jitable
 def turn_towards(speed: float, heading: float, theta: float) -> tuple[float, float]:
-    """Computes the speed and yaw rate that turn a robot to a heading while it drives.
+    """Computes the speed and yaw rate that turn a moving robot to a heading.
 
-    The speed, m/s, is at most ``speed``. It is lower during a turn, and 0 if the
-    heading error is large. ``heading`` is the wanted heading, and ``theta`` is the
-    present heading, both in the world frame W, rad. The yaw rate is in rad/s.
+    Args:
+        speed: Wanted speed, m/s.
+        heading: Wanted heading in the world frame W, rad.
+        theta: Present heading in W, rad.
+
+    Returns:
+        Speed, m/s, as from ``slowed_by``, and yaw rate, rad/s.
     """
     error = wrapped(heading - theta)
     return slowed_by(error, speed), turn_rate(error)

@@ -93,10 +93,12 @@ def wheel_planes(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the half planes of the velocities that the wheels can produce.
 
-    The limits are |v_xB + (L/2 epsilon) v_yB| <= top speed and |v_xB - (L/2 epsilon)
-    v_yB| <= top speed. v_xB and v_yB are the velocity of the control point P in the
-    axes of the body. L is the wheel separation. epsilon is the distance of P ahead of
-    the axle.
+    The limits are, for both signs::
+
+        |v_xB +- L/(2 epsilon) v_yB| <= top speed
+
+    v_xB and v_yB are the velocity of the control point P in the axes of the body. L is
+    the wheel separation. epsilon is the distance of P ahead of the axle.
 
     Args:
         theta: Heading of the robot, rad.

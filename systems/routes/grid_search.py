@@ -64,8 +64,8 @@ def search_cells(
     A diagonal step costs sqrt(2) times as much as a straight step. It is possible only
     if both cells beside it are free. The priority queue is a binary heap of cells,
     sorted by the cost so far plus the octile distance to the goal. If the search finds
-    a cheaper path to a cell, the cell enters the heap again, and the search later skips
-    its older entries.
+    a cheaper path to a cell, the cell enters the heap again. The search later skips the
+    older entries of the cell.
 
     Args:
         blocked: (n, m) whether each cell is blocked.

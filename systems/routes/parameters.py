@@ -16,8 +16,8 @@ class RouteParameters(Parameters):
     """
 
     speed_m_s: float = Field(default=0.15, ge=0.02, le=100.0)
-    """Speed of the target along the route, m/s. At a speed below the limit, the planner
-    would treat the robot as stalled.
+    """Speed of the target along the route, m/s. Below 0.02 m/s, the planner would treat
+    the robot as stalled.
     """
     acceleration_m_s2: Acceleration = 0.15
     """Acceleration of the target from rest and to rest, m/s^2."""

@@ -48,9 +48,9 @@ def route_fingerprint(
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
     """Computes four numbers that identify a route.
 
-    The block compares them to notice a new route. The numbers are the count of the
-    route's points, their spacing, a weighted sum of their x coordinates, and a weighted
-    sum of their y coordinates.
+    The block notices a new route by these numbers: the count of the points, their
+    spacing, a weighted sum of their x coordinates, and a weighted sum of their y
+    coordinates.
     """
     count, x, y = int(route[0]), 0.0, 0.0
     for k in range(count):

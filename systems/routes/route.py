@@ -216,9 +216,9 @@ def _pulled(
 ) -> Any:  # pragma: no cover  (compiled)
     """Removes points of a path so that the remaining path is taut.
 
-    From each kept point, the next kept point is the last one before a point that it
-    does not see. Two points see each other if the segment between them keeps the
-    clearance. Neighbors always count as seen.
+    From each kept point, the function goes along the path until it finds a point out of
+    sight, and keeps the point before it. A point is in sight if the straight segment to
+    it keeps the clearance. The next point always counts as in sight.
     """
     kept = np.empty_like(points)
     kept[0] = points[0]
@@ -291,8 +291,8 @@ def _way_out(
     """Returns the nearest free grid cell that a safe straight segment joins to ``end``.
 
     ``end`` is the start or the goal of a route. A safe segment keeps the clearance,
-    minus a small allowance. If ``end`` itself is nearer to an obstacle, the segment
-    only has to keep the distance of ``end``, minus the allowance.
+    minus a small allowance. If ``end`` itself is nearer to an obstacle, the segment has
+    to keep only the distance that ``end`` has, minus the allowance.
 
     Returns:
         (i, j), indices of the cell along x and y. They are (-1, -1) if there is no such
@@ -331,9 +331,9 @@ def find_route(
 
     The function works in these steps:
 
-    1. It joins the start and the goal to free grid cells by straight segments. Start
-       and goal may be nearer to obstacles than the clearance. The segments come only
-       slightly nearer still.
+    1. It joins the start and the goal to free grid cells by straight segments. If an
+       end is nearer to an obstacle than the clearance, its segment comes only slightly
+       nearer.
     2. A* finds a path of cells between the two free cells.
     3. The function pulls this path taut and rounds its corners.
 

@@ -93,12 +93,12 @@ class Danger(NamedTuple):
 
 @register_jitable
 def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, float]:
-    """Computes the wheel speeds after a time with a constant command.
+    """Computes the wheel speeds at the end of a time with a constant command.
 
     Args:
         speeds: Speeds of the left and right wheel at the start, rad/s.
         commanded: Commanded speeds of the left and right wheel, rad/s.
-        kept: Share of the difference between actual and commanded speed that remains at
+        kept: Part of the difference between actual and commanded speed that remains at
             the end, 0 to 1.
 
     Returns:
@@ -150,7 +150,7 @@ def roll_on(
 def braked(
     commanded: Any, numbers: BrakingNumbers
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the next command of a robot that brakes along its curve.
+    """Computes the next command of a robot that brakes without leaving its curve.
 
     Args:
         commanded: Present commanded speeds of the left and right wheel, rad/s.
@@ -171,10 +171,10 @@ def braked(
 def _nearest_view(
     danger: Danger, x: float, y: float, ahead_s: float, speed: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance from a position to the nearest end of a sensor view, m.
+    """Computes the distance from a position to the nearest possible obstacle, m.
 
-    An obstacle may have moved from there at ``speed`` since the reading, until
-    ``ahead_s`` from now. The function subtracts the distance that this obstacle covers.
+    An obstacle may be at the end of any sensor view at the time of the reading. It then
+    approaches at ``speed`` until ``ahead_s`` from now.
     """
     nearest = np.inf
     for sensor in range(danger.arcs.shape[0]):
@@ -196,26 +196,25 @@ def can_be_braked(
     """Checks whether the robot may obey a command for one control period.
 
     The function predicts that the robot obeys the command for one period and then
-    brakes to rest. After each part of a period, it compares the position of the axle
-    with the non-free cells. How near the axle may come depends on its present distance
-    from these cells:
+    brakes to rest. After each part of a period, it computes the distance of the axle
+    from the non-free cells. The limit of this distance depends on the present distance:
 
-    - If the distance is at least ``keep_m`` plus ``_SLACK_M``, the axle must stay
-      ``keep_m`` away.
-    - If it is smaller, but at least ``least_m``, the axle may come nearer by at most
+    - Present distance of at least ``keep_m`` plus ``_SLACK_M``: the limit is
+      ``keep_m``.
+    - Smaller present distance, but at least ``least_m``: the axle may come nearer by
       ``_SLACK_M``, but not nearer than ``least_m``.
-    - If it is below ``least_m``, the axle must not come nearer and has to end farther
-      away. It must not come nearer to any point of a cell within ``least_m`` either.
-      The distance can be this small because the map has forgotten nearby cells.
+    - Present distance below ``least_m``, because the map has forgotten nearby cells:
+      the axle must not come nearer to any point of a cell within ``least_m``, and must
+      end farther away.
 
-    These limits do not apply to a turn on the spot, because such a turn does not move
-    the disc that contains the body.
+    These limits do not apply to a turn on the spot, because it does not move the disc
+    that contains the body.
 
-    If obstacles may move, the function also assumes an obstacle at each end of a sensor
-    view. It moves at ``obstacle_speed_m_s`` from the time of the reading on. Then one
-    of two conditions must hold: the axle stays ``keep_m`` away from all points that the
-    obstacle may reach, or the robot withdraws from the end of the view. A slow turn on
-    the spot counts as rest and needs no such check.
+    If obstacles may move, the function also assumes obstacles at the ends of the sensor
+    views. Since the time of the reading, they may have moved at ``obstacle_speed_m_s``.
+    The robot may obey the command only if the axle stays ``keep_m`` away from all
+    points that they may reach, or if the robot withdraws from the end of the view. A
+    slow turn on the spot counts as rest and needs no such check.
 
     Args:
         pose: Present pose (x, y, theta), m and rad.
@@ -277,10 +276,10 @@ def _enters(
 ) -> bool:  # pragma: no cover  (compiled)
     """Checks whether a point of a non-free cell may have entered the robot's disc.
 
-    The disc at the start of the motion contains no obstacle, whatever the map states. A
-    point of the present disc was already in that disc if it is nearer to the start than
-    to the present center. A cell is therefore safe if all its corners lie on the
-    start's side of the perpendicular bisector between both centers.
+    The disc at the start of the motion contains no obstacle, whatever the map states.
+    All points of the present disc that are nearer to the start than to the present
+    center were already in the disc at the start. The function ignores cells that
+    contain only such points.
     """
     x, y, cell = pose[0], pose[1], danger.cell_m
     back_x, back_y = begin[0] - x, begin[1] - y
@@ -331,9 +330,9 @@ def danger_of(
         space: Map of free space.
         time: Current time, s.
         pose: Present pose (x, y, theta), m and rad.
-        reach: Two distances, m: the distance from the axle within which the function
-            collects cells, and the rolled distance of the wheels during which free
-            cells have to stay free.
+        reach: Two distances, m. The function collects cells within the first distance
+            of the axle. Free cells must still count as free after the wheels have
+            rolled the second distance.
         numbers: Model of the robot.
 
     Returns:
@@ -375,8 +374,8 @@ def chosen(
     1. the wanted wheel speeds, then smaller shares of them along the same curve
     2. the wanted turn, while the forward motion brakes
     3. the same turn, but slow enough to count as rest
-    4. braking along the present curve, without a check, because the check in the
-       previous control period included this motion
+    4. braking along the present curve, without a check, because the previous control
+       period has already checked it
 
     Args:
         pose: Present pose (x, y, theta), m and rad.
@@ -387,8 +386,8 @@ def chosen(
         numbers: Model of the robot.
 
     Returns:
-        Action, ``PASSED`` to ``BRAKED``, and commanded speeds of the left and right
-        wheel, rad/s.
+        Action (a number from ``PASSED`` to ``BRAKED``), and commanded speeds of the
+        left and right wheel, rad/s.
     """
     for number in range(len(_SHARES)):
         share = _SHARES[number]

@@ -31,8 +31,8 @@ _FULL_HIT_M = 0.6
 class FreeSpace(NamedTuple):
     """Map of a square window of n x n cells of the floor, which moves with the robot.
 
-    In the frame of the odometry, cell (i, j) of the floor covers x from i to i + 1 cell
-    sides and y from j to j + 1 cell sides. The arrays store its values at the index [i
+    Cell (i, j) of the floor covers x from i to i + 1 and y from j to j + 1, measured in
+    cell sides in the frame of the odometry. The arrays store its values at the index [i
     % n, j % n].
 
     The rolled distance is the mean distance that the rims of both wheels have rolled
@@ -68,7 +68,7 @@ class FreeSpace(NamedTuple):
 def make_free_space(
     cells: int, cell_m: float, sensors: int, arc_points: int
 ) -> FreeSpace:
-    """Makes a map without any free cells. The origin of the floor is in its middle.
+    """Makes a map without any free cells, around the origin of the floor.
 
     Args:
         cells: Number of cells along each side.
@@ -95,16 +95,19 @@ def make_free_space(
 def cell_is_free(
     space: FreeSpace, i: int, j: int, until: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether a cell counts as free up to a rolled distance of the wheels.
+    """Checks whether a cell still counts as free after the wheels have rolled.
+
+    The position of a cell becomes uncertain as the wheels roll. Therefore a cell that
+    was seen free counts as free only for some rolled distance.
 
     Args:
         space: Map of free space.
         i: Index of the cell on the floor along x.
         j: Index of the cell on the floor along y.
-        until: Rolled distance of the wheels since the start, m.
+        until: Mean distance that both wheels have rolled since the start, m.
 
     Returns:
-        True if the cell counts as free. Cells outside the window do not.
+        True if the cell counts as free. Cells outside the window never do.
     """
     cells = space.free_until.shape[0]
     di, dj = i - space.first[0], j - space.first[1]
@@ -121,7 +124,7 @@ def cells_within(
 
     The corners of the rectangle are (``low_x``, ``low_y``) and (``high_x``, ``high_y``)
     in the frame of the odometry, m. The result is four indices of cells: least i, least
-    j, greatest i, and greatest j. If a least index exceeds the greatest index, the
+    j, greatest i, and greatest j. If a least index is larger than the greatest, the
     rectangle meets no cells.
     """
     cell, cells, (first_i, first_j) = space.cell_m, len(space.hits), space.first
@@ -174,7 +177,8 @@ def clear_disc(
         x: Center of the disc, x in the frame of the odometry, m.
         y: Center of the disc, y in the frame of the odometry, m.
         radius: Radius of the disc, m.
-        until: Rolled distance of the wheels up to which the cells count as free, m.
+        until: The cells count as free until the wheels have rolled this mean distance
+            since the start, m.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
     low_i, low_j, high_i, high_j = cells_within(
@@ -203,9 +207,10 @@ def edge_cells(
         x: Middle of the square, x in the frame of the odometry, m.
         y: Middle of the square, y in the frame of the odometry, m.
         reach: Half of the side of the square, m.
-        until: Rolled distance of the wheels up to which a cell has to be free, m.
-        out: (m, 2) array that the function fills with the corner of least x and y of
-            each cell, m.
+        until: A cell is free if it counts as free until the wheels have rolled this
+            mean distance since the start, m.
+        out: (m, 2) array that the function fills with one corner of each cell: least x
+            and least y, m.
 
     Returns:
         Number of cells on the edge. If it exceeds m, ``out`` contains only m of them.
@@ -254,7 +259,7 @@ def nearest_cell(
     """Computes the distance from a position to the nearest of several cells.
 
     Args:
-        corners: (m, 2) corners of least x and y of the cells, m.
+        corners: (m, 2) one corner of each cell: least x and least y, m.
         count: Number of cells in ``corners``.
         cell: Side of a cell, m.
         x: Position, x in the frame of the odometry, m.
@@ -285,7 +290,8 @@ def see(
 
     Sensors at the same position form a group. For each group, the function visits the
     cells in its view, up to the greatest distance that the group has seen. It compares
-    each cell with the readings in the directions of the circle around the cell:
+    the circle around each cell with the readings in the directions that the circle
+    covers:
 
     - If the group has seen free floor in all these directions, up to the far side of
       the circle, the cell becomes free and loses all hits.
@@ -351,9 +357,9 @@ def _of_sectors(
     """Combines the readings of the sensors that see each sector.
 
     Returns:
-        (sectors, 3) array with three distances per sector, m: the distance seen free,
-        the distance of the nearest echo (infinite without an echo), and the greater of
-        both (without an echo, the first).
+        (sectors, 3) three distances per sector, m: the distance seen free; the distance
+        of the nearest echo, infinite without an echo; and the largest finite of these
+        two.
     """
     seen = np.empty((len(sectors.right), 3))
     for k in range(len(seen)):
@@ -373,11 +379,11 @@ def _in_direction(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Returns how far a group of sensors has seen toward a cell.
 
-    The circle around the cell covers an angle of half width ``hides``, rad, around
-    ``bearing``, rad, from the right edge of the group. The distance seen free is the
-    least distance of all sectors that overlap this angle. It is 0 if a part of the
-    angle is outside the view of the group. The echo is that of the sector that contains
-    the middle of the cell.
+    ``bearing`` is the direction of the cell from the right edge of the group's view,
+    rad. The circle around the cell covers this direction plus and minus ``hides``, rad.
+    The distance seen free is the least distance of all sectors that overlap the circle.
+    It is 0 if a part of the circle is out of view. The echo is that of the sector that
+    contains the middle of the cell.
 
     Returns:
         Distance seen free, m, and distance of the echo, m, infinite without an echo.
@@ -438,7 +444,7 @@ def end_view(
 def _sector_box(
     x: float, y: float, right: float, left: float, reach: float
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Computes the rectangle that encloses a sector of a disc.
+    """Computes the rectangle, parallel to the axes, that encloses a sector of a disc.
 
     The extremes are at the center, at an end of the arc, or where the arc crosses the
     direction of a coordinate axis.

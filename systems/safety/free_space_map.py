@@ -129,19 +129,19 @@ def map_step(
 def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float:
     """Computes the mean distance that both wheel rims roll in one control period.
 
-    ``place_error`` assumes the same definition of the distance.
+    ``place_error`` computes the position error from the sum of these distances.
 
     Args:
         was_at: Pose (x, y, theta) one control period ago, m and rad.
         pose: Present pose (x, y, theta), m and rad.
-        least: Least distance that counts for each wheel, m, because a wheel may have
-            moved back and forth without a change of the pose.
+        least: Least distance that counts for each wheel, m. A wheel may have moved back
+            and forth without a change of the pose.
         error: Errors of the odometry, with the wheel separation and the pulse of the
             encoders.
 
     Returns:
-        Mean rolled distance, m. It includes half a pulse, by which the true distance
-        may exceed the count of the encoders.
+        Mean distance, m, plus half a pulse of the encoders, because the true distance
+        may exceed the counted distance.
     """
     turn = pose[2] - was_at[2]
     # The path is longer than its chord by at most the factor 1/cos(turn/2). The factor
@@ -157,8 +157,8 @@ class FreeSpaceMap(Block):
     """Remembers which cells range sensors have seen free, and where echoes came from.
 
     The floor around the robot is divided into square cells. The sensors at one position
-    see a cell free if the circle around it is in view and nearer than their readings
-    minus a margin.
+    see a cell free on two conditions: the circle around the cell is in their view, and
+    it is nearer than their readings minus a margin.
 
     A cell stays free while the error of its position relative to the robot is at most
     ``place_error_m``. The error grows as the robot drives, for two reasons: encoders

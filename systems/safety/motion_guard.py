@@ -46,8 +46,9 @@ class GuardNumbers(NamedTuple):
     after one control period, 0 to 1.
     """
     reach: tuple[float, float]
-    """Two distances, m: the distance from the axle within which the guard checks cells,
-    and the rolled distance of the wheels during which free cells have to stay free.
+    """Two distances, m. The guard checks cells within the first distance of the axle.
+    Free cells must still count as free after the wheels have rolled the second
+    distance.
     """
 
 
@@ -117,9 +118,9 @@ class MotionGuard(Block):
 
     The block replaces ``WheelCommand``: it converts the command of the law to wheel
     speeds. It passes these speeds for one control period if the robot could then brake
-    to rest in free space. In free space means that the smallest disc around the axle
-    that contains the body stays ``margin_m`` away from all cells that are not known to
-    be free.
+    to rest in free space. For this check, the block uses the smallest disc around the
+    axle that contains the body. The disc must stay ``margin_m`` away from all cells
+    that are not known to be free.
 
     Otherwise, the block passes lower speeds along the same curve. If these do not help,
     it passes the turn alone, or it brakes. The virtual mass moves with the command that

@@ -102,10 +102,10 @@ class MonitorState(NamedTuple):
 def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untyped-def]
     """Checks a new echo of sensor ``k`` for the faults frozen and noisy.
 
-    A sensor is frozen after too many equal echoes, or if the robot has turned too far
-    since these began. While the robot turns slowly, a large second difference of the
-    last three ranges makes the reading strange. A sensor is noisy if too many recent
-    readings are strange.
+    A sensor is frozen after too many equal echoes, or if the echoes stay equal while
+    the robot turns far. While the robot turns slowly, a reading is strange if the
+    second difference of the last three ranges is large. A sensor is noisy if too many
+    recent readings are strange.
 
     Returns:
         Number of the fault, 0 if there is none.

@@ -90,9 +90,12 @@ class PlaceError(NamedTuple):
 def place_error(distance: float, way: float, error: PlaceError) -> float:
     """Computes the largest position error of a remembered cell relative to the robot.
 
-    The error has two parts. Wheels with the relative error e cause e s + 2 e s/L (d +
-    s). Encoder pulses of the length q at the rim cause q (s + d)/L + q. L is the wheel
-    separation (docs/guard.md).
+    The error is the sum of two parts (docs/guard.md):
+
+    - Wheels with the relative error e cause the part e s + 2 e s/L (d + s).
+    - Encoder pulses of the length q at the rim cause the part q (s + d)/L + q.
+
+    L is the wheel separation.
 
     Args:
         distance: Distance d from the axle to the cell when a sensor saw the cell, m.
@@ -100,7 +103,7 @@ def place_error(distance: float, way: float, error: PlaceError) -> float:
         error: Errors of wheels and encoders.
 
     Returns:
-        Sum of both parts, m.
+        Largest position error, m.
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     by_wheels = e * way + 2.0 * e * way / separation * (distance + way)
@@ -108,19 +111,18 @@ def place_error(distance: float, way: float, error: PlaceError) -> float:
 
 
 def lasting(distance: float, error: PlaceError) -> float:
-    """Computes the rolled distance after which a cell is forgotten.
+    """Computes how far the wheels may roll before a remembered cell is forgotten.
 
-    This is the mean distance that both wheel rims roll until ``place_error`` reaches
-    the allowed error.
+    A cell is forgotten when ``place_error`` reaches the allowed error.
 
     Args:
         distance: Distance from the axle to the cell when a sensor saw the cell, or an
-            upper bound of it, m.
+            upper bound of this distance, m.
         error: Errors of wheels and encoders.
 
     Returns:
-        Rolled distance, m. It is infinite if the error does not grow, and minus
-        infinity if the error is too large from the start.
+        Mean distance that both wheel rims roll, m. It is infinite if the error does not
+        grow, and minus infinity if the error is too large from the start.
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     a = 2.0 * e / separation
@@ -136,7 +138,7 @@ def lasting(distance: float, error: PlaceError) -> float:
 
 
 def range_errors(sensors: UltrasonicParameters) -> NDArray[np.float64]:
-    """Computes the largest amount by which each sensor reports too long a range.
+    """Computes by how much the range of each sensor can be too long.
 
     The result has the shape (sensors,), m.
     """
@@ -218,7 +220,7 @@ def tick_parts(tick_s: float) -> int:
 def unseen_approach(
     robot: RobotParameters, plant: PlantParameters, tick_s: float
 ) -> float:
-    """Computes by how much the axle may come nearer to a cell than the guard detects.
+    """Computes how much nearer to a cell the axle may come than the guard detects.
 
     The guard checks the position of the axle at the end of each part of a control
     period. The checks end when the rims will move by less than ``REST_M``. Between and
@@ -226,8 +228,8 @@ def unseen_approach(
 
     - The axle passes a corner of a cell on a straight path. At both checks, the corner
       is just outside the body, but halfway between them it is inside.
-    - The path is curved. It deviates from the straight line between two checks by up to
-      a quarter of this line's length times the turn in rad.
+    - The path is curved. Between two checks, it deviates from a straight line by up to
+      a quarter of the line's length times the turn in rad.
     - The wheels reverse between two checks: the axle goes on and comes back.
     - The axle coasts after the last check, or during a turn on the spot.
 

@@ -32,9 +32,9 @@ def song2011_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, int, int]
     Phase 1 lasts until the robot is in the plume for the first time. Afterwards, the
     phase depends on the airflow sensors:
 
-    - phase 2 if one sensor has wind
-    - phase 3 if no sensor has wind
-    - phase 4 if both sensors have wind
+    - phase 2 if one sensor detects wind
+    - phase 3 if no sensor detects wind
+    - phase 4 if both sensors detect wind
 
     Phases 3 and 4 both compare R1 with R3. For point G, section 4.2 of the paper prints
     "output of R1 was less than R2", which can only mean R3.

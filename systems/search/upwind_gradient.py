@@ -56,9 +56,10 @@ _CALM_STOPS = 3
 def upwind_angle(airflow: Any) -> float:
     """Computes the upwind direction from two sensors at 45 deg to the left and right.
 
-    Each reading should be proportional to the cosine of the angle between the wind and
-    the sensor. The result is then exact up to 39 deg from the heading. If the wind
-    comes from farther to one side, the result is 80 deg to that side.
+    The method assumes that each reading is proportional to the cosine of the angle
+    between the wind and the sensor. The result is exact if the upwind direction is
+    within 39 deg of the heading. Otherwise, it is 80 deg to the side from which the
+    wind comes.
 
     ``airflow`` has the left and the right reading. The result is the turning angle to
     the upwind direction, clockwise, deg.

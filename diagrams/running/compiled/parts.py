@@ -1,9 +1,9 @@
 """Defines the compiled functions that a compiled loop calls by their addresses.
 
-A part of the loop is a compiled function, for example the step of one block. If numba
-compiled the loop together with its parts, it would need a long time, and again for
-every other set of blocks. Because the loop calls its parts by address, numba compiles
-each part separately, and the loop ``run_parts`` only once.
+A part of the loop is a compiled function, for example the step of one block. To compile
+the loop together with its parts would take a long time for each set of blocks. Because
+the loop calls its parts by address, numba compiles each part separately, and the loop
+``run_parts`` only once.
 
 Each part has two arguments: the number of the tick (control period), and the address of
 an array of words. A word is a whole number or the address of another array. These

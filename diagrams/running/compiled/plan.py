@@ -104,9 +104,10 @@ class LoopPlan:
     ) -> int:
         """Adds the step of a block as a part with generated source code.
 
-        If the outputs of the block are parts of its state, the part computes the step,
-        or with ``PUBLISH`` as the tick it publishes the outputs. Otherwise, the part
-        sets the outputs to zero before the step fills them.
+        If the outputs of the block are parts of its state, the loop calls the part
+        twice per tick. With ``PUBLISH`` as the tick, the part publishes the outputs.
+        With the number of the tick, it computes the step. Otherwise, the part sets the
+        outputs to zero, and then the step fills them.
 
         Returns:
             Number of the part.

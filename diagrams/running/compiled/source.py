@@ -175,8 +175,8 @@ def _compilable(function: FunctionType) -> Any:
     """Makes a function callable from compiled code, without the checks that wrap it.
 
     numba identifies the result by its type alone. A compiled function in a named tuple
-    would be a pointer, and numba does not cache code with pointers. Plain functions in
-    a user's own modules that the function calls become callable, too.
+    would be a pointer, and numba does not cache code with pointers. The function may
+    also call plain functions in a user's own modules.
     """
     plain = inspect.unwrap(function)
     for called in _users_helpers(plain, set()):

@@ -168,8 +168,8 @@ def goal_warnings(
         margin_m: ``stop.goal_margin_m``, the permitted distance from the goal, m.
 
     Returns:
-        One warning if P comes to rest farther than the margin from the goal, otherwise
-        none.
+        One warning if P comes to rest farther from the goal than ``margin_m``,
+        otherwise none.
     """
     if robot.route is None or robot.law not in ROUTE_LAWS:
         return []

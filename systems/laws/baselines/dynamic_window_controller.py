@@ -159,11 +159,11 @@ def choose_in_window(
     The window contains all speeds and yaw rates that the robot can reach in one period.
     The function tries a grid of these motions. It rejects a motion if the robot could
     not brake to rest before it covers an occupied cell. From the remaining motions, it
-    chooses the motion with the largest weighted sum of three terms:
+    chooses the motion with the largest weighted sum of three terms. The terms reward:
 
-    - heading: small angle between the robot and the target after the motion
-    - distance: long way to the first contact
-    - speed: small difference from the wanted speed
+    - heading: a small angle between the heading after the motion and the target
+    - distance: a long way to the first contact
+    - speed: a speed near the wanted speed
 
     Args:
         places: (n, 3) occupied cells: x and y in the world frame W, m, and the

@@ -168,8 +168,8 @@ def roll_out(
             array in place.
         noise: (samples, steps, 2) normal random numbers of standard deviation 1.
         pose: Pose (x, y, theta) of the axle in the world frame W, m and rad.
-        goal: Position (x, y), m, and velocity (vx, vy), m/s, in W of the point that the
-            control point P should reach.
+        goal: Position (x, y), m, and velocity (vx, vy), m/s, in W of the moving goal of
+            the control point P.
         field: (m, m) result of ``distance_field`` around the axle, m.
         cell: Side of a cell of the field, m.
         numbers: Spreads, limits, and costs.

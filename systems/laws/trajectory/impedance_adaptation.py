@@ -116,7 +116,7 @@ class ImpedanceAdaptation(Block):
     subscript d marks the target, and the subscript ref marks a reference model. gamma
     is the rate of the adaptation, and M is the virtual mass.
 
-    The block has two rules:
+    The block has two rules, in which K', D' and q' are time derivatives:
 
     - ``lyapunov``: K' = (gamma/M) e_v . (p - p_d) and D' = (gamma/M) e_v . (v - v_d),
       with e_v = v - v_ref. This rule is equivalent to eq. 40 to 42 as printed. Without

@@ -121,15 +121,14 @@ def advance_sensitivity(
 def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
     """Computes the gradient of the penalty for small distances from objects.
 
-    For an object at the distance d, the penalty is lambda/2 h^2 with h = max(0, d_sec -
-    d). The gradient is the sum of -lambda h n over all objects, where n is the unit
-    vector from the object to the control point P. The penalty replaces the safety term
-    lambda/2 (d_sec^2 - d^2) of Engelbrecht 2021, eq. 27.
+    For an object at the distance d, the penalty is lambda/2 h^2. h is the larger of 0
+    and d_sec - d. The gradient is the sum of -lambda h n over all objects, where n is
+    the unit vector from the object to the control point P. The penalty replaces the
+    safety term lambda/2 (d_sec^2 - d^2) of Engelbrecht 2021, eq. 27.
 
     Args:
         contacts: Result of ``contacts_of_objects``.
-        security_m: Distance d_sec, m. The adaptation uses the distance S at which
-            contacts begin.
+        security_m: Distance d_sec below which the penalty acts, m.
         penalty: Weight lambda.
 
     Returns:

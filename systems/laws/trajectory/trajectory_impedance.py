@@ -118,11 +118,13 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
 def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
     """Computes the force of all contacts (Engelbrecht 2021, eq. 4 and 5).
 
-    Each contact has a spring and a damper. The force is the sum of K_e (S - d) n - D_e
-    (v - v_j) over all contacts. S - d is the compression of the spring. n is the unit
-    vector from the object to the control point P. v - v_j is the velocity of P relative
-    to the object. If the damping fades, only a part of D_e acts. These signs correct
-    the printed signs.
+    Each contact has a spring and a damper. The force is the sum over all contacts of::
+
+        K_e (S - d) n - D_e (v - v_j)
+
+    S - d is the compression of the spring. n is the unit vector from the object to the
+    control point P. v - v_j is the velocity of P relative to the object. If the damping
+    fades, only a part of D_e acts. The paper prints other signs (docs/errata.md).
 
     Args:
         contacts: Result of ``contacts_of_objects``.
@@ -145,11 +147,11 @@ def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
 def step_is_blocked(objects: Any, step: Any, block_m: Any) -> Any:
     """Checks whether eq. 6 of Engelbrecht 2021 forbids a step of the control point P.
 
-    Eq. 6 forbids a step that ends within the distance L_block of an object. In one
-    point, this function differs from eq. 6: a step that leads away from the object is
-    allowed. Otherwise a robot within L_block could never leave. A robot can come to
-    rest within L_block, because at the speed v it needs up to v (T + motor lag) to
-    stop. T is the control period.
+    Eq. 6 forbids a step that ends within the distance L_block of an object. This
+    function makes one exception: it allows a step that leads away from the object.
+    Otherwise a robot within L_block could never leave. A robot can get there, because
+    it needs a distance of up to v (T + motor lag) to stop from the speed v. T is the
+    control period.
 
     Args:
         objects: Vector of the port ``objects_W``, with the present positions.

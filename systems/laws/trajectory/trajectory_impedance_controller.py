@@ -122,13 +122,19 @@ def TrajectoryImpedanceController_(T):
     class Impl(Block_[T]):
         """Pulls P to a moving target and pushes it away from robots and obstacles.
 
-        P is the control point of the robot. The law is M p'' = -K (p - p_d) - D (v -
-        v_d) + V. p and v are the position and velocity of P. p_d and v_d are those of
-        the target. V is the force of all contacts.
+        P is the control point of the robot. The law is::
 
-        A contact is an object j at a distance d below S. The force V is the sum of K_e
-        (S - d) n - D_e (v - v_j) over all contacts. n is the unit vector from object j
-        to P, and v_j is the velocity of the object.
+            M p'' = -K (p - p_d) - D (v - v_d) + V
+
+        p and v are the position and velocity of P. p_d and v_d are those of the target.
+        V is the force of all contacts.
+
+        A contact is an object j at a distance d below S. The force V is the sum over
+        all contacts of::
+
+            K_e (S - d) n - D_e (v - v_j)
+
+        n is the unit vector from object j to P, and v_j is the velocity of the object.
 
         If ``block_distance_m`` is set, the block also obeys eq. 6: a step must not end
         within this distance of an object, except if it leads away from the object.
