@@ -31,7 +31,7 @@ class RunResult:
 
     If the run has several robots, the field ``several`` has one result per robot. In
     the result of the whole run, each column name then begins with the name of the robot
-    and a dot, and ``cause`` is the cause of one robot (see ``Referee.decisive``).
+    and a dot. Its ``cause`` is the cause of one robot (see ``Referee.decisive``).
     """
 
     scenario: Scenario

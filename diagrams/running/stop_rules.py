@@ -146,9 +146,9 @@ def judge_tick(
     diverged, reached, lost, and stuck or no way found.
 
     ``state`` contains the start time of each condition that must last for some time. It
-    also counts the ticks since the first detection of the target, and in how many of
-    them the control point P follows the target. ``Referee.cause_of`` uses both counts
-    if the run reaches its time limit.
+    also contains two counts: the ticks since the first detection of the target, and the
+    ticks among them in which the control point P follows the target.
+    ``Referee.cause_of`` uses both counts if the run reaches its time limit.
 
     Args:
         time: Time of the tick, s.

@@ -237,7 +237,8 @@ def _imports(file: Path, package: str) -> list[str]:
     """Returns the names of the modules that the source code of a file imports.
 
     The objects in a loaded module do not suffice to find these names. For example, a
-    number has no attribute ``__module__``.
+    number has no attribute ``__module__``, and does not show from which module it
+    comes.
     """
     try:
         tree = ast.parse(file.read_bytes())

@@ -11,8 +11,9 @@ from systems.laws.law import Equation, Law, Tuning
 class Active2017Parameters(Parameters):
     """Gains of a law whose push grows near the obstacle (Kim 2017, eq. 21, fig. 6).
 
-    The push is the part of the force that depends on the distance. At distances below
-    rho_1, the push is constant. Kim 2017 does not print the gains.
+    The push is the part of the force that depends on the distance. It grows as the
+    distance falls to rho_1, and is constant at smaller distances. Kim 2017 does not
+    print the gains.
     """
 
     distance_gain_j: Positive = 1.22

@@ -40,8 +40,8 @@ class GuardedController(Block):
     """Plans a route to the target and commands speed and yaw rate along the route.
 
     Every 0.5 s, the block computes the cheapest route through free and unknown space.
-    The route keeps free the smallest disc around the axle that contains the body at
-    every heading. An unknown cell of the map costs a little more than a free cell. A
+    The route leaves room for the smallest disc around the axle that contains the body
+    at every heading. An unknown cell of the map costs a little more than a free cell. A
     cell with echoes costs much more.
 
     The robot drives straight toward a point of the route. This is the farthest point

@@ -67,8 +67,8 @@ class AirflowSensors(Block):
     """Measures the wind with two airflow sensors on the left and right of the robot.
 
     With the directional sensitivity ``cosine``, the left sensor F1 points 45 deg to the
-    left, and the right sensor F2 points 45 deg to the right. Both sensors measure the
-    wind at the middle of the axle.
+    left. The right sensor F2 points 45 deg to the right. Both sensors measure the wind
+    at the middle of the axle.
 
     The block has no state. It draws new noise at every tick (control period). There is
     no latency.

@@ -134,7 +134,7 @@ def concentration(
 
     The result is the sum over all puffs, plus the background. A puff is a Gaussian
     distribution of odor around its center on the floor. The floor reflects the odor. A
-    steady plume has no puffs; its concentration follows from an equation.
+    steady plume has no puffs. Its concentration follows from a closed equation.
 
     Args:
         plume: (PLUME_SIZE,) value of the port ``plume``.

@@ -229,8 +229,8 @@ def find_threats(
 
     A particle is one possible position and velocity of a moving body. It is a threat if
     it will come near the robot, either while the robot drives as wanted or while it
-    stands still. The robot has to watch a threat more if no sensor has seen the body
-    for a while, or if the velocity of the body is uncertain.
+    stands still. The robot has to watch a threat more if its body was not seen for a
+    while, or if the body's velocity is uncertain.
 
     Args:
         bodies: Particles from ``pick_hazards``.

@@ -49,9 +49,9 @@ def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
     """Computes the speed and direction of a straight approach to the target.
 
     Args:
-        inputs: Values of the input ports. The function reads the position of the
-            target, m, the velocity of the target, m/s, whether there is a target, and
-            the pose of the robot, m and rad.
+        inputs: Values of the input ports. The function reads four of them: position of
+            the target, m; velocity of the target, m/s; whether there is a target; and
+            pose of the robot, m and rad.
         follow: Constants for following a target.
 
     Returns:

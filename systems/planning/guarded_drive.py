@@ -185,14 +185,11 @@ class DriveNumbers(NamedTuple):
 
 
 def make_drive_state(cells: int, sensors: int) -> DriveState:
-    """Makes the state before the first control period, without a plan.
+    """Makes the state before the first control period.
 
-    Args:
-        cells: Number of cells along a side of the map.
-        sensors: Number of range sensors.
-
-    Returns:
-        State whose memory contains no earlier position of the robot.
+    The state has no plan, and its memory contains no earlier position of the robot.
+    ``cells`` is the number of cells along a side of the map. ``sensors`` is the number
+    of range sensors.
     """
     pairs = "carrot", "stays_at", "headings", "block"
     memory = DriveMemory(
@@ -213,9 +210,8 @@ def drive_guarded(
 
     1. Update the tracks of moving bodies with the new echoes.
     2. Plan a route every 0.5 s. Compute the wanted speed and the heading error.
-    3. Update three timers. They measure how long the robot has stayed in one place, how
-       long the guard has blocked the robot, and how long all routes have led through
-       occupied cells.
+    3. Update three timers: time in one place, time of a block by the guard, and time
+       without a route through free cells.
     4. If a timer has expired, change the mode. Compute the motion of the mode.
     5. If moving bodies are near, replace the motion (``_evade``).
 

@@ -47,10 +47,11 @@ def _nearest(
 ) -> tuple[float, float, bool]:  # pragma: no cover  (compiled)
     """Finds the permitted velocity nearest to the wanted velocity for a given slack.
 
-    The solution is the wanted velocity, its projection on a border, or the intersection
-    of two borders. The function tries all these candidates. In its loops, the index -1
-    means no border, 0 to ``count - 1`` are the half planes, and ``count`` is the circle
-    of the top speed.
+    The slack is the distance by which all soft half planes move outward, m/s. The
+    solution is the wanted velocity, its projection on a border, or the intersection of
+    two borders. The function tries all these candidates. In its loops, the index -1
+    means no border. The indices 0 to ``count - 1`` are the half planes. The index
+    ``count`` is the circle of the top speed.
 
     Returns:
         Velocity x, m/s; velocity y, m/s; and whether there is a permitted velocity.

@@ -158,9 +158,9 @@ def came_from_free(
     """Checks whether the whole arc of an echo was seen free before.
 
     The arc contains all points from which the echo may come. It is as wide as the
-    aperture. It begins at the range minus the largest range error, and ends at the
-    range plus this error and a part of a cell. The cells of all points on the arc must
-    still count as free.
+    aperture. It extends from the range minus the largest range error to the range plus
+    this error and a part of a cell. The cells of all these points must still count as
+    free.
 
     Args:
         space: Cells that were seen free.

@@ -137,9 +137,9 @@ def filtered_velocity(
 
     If these constraints contradict each other, the function relaxes all soft
     constraints by the same slack. The constraints of moving objects and robots are
-    soft. The limits of the wheels and of the approach to objects at rest are hard, so
-    that a fast object cannot push the robot through walls. A robot that stands still
-    satisfies all hard constraints. For an object at rest that is too near, an
+    soft. The limits of the wheels and of the approach to objects at rest are hard.
+    Therefore a fast object cannot push the robot through walls. A robot that stands
+    still satisfies all hard constraints. For an object at rest that is too near, an
     additional soft constraint moves P away.
 
     Args:

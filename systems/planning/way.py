@@ -235,8 +235,8 @@ def _keep_off(
 ) -> None:  # pragma: no cover  (compiled)
     """Raises the prices of the wide cells near a narrow cell.
 
-    Within the radius of the disc around the narrow cell, the price is ``highest``.
-    Farther away, it is first ``TIGHT`` and then ``NEAR``.
+    Within ``radius`` of the narrow cell, the price is ``highest``. Farther away, it is
+    first ``TIGHT`` and then ``NEAR``.
     """
     size, cell = way.price.shape[0], way.cell_m[0]
     x, y = place[0] / cell - way.low[0], place[1] / cell - way.low[1]

@@ -124,16 +124,15 @@ class GlobalPlanner(Block):
     A route is a curve for P, the control point ahead of the wheel axle. The first route
     leads from the initial position of P past the known obstacles (``plan_route``).
     During the run, the planner remembers the nearest points of objects that are not
-    known to move, at most one point per cell of its grid.
+    known to move. It remembers at most one point per cell of its grid.
 
-    The robot stalls if P advances by less than 10 cm along the route in 6 s while it is
-    more than 15 cm from the goal. The block then plans a new route from the position of
-    P. This route also avoids the remembered points and robots at rest. If there is no
-    such route, the block keeps the old route and tries again after 6 s.
+    The robot stalls if P advances by less than 10 cm along the route in 6 s. Within 15
+    cm of the goal, it does not count as stalled. The block then plans a new route from
+    the position of P. This route also avoids the remembered points and robots at rest.
+    If there is no such route, the block keeps the old route and tries again after 6 s.
 
-    The discrete state is ``PlannerState``. An update at time t reads the inputs at t.
-    The block publishes the resulting route from t on, so other blocks read it in their
-    next update. There is no feedthrough.
+    The discrete state is ``PlannerState``. Other blocks read a new route one control
+    period after the inputs from which it follows. There is no feedthrough.
 
     Args:
         parameters: Goal, clearance, and whether the block plans new routes.

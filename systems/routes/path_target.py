@@ -138,13 +138,14 @@ def point_on_route(
 def next_speed(
     speed: float, way: float, top: float, acceleration: float, tick_s: float
 ) -> float:
-    """Returns the largest next speed that still permits a stop within a distance.
+    """Returns the largest next speed with which the target can still stop in time.
 
     The speed changes linearly during a tick (control period).
 
     Args:
         speed: Present speed, m/s.
-        way: Remaining distance to the stop, m. It is negative if the stop was missed.
+        way: Remaining distance to the point of the stop, m. It is negative beyond this
+            point.
         top: Largest permitted speed, m/s.
         acceleration: Largest acceleration and deceleration, m/s^2.
         tick_s: Duration of a tick, s.

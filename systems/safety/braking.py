@@ -211,9 +211,9 @@ def can_be_braked(
     that contains the body.
 
     If obstacles may move, the function also assumes obstacles at the ends of the sensor
-    views. Since the time of the reading, they may have moved at ``obstacle_speed_m_s``.
-    The robot may obey the command only if the axle stays ``keep_m`` away from all
-    points that they may reach, or if the robot withdraws from the end of the view. A
+    views. From the time of the reading on, these obstacles move at
+    ``obstacle_speed_m_s``. Then the axle must stay ``keep_m`` away from all points that
+    these obstacles may reach, or the robot must withdraw from the end of the view. A
     slow turn on the spot counts as rest and needs no such check.
 
     Args:

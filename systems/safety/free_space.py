@@ -31,9 +31,9 @@ _FULL_HIT_M = 0.6
 class FreeSpace(NamedTuple):
     """Map of a square window of n x n cells of the floor, which moves with the robot.
 
-    Cell (i, j) of the floor covers x from i to i + 1 and y from j to j + 1, measured in
-    cell sides in the frame of the odometry. The arrays store its values at the index [i
-    % n, j % n].
+    Positions are in the frame of the odometry. Measured in cell sides, cell (i, j) of
+    the floor covers x from i to i + 1 and y from j to j + 1. The arrays store its
+    values at the index [i % n, j % n].
 
     The rolled distance is the mean distance that the rims of both wheels have rolled
     since the start.

@@ -206,9 +206,9 @@ def _step_for(block: Any, run: RunFacts) -> Step:
 def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
     """Returns the blocks of all robots for a compiled loop.
 
-    The function reuses the blocks of an earlier scenario if both scenarios differ only
-    in fields that do not affect the blocks, such as start pose and seed. Reuse matters
-    because Drake never frees blocks written in Python.
+    The function reuses the blocks of an earlier scenario where possible. Both scenarios
+    may differ in fields that do not affect the blocks, such as start pose and seed.
+    Reuse matters because Drake never frees blocks written in Python.
 
     Args:
         scenario: The scenario to run.

@@ -204,9 +204,9 @@ def _cost(
 ) -> float:  # pragma: no cover  (compiled)
     """Computes the cost of one noisy sequence of motions.
 
-    The function writes the noisy sequence to ``tried`` and integrates the pose. A step
-    costs more if the robot drives backward, is near an occupied cell, is far from the
-    goal, or does not point to the goal. The deviation from the plan also costs.
+    The function writes the noisy sequence to ``tried`` and integrates the pose. The
+    cost of a step grows with backward speed, nearness to occupied cells, distance from
+    the goal, and the angle to the goal. The deviation from the plan also has a cost.
     """
     least, most, turn = SPEED_LIMITS
     spread, turn_spread = _SPEED_SPREAD_M_S, numbers.turn_spread_rad_s

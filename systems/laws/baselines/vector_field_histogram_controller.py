@@ -105,10 +105,10 @@ def _mask(
 ) -> None:  # pragma: no cover  (compiled)
     """Blocks the directions to which the moving robot cannot turn freely (eq. 8-13).
 
-    The robot can turn left or right on circles of radius ``circle``. If an occupied
-    cell, enlarged by the radius of the robot, meets the left circle, the function
-    blocks all directions to the left of the cell. Cells on the right circle block the
-    right side.
+    The robot can turn left or right on circles of radius ``circle``. The function
+    enlarges occupied cells by the radius of the robot. If a cell then meets the left
+    circle, all directions to the left of the cell are blocked. Cells on the right
+    circle block the right side.
     """
     x, y, theta = pose
     left = right = math.pi

@@ -33,8 +33,9 @@ def sensitivity_sources(
 
     - K: -(p - p_d)/M
     - D: -(v - v_d)/M
-    - K_e: sum of (S - d) n/M over all contacts, where S - d is the overlap, and n is
-      the unit vector from the object to P
+    - K_e: sum of (S - d) n/M over all contacts
+
+    S - d is the overlap of a contact. n is the unit vector from the object to P.
 
     Args:
         p_WP: Position p (x, y) of the control point P in the world frame W, m.
@@ -122,9 +123,9 @@ def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
     """Computes the gradient of the penalty for small distances from objects.
 
     For an object at the distance d, the penalty is lambda/2 h^2. h is the larger of 0
-    and d_sec - d. The gradient is the sum of -lambda h n over all objects, where n is
-    the unit vector from the object to the control point P. The penalty replaces the
-    safety term lambda/2 (d_sec^2 - d^2) of Engelbrecht 2021, eq. 27.
+    and d_sec - d. The gradient is the sum of -lambda h n over all objects. n is the
+    unit vector from the object to the control point P. The penalty replaces the safety
+    term lambda/2 (d_sec^2 - d^2) of Engelbrecht 2021, eq. 27.
 
     Args:
         contacts: Result of ``contacts_of_objects``.

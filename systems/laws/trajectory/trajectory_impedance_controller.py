@@ -127,14 +127,16 @@ def TrajectoryImpedanceController_(T):
             M p'' = -K (p - p_d) - D (v - v_d) + V
 
         p and v are the position and velocity of P. p_d and v_d are those of the target.
+        M is the virtual mass. K and D are the stiffness and damping toward the target.
         V is the force of all contacts.
 
-        A contact is an object j at a distance d below S. The force V is the sum over
-        all contacts of::
+        A contact is an object j whose distance d from P is below S, the width of the
+        security zone. The force V is the sum over all contacts of::
 
             K_e (S - d) n - D_e (v - v_j)
 
-        n is the unit vector from object j to P, and v_j is the velocity of the object.
+        K_e and D_e are the stiffness and damping of contacts. n is the unit vector from
+        object j to P, and v_j is the velocity of the object.
 
         If ``block_distance_m`` is set, the block also obeys eq. 6: a step must not end
         within this distance of an object, except if it leads away from the object.
