@@ -32,9 +32,8 @@ class StopParameters(Parameters):
     """Conditions that end a run, and limits within which a robot follows."""
 
     goal_margin_m: Length = 0.3
-    """Margin of the goal at a source at rest, m. The control point P is in the goal if
-    its distance from the source is at most the follow distance plus this margin.
-    """
+    """Margin of the goal at a source at rest, m. P is in the goal if its distance from
+    the source is at most the follow distance plus this margin."""
     rest_time_s: Duration = 1.0
     """Time for which P must be at rest in the goal without a break, s. After this time,
     the run ends as reached."""
@@ -42,9 +41,8 @@ class StopParameters(Parameters):
     """Greatest deviation from the follow distance, m. P follows if its distance from
     the source deviates from the follow distance by at most this value."""
     stuck_after_s: Duration = 10.0
-    """Time after which the run ends as stuck, s. The control point P must stay in one
-    place (within 0.1 m) outside of its goal for this time.
-    """
+    """Time after which the run ends as stuck, s. The run ends if P stays in one place
+    (within 0.1 m) outside of its goal for this time."""
     lost_after_s: Duration = 20.0
     """Time without a valid target after which the run ends as lost, s."""
     diverged_range_m: Length = 20.0

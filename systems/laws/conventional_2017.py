@@ -9,10 +9,9 @@ from systems.laws.law import Equation, Law, Tuning
 
 
 class Conventional2017Parameters(Parameters):
-    """Gains of the law with the force K_0/c + D_0 s (Kim 2017, eq. 20).
+    """Gains of a law whose force has the term K_0/distance (Kim 2017, eq. 20).
 
-    c is the distance of the obstacle, and s is its speed. Kim 2017 does not print the
-    gains.
+    Kim 2017 does not print the gains.
     """
 
     distance_gain_j: Positive = 0.917

@@ -26,9 +26,8 @@ class DynamicWindowParameters(Parameters):
     turn_acceleration_rad_s2: Positive = 6.1
     """Yaw acceleration that limits the window, and that stops a turn, rad/s^2."""
     farthest_m: Length = 2.6
-    """Largest distance along the arc that counts, m. A farther obstacle counts as if it
-    were at this distance.
-    """
+    """Largest distance along the arc that counts, m. An obstacle that is farther away
+    counts as if it were at this distance."""
 
 
 DWA = Law(

@@ -23,10 +23,8 @@ class AttractionParameters(Parameters):
     """Stiffness K_r, N/m (printed without unit)."""
     damping_n_s_m: NonNegativeDamping = 1.0
     """Damping D_r, N s/m (the paper prints no unit). With the stiffness K_r = 2 N/m and
-    a virtual mass of 3.94 kg, the damping ratio is 0.18.
-    """
+    a virtual mass of 3.94 kg, the damping ratio is 0.18."""
     follow_distance_m: NonNegativeLength = 1.2
     """Follow distance d_f from the source, m (our choice). At this distance, the spring
-    has no force. In the paper, d_f is 0: the spring pulls the control point P onto the
-    source.
-    """
+    has no force. The paper uses 0: the spring pulls the control point P onto the
+    source."""

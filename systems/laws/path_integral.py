@@ -26,8 +26,8 @@ class PathIntegralParameters(Parameters):
     temperature: Positive = 0.37
     """Temperature of the weights of sequences, exp(-cost/temperature) (Nav2: 0.3)."""
     angle_gain: NonNegative = 0.63
-    """Cost per radian between the heading and the direction of the wanted position
-    (Nav2's path angle critic: 2).
+    """Cost per radian of the angle between the heading and the direction of the wanted
+    position (Nav2's path angle critic: 2).
     """
     obstacle_gain: NonNegative = 3.4
     """Cost of a position at the distance ``clearance_m`` from an obstacle (Nav2's cost

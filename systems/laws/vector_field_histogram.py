@@ -19,12 +19,11 @@ class VectorFieldHistogramParameters(Parameters):
     """Distance that the robot keeps from cells with echoes, m."""
     window_m: Length = 1.1
     """Distance within which occupied cells count, m. The paper uses 1.65 m, half of the
-    side of its active window.
-    """
+    side of its active window."""
     low_threshold: NonNegative = 0.33
-    """Density of obstacles below which a sector becomes free. Above twice this value,
-    the sector becomes blocked. Between both thresholds, the sector keeps its state.
-    """
+    """Density of obstacles below which a sector becomes free. If the density is above
+    twice this value, the sector becomes blocked. Between both thresholds, the sector
+    keeps its state."""
     slow_density: Positive = 69.0
     """Density in the chosen direction at which the speed falls to 0."""
     previous_gain: NonNegative = 2.9

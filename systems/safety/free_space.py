@@ -289,8 +289,8 @@ def see(
     """Enters the newest readings of the sensors into the map of free space.
 
     Sensors at the same position form a group. For each group, the function visits the
-    cells in its view, up to the greatest distance that the group has seen. It compares
-    the circle around each cell with the readings in the directions that the circle
+    cells in its view, up to the greatest distance that the group has seen. For each
+    cell, it combines the readings in all directions that the circle around the cell
     covers:
 
     - If the group has seen free floor in all these directions, up to the far side of
@@ -301,8 +301,8 @@ def see(
     Args:
         space: Map of free space. The function changes the map in place.
         time: Current time, s.
-        turn: Number of the call. Each call updates only every fourth row of cells,
-            beginning with another row.
+        turn: Number of the call. One call updates only every fourth row of cells. The
+            next call updates other rows.
         pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
         readings: (sensors, 2) array with two distances per sensor, m. The sensor has
