@@ -314,17 +314,18 @@ def _weigh(
     The reading is from sensor ``k``. ``best`` is the number of the track to which the
     echo belongs, or -1. If ``best`` is ``t``, the track has echoed.
 
-    By Bayes' rule, each weight is multiplied by the likelihood of the reading for a
-    body at the particle. The likelihood depends on the gap: the measured distance minus
-    the distance of the particle. Without an echo, the gap is infinite for particles
-    within the greatest range, and 0 for the others. There are four cases:
+    By Bayes' rule, the function multiplies each weight by the likelihood of the
+    reading, assuming that the body is at the particle. The likelihood depends on the
+    gap: the measured distance minus the distance of the particle. Without an echo, the
+    gap is infinite for particles within the greatest range, and 0 for the others. There
+    are four cases:
 
     - The particle is outside the aperture. If the track has echoed, the particle loses
       weight.
     - The gap is large: the sensor has seen past the particle. The particle loses most
       of its weight, unless it is near the edge of the aperture.
-    - The track has echoed, and the gap is small. The weight is multiplied by a Gaussian
-      function of the gap. The particle moves to the measured range.
+    - The track has echoed, and the gap is small. The particle's weight changes by a
+      Gaussian factor of the gap. The particle moves to the measured range.
     - The track has echoed, and the particle is behind the echo. The particle loses
       weight.
 

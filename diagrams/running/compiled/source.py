@@ -174,9 +174,10 @@ def _tuple_type(model: type[Parameters]) -> Any:
 def _compilable(function: FunctionType) -> Any:
     """Makes a function callable from compiled code, without the checks that wrap it.
 
-    numba identifies the result by its type alone. A compiled function in a named tuple
-    would be a pointer, and numba does not cache code with pointers. The function may
-    also call plain functions in a user's own modules.
+    The result is a plain function, because numba identifies such a function by its type
+    alone. A compiled function in a named tuple would be a pointer, and numba does not
+    cache code with pointers. The function may also call plain functions in a user's own
+    modules.
     """
     plain = inspect.unwrap(function)
     for called in _users_helpers(plain, set()):
