@@ -127,9 +127,10 @@ class GlobalPlanner(Block):
     known to move. It remembers at most one point per cell of its grid.
 
     The robot stalls if P advances by less than 10 cm along the route in 6 s. Within 15
-    cm of the goal, it does not count as stalled. The block then plans a new route from
-    the position of P. This route also avoids the remembered points and robots at rest.
-    If there is no such route, the block keeps the old route and tries again after 6 s.
+    cm of the goal, it does not count as stalled. If the robot stalls, the block plans a
+    new route from the position of P. This route also avoids the remembered points and
+    robots at rest. If there is no such route, the block keeps the old route and tries
+    again after 6 s.
 
     The discrete state is ``PlannerState``. Other blocks read a new route one control
     period after the inputs from which it follows. There is no feedthrough.

@@ -128,8 +128,8 @@ class MotionGuard(Block):
 
     If ``obstacle_speed_m_s`` is above zero, the block assumes that obstacles in the
     sensors' view approach at this speed. The disc then also has to stay ``margin_m``
-    away from all points that they may reach. This second condition does not apply while
-    the robot withdraws from the obstacles.
+    away from all points that these obstacles may reach. This second condition does not
+    apply while the robot withdraws from the obstacles.
 
     If the sensing has a fault, the block brakes the robot to rest, whatever the law
     commands.
