@@ -11,7 +11,7 @@ from systems.framework.packing import Packing
 
 
 class Inner(NamedTuple):
-    count: int
+    number: int
     array: NDArray[np.float32] | None
 
 
@@ -43,12 +43,12 @@ def test_value_survives_with_types_and_bits() -> None:
     assert type(again) is Outer
     assert type(again.inner) is Inner
     assert again.flag is True
-    assert again.inner.count == 7
-    assert type(again.inner.count) is int
+    assert again.inner.number == 7
+    assert type(again.inner.number) is int
     assert again.inner.array is not None
     assert value.inner is not None
     assert again.inner.array.dtype == np.float32
-    assert np.array_equal(again.inner.array, value.inner.array)
+    assert again.inner.array.tobytes() == value.inner.array.tobytes()
     assert again.spectrum.tobytes() == value.spectrum.tobytes()
     assert again.pair[0] is None
     assert again.pair[1] == Inner(-3, None)
