@@ -47,6 +47,7 @@ def test_value_survives_with_types_and_bits() -> None:
     assert type(again.inner.number) is int
     assert again.inner.array is not None
     assert value.inner is not None
+    assert value.inner.array is not None
     assert again.inner.array.dtype == np.float32
     assert again.inner.array.tobytes() == value.inner.array.tobytes()
     assert again.spectrum.tobytes() == value.spectrum.tobytes()
