@@ -59,7 +59,8 @@ class RunResult(diagrams.RunResult):
                 has several robots. Each robot then has time series of its own.
         """
         from analysis.runs.proximity import Proximity
-        from analysis.views.picture import plot_time_series, plot_trajectory
+        from analysis.views.picture import plot_trajectory
+        from analysis.views.time_series import plot_time_series
 
         if what == "trajectory":
             return plot_trajectory(self)

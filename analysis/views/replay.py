@@ -19,13 +19,14 @@ from analysis.runs.known_space import has_known_space, known_space
 from analysis.runs.tracked_bodies import tracked_bodies
 from analysis.views import replay_scene
 from analysis.views.arrows import record_arrows, scale_m_n
+from analysis.views.curves import page_charts
 from analysis.views.floor_layers import clipped, floor_layers
-from analysis.views.picture import clearance_panel, heard_bursts, time_panels
 from analysis.views.replay_layers import replay_layers
 from analysis.views.replay_page import ReplayFacts, replay_page
 from analysis.views.replay_scene import OBSTACLE_HEIGHT_M, upright
 from analysis.views.scene import (
     Look,
+    call_time,
     contact_point,
     followed_sources,
     lightened,
@@ -35,9 +36,7 @@ from analysis.views.scene import (
     run_title,
     sound_bursts,
 )
-from analysis.views.search_panels import call_time
 from analysis.views.search_replay import record_searches, record_switch
-from analysis.views.time_charts import Chart, time_chart
 from diagrams import RunResult, Scenario
 from diagrams.scenario.bodies import RecordedPath
 from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
@@ -147,36 +146,11 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
         result.simulated_s,
         replay_scene.shown_rectangle(result),
         replay_layers(result, paths, estimates),
-        time_charts(result, clearance),
+        page_charts(result, clearance),
         [*robots, *sources, *obstacles],
         robots,
         [str(each) for each in result.warnings],
     )
-
-
-def time_charts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> list[Chart]:
-    """Returns the data of charts that show quantities of each robot over time.
-
-    The quantities are those of ``plot_time_series``. Charts without a curve are
-    omitted.
-
-    Args:
-        result: Result of the run.
-        clearance: (n,) distance from each robot to the nearest body at the ticks
-            (control periods), m, by name of the robot. A robot without an entry has no
-            such chart.
-
-    Returns:
-        Charts of all robots, one robot after the other.
-    """
-    found = []
-    for name, own in result.robots.items():
-        panels, bursts = time_panels(own), heard_bursts(own)
-        if name in clearance:
-            panels.append(clearance_panel(clearance[name]))
-        robot = name if result.several else ""
-        found += [time_chart(panel, own, robot, bursts) for panel in panels]
-    return [chart for chart in found if chart.series]
 
 
 @contextmanager

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from analysis.reporting.html_page import COLOURS_CSS
-from analysis.views.time_charts import Chart
 
 _HERE = Path(__file__).parent
 #: Call in Meshcat's page that passes a message to the viewer.
@@ -40,7 +39,8 @@ class ReplayFacts(NamedTuple):
     """Part of the floor that must be in view: least x, greatest x, least y, greatest y,
     m."""
     layers: Sequence[Layer]
-    charts: Sequence[Chart]
+    charts: Sequence[Mapping[str, Any]]
+    """Curves over time, from ``page_charts``."""
     names: Sequence[tuple[str, str]]
     """Pairs of a path in the scene tree of the 3D viewer, and the name of the object at
     this path."""
@@ -64,7 +64,7 @@ def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
         "end_s": facts.end_s,
         "bounds_m": facts.bounds_m,
         "names": facts.names,
-        "charts": [chart._asdict() for chart in facts.charts],
+        "charts": facts.charts,
     }
     # The replacement prevents a text of the scenario from ending the script early.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace(
@@ -162,13 +162,16 @@ def _entry(layer: Layer) -> str:
     return f"<li><label>{box}{swatch}<span>{label}</span>{small}</label></li>"
 
 
-def _whose(chart: Chart) -> str:
-    return f"{chart.robot}: {chart.title}" if chart.robot else chart.title
+def _whose(chart: Mapping[str, Any]) -> str:
+    robot, title = chart["robot"], chart["title"]
+    return f"{robot}: {title}" if robot else title
 
 
 def _quantities(facts: ReplayFacts) -> str:
     options = []
-    for robot, charts in groupby(enumerate(facts.charts), lambda pair: pair[1].robot):
+    for robot, charts in groupby(
+        enumerate(facts.charts), lambda pair: pair[1]["robot"]
+    ):
         inner = "".join(
             # Each option contains the robot's name, because a closed list hides groups.
             f'<option value="{k}">{html.escape(_whose(chart))}</option>'

@@ -12,9 +12,10 @@ from analysis.reporting.plain_values import write_json
 from analysis.runs.proximity import Proximity
 from analysis.runs.run_report import summary_rows
 from analysis.views.block_diagram import write_block_diagram
-from analysis.views.picture import plot_time_series, plot_trajectory
+from analysis.views.picture import plot_trajectory
 from analysis.views.replay import write_replay
 from analysis.views.run_page import run_page
+from analysis.views.time_series import plot_time_series
 from diagrams import RunResult, build_sound_follower, write_scenario
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from itertools import cycle
 from typing import NamedTuple
 
@@ -22,6 +23,9 @@ from systems.world.parameters import ObstacleParameters
 
 #: Intervals between times of a picture, s. A reader can count easily with these values.
 _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
+
+#: Largest number of characters per line of a title.
+LONGEST_LINE = 80
 
 
 def tick_at(result: RunResult, time: float) -> int:
@@ -123,6 +127,13 @@ def run_title(result: RunResult) -> str:
     return f"{scenario.name}, law {scenario.law_names}: {who}{result.ending}"
 
 
+def picture_title(result: RunResult) -> str:
+    """Returns the title of a picture: ``run_title``, the fault and the duration."""
+    fault = f" ({result.collision.fault}'s fault)" if result.collision else ""
+    title = f"{run_title(result)}{fault} after {result.simulated_s:.1f} s"
+    return textwrap.fill(title, LONGEST_LINE)
+
+
 def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
     """Returns all bursts of a sound that begin before a given time.
 
@@ -135,6 +146,50 @@ def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]
     """
     starts = np.arange(sound.start_s, end, sound.period_s)
     return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
+
+
+def call_time(result: RunResult) -> float | None:
+    """Returns the time at which the sink first received a call.
+
+    The sink is the computer of the operator. After a robot has found the odor source,
+    it calls the other robots. The function uses the radio frame with which a robot
+    reports this find to the sink.
+
+    Args:
+        result: Result of a run, for one robot or all robots.
+
+    Returns:
+        Time, s. The value is None if the sink received no such frame.
+    """
+    times = [
+        float(result.time[np.argmax(values > 0.5)])
+        for name, values in result.world.items()
+        if name.endswith(".result") and (values > 0.5).any()
+    ]
+    return min(times, default=None)
+
+
+def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
+    """Returns the bursts of the source that the robot hears.
+
+    If the robot listens to another robot that calls, the bursts begin after the call.
+
+    Args:
+        result: Result of a run, for one robot.
+
+    Returns:
+        Start and end of each burst, s. The list is empty if the robot drives to a goal.
+    """
+    if result.scenario.only.has_goal:
+        return []
+    sound, whole = result.scenario.source.sound, result.full_scenario
+    caller = whole.robots.get(whole.target(result.name))
+    if caller is not None and caller.searches == "odor":
+        since = call_time(result)
+        if since is None:
+            return []
+        sound = sound.model_copy(update={"start_s": since + sound.start_s})
+    return sound_bursts(sound, result.simulated_s)
 
 
 def logged_sensors(result: RunResult) -> range:
