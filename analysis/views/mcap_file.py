@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from analysis.runs.recorded_run import SCENARIO_FILE, RecordedRun
 from analysis.views.markers import body_markers
-from analysis.views.ros2_messages import message_definition
 from analysis.views.ros2_values import (
     WORLD_FRAME,
     Message,
@@ -29,7 +28,7 @@ from diagrams.scenario.participants import HasRangeSensors, Robot
 from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import InputError
 
-_PACKAGES = ("mcap", "mcap_ros2")
+_PACKAGES = ("mcap", "mcap_ros2", "rosbags")
 #: Columns of poses, by topic. They become pose messages instead of single numbers.
 _POSES = {
     "pose": ("p_WB_x", "p_WB_y", "theta_WB"),
@@ -52,8 +51,8 @@ def require_mcap() -> None:
     if missing:
         raise InputError(
             "mcap",
-            "needs the packages mcap and mcap-ros2-support; install them with pip "
-            "install 'phonotaxis[export]'",
+            "needs the packages mcap, mcap-ros2-support and rosbags; install them "
+            "with pip install 'phonotaxis[export]'",
         )
 
 
@@ -81,7 +80,9 @@ def write_mcap(run: RecordedRun, path: Path) -> None:
 
 
 def _write(writer: Any, run: RecordedRun) -> None:
-    schemas: dict[str, Any] = {}
+    from rosbags.typesys import Stores, get_typestore
+
+    known, schemas = get_typestore(Stores.ROS2_JAZZY), {}
     scenario = run.scenario
     about = {
         "scenario": scenario.name,
@@ -96,10 +97,9 @@ def _write(writer: Any, run: RecordedRun) -> None:
         time_ns = round(1e9 * float(run.time[tick]))
         for topic, kind, message in entries:
             if kind not in schemas:
-                package, name = kind.split("/")
-                schemas[kind] = writer.register_msgdef(
-                    f"{package}/msg/{name}", message_definition(kind)
-                )
+                name = kind.replace("/", "/msg/")
+                text, _ = known.generate_msgdef(name, ros_version=2)
+                schemas[kind] = writer.register_msgdef(name, text)
             writer.write_message(topic, schemas[kind], message, time_ns, sequence=tick)
 
 
