@@ -295,7 +295,7 @@ def test_a_definition_needs_no_other_file(file: Path):
         parts = set(re.findall(r"^MSG: (\S+)$", text, re.MULTILINE))
         assert set(re.findall(r"^(\w+/\w+)", text, re.MULTILINE)) == parts
     fields = texts["geometry_msgs/msg/PointStamped"].split("=" * 80)[0].split()
-    assert point.split() == [
+    assert fields == [
         "std_msgs/Header",
         "header",
         "geometry_msgs/Point",
