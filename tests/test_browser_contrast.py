@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from analysis.reporting.html_page import COLOURS_CSS
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
-from analysis.runs.replay import write_replay
+from analysis.views.replay import write_replay
 from diagrams import load_scenario, simulate
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

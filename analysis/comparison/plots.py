@@ -13,8 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from analysis.comparison.cells import LawCell, Mean
 from analysis.comparison.laws_in_pairs import Comparison
 from analysis.reporting.palette import COLOURS, draw_grid
-from analysis.runs.scene import bounds, looks
-from analysis.runs.trajectory_artists import (
+from analysis.views.scene import bounds, looks
+from analysis.views.trajectory_artists import (
     draw_collision,
     draw_obstacles,
     draw_robot,

@@ -117,7 +117,7 @@ def _run_examples(
     prepared: PreparedComparison, cell: LawCell, files: dict[_Key, str]
 ) -> Iterator[RunResult]:
     """Repeats a cell's examples; writes their scenarios and the typical replay."""
-    from analysis.runs.replay import write_replay
+    from analysis.views.replay import write_replay
 
     sweep = prepared.sweeps[cell.scenario]
     for example in cell.examples:

@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 
 from analysis.commands.command_line import make_parser
-from analysis.exports.columns import COLUMNS
 from analysis.reporting.markdown import markdown_table
+from analysis.runs.columns import COLUMNS
 from diagrams.scenario.fields.field_list import list_fields
 from diagrams.scenario.fields.shipped import scenario_schema
 

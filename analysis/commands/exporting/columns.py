@@ -9,7 +9,7 @@ from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
 
 if TYPE_CHECKING:
-    from analysis.exports.columns import Column
+    from analysis.runs.columns import Column
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -20,7 +20,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[list[Column]]:
-    from analysis.exports.columns import COLUMNS
+    from analysis.runs.columns import COLUMNS
     from systems.framework.input_error import InputError
 
     found = [column for column in COLUMNS if options.pattern in column.name]

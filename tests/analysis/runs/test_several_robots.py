@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from analysis.runs.metrics import run_metrics
-from analysis.runs.replay import record_run, write_replay
-from analysis.runs.run_plots import plot_trajectory
-from analysis.runs.run_report import run_summary, summary_text, write_run
-from analysis.runs.scene import looks
+from analysis.runs.run_report import run_summary, summary_text
+from analysis.views.picture import plot_trajectory
+from analysis.views.replay import record_run, write_replay
+from analysis.views.run_directory import write_run
+from analysis.views.scene import looks
 from diagrams import RunResult, load_scenario, simulate
 
 
