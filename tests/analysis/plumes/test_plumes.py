@@ -10,7 +10,7 @@ import pytest
 from analysis.plumes.plume_history import concentration_map, plume_history
 from analysis.plumes.search_panels import call_time, search_panels
 from analysis.plumes.search_replay import record_searches
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from analysis.runs.run_plots import plot_time_series, plot_trajectory
 from diagrams import RunResult, load_scenario, simulate
 from systems.odor.odor_plume import concentration
