@@ -20,7 +20,7 @@ import pandas as pd
 
 from analysis.comparison.plans import library_layouts
 from analysis.reporting.intervals import wilson_interval
-from analysis.runs.search_metrics import ARMS_M
+from analysis.runs.metric_table import ARMS_M
 from studies.support.bearing_trials import FAN_M, BearingTrial, hear_once
 from studies.support.listening_methods import (
     PlaneEstimator,

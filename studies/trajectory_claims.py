@@ -20,7 +20,7 @@ from analysis.reporting.intervals import (
     wilson_interval,
     with_interval,
 )
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from analysis.sweeps.plan import load_sweep
 from diagrams import Scenario, simulate
 from studies.tables import Table

@@ -223,7 +223,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
 
 
 def test_json_has_no_infinity(capsys, tmp_path, monkeypatch):
-    from analysis.runs.metrics import run_metrics
+    from analysis.runs.metric_table import run_metrics
 
     def with_infinity(result):
         return run_metrics(result) | {"least_time_to_contact_s": float("inf")}

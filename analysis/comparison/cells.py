@@ -15,13 +15,13 @@ from analysis.reporting.intervals import (
     median_interval,
     wilson_interval,
 )
+from analysis.runs.metric_table import METRICS
 from analysis.runs.run_table import (
-    ALL_RUNS,
-    SUCCESSES,
     WarningCount,
     bootstrap_seed,
     collisions,
     column,
+    counted,
     successes,
     warning_counts,
 )
@@ -108,10 +108,10 @@ def make_cell(
     success, collision = successes(rows), collisions(rows)
     spl = column(rows, "spl")
     metrics = {}
-    for name in (*ALL_RUNS, *SUCCESSES):
-        values = column(rows, name)
-        if name in SUCCESSES:
-            values = values[success]
+    for name, metric in METRICS.items():
+        if not metric.paired:
+            continue
+        values = column(rows, name)[counted(rows, metric)]
         values = values[np.isfinite(values)]
         if len(values):
             ends = median_interval(values)

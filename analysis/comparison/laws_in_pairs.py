@@ -24,13 +24,8 @@ from analysis.comparison.paired_statistics import (
     paired_median,
     paired_rate,
 )
-from analysis.runs.run_table import (
-    ALL_RUNS,
-    SUCCESSES,
-    collisions,
-    column,
-    successes,
-)
+from analysis.runs.metric_table import METRICS
+from analysis.runs.run_table import collisions, column, successes
 from analysis.sweeps.estimates import by_cell
 from analysis.sweeps.plan import SweepPlan
 from diagrams.scenario.scenario import scenario_from_mapping
@@ -151,11 +146,8 @@ def _pair(scenario: str, runs: _Neighbours) -> Pair:
         fields=runs.fields,
         success=paired_rate(successes(first), successes(second)),
         collision=paired_rate(collisions(first), collisions(second)),
-        metrics={
-            **_medians(first, second, ALL_RUNS, everywhere),
-            **_medians(first, second, SUCCESSES, both),
-        },
-        encounters=_medians(first, second, SUCCESSES, met),
+        metrics=_medians(first, second, {"ended": everywhere, "successes": both}),
+        encounters=_medians(first, second, {"successes": met}),
     )
 
 
@@ -165,14 +157,12 @@ def _pushed(rows: pd.DataFrame) -> NDArray[np.bool_]:
 
 
 def _medians(
-    first: pd.DataFrame,
-    second: pd.DataFrame,
-    names: Sequence[str],
-    chosen: NDArray[np.bool_],
+    first: pd.DataFrame, second: pd.DataFrame, chosen: dict[str, NDArray[np.bool_]]
 ) -> dict[str, PairedMedian]:
-    """Compares each metric over the chosen pairs; omits metrics without values."""
+    """Compares metrics over the pairs chosen for their kind; omits those without."""
     medians = {
-        name: paired_median(column(first, name)[chosen], column(second, name)[chosen])
-        for name in names
+        name: paired_median(*(column(rows, name)[which] for rows in (first, second)))
+        for name, metric in METRICS.items()
+        if metric.paired and (which := chosen.get(metric.of)) is not None
     }
     return {name: median for name, median in medians.items() if median.pairs}

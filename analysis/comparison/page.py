@@ -18,7 +18,6 @@ from analysis.comparison.report_text import (
     rate_text,
     warning_texts,
 )
-from analysis.reporting.fact_tables import readable_name
 from analysis.reporting.html_page import (
     Cell,
     definitions,
@@ -31,6 +30,7 @@ from analysis.reporting.html_page import (
     section,
     table,
 )
+from analysis.runs.metric_table import METRICS
 
 
 def comparison_page(
@@ -76,9 +76,8 @@ def _summary(summary: Mapping[str, Any]) -> list[str]:
         ("Versions", versions),
     ]
     text = (
-        "Brackets are 95 % intervals. Clearance, reaction, distance off the path and "
-        "ripple are medians of all runs; the other metrics are medians of successful "
-        "runs."
+        "Brackets are 95 % intervals. docs/metrics.md states of each metric whether "
+        "its median includes all runs or successful runs."
     )
     files = [("summary.json", "the numbers of this page, for programs")]
     rates = (
@@ -109,14 +108,20 @@ def _scenario(
 
 def _laws(cells: Sequence[LawCell]) -> str:
     columns = median_columns(cells)
-    titles = ["law", "runs", "success %", "collision %", *(c.heading for c in columns)]
+    titles = [
+        "law",
+        "runs",
+        "success %",
+        "collision %",
+        *(metric.label for metric in columns),
+    ]
     rows: list[list[Cell]] = [
         [
             cell.label,
             cell.runs,
             rate_text(cell.success),
             rate_text(cell.collision),
-            *(median_text(cell, column) for column in columns),
+            *(median_text(cell, metric) for metric in columns),
         ]
         for cell in cells
     ]
@@ -133,7 +138,7 @@ def _endings(cells: Sequence[LawCell]) -> str:
 
 def _pairs(pairs: Sequence[Pair]) -> str:
     titles = ["first less second", "success, points", "p", "collision, points", "p"]
-    titles += [readable_name(metric) for metric in PAIRED]
+    titles += [METRICS[metric].label for metric in PAIRED]
     rows: list[list[Cell]] = []
     for pair in pairs:
         common = "".join(f", {value}" for value in pair.fields.values())

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from analysis.comparison.cells import LawCell, Mean
 from analysis.comparison.laws_in_pairs import Comparison
 from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.runs.metric_table import METRICS
 from analysis.views.scene import bounds, looks
 from analysis.views.trajectory_artists import (
     draw_collision,
@@ -24,19 +25,19 @@ from analysis.views.trajectory_artists import (
 from diagrams import RunResult
 from systems.world.geometry import rectangle_corners
 
-#: Metrics that have a panel, with the titles of their axes.
-_METRICS = {
-    "minimum_obstacle_clearance_m": "least clearance from obstacles (m), all runs",
-    "jerk_rms_m_s3": "rms jerk (m/s$^3$), successful runs",
-}
-
 
 def plot_rates(comparisons: Sequence[Comparison]) -> Figure:
-    """Draws the success rate, the collision rate and two medians of every control law.
+    """Draws the success rate, the collision rate and some medians of every control law.
 
     All values have 95 % confidence intervals. Each scenario has one row of panels.
     """
-    rows, columns = len(comparisons), 2 + len(_METRICS)
+    metrics = [
+        metric
+        for metric in METRICS.values()
+        if metric.shown == "picture"
+        and any(metric.name in c.metrics for each in comparisons for c in each.cells)
+    ]
+    rows, columns = len(comparisons), 2 + len(metrics)
     tallest = max(len(comparison.cells) for comparison in comparisons)
     figure = Figure(
         figsize=(3.6 * columns, rows * (0.9 + 0.32 * tallest)), layout="constrained"
@@ -46,12 +47,12 @@ def plot_rates(comparisons: Sequence[Comparison]) -> Figure:
         cells = comparison.cells
         _rate_panel(axes[0], cells, [cell.success for cell in cells], "robot")
         _rate_panel(axes[1], cells, [cell.collision for cell in cells], "source")
-        for panel, name in zip(axes[2:], _METRICS, strict=True):
-            _median_panel(panel, cells, name)
+        for panel, metric in zip(axes[2:], metrics, strict=True):
+            _median_panel(panel, cells, metric.name)
         for panel in axes[1:]:
             panel.tick_params(labelleft=False)
         axes[0].set_title(cells[0].scenario, loc="left", fontsize=10)
-    titles = ("success (%)", "collision (%)", *_METRICS.values())
+    titles = ("success (%)", "collision (%)", *(metric.label for metric in metrics))
     for panel, title in zip(grid[-1], titles, strict=True):
         panel.set_xlabel(title, fontsize=9)
     return figure

@@ -3,36 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from analysis.comparison.cells import LawCell, Mean
 from analysis.comparison.laws_in_pairs import Comparison, Pair
 from analysis.comparison.paired_statistics import PairedMedian, PairedRate
 from analysis.reporting.intervals import with_interval
+from analysis.runs.metric_table import METRICS, Metric
 
-
-class MedianColumn(NamedTuple):
-    """A column of the printed table that shows a median."""
-
-    heading: str
-    metric: str
-    factor: float
-    """Factor from the unit of the metric to the unit of the heading."""
-    form: str
-    """Format of the number."""
-
-
-_COLUMNS = (
-    MedianColumn("clearance cm", "minimum_obstacle_clearance_m", 100.0, ".1f"),
-    MedianColumn("jerk m/s^3", "jerk_rms_m_s3", 1.0, ".2f"),
-    MedianColumn("SPARC", "sparc", 1.0, ".2f"),
-    MedianColumn("reacts m", "reaction_distance_m", 1.0, ".2f"),
-    MedianColumn("error m", "following_error_rms_m", 1.0, ".2f"),
-    MedianColumn("off the path m", "route_deviation_max_m", 1.0, ".2f"),
-    MedianColumn("ripple rad/s", "yaw_ripple_rad_s", 1.0, ".3f"),
-)
 #: Metrics whose paired differences are printed.
-PAIRED = ("minimum_obstacle_clearance_m", "jerk_rms_m_s3", "sparc")
+PAIRED = [name for name, metric in METRICS.items() if metric.paired and metric.shown]
 
 
 def compare_text(
@@ -51,10 +31,6 @@ def compare_text(
     lines = [
         f"{summary['layouts']} layouts per scenario, seed {summary['seed']}",
         "Brackets are 95 % intervals.",
-        (
-            "Medians of clearance, reaction, path and ripple are of all runs, others "
-            "of successes."
-        ),
     ]
     for name, comparison in comparisons.items():
         lines += ["", name, *_cell_lines(comparison.cells)]
@@ -73,13 +49,16 @@ def compare_text(
 def _cell_lines(cells: list[LawCell]) -> Iterator[str]:
     width = max(len("law"), *(len(cell.label) for cell in cells))
     columns = median_columns(cells)
-    headings = "".join(f"{column.heading:>21}" for column in columns)
+    widths = [max(21, len(metric.label) + 2) for metric in columns]
+    headings = "".join(
+        f"{metric.label:>{wide}}" for metric, wide in zip(columns, widths, strict=True)
+    )
     yield f"{'law':<{width}}{'success %':>17}{'collision %':>17}{headings}"
     for cell in cells:
         row = f"{cell.label:<{width}}{rate_text(cell.success):>17}"
         row += f"{rate_text(cell.collision):>17}"
-        for column in columns:
-            row += f"{median_text(cell, column):>21}"
+        for metric, wide in zip(columns, widths, strict=True):
+            row += f"{median_text(cell, metric):>{wide}}"
         yield row
     for cell in cells:
         yield f"  {cell.label}: {counts_text(cell.causes)}"
@@ -110,10 +89,12 @@ def warning_texts(cells: Sequence[LawCell]) -> list[str]:
     ]
 
 
-def median_columns(cells: Sequence[LawCell]) -> list[MedianColumn]:
-    """Columns of the medians that at least one law has."""
+def median_columns(cells: Sequence[LawCell]) -> list[Metric]:
+    """Metrics to show that at least one law has."""
     return [
-        column for column in _COLUMNS if any(column.metric in c.metrics for c in cells)
+        metric
+        for name, metric in METRICS.items()
+        if metric.shown and any(name in cell.metrics for cell in cells)
     ]
 
 
@@ -127,21 +108,12 @@ def rate_text(rate: Mean) -> str:
     return with_interval(rate.estimate, rate.low, rate.high, ".0f", factor=100.0)
 
 
-def median_text(cell: LawCell, column: MedianColumn) -> str:
-    """Writes a median of a control law with its confidence interval.
-
-    Args:
-        cell: Summary of the runs of the law.
-        column: Metric of the median, and format of the numbers.
-
-    Returns:
-        The text; a dash if the law has no such median.
-    """
-    median, factor = cell.metrics.get(column.metric), column.factor
+def median_text(cell: LawCell, metric: Metric) -> str:
+    """A median of a law with its interval; a dash if there is none."""
+    median = cell.metrics.get(metric.name)
     if median is None:
         return "-"
-    figures = median.median, median.low, median.high
-    return with_interval(*figures, column.form, factor=factor)
+    return with_interval(median.median, median.low, median.high, f".{metric.digits}f")
 
 
 def points_text(rate: PairedRate) -> str:

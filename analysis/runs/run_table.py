@@ -1,4 +1,4 @@
-"""Lists the metrics of a sweep's table, and the runs over which each metric counts."""
+"""Reads endings, metrics and warnings from a sweep's table of runs."""
 
 from __future__ import annotations
 
@@ -11,43 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.runs.metric_table import Metric
 from diagrams.running.stop_rules import SUCCESSFUL
-
-#: Metrics of all runs, with any ending.
-ALL_RUNS = (
-    "minimum_clearance_m",
-    "minimum_obstacle_clearance_m",
-    "minimum_time_to_contact_s",
-    "reaction_distance_m",
-    "yaw_ripple_rad_s",
-    "route_deviation_m",
-    "route_deviation_max_m",
-    "replans",
-    "greatest_stiffness_n_m",
-    "last_stiffness_n_m",
-)
-#: Metrics of successful runs only. An early end of a run would change their values.
-SUCCESSES = (
-    "time_to_goal_s",
-    "path_length_m",
-    "following_fraction",
-    "following_error_rms_m",
-    "following_error_p95_m",
-    "jerk_rms_m_s3",
-    "jerk_max_m_s3",
-    "angular_jerk_rms_rad_s3",
-    "sparc",
-    "ldlj",
-    "turn_reversals_per_s",
-    "heading_change_rad_m",
-    "control_effort_rms_n",
-    "wheel_variation_m_s2",
-    "saturated_fraction",
-    "odometry_error_rms_m",
-    "odometry_error_final_m",
-    "odometry_heading_error_rms_deg",
-    "slip_way_m",
-)
 
 
 def successes(rows: pd.DataFrame) -> NDArray[np.bool_]:
@@ -58,6 +23,13 @@ def successes(rows: pd.DataFrame) -> NDArray[np.bool_]:
 def collisions(rows: pd.DataFrame) -> NDArray[np.bool_]:
     """(n,) whether each run ended in a collision."""
     return (rows["cause"] == "collision").to_numpy()
+
+
+def counted(rows: pd.DataFrame, metric: Metric) -> NDArray[np.bool_]:
+    """(n,) whether an average of the metric includes each run."""
+    if metric.of == "successes":
+        return successes(rows)
+    return np.ones(len(rows), dtype=bool)
 
 
 def column(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:

@@ -12,6 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.reporting.intervals import Estimate, median_interval, wilson_interval
+from analysis.runs.metric_table import METRICS
+from analysis.runs.run_table import counted
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan
 from diagrams.running.stop_rules import SUCCESSFUL
@@ -50,7 +52,9 @@ class Quantity:
             return Estimate(count / len(runs), *wilson_interval(count, len(runs)))
         if self.metric not in runs:
             return nothing
-        values = runs[self.metric].dropna().to_numpy()
+        known = METRICS.get(self.metric.rpartition(".")[2])
+        chosen = counted(runs, known) if known else np.ones(len(runs), dtype=bool)
+        values = runs[self.metric][chosen].dropna().to_numpy()
         if not len(values):
             return nothing
         return Estimate(float(np.median(values)), *median_interval(values))
@@ -60,21 +64,16 @@ class Quantity:
 QUANTITIES = (
     Quantity("success", "runs that end well", causes=SUCCESSFUL),
     Quantity("collision", "runs that end in a collision", causes=("collision",)),
-    Quantity(
-        "minimum_clearance_m",
-        "least clearance, median (m)",
-        metric="minimum_clearance_m",
-    ),
-    Quantity(
-        "following_error_rms_m",
-        "following error rms, median (m)",
-        metric="following_error_rms_m",
+    *(
+        Quantity(name, f"{metric.title}, median ({metric.unit})", metric=name)
+        for name, metric in METRICS.items()
+        if metric.shown == "picture"
     ),
 )
 
 
 def quantities(results: pd.DataFrame) -> tuple[Quantity, ...]:
-    """Returns the quantities to show; medians are shown for each robot separately."""
+    """Returns the quantities to show that the runs have, of each robot separately."""
     shown_: list[Quantity] = []
     for quantity in QUANTITIES:
         ending = f".{quantity.metric}"
@@ -91,7 +90,11 @@ def quantities(results: pd.DataFrame) -> tuple[Quantity, ...]:
             )
             for robot in robots
         ] or [quantity]
-    return tuple(shown_)
+    return tuple(
+        quantity
+        for quantity in shown_
+        if quantity.rate or not math.isnan(quantity.estimate(results).value)
+    )
 
 
 def ended(results: pd.DataFrame) -> pd.DataFrame:

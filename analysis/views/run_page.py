@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from analysis.reporting.fact_tables import fact_table, readable_name
 from analysis.reporting.html_page import (
     definitions,
     file_links,
@@ -18,6 +17,7 @@ from analysis.reporting.html_page import (
     section,
     table,
 )
+from analysis.runs.metric_table import METRICS
 from analysis.views.scene import run_title
 from diagrams import RunResult
 
@@ -113,21 +113,20 @@ def _summary(
 
 
 def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
+    """Returns a table with one row per metric and one column per robot."""
     metrics: Mapping[str, Any] = summary["metrics"]
-    text = paragraph(
-        "See docs/metrics.md for the definition and the source of each metric."
-    )
-    names = list(result.several)
-    if not names:
-        return [text, fact_table(metrics)]
-    # One row per metric, in the order of the first robot that has this metric.
-    own = dict.fromkeys(
-        key.partition(".")[2] for key in metrics if key.partition(".")[0] in names
-    )
-    rows = [
-        [readable_name(key), *(metrics.get(f"{name}.{key}") for name in names)]
-        for key in own
+    prefixes = [f"{name}." for name in result.several] or [""]
+    found = [
+        metric
+        for metric in METRICS.values()
+        if any(f"{prefix}{metric.name}" in metrics for prefix in prefixes)
     ]
-    shared = {key: value for key, value in metrics.items() if "." not in key}
-    together = [fact_table(shared, caption="All together")] if shared else []
-    return [text, table(["", *names], rows), *together]
+    rows = [
+        [
+            metric.label,
+            *(metrics.get(f"{prefix}{metric.name}") for prefix in prefixes),
+        ]
+        for metric in found
+    ]
+    text = "docs/metrics.md defines each metric."
+    return [paragraph(text), table(["", *(result.several or [""])], rows)]

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from analysis.comparison.mechanisms import failure_mechanisms
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from diagrams import load_scenario, simulate
 
 KINDS = [

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from analysis.runs.run_report import run_summary, summary_text
 from analysis.views.picture import plot_trajectory
 from analysis.views.replay import record_run, write_replay

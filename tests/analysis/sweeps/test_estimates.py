@@ -17,7 +17,7 @@ from analysis.sweeps.page import sweep_page
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.summary import sweep_summary, sweep_text
 
-SUCCESS, COLLISION, CLEARANCE, _ = QUANTITIES
+SUCCESS, COLLISION, CLEARANCE, *_ = QUANTITIES
 SPEED, X = "source.speed_m_s", "obstacles.0.waypoints_m"
 PLACES = [[[2.0, 1.0]], [[3.0, 1.0]]]
 BOXES = {"count": [1, 2], "x_m": [2.0, 3.0], "y_m": [1.0, 2.0], "side_m": [0.1, 0.2]}

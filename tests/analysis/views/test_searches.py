@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from analysis.views.picture import plot_trajectory
 from analysis.views.plume_history import concentration_map, plume_history
 from analysis.views.scene import call_time
