@@ -20,17 +20,17 @@ from analysis.comparison.report_text import (
 )
 from analysis.reporting.fact_tables import readable_name
 from analysis.reporting.html_page import (
-    Cell,
     definitions,
     file_links,
     heading,
     note,
-    page,
     paragraph,
     picture,
     section,
     table,
 )
+from analysis.reporting.render import page
+from analysis.reporting.section import Cell
 
 
 def comparison_page(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from analysis.replays.time_charts import Chart
-from analysis.reporting.html_page import COLOURS_CSS
+from analysis.reporting.render import COLOURS_CSS
 
 _HERE = Path(__file__).parent
 #: Call in Meshcat's page that passes a message to the viewer.

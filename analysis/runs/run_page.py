@@ -12,12 +12,12 @@ from analysis.reporting.html_page import (
     file_links,
     heading,
     note,
-    page,
     paragraph,
     picture,
     section,
     table,
 )
+from analysis.reporting.render import html, page
 from analysis.runs.scene import run_title
 from diagrams import RunResult
 
@@ -119,7 +119,7 @@ def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
     )
     names = list(result.several)
     if not names:
-        return [text, fact_table(metrics)]
+        return [text, html(fact_table(metrics))]
     # One row per metric, in the order of the first robot that has this metric.
     own = dict.fromkeys(
         key.partition(".")[2] for key in metrics if key.partition(".")[0] in names
@@ -129,5 +129,5 @@ def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
         for key in own
     ]
     shared = {key: value for key, value in metrics.items() if "." not in key}
-    together = [fact_table(shared, caption="All together")] if shared else []
+    together = [html(fact_table(shared, caption="All together"))] if shared else []
     return [text, table(["", *names], rows), *together]
