@@ -11,7 +11,6 @@ from analysis.reporting.criterion import Criterion
 from analysis.reporting.section import Figure
 from analysis.stability import report_parts
 from analysis.stability.law_analysis import Part
-from analysis.stability.safety_parts import GUARD
 from diagrams import load_scenario
 from systems.framework.input_error import InputError
 

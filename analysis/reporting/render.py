@@ -15,7 +15,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -23,6 +22,7 @@ from analysis.reporting.section import (
     ZERO,
     Bullets,
     Cell,
+    Column,
     Content,
     Definitions,
     Figure,
@@ -110,30 +110,25 @@ def _wrapped(line: str, indent: str = "") -> str:
 
 
 def _table_text(table: Table) -> str:
-    heads = table.heads
-    groups: list[tuple[str, list[Sequence[Cell]]]] = [("", [])]
-    for row in table.rows:
-        if len(row) == 1 < len(heads):
-            groups.append((str(row[0]), []))
-        else:
-            groups[-1][1].append(row)
-    lines = [table.caption] if table.caption else []
-    for title, rows in groups:
-        lines += [title] if title else []
-        if rows:
-            columns = [
-                _column_text(head.heading, [row[k] for row in rows], head.digits)
-                for k, head in enumerate(heads)
-            ]
-            frame = pd.DataFrame([each[1:] for each in columns]).T
-            frame.columns = pd.Index([each[0] for each in columns])
-            lines.append(frame.to_string(index=False))
-    return "\n".join(lines)
+    heads, rows = table.heads, list(table.rows)
+    whole = [row for row in rows if len(row) == len(heads)]
+    columns = [
+        _column_text(head, [row[k] for row in whole]) for k, head in enumerate(heads)
+    ]
+    head, *lines = ["  ".join(words).rstrip() for words in zip(*columns, strict=True)]
+    body = iter(lines)
+    return "\n".join(
+        [
+            *([table.caption] if table.caption else []),
+            *([head] if head else []),
+            *(next(body) if len(row) == len(heads) else str(row[0]) for row in rows),
+        ]
+    )
 
 
-def _column_text(heading: str, cells: Sequence[Cell], digits: int) -> list[str]:
+def _column_text(head: Column, cells: Sequence[Cell]) -> list[str]:
     """Returns a heading and cells of equal width: texts at the left, numbers right."""
-    words = [heading, *(_cell_text(cell, digits) for cell in cells)]
+    words = [head.heading, *(_cell_text(cell, head.digits) for cell in cells)]
     width = max(map(len, words))
     left = any(isinstance(cell, str) and cell != ZERO for cell in cells)
     return [word.ljust(width) if left else word.rjust(width) for word in words]

@@ -18,9 +18,9 @@ from analysis.reporting.html_page import (
     section,
     table,
 )
+from analysis.reporting.plain_values import write_json
 from analysis.reporting.render import page
 from analysis.reporting.section import Cell
-from analysis.reporting.plain_values import write_json
 from analysis.runs.run_table import warning_counts
 from analysis.sweeps.estimates import by_cell, cell_label, ended, figure_table
 from analysis.sweeps.one_run import FAILED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+
 import pytest
 
 from analysis.reporting.criterion import Criterion, Reading, compare_verdicts
