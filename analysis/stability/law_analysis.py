@@ -129,8 +129,8 @@ class LawAnalysis:
     """Linear models of all parts, which are written to files."""
     notes: list[str] = field(default_factory=list)
     """Notes of all parts for the first page, each a sentence."""
-    seconds: dict[str, float] = field(default_factory=dict)
-    """Computing time by key of the part, s."""
+    computing_time_s: dict[str, float] = field(default_factory=dict)
+    """Computing time by key of the part."""
     failures: dict[str, Exception] = field(default_factory=dict)
     """Unexpected exceptions by key of the part that raised them."""
 
@@ -180,7 +180,7 @@ def analyse_law(
         step(part.title)
         start = time.perf_counter()
         analysis.sections.append(_run(part, study, analysis))
-        analysis.seconds[part.key] = round(time.perf_counter() - start, 3)
+        analysis.computing_time_s[part.key] = round(time.perf_counter() - start, 3)
     return analysis
 
 

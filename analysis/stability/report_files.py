@@ -57,7 +57,7 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
         **{section.key: plain(section.data) for section in analysis.sections},
         "verdicts": plain(analysis.verdicts),
         "model": plain(analysis.sheet),
-        "seconds": analysis.seconds,
+        "computing_time_s": analysis.computing_time_s,
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -362,9 +362,11 @@ class ContactMode:
     """Motion in front of an obstacle, where the law adds a spring to the attraction."""
 
     limits: ContactLimits
-    growth_per_s: tuple[float, ...] | None
-    """Growth rate where the law is stiffest, 1/s: with echoes as they are, and one
-    control period later. None if the law does not push away from obstacles."""
+    growth_per_s: float | None
+    """Growth rate where the law is stiffest, 1/s. None if the law does not push away
+    from obstacles."""
+    growth_one_tick_late_per_s: float | None
+    """The same growth rate if echoes arrive one control period later, 1/s."""
 
 
 def contact_growth(scenario: Scenario, ticks: int) -> float | None:
@@ -390,17 +392,14 @@ def contact_growth(scenario: Scenario, ticks: int) -> float | None:
 
 def _contact_mode(study: Study) -> ContactMode:
     scenario = study.scenario
-    growth = [contact_growth(scenario, ticks) for ticks in (0, 1)]
-    known = tuple(value for value in growth if value is not None)
-    return ContactMode(contact_limits(scenario), known or None)
+    growth = (contact_growth(scenario, ticks) for ticks in (0, 1))
+    return ContactMode(contact_limits(scenario), *growth)
 
 
-def _growth(ticks: int) -> Callable[[ContactMode], Reading]:
-    return lambda data: (
-        data.growth_per_s[ticks]
-        if data.growth_per_s
-        else "the law does not push off obstacles"
-    )
+def _of_push(growth_per_s: float | None) -> Reading:
+    if growth_per_s is None:
+        return "the law does not push off obstacles"
+    return growth_per_s
 
 
 def _show_contact(data: ContactMode) -> list[Content]:
@@ -440,7 +439,7 @@ CONTACT_MODE = Part[ContactMode](
             "it comes to rest however hard it presses against an obstacle",
             "it swings where it presses to the law's stiffest point",
             "stability of the contact mode at the law's largest slope",
-            _growth(0),
+            lambda data: _of_push(data.growth_per_s),
         ),
         Criterion(
             "growth where the law is stiffest, echoes one tick late", "1/s", "below",
@@ -448,8 +447,7 @@ CONTACT_MODE = Part[ContactMode](
             "the loop tolerates a processor that needs one more tick",
             "with one more tick of latency it swings where the law is stiffest",
             "set by this project",
-            _growth(1),
+            lambda data: _of_push(data.growth_one_tick_late_per_s),
         ),
     ),
-    document=lambda data: {**vars(data.limits), "growth_per_s": data.growth_per_s},
 )  # fmt: skip

@@ -119,7 +119,7 @@ EXPECTED = [
         "least delay margin": (0.2, "pass"),
     }),
     (BURST_CYCLE, CYCLES, {"deviation remaining after a burst cycle": (0.7, "pass")}),
-    (CONTACT_MODE, ContactMode(Made(), (-0.1, 0.4)), {
+    (CONTACT_MODE, ContactMode(Made(), -0.1, 0.4), {
         "growth where the law is stiffest": (-0.1, "pass"),
         "growth where the law is stiffest, echoes one tick late": (0.4, "fail"),
     }),
@@ -239,7 +239,7 @@ def test_signs_and_sides_do_not_hide():
         ),
         (
             CONTACT_MODE,
-            ContactMode(Made(), None),
+            ContactMode(Made(), None, None),
             "growth where the law is stiffest",
             "does not push",
         ),
