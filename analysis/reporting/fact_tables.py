@@ -49,13 +49,9 @@ def fact_table(
     """Makes a table with two columns: the name and the value of each fact.
 
     If a value is a mapping, its entries get a row each. Their names start with the name
-    of the mapping.
-
-    Args:
-        facts: Plain values by name (see ``analysis.reporting.plain_values``). The table
-            omits lists of mappings and lists of more than 8 values.
-        skip: Keys or dotted paths of values to omit.
-        caption: Text above the table.
+    of the mapping. The table omits lists of mappings and lists of more than 8 values,
+    and also the keys and dotted paths in ``skip``. ``facts`` are plain values (see
+    ``analysis.reporting.plain_values``).
     """
     rows = list(_facts(facts, "", "", frozenset(skip)))
     return Table(["", ""], rows, caption)
@@ -93,12 +89,10 @@ def _cell(value: Any) -> Any:
 
 
 def row_table(rows: Sequence[Mapping[str, Any]], *, caption: str = "") -> Table:
-    """Makes a table with one row for each mapping.
+    """Makes a table with one row for each mapping; there is at least one.
 
-    Args:
-        rows: Plain values by name, at least one row. The names of the first row are the
-            headings of the columns. The table omits values that do not fit into a cell.
-        caption: Text above the table.
+    The names of the first row are the headings of the columns. The table omits values
+    that do not fit into a cell.
     """
     keys = [k for k, value in rows[0].items() if _cell(value) is not _LEFT_OUT]
     body: list[list[Cell]] = [[_cell(row.get(key)) for key in keys] for row in rows]

@@ -56,11 +56,9 @@ _COLUMNS = 88
 def html(content: Content, name: str = "", level: int = 2) -> Markup:
     """Returns a paragraph, table, figure, section or other content as HTML.
 
-    Args:
-        content: The content.
-        name: Anchor of a section. For a figure or a formula, the beginning of all
-            identifiers in its SVG. Each of these names may occur once on a page.
-        level: Level of the heading of a section, from 1 to 4.
+    ``name`` is the anchor of a section, whose heading has a ``level`` from 1 to 4. For
+    a figure or a formula, ``name`` is the beginning of all identifiers in its SVG. Each
+    of these names may occur once on a page.
     """
     return Markup(_template().show(content, name, level))
 

@@ -36,12 +36,9 @@ def figure_svg(figure: Figure, name: str, label: str) -> Markup:
 
 
 def formula_svg(tex: str, name: str, label: str) -> Markup:
-    """Returns a formula as an SVG element.
+    """Returns a formula as an SVG element; see ``figure_svg`` for name and label.
 
-    Args:
-        tex: Formula in matplotlib's subset of TeX, without dollar signs.
-        name: As for ``figure_svg``.
-        label: Text for screen readers.
+    The formula is in matplotlib's subset of TeX, without dollar signs.
     """
     stream = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": name, "mathtext.fontset": "cm"}):

@@ -94,12 +94,10 @@ class Part(Generic[Data]):
         )
 
     def problem(self, text: str, *, failed: bool = False) -> Section:
-        """Returns the section of a part without a result.
+        """Returns the section of a part without a result, which states the reason.
 
-        Args:
-            text: Reason why there is no result.
-            failed: Whether the reason is a fault of the program, and not of the law or
-                of the scenario.
+        ``failed`` states whether the reason is a fault of the program, and not of the
+        law or of the scenario.
         """
         words = "This part failed" if failed else "Not computed"
         return Section(
