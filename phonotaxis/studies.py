@@ -91,7 +91,7 @@ class StabilityResult:
         """Verdicts on the stability, for a terminal."""
         from analysis.stability.report_files import stability_text
 
-        return stability_text(self.summary)
+        return stability_text(self.analyses)
 
     def save(self, directory: str | Path | None = None) -> Path:
         """Writes all files of ``phonotaxis stability`` into a new directory.
@@ -273,7 +273,7 @@ def stability(
         make_controller(each)
     work = parts_for(scenarios, full=full)
     step = progress or (lambda title: None)
-    analyses = [analyse_law(each, work, step=step) for each in scenarios]
+    analyses = [analyse_law(each, work, full=full, step=step) for each in scenarios]
     return StabilityResult(analyses, stability_document(analyses, None))
 
 

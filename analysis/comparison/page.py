@@ -19,17 +19,17 @@ from analysis.comparison.report_text import (
     warning_texts,
 )
 from analysis.reporting.html_page import (
-    Cell,
     definitions,
     file_links,
     heading,
     note,
-    page,
     paragraph,
     picture,
     section,
     table,
 )
+from analysis.reporting.render import page
+from analysis.reporting.section import Cell
 from analysis.runs.metric_table import METRICS
 
 

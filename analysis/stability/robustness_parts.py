@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
+from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
 from analysis.linear.loop_uncertainty import (
     contact_poles,
     contact_uncertainty,
@@ -22,8 +24,10 @@ from analysis.linear.robustness import (
     pole_sensitivities,
     slowest_pole,
 )
-from analysis.reporting.html_page import Cell, figure_html, paragraph, table
-from analysis.stability.law_analysis import Part
+from analysis.reporting.criterion import Criterion
+from analysis.reporting.plain_values import pick
+from analysis.reporting.section import Cell, Column, Content, Figure, Table
+from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
 
 #: Number of random points in the parameter box, in a short and in a full report.
@@ -37,24 +41,10 @@ class LoopRobustness:
     cloud: PoleCloud
     sensitivities: tuple[PoleSensitivity, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns everything except the poles of each sample, for the JSON document."""
-        cloud = self.cloud
-        return {
-            "period_s": cloud.period_s,
-            "parameters": cloud.parameters,
-            "samples": len(cloud.values),
-            "stable_share": cloud.stable_share,
-            "nominal_radius": cloud.nominal_radius,
-            "worst_radius": cloud.worst_radius,
-            "worst_damping_ratio": cloud.worst_damping_ratio,
-            "worst_values": cloud.worst_values,
-            "worst_poles": cloud.worst_poles,
-            "sensitivities": [
-                vars(row) | {"parameter": row.parameter.name}
-                for row in self.sensitivities
-            ],
-        }
+    @property
+    def worst_growth_per_s(self) -> float:
+        """Growth rate for the worst parameter values, 1/s."""
+        return math.log(self.cloud.worst_radius) / self.cloud.period_s
 
 
 def loop_robustness(
@@ -90,49 +80,39 @@ def loop_robustness(
     )
 
 
-def robustness_parts(*, full: bool) -> tuple[Part, ...]:
-    """Returns the two parts on robustness under uncertain parameters.
-
-    The first part is about the operating point. The second part is about the motion in
-    front of an obstacle.
-
-    Args:
-        full: Whether more random points of the parameter box are analyzed.
-
-    Returns:
-        The two parts, in the order of the report.
-    """
-    samples = _SAMPLES[full]
-    return (
-        Part(
-            "robustness",
-            "Robustness at the operating point",
-            lambda study: loop_robustness(
-                study.scenario,
-                following_poles(study.need("equilibria").at),
-                following_uncertainty(study.scenario),
-                samples=samples,
-            ),
-            _render,
-            fresh=True,
-        ),
-        Part(
-            "contact_robustness",
-            "Robustness before an obstacle",
-            lambda study: loop_robustness(
-                study.scenario,
-                contact_poles(study.scenario),
-                contact_uncertainty(study.scenario),
-                samples=4 * samples,
-            ),
-            _render,
-        ),
+def _following(study: Study) -> LoopRobustness:
+    return loop_robustness(
+        study.scenario,
+        following_poles(study.need("equilibria").at),
+        following_uncertainty(study.scenario),
+        samples=_SAMPLES[study.full],
     )
 
 
-def _render(data: LoopRobustness, name: str) -> list[str]:
-    from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
+def _before_an_obstacle(study: Study) -> LoopRobustness:
+    return loop_robustness(
+        study.scenario,
+        contact_poles(study.scenario),
+        contact_uncertainty(study.scenario),
+        samples=4 * _SAMPLES[study.full],
+    )
 
+
+def _document(data: LoopRobustness) -> dict[str, Any]:
+    """Returns everything except the poles of each sample."""
+    return {
+        **pick(
+            data.cloud, "period_s", "parameters", "stable_share", "nominal_radius",
+            "worst_radius", "worst_damping_ratio", "worst_values", "worst_poles",
+        ),
+        "samples": len(data.cloud.values),
+        "sensitivities": [
+            vars(row) | {"parameter": row.parameter.name} for row in data.sensitivities
+        ],
+    }  # fmt: skip
+
+
+def _show(data: LoopRobustness) -> list[Content]:
     cloud = data.cloud
     slowest = slowest_pole(cloud.worst_poles)
     rate = continuous(slowest, cloud.period_s).real
@@ -148,7 +128,6 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
         ]
         for p in cloud.parameters
     ]
-    headings = ["parameter", "least", "nominal", "most", "unit", "worst case", "why"]
     nominal = damping_ratio(slowest_pole(cloud.nominal_poles), cloud.period_s)
     shares: list[list[Cell]] = [
         [
@@ -160,7 +139,7 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
         for row in sorted(data.sensitivities, key=lambda r: -abs(r.per_interval))
     ]
     return [
-        paragraph(
+        (
             f"The analysis takes {len(cloud.values)} random points within the ranges "
             "below, and the worst corner of these ranges. "
             f"{100.0 * cloud.stable_share:.0f} % of the points are stable. In the "
@@ -168,27 +147,64 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
             f"{abs(rate):.3g} 1/s and its damping ratio is "
             f"{cloud.worst_damping_ratio:.3f} (nominal {nominal:.3f})."
         ),
-        table(headings, boxes),
-        figure_html(
-            plot_pole_cloud(cloud),
-            f"{name}-cloud",
+        Table(
+            ["parameter", "least", "nominal", "most", "unit", "worst case", "why"],
+            boxes,
+        ),
+        Figure(
+            lambda: plot_pole_cloud(cloud),
             "Poles within the ranges of all parameters, ln(z)/T of the sampled loop. "
             "Poles faster than 12 1/s are left out.",
         ),
-        table(
+        Table(
             [
                 "parameter",
-                "d(pole)/dp (1/s per unit)",
+                Column("d(pole)/dp", "1/s per unit"),
                 "unit",
-                "over the interval (1/s)",
+                Column("over the interval", "1/s"),
             ],
             shares,
-            caption="Sensitivity of the slowest pole",
+            "Sensitivity of the slowest pole",
         ),
-        figure_html(
-            plot_sensitivities(data.sensitivities),
-            f"{name}-sensitivity",
+        Figure(
+            lambda: plot_sensitivities(data.sensitivities),
             "Change of the slowest pole over each interval, to first order. Orange "
             "marks less decay or a higher frequency.",
         ),
     ]
+
+
+ROBUSTNESS = Part[LoopRobustness](
+    "robustness",
+    "Robustness at the operating point",
+    _following,
+    _show,
+    criteria=(
+        Criterion(
+            "growth at rest, worst parameters", "1/s", "below", 0.0,
+            "it stays stable for all parameters in their ranges",
+            "some parameters in their ranges make it unstable",
+            "stability over the ranges of all parameters",
+            lambda data: data.worst_growth_per_s,
+        ),
+    ),
+    document=_document,
+    fresh=True,
+)  # fmt: skip
+
+CONTACT_ROBUSTNESS = Part[LoopRobustness](
+    "contact_robustness",
+    "Robustness before an obstacle",
+    _before_an_obstacle,
+    _show,
+    criteria=(
+        Criterion(
+            "growth before an obstacle, worst parameters", "1/s", "below", 0.0,
+            "it comes to rest before an obstacle for all parameters in their ranges",
+            "some parameters in their ranges make it swing where the law is stiffest",
+            "stability over the ranges of all parameters",
+            lambda data: data.worst_growth_per_s,
+        ),
+    ),
+    document=_document,
+)  # fmt: skip

@@ -10,17 +10,17 @@ from typing import Any
 import pandas as pd
 
 from analysis.reporting.html_page import (
-    Cell,
     definitions,
     figure_html,
     heading,
     note,
-    page,
     paragraph,
     section,
     table,
 )
 from analysis.reporting.plain_values import write_json
+from analysis.reporting.render import page
+from analysis.reporting.section import Cell
 from analysis.runs.run_table import warning_counts
 from analysis.sweeps.estimates import by_cell, cell_label, ended, figure_table
 from analysis.sweeps.one_run import FAILED

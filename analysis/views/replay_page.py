@@ -9,7 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from analysis.reporting.html_page import COLOURS_CSS
+from analysis.reporting.render import COLOURS_CSS
 
 _HERE = Path(__file__).parent
 #: Call in Meshcat's page that passes a message to the viewer.

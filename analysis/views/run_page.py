@@ -11,12 +11,12 @@ from analysis.reporting.html_page import (
     file_links,
     heading,
     note,
-    page,
     paragraph,
     picture,
     section,
     table,
 )
+from analysis.reporting.render import page
 from analysis.runs.metric_table import METRICS
 from analysis.views.scene import run_title
 from diagrams import RunResult

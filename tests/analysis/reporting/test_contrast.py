@@ -25,7 +25,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from analysis.reporting import palette
-from analysis.reporting.html_page import COLOURS_CSS
+from analysis.reporting.render import COLOURS_CSS
 from analysis.views.picture import plot_trajectory
 from analysis.views.time_series import plot_time_series
 

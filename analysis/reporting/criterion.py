@@ -1,20 +1,26 @@
-"""Verdicts on numbers: pass, fail, or not applicable, with a text in plain words."""
+"""Criteria and verdicts on numbers: pass, fail, or not applicable, with a text."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Generic, Literal, TypeVar
 
 #: Unit of a number that is 1 for true and 0 for false.
 YES_OR_NO = "yes or no"
 
 Judgement = Literal["pass", "fail", "not applicable"]
 
+#: A number, or a text with the reason why the number does not exist.
+Reading = float | str
+
+Data = TypeVar("Data")
+
 
 @dataclass(frozen=True)
-class Criterion:
-    """A criterion compares a number with a threshold."""
+class Criterion(Generic[Data]):
+    """A criterion compares a number in the data of a section with a threshold."""
 
     name: str
     unit: str
@@ -26,6 +32,9 @@ class Criterion:
     """What follows if the number does not meet the threshold; a clause."""
     source: str
     """Where the threshold comes from."""
+    read: Callable[[Data], Reading]
+    """Takes the number from the data of the section. NaN means that there is no such
+    number."""
 
     @property
     def threshold(self) -> str:
@@ -43,6 +52,27 @@ class Criterion:
             "at most": value <= self.limit,
             "below": value < self.limit,
         }[self.sense]
+
+    def judge(self, data: Data) -> Verdict:
+        """Compares the number in the data of a section with the threshold."""
+        value = self.read(data)
+        if isinstance(value, str):
+            return self.without_number(value)
+        if math.isnan(value):
+            return self.without_number("there is no such number")
+        met = self.met_by(value)
+        return self._verdict(
+            float(value), "pass" if met else "fail", self.good if met else self.bad
+        )
+
+    def without_number(self, reason: str) -> Verdict:
+        """Returns the verdict if there is no number, for a reason (a clause)."""
+        return self._verdict(None, "not applicable", reason)
+
+    def _verdict(self, value: float | None, verdict: Judgement, text: str) -> Verdict:
+        return Verdict(
+            self.name, value, self.unit, self.threshold, verdict, text, self.source
+        )
 
 
 @dataclass(frozen=True)
@@ -90,37 +120,8 @@ def shown_value(value: float | None, unit: str) -> float | str | None:
     return "yes" if value else "no"
 
 
-def judge(criterion: Criterion, value: float | None, reason: str = "") -> Verdict:
-    """Compares a number with the threshold of a criterion.
-
-    Args:
-        criterion: The criterion with the threshold.
-        value: The number, or None if it does not exist.
-        reason: Why the number does not exist; a clause.
-
-    Returns:
-        A verdict (pass, fail, or not applicable) with a text.
-    """
-    if value is None:
-        verdict: Judgement = "not applicable"
-        text = reason or "this law has no such number"
-    elif criterion.met_by(value):
-        verdict, text = "pass", criterion.good
-    else:
-        verdict, text = "fail", criterion.bad
-    return Verdict(
-        criterion.name,
-        value,
-        criterion.unit,
-        criterion.threshold,
-        verdict,
-        text,
-        criterion.source,
-    )
-
-
 def compare_verdicts(
-    by_law: dict[str, Sequence[Verdict]],
+    by_law: Mapping[str, Sequence[Verdict]],
 ) -> tuple[VerdictRow, ...]:
     """Puts the verdicts of several laws side by side, in the order of the first law."""
     laws = list(by_law)
