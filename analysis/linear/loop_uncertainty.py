@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.laws.radial_law import DISTANCE_STEP_M, radial_law
-from analysis.linear.contact_mode import contact_matrix
+from analysis.linear.contact_mode import contact_model
 from analysis.linear.robustness import PoleFunction, UncertainParameter
 from analysis.models.equilibria import nearest_equilibrium
 from analysis.models.force_field import ForceField
@@ -204,10 +204,8 @@ def contact_poles(scenario: Scenario) -> PoleFunction:
         stiffness = changed.follower.attraction.stiffness_n_m + values.get(
             "law_stiffness_n_m", 0.0
         )
-        matrix = contact_matrix(
-            changed, stiffness, latency_ticks=round(values["extra_ticks"])
-        )
-        return np.linalg.eigvals(matrix).astype(np.complex128)
+        late = round(values["extra_ticks"])
+        return contact_model(changed, stiffness, latency_ticks=late).poles
 
     return poles
 

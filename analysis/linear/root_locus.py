@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.linear.contact_mode import contact_matrix
+from analysis.linear.contact_mode import contact_model
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import frozen_scenario, ideal_scenario
+from analysis.models.linear_models import LinearModel
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
@@ -112,18 +113,16 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
         parameter: str,
         loop: str,
         today: float,
-        matrix: Callable[[float], NDArray[np.float64]],
+        model: Callable[[float], LinearModel],
     ) -> RootLocus:
         values = _FACTORS * (today if today > 0.0 else 1.0)
         return RootLocus(
             parameter=parameter,
             loop=loop,
             values=values,
-            poles=np.array(
-                [_poles(matrix(float(value)), scenario.tick_s) for value in values]
-            ),
+            poles=np.array([_poles(model(float(value))) for value in values]),
             today=today,
-            poles_today=_poles(matrix(today), scenario.tick_s),
+            poles_today=_poles(model(today)),
         )
 
     target = (
@@ -131,13 +130,13 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
             "attraction.stiffness_n_m",
             "target",
             K,
-            lambda value: contact_matrix(scenario, value),
+            lambda value: contact_model(scenario, value),
         ),
         locus(
             "attraction.damping_n_s_m",
             "target",
             D,
-            lambda value: contact_matrix(scenario, K, damping_n_s_m=value),
+            lambda value: contact_model(scenario, K, damping_n_s_m=value),
         ),
     )
     record = LAWS.get(scenario.only.law)
@@ -154,23 +153,20 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
             f"laws.{scenario.only.law}.{spring}",
             "contact",
             today,
-            lambda value: contact_matrix(scenario, K + k * value / today),
+            lambda value: contact_model(scenario, K + k * value / today),
         ),
         locus(
             f"laws.{scenario.only.law}.{damper}",
             "contact",
             strength,
-            lambda value: contact_matrix(
+            lambda value: contact_model(
                 scenario, K + k, approach_damping_n_s_m=d * value / strength
             ),
         ),
     )
 
 
-def _poles(matrix: NDArray[np.float64], tick_s: float) -> NDArray[np.complex128]:
-    z = np.linalg.eigvals(matrix).astype(complex)
-    z[np.abs(z) < 1e-9] = 0.0
-    gone = z == 0.0
-    poles = np.log(np.where(gone, 1.0, z)) / tick_s
-    poles[gone] = -np.inf
-    return np.sort_complex(poles)
+def _poles(model: LinearModel) -> NDArray[np.complex128]:
+    poles = np.sort_complex(model.s_poles)
+    delays = np.full(len(model.A) - len(poles), -np.inf, dtype=np.complex128)
+    return np.concatenate([delays, poles])

@@ -16,11 +16,8 @@ from analysis.linear.robustness import (
     PoleFunction,
     PoleSensitivity,
     UncertainParameter,
-    continuous,
-    damping_ratio,
     pole_cloud,
     pole_sensitivities,
-    slowest_pole,
 )
 from analysis.reporting.html_page import Cell, figure_html, paragraph, table
 from analysis.stability.law_analysis import Part
@@ -134,8 +131,7 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
     from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
 
     cloud = data.cloud
-    slowest = slowest_pole(cloud.worst_poles)
-    rate = continuous(slowest, cloud.period_s).real
+    rate = cloud.worst_growth_per_s
     boxes: list[list[Cell]] = [
         [
             f"{p.symbol}, `{p.name}`",
@@ -149,7 +145,7 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
         for p in cloud.parameters
     ]
     headings = ["parameter", "least", "nominal", "most", "unit", "worst case", "why"]
-    nominal = damping_ratio(slowest_pole(cloud.nominal_poles), cloud.period_s)
+    nominal = cloud.nominal_damping_ratio
     shares: list[list[Cell]] = [
         [
             row.parameter.symbol,

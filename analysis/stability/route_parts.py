@@ -135,9 +135,9 @@ def _frozen_document(data: Sequence[FrozenPoint]) -> dict[str, Any]:
                 "at": point.at,
                 "stiffness_n_m": point.stiffness_n_m,
                 "damping_n_s_m": point.damping_n_s_m,
-                "poles": point.poles,
-                "growth_per_s": point.growth_per_s,
-                "damping_ratio": point.damping_ratio,
+                "poles": point.model.s_poles,
+                "growth_per_s": point.model.growth_per_s,
+                "damping_ratio": point.model.damping_ratio,
                 "margins": {
                     axis: {name: getattr(margins, name) for name in _MARGINS}
                     for axis, margins in point.margins.items()
@@ -155,8 +155,8 @@ def _render_frozen(data: Sequence[FrozenPoint], name: str) -> list[str]:
             point.stiffness_n_m,
             point.damping_n_s_m,
             ", ".join(_poles_of(point)),
-            point.growth_per_s,
-            point.damping_ratio,
+            point.model.growth_per_s,
+            point.model.damping_ratio,
         ]
         for point in data
     ]
@@ -189,7 +189,7 @@ def _render_frozen(data: Sequence[FrozenPoint], name: str) -> list[str]:
 
 def _poles_of(point: FrozenPoint) -> list[str]:
     """Returns the poles as texts, slowest first; of a conjugate pair only one pole."""
-    poles = sorted(point.poles.tolist(), key=lambda pole: -pole.real)
+    poles = sorted(point.model.s_poles.tolist(), key=lambda pole: -pole.real)
     shown = [pole for pole in poles if pole.imag >= -1e-9]
     return [number(p if abs(p.imag) > 1e-9 else p.real) for p in shown]
 

@@ -103,21 +103,23 @@ ROUTE_CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
         "small deviations die out, on the route, at rest and before a wall",
         "small deviations grow, on the route, at rest or before a wall",
         "stability",
-    ): _frozen(lambda points: max(point.growth_per_s for point in points)),
+    ): _frozen(lambda points: max(point.model.growth_per_s for point in points)),
     Criterion(
         "damping ratio out of contact", "", "at least", WELL_DAMPED,
         "it hardly overshoots its target",
         "it overshoots its target",
         "set by this project: 5 % of overshoot",
     ): _frozen(
-        lambda points: min(p.damping_ratio for p in points if p.at.wall_m is None)
+        lambda points: min(
+            p.model.damping_ratio for p in points if p.at.wall_m is None
+        )
     ),
     Criterion(
         "least damping ratio", "", "at least", 0.4,
         "it does not swing before a wall either",
         "somewhere in the zone of a wall it swings for several cycles",
         "usual: 0.4 to 0.8 (Astrom and Murray)",
-    ): _frozen(lambda points: min(point.damping_ratio for point in points)),
+    ): _frozen(lambda points: min(point.model.damping_ratio for point in points)),
     Criterion(
         "least phase margin", "deg", "at least", 45.0,
         "the loop tolerates the usual extra phase lag or lead",

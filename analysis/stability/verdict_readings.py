@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from analysis.linear.contact_mode import contact_spectral_radius
+from analysis.linear.contact_mode import contact_model
 from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.stability.law_analysis import Study
 from analysis.stability.margin_parts import Margins, least_damped
@@ -136,8 +136,7 @@ def read_contact(study: Study, ticks: int) -> Reading:
     if stiffness <= 0.0:
         return "the law does not push off obstacles"
     total = scenario.follower.attraction.stiffness_n_m + stiffness
-    radius = contact_spectral_radius(scenario, total, latency_ticks=ticks)
-    return math.log(radius) / scenario.tick_s
+    return contact_model(scenario, total, latency_ticks=ticks).growth_per_s
 
 
 def read_worst_case(key: str) -> Callable[[Study], Reading]:
@@ -150,7 +149,7 @@ def read_worst_case(key: str) -> Callable[[Study], Reading]:
         data = study.found.get(key)
         if not data:
             return "it was not computed"
-        return math.log(data.cloud.worst_radius) / study.scenario.tick_s
+        return float(data.cloud.worst_growth_per_s)
 
     return read
 

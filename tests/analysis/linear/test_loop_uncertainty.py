@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from analysis.linear.contact_mode import contact_spectral_radius
+from analysis.linear.contact_mode import contact_model
 from analysis.linear.loop_uncertainty import (
     contact_poles,
     contact_uncertainty,
@@ -81,7 +81,7 @@ def test_nominal_poles_are_the_contact_modes(law):
     box = contact_uncertainty(scenario(law))
     poles = contact_poles(scenario(law))({p.name: p.nominal for p in box})
     total = 2.0 + law_stiffness(scenario(law))
-    radius = contact_spectral_radius(scenario(law), total)
+    radius = contact_model(scenario(law), total).spectral_radius
     assert np.abs(poles).max() == pytest.approx(radius, rel=1e-12)
 
 

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from analysis.laws.law_curves import radial_forces
 from analysis.linear.burst_cycle import burst_cycle, simulate_burst_cycle
-from analysis.linear.contact_mode import contact_matrix, largest_contact_stiffness
+from analysis.linear.contact_mode import contact_model, largest_contact_stiffness
 from analysis.linear.delay_margin import delay_margin
 from analysis.linear.delayed_run import check_delay_margin
 from analysis.linear.loop_margins import loop_margins
@@ -55,7 +55,7 @@ def by_size(poles: np.ndarray) -> np.ndarray:
 def test_contact_mode_is_the_matrix_exponentials(tick_s):
     for stiffness in (K, 12.0):
         np.testing.assert_allclose(
-            by_size(np.linalg.eigvals(contact_matrix(scenario(tick_s), stiffness))),
+            by_size(contact_model(scenario(tick_s), stiffness).poles),
             by_size(np.linalg.eigvals(held_over_a_tick(stiffness, tick_s))),
             atol=1e-9,
         )

@@ -77,8 +77,8 @@ def study(**parts):
             cycles=[Made(hold="world", largest=0.5), Made(hold="motion", largest=0.7),
                     Made(hold="robot", largest=1.3)],
         ),
-        "robustness": Made(cloud=Made(worst_radius=math.exp(-0.3 * T))),
-        "contact_robustness": Made(cloud=Made(worst_radius=math.exp(0.6 * T))),
+        "robustness": Made(cloud=Made(worst_growth_per_s=-0.3)),
+        "contact_robustness": Made(cloud=Made(worst_growth_per_s=0.6)),
         "certificates": (
             Made(
                 certificate=Made(start_certified=True),
