@@ -25,7 +25,7 @@ from pydrake.systems.analysis import DiscreteTimeApproximation
 from pydrake.systems.primitives import Linearize
 from scipy.optimize import brentq
 
-from analysis.laws.push_and_pull import stiffest
+from analysis.laws.radial_law import radial_law
 from analysis.models.block_models import block_model
 from analysis.models.ideal_scenarios import require_rolling
 from analysis.models.linear_models import LinearModel
@@ -290,7 +290,7 @@ def contact_limits(
     )
     left = total - scenario.follower.attraction.stiffness_n_m
     k_ref = scenario.follower.laws.active.reference_stiffness_n_m
-    slope = stiffest("active", scenario)
+    slope = radial_law(scenario.with_robot(law="active")).stiffest_n_m
     return ContactLimits(
         motor_lags_s=tuple(lags),
         latency_ticks=tuple(latency_ticks),

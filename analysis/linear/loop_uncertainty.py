@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.laws.radial_law import DISTANCE_STEP_M, radial_law
+from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import contact_model
 from analysis.linear.robustness import PoleFunction, UncertainParameter
 from analysis.models.equilibria import nearest_equilibrium
@@ -49,7 +49,7 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     Raises:
         InputError: The repulsion does not grow as the obstacle comes nearer.
     """
-    stiffness = law_stiffness(scenario)
+    stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:
         raise InputError(
             "law",
@@ -179,11 +179,6 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
     distance = scenario.follower.attraction.follow_distance_m
     h = math.hypot(distance, half)
     return ((h + distance) / k + k * (h - distance)) / (2.0 * h)
-
-
-def law_stiffness(scenario: Scenario) -> float:
-    """Returns the largest slope -df/dc of the law for an obstacle at rest, N/m."""
-    return float(np.max(-np.diff(radial_law(scenario).forces_n)) / DISTANCE_STEP_M)
 
 
 def contact_poles(scenario: Scenario) -> PoleFunction:

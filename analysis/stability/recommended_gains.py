@@ -23,13 +23,13 @@ from analysis.design.attraction_search import (
     following_lag,
     with_attraction,
 )
+from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import (
     contact_model,
     largest_contact_stiffness,
     motion_chain,
 )
 from analysis.linear.loop_margins import all_margins, loop_margins
-from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import BreakPoint
@@ -359,6 +359,7 @@ def _meets(scenario: Scenario, thresholds: GainThresholds) -> bool:
 
 
 def _contact_radius(scenario: Scenario, thresholds: GainThresholds) -> float:
-    total = scenario.follower.attraction.stiffness_n_m + law_stiffness(scenario)
+    total = scenario.follower.attraction.stiffness_n_m
+    total += radial_law(scenario).stiffest_n_m
     model = contact_model(scenario, total, latency_ticks=thresholds.spare_ticks)
     return model.spectral_radius

@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import contact_model
-from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.stability.law_analysis import Study
 from analysis.stability.margin_parts import Margins, least_damped
 from analysis.stability.verdicts import YES_OR_NO, Criterion
@@ -132,7 +132,7 @@ def read_contact(study: Study, ticks: int) -> Reading:
         away from obstacles, the result is a text that says so.
     """
     scenario = study.scenario
-    stiffness = law_stiffness(scenario)
+    stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:
         return "the law does not push off obstacles"
     total = scenario.follower.attraction.stiffness_n_m + stiffness

@@ -48,10 +48,6 @@ class Tuning:
 
     ``matched`` is the rule of the active law of 2019. This rule suits laws that have
     the same gains as the active law."""
-    stiffest: Callable[[Any, float], float]
-    """Function that returns the largest slope -df/dc of the force for an obstacle at
-    rest, N/m. The arguments of the function are the gains and the least range of the
-    sensors in m."""
     spring_speed: Callable[[Any], float] = _always_at_rest
     """Function of the gains that returns a speed s, m/s. At this speed, the force f(c,
     s) has only its spring term."""
