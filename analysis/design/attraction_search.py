@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from scipy.optimize import brentq
 
 from analysis.design.gain_search import search_gains
 from analysis.design.requirements import DesignRequirements, check_law, metres_to_go
 from analysis.laws.push_and_pull import DESIGNED_LAWS
-from analysis.linear.contact_mode import contact_matrix
+from analysis.linear.contact_mode import contact_model
 from analysis.models.ideal_scenarios import changed, ideal_scenario
 from diagrams.running.simulation import simulate
 from diagrams.scenario.scenario import Scenario
@@ -116,11 +115,8 @@ def attraction_damping_ratio(scenario: Scenario) -> float:
     The loop is sampled and has the motor lag. The robot moves straight toward the
     source, and there is no obstacle.
     """
-    z = np.linalg.eigvals(
-        contact_matrix(scenario, scenario.follower.attraction.stiffness_n_m)
-    )
-    s = np.log(z[np.abs(z) > 1e-6].astype(complex)) / scenario.tick_s
-    return float(np.min(-s.real / np.abs(s)))
+    stiffness = scenario.follower.attraction.stiffness_n_m
+    return contact_model(scenario, stiffness).damping_ratio
 
 
 def following_lag(scenario: Scenario) -> float:

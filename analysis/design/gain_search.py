@@ -28,12 +28,11 @@ from analysis.laws.push_and_pull import (
     injected_share,
     kinetic_energy,
     largest_rise,
-    law_force,
     rest_offset,
     sampled_push,
     spring,
-    stiffest,
 )
+from analysis.laws.radial_law import radial_law
 from diagrams.scenario.participants import LawGains
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -155,7 +154,8 @@ def _matched_damper(
     )
     unit = {"reference_damping_n_s_m": 1.0, "matched_damping_n_s_m": 2.0}
     with_unit = with_gains(scenario, law, **unit)
-    unit_term = law_force(law, with_unit)(far, 0.0) - spring(law, with_unit)(far)
+    force = radial_law(with_unit.with_robot(law=law)).function
+    unit_term = force(far, 0.0) - spring(law, with_unit)(far)
     d_ref = _rounded(at_rest / unit_term)
 
     def excess(D_0: float) -> float:
@@ -215,7 +215,8 @@ def _matched_spring(
         return rest_offset(law, with_alpha(alpha)) - scenario.stop.goal_margin_m
 
     def too_stiff(alpha: float) -> float:
-        return stiffest(law, with_alpha(alpha)) - allowed
+        softer = with_alpha(alpha).with_robot(law=law)
+        return radial_law(softer).stiffest_n_m - allowed
 
     field = f"laws.{law}.reference_stiffness_n_m"
     alpha = _root(too_far, *_ALPHAS_M, field)

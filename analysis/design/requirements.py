@@ -13,8 +13,8 @@ from analysis.laws.push_and_pull import (
     net_barrier,
     rest_offset,
     spring,
-    stiffest,
 )
+from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import largest_contact_stiffness
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -194,7 +194,8 @@ def check_law(
     push = spring(law, scenario)
     to_go = metres_to_go(scenario, requirements)
     barrier, energy = net_barrier(push, scenario, to_go), kinetic_energy(scenario)
-    slope, allowed = stiffest(law, scenario), allowed_stiffness(scenario, requirements)
+    slope = radial_law(scenario.with_robot(law=law)).stiffest_n_m
+    allowed = allowed_stiffness(scenario, requirements)
     rest, far = rest_offset(law, scenario), far_offset(law, scenario)
     room, share = scenario.stop.goal_margin_m, injected_share(law, scenario)
     checks = (

@@ -23,14 +23,13 @@ from analysis.design.attraction_search import (
     following_lag,
     with_attraction,
 )
+from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import (
-    contact_matrix,
-    contact_spectral_radius,
+    contact_model,
     largest_contact_stiffness,
     motion_chain,
 )
 from analysis.linear.loop_margins import all_margins, loop_margins
-from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import BreakPoint
@@ -234,8 +233,7 @@ def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
     """
     margins = [loop_margins(attraction_loop(scenario, at)) for at in _CUTS]
     K_r = scenario.follower.attraction.stiffness_n_m
-    z = np.linalg.eigvals(contact_matrix(scenario, K_r))
-    slowest = -math.log(float(np.abs(z).max())) / scenario.tick_s
+    motion = contact_model(scenario, K_r)
 
     def least(name: str) -> float:
         return min(float(getattr(m, name)) for m in margins)
@@ -243,7 +241,7 @@ def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
     return GainFigures(
         stiffness_n_m=K_r,
         damping_n_s_m=scenario.follower.attraction.damping_n_s_m,
-        damping_ratio=attraction_damping_ratio(scenario),
+        damping_ratio=motion.damping_ratio,
         phase_margin_deg=least("phase_margin_deg"),
         gain_margin_db=least("gain_margin_db"),
         sensitivity_peak=max(m.sensitivity_peak for m in margins),
@@ -251,7 +249,7 @@ def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
         delay_margin_s=least("delay_margin_s"),
         contact_radius=_contact_radius(scenario, thresholds),
         following_lag_m=following_lag(scenario),
-        settling_s=4.0 / slowest,
+        settling_s=motion.settling_s,
         largest_law_stiffness_n_m=largest_contact_stiffness(scenario) - K_r,
     )
 
@@ -361,7 +359,7 @@ def _meets(scenario: Scenario, thresholds: GainThresholds) -> bool:
 
 
 def _contact_radius(scenario: Scenario, thresholds: GainThresholds) -> float:
-    total = scenario.follower.attraction.stiffness_n_m + law_stiffness(scenario)
-    return contact_spectral_radius(
-        scenario, total, latency_ticks=thresholds.spare_ticks
-    )
+    total = scenario.follower.attraction.stiffness_n_m
+    total += radial_law(scenario).stiffest_n_m
+    model = contact_model(scenario, total, latency_ticks=thresholds.spare_ticks)
+    return model.spectral_radius

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,11 +17,8 @@ from analysis.linear.robustness import (
     PoleFunction,
     PoleSensitivity,
     UncertainParameter,
-    continuous,
-    damping_ratio,
     pole_cloud,
     pole_sensitivities,
-    slowest_pole,
 )
 from analysis.reporting.criterion import Criterion
 from analysis.reporting.plain_values import pick
@@ -40,11 +36,6 @@ class LoopRobustness:
 
     cloud: PoleCloud
     sensitivities: tuple[PoleSensitivity, ...]
-
-    @property
-    def worst_growth_per_s(self) -> float:
-        """Growth rate for the worst parameter values, 1/s."""
-        return math.log(self.cloud.worst_radius) / self.cloud.period_s
 
 
 def loop_robustness(
@@ -114,8 +105,7 @@ def _document(data: LoopRobustness) -> dict[str, Any]:
 
 def _show(data: LoopRobustness) -> list[Content]:
     cloud = data.cloud
-    slowest = slowest_pole(cloud.worst_poles)
-    rate = continuous(slowest, cloud.period_s).real
+    rate = cloud.worst_growth_per_s
     boxes: list[list[Cell]] = [
         [
             f"{p.symbol}, `{p.name}`",
@@ -128,7 +118,7 @@ def _show(data: LoopRobustness) -> list[Content]:
         ]
         for p in cloud.parameters
     ]
-    nominal = damping_ratio(slowest_pole(cloud.nominal_poles), cloud.period_s)
+    nominal = cloud.nominal_damping_ratio
     shares: list[list[Cell]] = [
         [
             row.parameter.symbol,
@@ -185,7 +175,7 @@ ROBUSTNESS = Part[LoopRobustness](
             "it stays stable for all parameters in their ranges",
             "some parameters in their ranges make it unstable",
             "stability over the ranges of all parameters",
-            lambda data: data.worst_growth_per_s,
+            lambda data: data.cloud.worst_growth_per_s,
         ),
     ),
     document=_document,
@@ -203,7 +193,7 @@ CONTACT_ROBUSTNESS = Part[LoopRobustness](
             "it comes to rest before an obstacle for all parameters in their ranges",
             "some parameters in their ranges make it swing where the law is stiffest",
             "stability over the ranges of all parameters",
-            lambda data: data.worst_growth_per_s,
+            lambda data: data.cloud.worst_growth_per_s,
         ),
     ),
     document=_document,

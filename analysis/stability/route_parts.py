@@ -50,17 +50,16 @@ _MARGINS = (
 def _frozen_document(data: Sequence[FrozenPoint]) -> list[dict[str, Any]]:
     return [
         {
-            **pick(
-                point, "at", "stiffness_n_m", "damping_n_s_m", "poles",
-                "growth_per_s", "damping_ratio",
-            ),
+            **pick(point, "at", "stiffness_n_m", "damping_n_s_m"),
+            "poles": point.model.s_poles,
+            **pick(point.model, "growth_per_s", "damping_ratio"),
             "margins": {
                 axis: pick(margins, *_MARGINS)
                 for axis, margins in point.margins.items()
             },
         }
         for point in data
-    ]  # fmt: skip
+    ]
 
 
 def _show_frozen(data: Sequence[FrozenPoint]) -> list[Content]:
@@ -70,8 +69,8 @@ def _show_frozen(data: Sequence[FrozenPoint]) -> list[Content]:
             point.stiffness_n_m,
             point.damping_n_s_m,
             ", ".join(_poles_of(point)),
-            point.growth_per_s,
-            point.damping_ratio,
+            point.model.growth_per_s,
+            point.model.damping_ratio,
         ]
         for point in data
     ]
@@ -115,7 +114,7 @@ def _show_frozen(data: Sequence[FrozenPoint]) -> list[Content]:
 
 def _poles_of(point: FrozenPoint) -> list[str]:
     """Returns the poles as texts, slowest first; of a conjugate pair only one pole."""
-    poles = sorted(point.poles.tolist(), key=lambda pole: -pole.real)
+    poles = sorted(point.model.s_poles.tolist(), key=lambda pole: -pole.real)
     shown = [pole for pole in poles if pole.imag >= -1e-9]
     return [number(p if abs(p.imag) > 1e-9 else p.real) for p in shown]
 
@@ -140,21 +139,23 @@ FROZEN_GAINS = Part[Sequence[FrozenPoint]](
             "small deviations die out, on the route, at rest and before a wall",
             "small deviations grow, on the route, at rest or before a wall",
             "stability",
-            lambda data: max(point.growth_per_s for point in data),
+            lambda data: max(point.model.growth_per_s for point in data),
         ),
         Criterion(
             "damping ratio out of contact", "", "at least", WELL_DAMPED,
             "it hardly overshoots its target",
             "it overshoots its target",
             "set by this project: 5 % of overshoot",
-            lambda data: min(p.damping_ratio for p in data if p.at.wall_m is None),
+            lambda data: min(
+                point.model.damping_ratio for point in data if point.at.wall_m is None
+            ),
         ),
         Criterion(
             "least damping ratio", "", "at least", 0.4,
             "it does not swing before a wall either",
             "somewhere in the zone of a wall it swings for several cycles",
             "usual: 0.4 to 0.8 (Astrom and Murray)",
-            lambda data: min(point.damping_ratio for point in data),
+            lambda data: min(point.model.damping_ratio for point in data),
         ),
         Criterion(
             "least phase margin", "deg", "at least", 45.0,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.laws.radial_law import radial_law
 from analysis.linear.burst_cycle import (
     HOLDS,
     BurstCycle,
@@ -22,11 +23,10 @@ from analysis.linear.burst_gaps import GapChart, gap_chart
 from analysis.linear.contact_mode import (
     ContactLimits,
     contact_limits,
-    contact_spectral_radius,
+    contact_model,
 )
 from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
 from analysis.linear.delayed_run import DelayCheck, check_delay_margin
-from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.linear.root_locus import RootLocus, root_loci
 from analysis.linear.sampled_stability import (
     ConditionCheck,
@@ -382,12 +382,11 @@ def contact_growth(scenario: Scenario, ticks: int) -> float | None:
         The growth rate in 1/s, negative if the motion decays. If the law does not push
         away from obstacles, None.
     """
-    stiffness = law_stiffness(scenario)
+    stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:
         return None
     total = scenario.follower.attraction.stiffness_n_m + stiffness
-    radius = contact_spectral_radius(scenario, total, latency_ticks=ticks)
-    return math.log(radius) / scenario.tick_s
+    return contact_model(scenario, total, latency_ticks=ticks).growth_per_s
 
 
 def _contact_mode(study: Study) -> ContactMode:

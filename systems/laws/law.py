@@ -48,10 +48,6 @@ class Tuning:
     ``matched`` is the rule of the active law of 2019. It suits laws with the same gains
     as that law.
     """
-    stiffest: Callable[[Any, float], float]
-    """Function that returns the largest slope -df/dc of the force for an obstacle at
-    rest, N/m. Its arguments are the gains and the least range of the sensors in m.
-    """
     spring_speed: Callable[[Any], float] = _always_at_rest
     """Function of the gains. It returns the speed s, m/s, at which the force f(c, s)
     consists only of its spring term.

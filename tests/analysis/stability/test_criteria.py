@@ -76,8 +76,7 @@ def sampled(*delays_s):
 
 
 def uncertain(growth_per_s):
-    cloud = Made(worst_radius=math.exp(growth_per_s * T), period_s=T)
-    return LoopRobustness(cloud, ())
+    return LoopRobustness(Made(worst_growth_per_s=growth_per_s), ())
 
 
 def certified(start, collisions=3):
