@@ -23,7 +23,7 @@ from systems.safety.free_space import (
     move_window,
     see,
 )
-from systems.safety.parameters import GuardParameters
+from systems.safety.parameters import START_BUBBLE_M, GuardParameters
 from systems.safety.views import (
     PlaceError,
     Sectors,
@@ -173,7 +173,7 @@ class FreeSpaceMap(Block):
     pulses, and the travel of each wheel has the relative error ``wheel_error``. The
     block enters each reading in the control period in which the sensor fires.
 
-    At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
+    At the start, a disc around the axle with the radius ``START_BUBBLE_M`` counts as
     free. The disc that contains the body counts as free in every period, because
     ``MotionGuard`` keeps this disc free.
 
@@ -181,7 +181,7 @@ class FreeSpaceMap(Block):
     a function of the state and the present inputs in every period. There is no latency.
 
     Args:
-        parameters: Cells, start bubble, and errors of positions.
+        parameters: Cells, and errors of positions.
         sensors: Positions, apertures, ranges, and noise of the sensors.
         robot: Body, and position of the control point P.
         odometry: Pulses of the encoders.
@@ -189,7 +189,7 @@ class FreeSpaceMap(Block):
         tick_s: Control period, s.
 
     Raises:
-        InputError: The start bubble is too small for the robot.
+        InputError: The robot is too large for the start bubble.
 
     Reference: our own work; docs/guard.md has the theorem that depends on this block.
     """
@@ -239,7 +239,7 @@ class FreeSpaceMap(Block):
             place_error,
             least_way,
             body_radius(robot),
-            parameters.start_bubble_m,
+            START_BUBBLE_M,
             tick_s,
             sensors.round_ticks(tick_s),
         )

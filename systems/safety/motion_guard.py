@@ -26,7 +26,7 @@ from systems.safety.braking import (
     danger_of,
     rolled_speeds,
 )
-from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
+from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M, GuardParameters
 from systems.safety.views import stopping_way, tick_parts
 
 #: Sizes of the four parts of the state: velocity of P, wheel speeds, report, and
@@ -117,7 +117,7 @@ class MotionGuard(Block):
     The block replaces ``WheelCommand``. It has the same input and converts the command
     of the law to wheel speeds. The block passes these wheel speeds for one control
     period if the robot can brake to rest after this period. A disc around the axle
-    contains the body. Until the robot is at rest, this disc has to stay ``margin_m``
+    contains the body. Until the robot is at rest, this disc has to stay ``MARGIN_M``
     away from all cells that are not known to be free.
 
     If this condition does not hold, the block passes lower speeds along the same curve.
@@ -125,7 +125,7 @@ class MotionGuard(Block):
     brakes. The virtual mass moves with the command that the guard passes.
 
     If ``obstacle_speed_m_s`` is above zero, the block assumes that obstacles in the
-    sensors' view come nearer at this speed. The disc then also has to stay ``margin_m``
+    sensors' view come nearer at this speed. The disc then also has to stay ``MARGIN_M``
     away from all points that such obstacles may reach. This second condition does not
     apply while the robot withdraws from the obstacles.
 
@@ -210,7 +210,7 @@ def _numbers(
     tick_s: float,
 ) -> GuardNumbers:
     radius = body_radius(robot) + own.place_error_m
-    keep = radius + own.margin_m
+    keep = radius + MARGIN_M
     parts = tick_parts(tick_s)
     braking = BrakingNumbers(
         robot.wheel_radius_m,

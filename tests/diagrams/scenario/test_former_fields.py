@@ -33,7 +33,7 @@ name: cart
 law: guarded
 compass: {noise_deg: 0.5}
 repulsion: {velocity_term: closing, active: {reach_m: 0.7}}
-guard: {margin_m: 0.01}
+guard: {margin_m: 0.006, place_error_m: 0.01}
 free_space: {cell_m: 0.04, window_m: 12.8}
 tdoa: {maximum_misfit: 0.05}
 integrator: {step_s: 0.005, scheme: runge_kutta5}
@@ -48,7 +48,7 @@ name: cart
 law: guarded
 collision_vector: {velocity_term: closing}
 laws: {active: {reach_m: 0.7}}
-guard: {margin_m: 0.01, cell_m: 0.04}
+guard: {place_error_m: 0.01, cell_m: 0.04}
 integration_step_s: 0.005
 faults:
   - {sensor: microphones, number: 2, kind: dead, start_s: 1.5}

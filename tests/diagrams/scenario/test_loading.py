@@ -59,7 +59,7 @@ laws: {conventional: {damping_n_s_m: 0.9}}
 robot: {mass_kg: 5}
 plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
 odometry: {rounding: false}
-guard: {margin_m: 0.02, cell_m: 0.04}
+guard: {wheel_error: 0.001, cell_m: 0.04}
 integration_step_s: 0.005
 faults: [{sensor: ultrasonic, number: 2, kind: noisy, start_s: 1}]
 """

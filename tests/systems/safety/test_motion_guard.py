@@ -125,23 +125,18 @@ def test_what_it_changes_the_virtual_mass_moves_by(bench):
     np.testing.assert_allclose(state[:2], expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("fields", [{"margin_m": 0.002}, {"start_bubble_m": 3.3}])
-def test_a_margin_below_the_least_and_a_bubble_beyond_the_map_are_refused(fields):
-    with pytest.raises(ValueError, match=next(iter(fields))):
-        GuardParameters(**fields)
-
-
-def test_a_bubble_that_is_too_small_for_the_body_is_refused():
-    with pytest.raises(InputError) as error:
-        FreeSpaceMap(parameters=GuardParameters(start_bubble_m=0.5))
-    assert error.value.field == "start_bubble_m"
+def test_a_body_that_is_too_large_for_the_bubble_is_refused():
+    """The corners of a body 1.85 m wide are more than 0.92 m from the axle."""
+    with pytest.raises(InputError, match="two cells") as error:
+        FreeSpaceMap(robot=RobotParameters(width_m=1.85))
+    assert error.value.field == "guard"
 
 
 @pytest.mark.parametrize(
     ("overrides", "field"),
     [
         (["obstacle_sensing=ideal"], "obstacle_sensing"),
-        (["guard.start_bubble_m=0.5"], "guard.start_bubble_m"),
+        (["robot.width_m=1.85"], "guard"),
         (
             ["ultrasonic.sensors=[{axis_deg: 60}, {axis_deg: -60}]"],
             "ultrasonic.sensors",
