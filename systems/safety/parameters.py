@@ -24,7 +24,8 @@ MARGIN_M = 0.006
 LEAST_MARGIN_M = 0.003
 #: Side of the square that the map remembers, m. The square moves along with the robot.
 WINDOW_M = 12.8
-#: Radius of the disc around the axle that counts as free at the start (start bubble), m.
+#: Radius of the start bubble, the disc around the axle that counts as free at the
+#: start, m.
 START_BUBBLE_M = 1.0
 
 
@@ -66,7 +67,7 @@ class GuardParameters(Parameters):
             raise InputError(
                 "guard",
                 f"assumes that a disc of {START_BUBBLE_M:g} m around the axle is free "
-                f"at the start, but the body turns within {radius:.3g} m, and two cells "
-                f"of {self.cell_m:g} m do not fit beside it; leave guard out, or lower "
-                "guard.cell_m or the size of the body",
+                f"at the start, but the body turns within {radius:.3g} m, and two "
+                f"cells of {self.cell_m:g} m do not fit beside it; leave guard out, or "
+                "lower guard.cell_m or the size of the body",
             )
