@@ -124,7 +124,7 @@ class PlainLoop:
         return np.array(states)
 
     def _odometry(self, pose: Any, angles: Any, true_angles: Any, wheels: Any) -> Any:
-        pulses = self.scenario.only.odometry.pulses_per_revolution
+        pulses = self.scenario.only.plant.pulses_per_revolution
         now = [encoder_angle(angle, pulses) for angle in true_angles]
         steps = (now[0] - angles[0], now[1] - angles[1])
         robot = self.scenario.only.robot

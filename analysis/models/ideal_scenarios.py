@@ -18,7 +18,7 @@ _ALL_IDEAL: dict[str, Any] = {
         "bearing_noise_deg": 0.0,
         "range_noise_fraction": 0.0,
     },
-    "odometry": {"rounding": False},
+    "plant": {"pulses_per_revolution": None},
     # A guard that passes the law's command does not change the loop.
     "guard": None,
 }
@@ -128,8 +128,8 @@ def require_ideal(scenario: Scenario) -> None:
             "'ultrasonic' has no linear model, because ranges of cones jump",
         ),
         (
-            not scenario.only.odometry.rounding,
-            "odometry.rounding",
+            scenario.only.plant.pulses_per_revolution is None,
+            "plant.pulses_per_revolution",
             "a rounded wheel angle has no derivative",
         ),
         (

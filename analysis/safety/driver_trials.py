@@ -191,12 +191,12 @@ VARIANTS: dict[str, dict[str, Any]] = {
 #: All settings. Unless ``draw_trial`` gets a setting, it uses only ``VARIANTS``.
 SETTINGS = {
     **VARIANTS,
-    "encoders not rounded": {"odometry": {"rounding": False}},
+    "encoders not rounded": {"plant": {"pulses_per_revolution": None}},
     "slip apart, known to 10 cm": {
         "plant": {"slip": (0.005, -0.005)},
         "guard": {"wheel_error": 0.005, "place_error_m": 0.1},
     },
-    "encoders of 650 pulses": {"odometry": {"pulses_per_revolution": 650}},
+    "encoders of 650 pulses": {"plant": {"pulses_per_revolution": 650}},
 }
 
 

@@ -210,7 +210,6 @@ def robot_blocks(
         ),
         WheelOdometry(
             robot=robot.robot,
-            odometry=robot.odometry,
             faults=robot.faults,
             plant=robot.plant,
             initial_pose=robot.start.pose,
@@ -247,7 +246,7 @@ def make_robot(
 
     The robot can have simulated sensors or ideal sensors, as the fields ``hearing`` and
     ``obstacle_sensing`` state. Both kinds of blocks have the same ports. If both fields
-    are ``ideal`` and ``odometry.rounding`` is off, Drake can convert the diagram to
+    are ``ideal`` and ``plant.pulses_per_revolution`` is null, Drake can convert the diagram to
     AutoDiffXd. Each input of a block connects to the only output with the same name
     (see docs/model.md).
 

@@ -161,6 +161,7 @@ def _robots_and_sources(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, A
 
 def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
     _renew_safety_filter(fields)
+    _renew_rounding(fields)
     for former in former_fields():
         path = former.path
         if where.startswith("sources."):
@@ -193,6 +194,14 @@ def _renew_safety_filter(fields: Mapping[str, Any]) -> None:
         if isinstance(adaptive, dict) and "safety_filter" in adaptive:
             given = adaptive["safety_filter"]
             adaptive["safety_filter"] = given is not None and given is not False
+
+
+def _renew_rounding(fields: dict[str, Any]) -> None:
+    """Replaces encoders that do not round angles by encoders without pulses."""
+    odometry = fields.get("odometry")
+    if isinstance(odometry, dict) and odometry.get("rounding") is False:
+        fields["odometry"] = {**odometry, "pulses_per_revolution": None}
+        del fields["odometry"]["rounding"]
 
 
 def _renewed_faults(where: str, fields: dict[str, Any]) -> Iterator[str]:

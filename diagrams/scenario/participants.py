@@ -24,7 +24,7 @@ from pydantic import (
 
 from diagrams.scenario.suggestions import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
-from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.faults import Faults, FaultySensor, faults_of
 from systems.framework.input_error import InputError
@@ -129,7 +129,6 @@ class Robot(Parameters):
     of sound."""
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
-    odometry: OdometryParameters = OdometryParameters()
     faults: Faults = ()
     """Sensors that fail during a run."""
 

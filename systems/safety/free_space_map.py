@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.lagged_motion import lagged_motion
-from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
@@ -184,8 +184,7 @@ class FreeSpaceMap(Block):
         parameters: Cells, and errors of positions.
         sensors: Positions, apertures, ranges, and noise of the sensors.
         robot: Body, and position of the control point P.
-        odometry: Pulses of the encoders.
-        plant: Lag of the motors.
+        plant: Lag of the motors, and pulses of the encoders.
         tick_s: Control period, s.
 
     Raises:
@@ -210,7 +209,6 @@ class FreeSpaceMap(Block):
         parameters: GuardParameters = GuardParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
         robot: RobotParameters = RobotParameters(),
-        odometry: OdometryParameters = OdometryParameters(),
         plant: PlantParameters = PlantParameters(),
         tick_s: float = TICK_S,
     ) -> None:
@@ -218,7 +216,7 @@ class FreeSpaceMap(Block):
         parameters.check(robot)
         self.set_name("free_space_map")
         axes, places, half_angles = sensors.beams
-        place_error = PlaceError.of(parameters, robot, odometry)
+        place_error = PlaceError.of(parameters, robot, plant)
         least_way = 0.0
         if place_error.pulse_m > 0.0:
             motion = lagged_motion(tick_s, plant.motor_lag_s)

@@ -173,7 +173,6 @@ def _obstacle_sensing(
             parameters=robot.own_map,
             sensors=robot.ultrasonic,
             robot=robot.robot,
-            odometry=robot.odometry,
             plant=robot.plant,
             tick_s=scenario.tick_s,
         )

@@ -89,7 +89,7 @@ def _check_memory(
     """
     body = robot.robot
     stopping = stopping_way(guard, body, robot.plant, tick_s)
-    error = PlaceError.of(guard, body, robot.odometry)
+    error = PlaceError.of(guard, body, robot.plant)
     distance = body_radius(body) + stopping
     needed = place_error(distance, stopping, error)
     if needed > guard.place_error_m:

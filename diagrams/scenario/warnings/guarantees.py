@@ -318,7 +318,7 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
     guard, robot, plant = own.own_guard, own.robot, own.plant
     assert guard is not None
     stopping = stopping_way(guard, robot, plant, tick_s)
-    error = PlaceError.of(guard, robot, scenario.only.odometry)
+    error = PlaceError.of(guard, robot, plant)
     lost = place_error(body_radius(robot) + stopping, stopping, error)
     slip = max(map(abs, plant.slip))
     grip = math.inf if plant.friction is None else plant.friction

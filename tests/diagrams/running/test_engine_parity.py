@@ -41,7 +41,7 @@ OTHERS = {
 FAST = {"tick_s": 0.0125, "microphones.frame_s": 0.05, "ultrasonic.period_s": 0.0375}
 WHEELS = {
     "plant.slip": [0.02, -0.01],
-    "odometry.pulses_per_revolution": 1000,
+    "plant.pulses_per_revolution": 1000,
 }
 AIR = {
     "wind.meander_intensity": 0.2,
@@ -142,7 +142,7 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "ideal_hearing.bearing_noise_deg": 2.0,
             "ultrasonic.preset": "lidar",
             "ultrasonic.dropout_probability": 0.02,
-            "odometry.rounding": False,
+            "plant.pulses_per_revolution": None,
         },
     ),
     "dwa": (

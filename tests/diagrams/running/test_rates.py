@@ -13,7 +13,7 @@ EXACT = {
     "hearing": "ideal",
     "obstacle_sensing": "ideal",
     "ideal_hearing": {"burst_gaps": False},
-    "odometry": {"rounding": False},
+    "plant": {"pulses_per_revolution": None},
     "law": "none",
     "obstacles": [],
 }

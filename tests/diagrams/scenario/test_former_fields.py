@@ -38,7 +38,7 @@ free_space: {cell_m: 0.04, window_m: 12.8}
 tdoa: {maximum_misfit: 0.05}
 integrator: {step_s: 0.005, scheme: runge_kutta5}
 microphones: {faults: [{microphone: 2, start_s: 1.5}]}
-odometry: {lost_at_s: 3.0}
+odometry: {lost_at_s: 3.0, rounding: false, pulses_per_revolution: 650}
 """,
         "utf-8",
     )
@@ -50,6 +50,7 @@ collision_vector: {velocity_term: closing}
 laws: {active: {reach_m: 0.7}}
 guard: {place_error_m: 0.01, cell_m: 0.04}
 integration_step_s: 0.005
+plant: {pulses_per_revolution: null}
 faults:
   - {sensor: microphones, number: 2, kind: dead, start_s: 1.5}
   - {sensor: odometry, kind: lost, start_s: 3.0}

@@ -57,8 +57,7 @@ collision_vector: {aggregation: sum, velocity_term: closing}
 attraction: {follow_distance_m: 0.6, damping_n_s_m: 4}
 laws: {conventional: {damping_n_s_m: 0.9}}
 robot: {mass_kg: 5}
-plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
-odometry: {rounding: false}
+plant: {motor_lag_s: 0.1, slip: [0.1, 0], pulses_per_revolution: null}
 guard: {wheel_error: 0.001, cell_m: 0.04}
 integration_step_s: 0.005
 faults: [{sensor: ultrasonic, number: 2, kind: noisy, start_s: 1}]
@@ -230,7 +229,7 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("duration_s=.inf", "duration_s", "finite"),
         ("seed=1.5", "seed", "valid integer"),
         ("hearing=ears", "hearing", "'audio' or 'ideal'"),
-        ("odometry.rounding=1", "odometry.rounding", "valid boolean"),
+        ("tdoa.suppress_echoes=1", "tdoa.suppress_echoes", "valid boolean"),
         ("arena_m=[1]", "arena_m.1", "is missing; set it"),
         ("arena_m=[1, -1]", "arena_m.1", "greater than"),
         ("start.position_m=[0, .nan]", "start.position_m.1", "finite"),

@@ -53,7 +53,7 @@ def scenario(name: str) -> Scenario:
             f"law={name}",
             "hearing=ideal",
             "obstacle_sensing=ideal",
-            "odometry.rounding=false",
+            "plant.pulses_per_revolution=null",
             "ideal_hearing.burst_gaps=false",
         ],
     )
