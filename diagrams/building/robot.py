@@ -246,9 +246,9 @@ def make_robot(
 
     The robot can have simulated sensors or ideal sensors, as the fields ``hearing`` and
     ``obstacle_sensing`` state. Both kinds of blocks have the same ports. If both fields
-    are ``ideal`` and ``plant.pulses_per_revolution`` is null, Drake can convert the diagram to
-    AutoDiffXd. Each input of a block connects to the only output with the same name
-    (see docs/model.md).
+    are ``ideal`` and ``plant.pulses_per_revolution`` is null, Drake can convert the
+    diagram to AutoDiffXd. Each input of a block connects to the only output with the
+    same name (see docs/model.md).
 
     The diagram can have the following inputs. Only those that the blocks need exist:
 
