@@ -76,7 +76,8 @@ def renewed(data: dict[str, Any]) -> dict[str, Any]:
     """
     notes: dict[str, None] = {}
     for where, fields in _robots_and_sources(data):
-        notes |= dict.fromkeys(_renewed(where, fields))
+        law = fields.get("law", data.get("law"))
+        notes |= dict.fromkeys(_renewed(where, fields, law))
     if notes:
         _drop_groups_of_other_kinds(data)
         _LOGGER.warning("fields of the previous version: %s", "; ".join(notes))
@@ -159,7 +160,7 @@ def _robots_and_sources(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, A
                 yield f"{group}.{name}.", own
 
 
-def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
+def _renewed(where: str, fields: dict[str, Any], law: Any) -> Iterator[str]:
     _renew_safety_filter(fields)
     _renew_rounding(fields)
     for former in former_fields():
@@ -173,6 +174,8 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
             continue
         if former.new.startswith("guard.") and not _has_guard(fields):
             yield f"{where}{path} has no effect without a guard"
+        elif former.new.startswith("impedance.") and path.split(".")[1] != law:
+            yield f"{where}{path} has no effect with law {law!r}"
         elif former.new:
             _put(fields, former.new.split("."), value)
             yield f"{where}{path} is now {former.new}"

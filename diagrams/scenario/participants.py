@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -36,7 +37,10 @@ from systems.hearing.parameters import (
     TrackerParameters,
 )
 from systems.laws.catalogue import LAWS
-from systems.laws.parameters import AttractionParameters
+from systems.laws.parameters import AttractionParameters, ImpedanceParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 from systems.odor.parameters import (
     GAS_SENSORS,
     AirflowParameters,
@@ -257,6 +261,7 @@ class Router(Robot):
     """``ultrasonic``: sensors with cones; ``ideal``: exact objects."""
     ultrasonic: UltrasonicParameters = UltrasonicParameters()
     route: RouteParameters
+    impedance: ImpedanceParameters = ImpedanceParameters()
     laws: LawGains = LawGains()
     """Gains by law. Only the gains of the robot's law have an effect."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
@@ -276,10 +281,16 @@ class Router(Robot):
         """Number of sensors of each kind that can fail."""
         return super().sensor_counts | {"ultrasonic": self.ultrasonic.count}
 
-    @property
+    @cached_property
     def gains(self) -> Any:
-        """Gains of the robot's control law; None for a law without gains."""
-        return getattr(self.laws, self.law, None)
+        """Parameters of the control law: ``impedance`` and the law's own in ``laws``.
+
+        A value that is null in ``impedance`` is the default of the law.
+        """
+        law = LAWS.get(self.law)
+        model = (law and law.impedance) or TrajectoryImpedanceParameters
+        given = {name: v for name, v in self.impedance if v is not None}
+        return model(**given, **dict(getattr(self.laws, self.law, None) or ()))
 
 
 class OdorSearcher(Robot):

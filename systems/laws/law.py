@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any, Literal
 
 from systems.framework.parameters import Parameters
+from systems.laws.parameters import ImpedanceParameters
 
 #: Columns of the port ``forces_W`` of a law's block.
 FORCE_COLUMNS = "attraction_x", "attraction_y", "repulsion_x", "repulsion_y"
@@ -84,7 +85,10 @@ class Law:
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
-    """Model of the gains. Every field has a default."""
+    """Model of the gains in ``laws.<name>``. Every field has a default."""
+    impedance: type[ImpedanceParameters] | None = None
+    """Model of all parameters of a law on planned routes: those in ``impedance`` and
+    those in ``laws.<name>``."""
     controller_name: str = ""
     """Name of the class of the law's block in ``systems``. If the name is empty, the
     block ``RadialLawController`` computes the force."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from systems.framework.parameters import NonNegative
+from systems.framework.parameters import NonNegative, Parameters
 from systems.laws.law import Equation
 from systems.laws.trajectory.trajectory_conventional import (
     TrajectoryImpedanceParameters,
@@ -12,8 +12,8 @@ from systems.laws.trajectory.trajectory_conventional import (
 )
 
 
-class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
-    """Parameters of the adaptive law. The paper prints no rates and no limits."""
+class AdaptationParameters(Parameters):
+    """Parameters of the adaptation. The paper prints no rates and no limits."""
 
     rule: Literal["lyapunov", "sensitivity"] = "lyapunov"
     """Rule that adapts the gains.
@@ -34,8 +34,8 @@ class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
 
     Eq. 27 of Engelbrecht 2021 prints the term lambda/2 (d_sec^2 - d^2) for each object.
     Here the term is lambda/2 max(0, S - d)^2. d is the distance of the object, and S is
-    ``security_zone_m``. The gradient of the term is -lambda (S - d) n, where n is the
-    unit vector from the object to P.
+    ``impedance.security_zone_m``. The gradient of the term is -lambda (S - d) n, where
+    n is the unit vector from the object to P.
 
     The term has an effect only with ``rule: sensitivity``. Without the term, a robot
     with adaptive gains collides more often than a robot with fixed gains."""
@@ -44,6 +44,10 @@ class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
     from 0.5 to 24 N/m."""
     safety_filter: bool = False
     """Whether ``SafetyFilter`` keeps P away from objects, whatever the gains."""
+
+
+class AdaptiveTrajectoryParameters(AdaptationParameters, TrajectoryImpedanceParameters):
+    """Parameters of the adaptive law. The paper prints no rates and no limits."""
 
     @property
     def damping_fades(self) -> bool:
@@ -62,4 +66,5 @@ TRAJECTORY_ADAPTIVE = trajectory_law(
         r"\dot{D}=\frac{\gamma}{M}e_v\cdot(v-v_d)",
         "K' = (gamma/M) e_v . (p - p_d), D' = (gamma/M) e_v . (v - v_d)",
     ),
+    gains=AdaptationParameters,
 )

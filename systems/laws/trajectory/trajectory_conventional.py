@@ -2,43 +2,18 @@
 
 from __future__ import annotations
 
-from systems.framework.parameters import (
-    Damping,
-    Length,
-    NonNegativeDamping,
-    NonNegativeStiffness,
-    Parameters,
-    Stiffness,
-)
+from systems.framework.parameters import Length, NonNegativeStiffness, Parameters
 from systems.laws.law import Equation, Law
+from systems.laws.parameters import ImpedanceParameters
 
 
-class TrajectoryImpedanceParameters(Parameters):
-    """Springs and dampers that act from the target and from contacts.
+class TrajectoryImpedanceParameters(ImpedanceParameters):
+    """Springs and dampers that act from the target and from contacts."""
 
-    K, D, and S have the values of tables 1 and 2 of Engelbrecht, Steyn and Djouani
-    (2021). The paper prints only one stiffness K and one damping D. Contacts have the
-    same values by default: K_e = K and D_e = D.
-    """
-
-    stiffness_n_m: Stiffness = 3.0
-    """Stiffness K to the target, N/m (tables 1 and 2)."""
-    damping_n_s_m: Damping = 4.0
-    """Damping D to the target, N s/m (tables 1 and 2)."""
     contact_stiffness_n_m: NonNegativeStiffness = 3.0
     """Stiffness K_e to robots and obstacles, N/m."""
-    contact_damping_n_s_m: NonNegativeDamping = 4.0
-    """Damping D_e to robots and obstacles, N s/m."""
     security_zone_m: Length = 1.0
     """Distance S from P at which contacts begin, m (1 m in tables 1 and 2)."""
-    block_distance_m: Length | None = None
-    """Distance L_block of eq. 6 of Engelbrecht 2021, m. With null, eq. 6 is off.
-
-    The control point P stops if two conditions hold. The next step of P would end
-    within this distance of an object. The step would not lead away from the object.
-
-    The paper prints no value. A distance of 0.2 m is enough for ``turtlebot3_burger``,
-    whose rear corners are 0.174 m from P."""
 
     @property
     def damping_fades(self) -> bool:
@@ -54,8 +29,9 @@ def trajectory_law(
     name: str,
     title: str,
     label: str,
-    gains: type[TrajectoryImpedanceParameters],
+    impedance: type[TrajectoryImpedanceParameters],
     *more: Equation,
+    gains: type[Parameters] | None = None,
 ) -> Law:
     """Makes the record of a law whose block is ``TrajectoryImpedanceController``.
 
@@ -63,8 +39,9 @@ def trajectory_law(
         name: Name of the law in scenarios.
         title: Heading in reports.
         label: Label in the legends of pictures.
-        gains: Model of the gains.
+        impedance: Model of the parameters of the block.
         *more: Equations that follow the equation of motion.
+        gains: Model of those parameters that only this law has.
 
     Returns:
         Record of the law.
@@ -80,6 +57,7 @@ def trajectory_law(
         label=label,
         equations=(motion, *more),
         gains=gains,
+        impedance=impedance,
         controller_name="TrajectoryImpedanceController",
         robot="router",
     )

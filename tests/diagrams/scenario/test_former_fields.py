@@ -60,6 +60,25 @@ faults:
     assert load_scenario(former) == load_scenario(now)
 
 
+def test_the_impedance_is_that_of_the_robots_law(tmp_path):
+    """The previous version had it for each law, with all values in a saved file."""
+    file = tmp_path / "old.yaml"
+    file.write_text(
+        """
+law: trajectory_filtered
+route: {goal_m: [4, 0]}
+laws:
+  trajectory_conventional: {security_zone_m: 0.7, stiffness_n_m: 5}
+  trajectory_filtered: {contact_stiffness_n_m: 9}
+""",
+        "utf-8",
+    )
+    own = load_scenario(file).router.gains
+    assert own.stiffness_n_m == 3.0
+    assert own.security_zone_m == 0.8
+    assert own.contact_stiffness_n_m == 9.0
+
+
 def test_a_map_without_a_guard_makes_no_guard(tmp_path):
     file = tmp_path / "old.yaml"
     file.write_text("free_space: {cell_m: 0.04}\n", "utf-8")
