@@ -163,6 +163,7 @@ def _robots_and_sources(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, A
 def _renewed(where: str, fields: dict[str, Any], law: Any) -> Iterator[str]:
     _renew_safety_filter(fields)
     _renew_rounding(fields)
+    _renew_gaps(fields)
     for former in former_fields():
         path = former.path
         if where.startswith("sources."):
@@ -205,6 +206,15 @@ def _renew_rounding(fields: dict[str, Any]) -> None:
     if isinstance(odometry, dict) and odometry.get("rounding") is False:
         fields["odometry"] = {**odometry, "pulses_per_revolution": None}
         del fields["odometry"]["rounding"]
+
+
+def _renew_gaps(fields: dict[str, Any]) -> None:
+    """Replaces ideal hearing without gaps by hearing ``ideal_always``."""
+    ideal = fields.get("ideal_hearing")
+    if isinstance(ideal, dict) and ideal.get("burst_gaps") is False:
+        fields["ideal_hearing"] = {**ideal, "burst_gaps": True}
+        if fields.get("hearing") == "ideal":
+            fields["hearing"] = "ideal_always"
 
 
 def _renewed_faults(where: str, fields: dict[str, Any]) -> Iterator[str]:

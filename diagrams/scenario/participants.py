@@ -32,7 +32,6 @@ from systems.framework.input_error import InputError
 from systems.framework.parameters import Angle, Parameters, Point, SoundSpeed
 from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
-    IdealHearingParameters,
     TDOAParameters,
     TrackerParameters,
 )
@@ -188,15 +187,15 @@ class Follower(Robot):
 
     kind: ClassVar[str] = "follower"
 
-    hearing: Literal["audio", "ideal"] = "audio"
-    """``audio``: sound waves and microphones; ``ideal``: exact positions."""
+    hearing: Literal["audio", "ideal", "ideal_always"] = "audio"
+    """``audio``: sound waves and microphones. ``ideal``: exact positions of the source
+    while it sounds. ``ideal_always``: exact positions at all times."""
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
     """``ultrasonic``: sensors with cones; ``ideal``: exact nearest points."""
     follows: str = ""
     """Name of the source or the leader to follow; empty: the first source."""
     microphones: MicArrayParameters = MicArrayParameters()
     tdoa: TDOAParameters = TDOAParameters()
-    ideal_hearing: IdealHearingParameters = IdealHearingParameters()
     tracker: TrackerParameters = TrackerParameters()
     ultrasonic: UltrasonicParameters = UltrasonicParameters()
     collision_vector: CollisionVectorParameters = CollisionVectorParameters()

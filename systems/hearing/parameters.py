@@ -1,4 +1,4 @@
-"""Parameters of the estimators, the tracker and ideal hearing."""
+"""Parameters of the estimator and of the tracker."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from systems.framework.parameters import (
     Angle,
     Duration,
     Frequency,
-    NonNegative,
     Parameters,
 )
 from systems.framework.signals import SAMPLE_RATE_HZ
@@ -74,15 +73,3 @@ class TrackerParameters(Parameters):
     maximum_age_s: Duration = 6.0
     """Longest time since the target was last heard, s. After a longer time, the target
     is lost. The default is three periods of the sound."""
-
-
-class IdealHearingParameters(Parameters):
-    """Imperfections of ideal hearing."""
-
-    burst_gaps: bool = True
-    """Whether the sensor hears only while the source sounds. Off: the sensor hears in
-    every control period."""
-    bearing_noise_deg: NonNegative = 0.0
-    """Standard deviation of a bearing, deg."""
-    range_noise_fraction: NonNegative = 0.0
-    """Standard deviation of a range, as a share of the range."""

@@ -37,8 +37,7 @@ def run_at_wall(law: str, share: float):
         Scenario.model_validate(
             {
                 "law": law,
-                "hearing": "ideal",
-                "ideal_hearing": {"burst_gaps": False},
+                "hearing": "ideal_always",
                 "obstacle_sensing": "ideal",
                 "plant": {"pulses_per_revolution": None},
                 "duration_s": 15.0,

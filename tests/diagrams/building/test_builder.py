@@ -27,10 +27,9 @@ pytestmark = pytest.mark.drake
 
 T = 0.025
 IDEAL: dict[str, Any] = {
-    "hearing": "ideal",
+    "hearing": "ideal_always",
     "obstacle_sensing": "ideal",
     "plant": {"pulses_per_revolution": None},
-    "ideal_hearing": {"burst_gaps": False},
     "ultrasonic": {"noise_m": 0.0},
 }
 COMMON_BLOCKS = {

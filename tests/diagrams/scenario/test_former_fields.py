@@ -32,6 +32,8 @@ def test_a_former_file_gives_the_same_scenario(tmp_path):
 name: cart
 law: guarded
 compass: {noise_deg: 0.5}
+hearing: ideal
+ideal_hearing: {burst_gaps: false, bearing_noise_deg: 0.0}
 repulsion: {velocity_term: closing, active: {reach_m: 0.7}}
 guard: {margin_m: 0.006, place_error_m: 0.01}
 free_space: {cell_m: 0.04, window_m: 12.8}
@@ -46,6 +48,7 @@ odometry: {lost_at_s: 3.0, rounding: false, pulses_per_revolution: 650}
         """
 name: cart
 law: guarded
+hearing: ideal_always
 collision_vector: {velocity_term: closing}
 laws: {active: {reach_m: 0.7}}
 guard: {place_error_m: 0.01, cell_m: 0.04}

@@ -50,7 +50,6 @@ robots:
   second: {hearing: audio, obstacle_sensing: ultrasonic, start: {position_m: [-2, -1]}}
 sound_speed_m_s: 346.5
 assumed_sound_speed_m_s: 340
-ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
 ultrasonic: {noise_m: 0, firing: sequential}
 collision_vector: {aggregation: sum, velocity_term: closing}
@@ -228,7 +227,7 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("duration_s=.nan", "duration_s", "finite"),
         ("duration_s=.inf", "duration_s", "finite"),
         ("seed=1.5", "seed", "valid integer"),
-        ("hearing=ears", "hearing", "'audio' or 'ideal'"),
+        ("hearing=ears", "hearing", "'audio', 'ideal' or 'ideal_always'"),
         ("tdoa.suppress_echoes=1", "tdoa.suppress_echoes", "valid boolean"),
         ("arena_m=[1]", "arena_m.1", "is missing; set it"),
         ("arena_m=[1, -1]", "arena_m.1", "greater than"),
