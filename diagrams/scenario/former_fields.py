@@ -164,6 +164,7 @@ def _renewed(where: str, fields: dict[str, Any], law: Any) -> Iterator[str]:
     _renew_safety_filter(fields)
     _renew_rounding(fields)
     _renew_gaps(fields)
+    _renew_band(fields)
     for former in former_fields():
         path = former.path
         if where.startswith("sources."):
@@ -215,6 +216,19 @@ def _renew_gaps(fields: dict[str, Any]) -> None:
         fields["ideal_hearing"] = {**ideal, "burst_gaps": True}
         if fields.get("hearing") == "ideal":
             fields["hearing"] = "ideal_always"
+
+
+def _renew_band(fields: dict[str, Any]) -> None:
+    """Replaces the ends of the estimator's band by one field."""
+    tdoa = fields.get("tdoa")
+    if not isinstance(tdoa, dict) or "band_hz" in tdoa:
+        return
+    ends = [tdoa.get("low_hz", 300.0), tdoa.get("high_hz", 15_000.0)]
+    kept = {name: v for name, v in tdoa.items() if name not in ("low_hz", "high_hz")}
+    if kept.get("band") == "found":
+        fields["tdoa"] = {**kept, "band": "set", "band_hz": "found"}
+    elif ends != [300.0, 15_000.0]:
+        fields["tdoa"] = {**kept, "band": "set", "band_hz": ends}
 
 
 def _renewed_faults(where: str, fields: dict[str, Any]) -> Iterator[str]:

@@ -53,7 +53,7 @@ from systems.ranging.parameters import (
 from systems.routes.parameters import RouteParameters
 from systems.safety.parameters import GuardParameters
 from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
-from systems.sound.parameters import MicArrayParameters, SoundParameters, channel_skew
+from systems.sound.parameters import MicArrayParameters, SoundParameters
 
 #: Law of a robot that states none.
 DEFAULT_LAW = "active"
@@ -205,11 +205,6 @@ class Follower(Robot):
     """The guard limits the commands of any law, so that the robot stays in space that
     its sensors have seen as free. null: no guard, unless the law is ``guarded``."""
 
-    @model_validator(mode="after")
-    def _check_channels(self) -> Follower:
-        channel_skew(self.microphones, len(self.robot.microphones_m))
-        return self
-
     @property
     def sensor_counts(self) -> dict[FaultySensor, int]:
         """Number of sensors of each kind that can fail."""
@@ -326,11 +321,6 @@ class SoundSearcher(Robot):
     sound_search: SoundSearchParameters = SoundSearchParameters()
     compass: CompassParameters = CompassParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
-
-    @model_validator(mode="after")
-    def _check_channels(self) -> SoundSearcher:
-        channel_skew(self.microphones, len(self.robot.microphones_m))
-        return self
 
     @property
     def sensor_counts(self) -> dict[FaultySensor, int]:

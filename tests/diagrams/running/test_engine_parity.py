@@ -86,9 +86,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
             "microphones.snr_db_at_1m": 15.0,
             "microphones.ego_noise_file": "noise.wav",
             "microphones.ego_noise_snr_db_at_1m": 25.0,
-            "microphones.position_tolerance_m": 0.002,
-            "microphones.delay_tolerance_s": 1e-6,
-            "microphones.gain_tolerance_db": 1.0,
             "faults": [
                 {"sensor": "microphones", "number": 3, "kind": "dead", "start_s": 3.0}
             ],

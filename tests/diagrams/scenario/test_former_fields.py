@@ -37,7 +37,7 @@ ideal_hearing: {burst_gaps: false, bearing_noise_deg: 0.0}
 repulsion: {velocity_term: closing, active: {reach_m: 0.7}}
 guard: {margin_m: 0.006, place_error_m: 0.01}
 free_space: {cell_m: 0.04, window_m: 12.8}
-tdoa: {maximum_misfit: 0.05}
+tdoa: {maximum_misfit: 0.05, low_hz: 400.0, band: set}
 integrator: {step_s: 0.005, scheme: runge_kutta5}
 microphones: {faults: [{microphone: 2, start_s: 1.5}]}
 odometry: {lost_at_s: 3.0, rounding: false, pulses_per_revolution: 650}
@@ -54,6 +54,7 @@ laws: {active: {reach_m: 0.7}}
 guard: {place_error_m: 0.01, cell_m: 0.04}
 integration_step_s: 0.005
 plant: {pulses_per_revolution: null}
+tdoa: {band_hz: [400, 15000]}
 faults:
   - {sensor: microphones, number: 2, kind: dead, start_s: 1.5}
   - {sensor: odometry, kind: lost, start_s: 3.0}
