@@ -121,6 +121,7 @@ class PlainLoop:
 
     def _odometry(self, pose: Any, angles: Any, true_angles: Any, wheels: Any) -> Any:
         pulses = self.scenario.only.plant.pulses_per_revolution
+        assert pulses is not None
         now = [encoder_angle(angle, pulses) for angle in true_angles]
         steps = (now[0] - angles[0], now[1] - angles[1])
         robot = self.scenario.only.robot
