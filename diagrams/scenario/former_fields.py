@@ -103,8 +103,8 @@ def renamed(path: str) -> str:
 def is_constant_now(path: str, value: Any) -> bool:
     """Whether a field has become a constant with the value that a user has given.
 
-    The result is False if the dotted path ``path`` is no constant. If the constant has
-    another value, the function raises an ``InputError``.
+    The result is False if no constant has replaced the field at the dotted path
+    ``path``. If the constant has another value, the function raises an ``InputError``.
     """
     begin = _PREFIX.match(path)
     own = path[begin.end() :] if begin else path

@@ -347,9 +347,9 @@ KINDS: Mapping[str, type[Robot]] = {
 def kind_of(robot: Any) -> str:
     """Returns the kind of a robot, a key of ``KINDS``.
 
-    The kind follows from the control law in the robot's fields, which are a model or
-    plain values. With a user's own law, the robot is a router if its fields contain a
-    route. A router drives on a route.
+    ``robot`` is a ``Robot`` or a mapping of plain values. The kind follows from the
+    control law among its fields. With a user's own law, the robot is a router if its
+    fields contain a route. A router drives on a route.
     """
     if isinstance(robot, Robot):
         return robot.kind

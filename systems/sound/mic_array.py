@@ -63,8 +63,9 @@ class MicArray(Block):
     every ``UPDATE_PERIOD_S`` (0.1 s). In the frame that ends at an update, the
     reflections fade from those of the previous positions to those of the new positions.
 
-    A trial may set four numeric parameters in its context before the first control
-    period (tick). The index of each parameter is a constant of this class:
+    A Monte Carlo trial may set four numeric parameters of the block in the context
+    before the first control period (tick). The index of each parameter is a constant of
+    this class:
 
     - ``POSITION_ERRORS``: (2 n,) x and y of one microphone after the other, m;
     - ``CHANNEL_DELAYS``: (n,) delays, s;

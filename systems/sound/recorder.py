@@ -48,7 +48,7 @@ def record_frame(
             sound.
         time: Present time, s.
         before: Pose (3,), m and rad, and velocity (3,), m/s and rad/s, of the robot in
-            the world frame W one frame ago.
+            the world frame W at the beginning of the audio frame.
         now: Present pose and velocity of the robot, in the form of ``before``.
         array: True array, from ``real_array``.
         parameters: Microphones, amplifier, converter and length of the frame.
