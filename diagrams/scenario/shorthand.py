@@ -323,8 +323,8 @@ def _hoisted(
 def _common(trees: Sequence[Mapping[str, Any]], depth: int = 0) -> dict[str, Any]:
     """Returns the values that are equal in all trees of fields.
 
-    At the top level, a tree without a field does not count, because robots of other
-    kinds lack this field. Groups with different presets have nothing in common.
+    At the top level, a value may be missing in some of the trees, because robots of
+    other kinds lack this field. Groups with different presets have nothing in common.
     """
     found: dict[str, Any] = {}
     for key in dict.fromkeys(key for tree in trees for key in tree):
