@@ -164,9 +164,9 @@ def IdealSourceSensor_(T):
         the outputs of ``TDOAEstimator``. Its discrete state has the position of the
         source relative to the control point P, and ``detected``. The block updates the
         state every audio frame. Its latency is one control period, like that of the
-        estimator, so that the control loop is the same with either block. Like sound,
-        the block reaches 30 m. Unlike the estimator with a row of microphones, the
-        block distinguishes front from back.
+        estimator, so that the control loop is the same with either block. The block
+        detects the source at distances up to 30 m. Unlike the estimator with a row of
+        microphones, the block distinguishes front from back.
 
         Args:
             robot: Distance of P ahead of the axle.

@@ -167,8 +167,8 @@ class Localiser:
         c: Speed of sound, m/s.
         sample_rate_hz: Sample rate of the frames, Hz.
         frame_samples: Samples per channel of a frame.
-        limited: Whether to reject estimates that are not reliable. Off: every estimate
-            counts, as in the papers.
+        limited: Whether to reject estimates that are not reliable. If not, every
+            estimate counts, as in the papers.
 
     Raises:
         InputError: The array cannot be used at this sample rate and band.
@@ -430,9 +430,9 @@ class Localiser:
     ) -> bool:
         """Returns whether two channels of an audio frame repeat each other.
 
-        Without noise, microphones at equal distances from the source record equal
-        samples. If two microphones have equal distances from the centroid, the function
-        therefore does not compare their channels at lag 0 in frames without noise.
+        Two microphones at equal distances from the centroid have equal distances from a
+        source straight ahead. Without noise, they then record equal samples. In frames
+        without noise, the function therefore does not compare their channels at lag 0.
         """
         shape = self.plan.shape
         # A fix without range has the delays of a plane wave. They may differ from those
