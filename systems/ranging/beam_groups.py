@@ -61,9 +61,9 @@ def _is_open(
 ) -> bool:  # pragma: no cover  (compiled)
     """Returns whether a surface may continue beyond its outer hit.
 
-    The outer hit is the hit of the beam ``own``. The next beam, ``other``, has not hit
-    the surface. ``apart`` is the angle between the two beams, rad, or 0 if there is no
-    next beam. There are four cases:
+    The outer hit is the hit of the beam ``own``. The next beam outward is ``other``.
+    ``apart`` is the angle between the two beams, rad, or 0 if there is no next beam.
+    There are four cases:
 
     - If there is no next beam, the surface may continue.
     - If the next beam has a nearer hit, a nearer object may hide the surface, so the

@@ -140,9 +140,9 @@ def next_speed(
 ) -> float:
     """Returns the largest speed from which the target can still stop in time.
 
-    The speed is that at the end of the present tick (control period), and changes
-    linearly during the tick. If no speed lets the target stop in time, the target
-    brakes at the largest deceleration.
+    The result is the speed at the end of the present tick (control period). The speed
+    changes linearly during the tick. If no speed lets the target stop in time, the
+    target brakes at the largest deceleration.
 
     Args:
         speed: Present speed, m/s.

@@ -16,10 +16,10 @@ from systems.laws.law import Equation, Law
 class TrajectoryImpedanceParameters(Parameters):
     """Springs and dampers from the robot to the target and to contacts.
 
-    K and D pull the robot toward the target. K_e and D_e push it away from contacts,
-    which begin at the distance S. K, D, and S have the values of tables 1 and 2 of
-    Engelbrecht, Steyn and Djouani (2021). The paper prints only one stiffness and one
-    damping. Therefore K_e = K and D_e = D by default.
+    K and D are the stiffness and damping to the target, and K_e and D_e are those to
+    contacts. Contacts begin at the distance S. K, D, and S have the values of tables 1
+    and 2 of Engelbrecht, Steyn and Djouani (2021). The paper prints only one stiffness
+    and one damping. Therefore K_e = K and D_e = D by default.
     """
 
     stiffness_n_m: Stiffness = 3.0
