@@ -132,10 +132,10 @@ class Law:
     def arguments(self, gains: Any, least_range_m: float) -> tuple[Any, ...]:
         """Returns the arguments that the function ``force`` takes after c and s.
 
-        The first argument is the gains: ``gains``, or the default gains of the law if
-        ``gains`` is None. For a law without gains, it is None. If the field
-        ``least_range`` is true, the second argument is the least range of the sensors,
-        m.
+        The first argument is ``gains``. If ``gains`` is None, the default gains of the
+        law replace it. For a law without gains, the first argument is None. If the
+        field ``least_range`` is true, the second argument is the least range of the
+        sensors, m.
         """
         if gains is None and self.gains is not None:
             gains = self.gains()

@@ -157,8 +157,8 @@ class FreeSpaceMap(Block):
     """Remembers which cells range sensors have seen free, and where echoes came from.
 
     The floor around the robot is divided into square cells. The sensors at one position
-    see a cell free on two conditions: the circle around the cell is in their view, and
-    it is nearer than their readings minus a margin.
+    see a cell free if the circle around the cell is in their view, and if the whole
+    circle is nearer than their readings minus a margin.
 
     A cell stays free while the error of its position relative to the robot is at most
     ``place_error_m``. The error grows as the robot drives, for two reasons: encoders

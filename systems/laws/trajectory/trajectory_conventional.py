@@ -14,12 +14,12 @@ from systems.laws.law import Equation, Law
 
 
 class TrajectoryImpedanceParameters(Parameters):
-    """Springs and dampers that act from the target and from contacts.
+    """Springs and dampers from the robot to the target and to contacts.
 
-    K and D act toward the target, K_e and D_e act away from contacts, and contacts
-    begin at the distance S. K, D, and S have the values of tables 1 and 2 of
-    Engelbrecht, Steyn and Djouani (2021). The paper prints only one stiffness and one
-    damping. Therefore K_e = K and D_e = D by default.
+    K and D are the stiffness and damping to the target, and K_e and D_e are those to
+    contacts. Contacts begin at the distance S. K, D, and S have the values of tables 1
+    and 2 of Engelbrecht, Steyn and Djouani (2021). The paper prints only one stiffness
+    and one damping. Therefore K_e = K and D_e = D by default.
     """
 
     stiffness_n_m: Stiffness = 3.0
@@ -44,10 +44,10 @@ class TrajectoryImpedanceParameters(Parameters):
 
     @property
     def damping_fades(self) -> bool:
-        """Whether the damping of a contact is 0 at the edge of the zone.
+        """Whether the damping of a contact is 0 at the edge of the security zone.
 
         If true, the damping grows from the edge toward the object. If false, the full
-        damping acts in the whole zone, as printed.
+        damping acts in the whole zone, as the paper prints it.
         """
         return False
 
@@ -62,8 +62,8 @@ def trajectory_law(
     """Makes the record of a law whose block is ``TrajectoryImpedanceController``.
 
     ``name`` is the name in scenarios, ``title`` the heading in reports, and ``label``
-    the label in legends. ``gains`` is the model of the gains. The equations ``more``
-    follow the equation of motion.
+    the label in legends. ``gains`` is the parameter class of the gains. The record
+    lists the equation of motion, then the equations ``more``.
     """
     motion = Equation(
         "Impedance to the target and to contacts",
