@@ -34,11 +34,12 @@ class AttractionParameters(Parameters):
 
 
 class ImpedanceParameters(Parameters):
-    """Springs and dampers of a robot on a route, from its target and from contacts.
+    """Springs and dampers from a robot on a route to its target and to contacts.
 
-    K, D, and S have the values of tables 1 and 2 of Engelbrecht, Steyn and Djouani
-    (2021). The paper prints only one stiffness K and one damping D. Contacts have the
-    same values by default: K_e = K and D_e = D.
+    K and D are the stiffness and damping to the target, and K_e and D_e are those to
+    contacts. Contacts begin at the distance S. K, D, and S have the values of tables 1
+    and 2 of Engelbrecht, Steyn and Djouani (2021). The paper prints only one stiffness
+    and one damping. Therefore K_e = K and D_e = D by default.
     """
 
     stiffness_n_m: Stiffness = 3.0
@@ -57,8 +58,9 @@ class ImpedanceParameters(Parameters):
     block_distance_m: Length | None = None
     """Distance L_block of eq. 6 of Engelbrecht 2021, m. With null, eq. 6 is off.
 
-    The control point P stops if two conditions hold. The next step of P would end
-    within this distance of an object. The step would not lead away from the object.
+    With eq. 6, the control point P stops if its next step would end within this
+    distance of an object and would not lead away from the object.
 
     The paper prints no value. A distance of 0.2 m is enough for ``turtlebot3_burger``,
-    whose rear corners are 0.174 m from P."""
+    whose rear corners are 0.174 m from P.
+    """

@@ -8,7 +8,7 @@ from systems.laws.parameters import ImpedanceParameters
 
 
 class TrajectoryImpedanceParameters(ImpedanceParameters):
-    """Springs and dampers that act from the target and from contacts."""
+    """Springs and dampers from the robot to the target and to contacts."""
 
     contact_stiffness_n_m: NonNegativeStiffness = 3.0
     """Stiffness K_e to robots and obstacles, N/m."""
@@ -17,10 +17,10 @@ class TrajectoryImpedanceParameters(ImpedanceParameters):
 
     @property
     def damping_fades(self) -> bool:
-        """Whether the damping of a contact is 0 at the edge of the zone.
+        """Whether the damping of a contact is 0 at the edge of the security zone.
 
         If true, the damping grows from the edge toward the object. If false, the full
-        damping acts in the whole zone, as printed.
+        damping acts in the whole zone, as the paper prints it.
         """
         return False
 
@@ -35,16 +35,10 @@ def trajectory_law(
 ) -> Law:
     """Makes the record of a law whose block is ``TrajectoryImpedanceController``.
 
-    Args:
-        name: Name of the law in scenarios.
-        title: Heading in reports.
-        label: Label in the legends of pictures.
-        impedance: Model of the parameters of the block.
-        *more: Equations that follow the equation of motion.
-        gains: Model of those parameters that only this law has.
-
-    Returns:
-        Record of the law.
+    ``name`` is the name in scenarios, ``title`` the heading in reports, and ``label``
+    the label in legends. ``impedance`` is the class of all parameters, and ``gains``
+    the class of those that only this law has. The record lists the equation of motion,
+    then the equations ``more``.
     """
     motion = Equation(
         "Impedance to the target and to contacts",
