@@ -268,7 +268,7 @@ class MeasuredRun(Proximity):
         if scenario.follower.hearing == "audio":
             # The distance is that at the end of the frame: half a frame too late.
             travel = self.columns["source_range_true"] / scenario.sound_speed_m_s
-        elif not scenario.follower.ideal_hearing.burst_gaps:
+        elif scenario.follower.hearing == "ideal_always":
             return np.ones(len(self.time), dtype=bool)
         middle = 0.5 * scenario.follower.microphones.frame_s
         sounds: Flags = scenario.source.sound.sounds(self.time - middle - travel)
