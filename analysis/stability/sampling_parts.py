@@ -9,6 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.design.attraction_search import (
+    GainFigures,
+    RecommendedGains,
+    recommend_gains,
+)
 from analysis.linear.burst_cycle import (
     HOLDS,
     BurstCycle,
@@ -42,11 +47,6 @@ from analysis.stability.chart_plots import (
     plot_root_loci,
 )
 from analysis.stability.law_analysis import Part, Study
-from analysis.stability.recommended_gains import (
-    GainFigures,
-    RecommendedGains,
-    recommend_gains,
-)
 
 #: Duration of the runs that check delay margins, s, in a short and in a full report.
 _CHECK_S = (60.0, 300.0)
@@ -407,7 +407,7 @@ def gain_parts() -> tuple[Part, ...]:
 
 
 def _render_gains(data: RecommendedGains, name: str) -> list[str]:
-    t, today = data.thresholds, data.today
+    t, today = data.requirements, data.today
     headings = [
         "K_r", "D_r", "damping ratio", "phase (deg)", "gain (dB)", "M_s", "disk",
         "delay (s)", "lag (m)", "to 2 % (s)", "stiffest law (N/m)",
@@ -426,9 +426,11 @@ def _render_gains(data: RecommendedGains, name: str) -> list[str]:
     return [
         paragraph(
             f"The requirements are a damping ratio of {t.damping_ratio:g}, a phase "
-            f"margin of {t.phase_margin_deg:g} deg, M_s of {t.sensitivity_peak:g}, a "
-            f"disk margin of {t.disk_margin:.2f}, at sensor and actuator, and rest "
-            f"before an obstacle with echoes that are {t.spare_ticks} tick late. The "
+            f"margin of {t.phase_margin_deg:g} deg, a gain margin of "
+            f"{t.gain_margin_db:g} dB, M_s of {t.sensitivity_peak:g}, a disk margin of "
+            f"{t.disk_margin:.2f}, a delay margin of {t.delay_margin_s:g} s, at sensor "
+            "and actuator, and rest before an obstacle with echoes that are "
+            f"{t.spare_latency_ticks} tick late. The "
             "loop is the sampled loop of the attraction with motor lag; margins are "
             "the least in both directions. The lag is the distance of P behind the "
             "follow point of a source that moves like the source of this scenario. "
