@@ -71,7 +71,7 @@ def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
     scenario = study.today.scenario
     attraction, spare = (
         scenario.follower.attraction,
-        study.requirements.spare_latency_ticks,
+        study.gains.requirements.spare_latency_ticks,
     )
     lines = dict.fromkeys((0, spare), "-") | {spare: "--"}
     for ticks, line in lines.items():

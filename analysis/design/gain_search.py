@@ -13,12 +13,12 @@ docs/avoidance.md explains these requirements.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from scipy.optimize import brentq
 
 from analysis.design.requirements import (
-    DesignRequirements,
+    Requirements,
     allowed_stiffness,
     metres_to_go,
     with_gains,
@@ -47,13 +47,19 @@ _GAINS = (1e-3, 1e5)
 _ALPHAS_M = (0.05, 1.0)
 
 
-def search_gains(scenario: Scenario, requirements: DesignRequirements) -> LawGains:
-    """Finds the gains of each law that meet the requirements.
+def search_gains(
+    scenario: Scenario,
+    requirements: Requirements,
+    *,
+    laws: Iterable[str] = tuple(DESIGNED_LAWS),
+) -> LawGains:
+    """Finds gains of laws that meet the requirements.
 
     Args:
         scenario: The scenario with the attraction, the robot, and the sensors. The
             reaches, speed limits, and saturations of its laws are also used.
         requirements: Requirements that the gains must meet.
+        laws: Names of the laws, all of them in ``DESIGNED_LAWS``.
 
     Returns:
         The law parameters of the scenario, with the gains that were found.
@@ -61,8 +67,9 @@ def search_gains(scenario: Scenario, requirements: DesignRequirements) -> LawGai
     Raises:
         InputError: No gain meets a requirement that must be met.
     """
-    for law, tuning in DESIGNED_LAWS.items():
-        scenario = _RULES[tuning.rule](scenario, law, requirements)
+    for law in laws:
+        rule = _RULES[DESIGNED_LAWS[law].rule]
+        scenario = rule(scenario, law, requirements)
     return LawGains.model_validate(scenario.follower.laws.model_dump())
 
 
@@ -70,7 +77,7 @@ def gain_for_barrier(
     scenario: Scenario,
     law: str,
     field: str,
-    requirements: DesignRequirements,
+    requirements: Requirements,
     **also: float,
 ) -> float:
     """Returns the value of a gain with which a law just stops the robot at an obstacle.
@@ -105,7 +112,7 @@ def gain_for_barrier(
 
 
 def _barrier_gains(
-    scenario: Scenario, law: str, requirements: DesignRequirements
+    scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
     """Derives the two gains of a law by the rule ``barrier``.
 
@@ -124,7 +131,7 @@ def _barrier_gains(
 
 
 def _matched_gains(
-    scenario: Scenario, law: str, requirements: DesignRequirements
+    scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
     """Derives the gains of both terms of the active law of 2019."""
     # The push on a far echo includes the tail of the spring term. The second round
@@ -140,7 +147,7 @@ _RULES = {"barrier": _barrier_gains, "matched": _matched_gains}
 
 
 def _matched_damper(
-    scenario: Scenario, law: str, requirements: DesignRequirements
+    scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
     """Derives the two gains of the velocity term of the active law of 2019.
 
@@ -179,7 +186,7 @@ def _matched_damper(
 
 
 def _matched_spring(
-    scenario: Scenario, law: str, requirements: DesignRequirements
+    scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
     """Derives the two gains of the spring term of the active law of 2019.
 
@@ -212,7 +219,7 @@ def _matched_spring(
         )
 
     def too_far(alpha: float) -> float:
-        return rest_offset(law, with_alpha(alpha)) - scenario.stop.goal_margin_m
+        return rest_offset(law, with_alpha(alpha)) - requirements.rest_offset_m
 
     def too_stiff(alpha: float) -> float:
         softer = with_alpha(alpha).with_robot(law=law)

@@ -49,7 +49,8 @@ class RadialLaw:
     @cached_property
     def distances_m(self) -> NDArray[np.float64]:
         """(n,) distances 0, DISTANCE_STEP_M, and so on up to ``range_m``, m."""
-        return DISTANCE_STEP_M * np.arange(round(self.range_m / DISTANCE_STEP_M) + 1)
+        count = round(self.range_m / DISTANCE_STEP_M) + 1
+        return DISTANCE_STEP_M * np.arange(count, dtype=float)
 
     @cached_property
     def forces_n(self) -> NDArray[np.float64]:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from analysis.reporting.section import Cell, Column, Content, Table
-from analysis.stability.law_analysis import Part
-from analysis.stability.recommended_gains import (
+from analysis.design.attraction_search import (
     GainFigures,
     RecommendedGains,
     recommend_gains,
 )
+from analysis.reporting.section import Cell, Column, Content, Table
+from analysis.stability.law_analysis import Part
 
 
 def _show(data: RecommendedGains) -> list[Content]:
-    t, today = data.thresholds, data.today
+    t, today = data.requirements, data.today
     columns: list[Column | str] = [
         "K_r", "D_r", "damping ratio", Column("phase", "deg"), Column("gain", "dB"),
         "M_s", "disk", Column("delay", "s"), Column("lag", "m"), Column("to 2 %", "s"),
@@ -32,14 +32,15 @@ def _show(data: RecommendedGains) -> list[Content]:
     return [
         (
             f"The requirements are a damping ratio of {t.damping_ratio:g}, a phase "
-            f"margin of {t.phase_margin_deg:g} deg, M_s of {t.sensitivity_peak:g}, a "
-            f"disk margin of {t.disk_margin:.2f}, at sensor and actuator, and rest "
-            f"before an obstacle with echoes that are {t.spare_ticks} tick late. The "
-            "loop is the sampled loop of the attraction with motor lag; margins are "
-            "the least in both directions. The lag is the distance of P behind the "
-            "follow point of a source that moves like the source of this scenario. The "
-            "stiffest law is the largest spring to obstacles with which P comes to "
-            "rest."
+            f"margin of {t.phase_margin_deg:g} deg, a gain margin of "
+            f"{t.gain_margin_db:g} dB, M_s of {t.sensitivity_peak:g}, a disk margin of "
+            f"{t.disk_margin:.2f}, a delay margin of {t.delay_margin_s:g} s, at sensor "
+            "and actuator, and rest before an obstacle with echoes that are "
+            f"{t.spare_latency_ticks} tick late. The loop is the sampled loop of the "
+            "attraction with motor lag; margins are the least in both directions. The "
+            "lag is the distance of P behind the follow point of a source that moves "
+            "like the source of this scenario. The stiffest law is the largest spring "
+            "to obstacles with which P comes to rest."
         ),
         Table(columns, rows),
         data.advice,

@@ -1,4 +1,4 @@
-"""Gains that meet thresholds, against closed forms and against the blocks."""
+"""Gains that meet requirements, against closed forms and against the blocks."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ import math
 import control
 import numpy as np
 import pytest
+from analysis.stability.verdict_readings import CRITERIA
 
-from analysis.models.equilibria import follow_equilibrium
-from analysis.models.open_loops import open_loop
-from analysis.stability.recommended_gains import (
-    GainThresholds,
+from analysis.design.attraction_search import (
     attraction_loop,
     gain_figures,
+    least_damping,
     recommend_gains,
 )
+from analysis.design.requirements import Requirements
+from analysis.models.equilibria import follow_equilibrium
+from analysis.models.open_loops import open_loop
 from diagrams import load_scenario
 
 ALONE = ["law=none", "obstacles=[]", "source.waypoints_m=[[2, 0]]"]
@@ -63,7 +65,7 @@ def largest_root(spring: float, damper: float, ticks: int) -> float:
 def test_figures_are_the_worse_of_both_cuts():
     """Of phase and modulus by control, of the rest by the difference equation."""
     scenario = load_scenario("default", [*ALONE, "attraction.damping_n_s_m=3"])
-    figures = gain_figures(scenario, GainThresholds(spare_ticks=2))
+    figures = gain_figures(scenario, Requirements(spare_latency_ticks=2))
     found = []
     for at in ("sensor", "actuator"):
         L = attraction_loop(scenario, at)
@@ -87,17 +89,18 @@ def test_figures_are_the_worse_of_both_cuts():
     assert largest_root(limit, 3.0, 0) == pytest.approx(1.0, abs=1e-8)
 
 
-def test_recommended_gains_meet_everything_and_less_damping_does_not():
+def test_least_damping_meets_everything_and_less_does_not():
     scenario = load_scenario("default", ["law=conventional"])
-    found = recommend_gains(scenario, springs=(1.0, 2.0))
-    limits = GainThresholds()
-    for choice in found.choices:
-        figures = choice.figures
+    limits = Requirements()
+    for K_r in (2.0, 4.0):
+        figures = least_damping(scenario, K_r, limits).figures
         assert figures is not None
         assert figures.damping_ratio >= limits.damping_ratio
         assert figures.phase_margin_deg >= limits.phase_margin_deg
+        assert figures.gain_margin_db >= limits.gain_margin_db
         assert figures.sensitivity_peak <= limits.sensitivity_peak
         assert figures.disk_margin >= limits.disk_margin
+        assert figures.delay_margin_s >= limits.delay_margin_s
         assert figures.contact_radius < 1.0
         assert figures.damping_n_s_m == round(figures.damping_n_s_m, 2)
         less = load_scenario(
@@ -115,36 +118,69 @@ def test_recommended_gains_meet_everything_and_less_damping_does_not():
             or below.sensitivity_peak > limits.sensitivity_peak
             or below.disk_margin < limits.disk_margin
         )
-    assert found.recommended == found.choices[0].figures
+
+
+def test_requirements_are_the_thresholds_of_the_report():
+    """Of the verdicts on phase, gain, M_s, disk, delay, damping, and offset."""
+    limits = {each.name: each.limit for each in CRITERIA}
+    asked = Requirements()
+    assert asked.damping_ratio == limits["damping ratio at rest"]
+    assert asked.phase_margin_deg == limits["least phase margin"]
+    assert asked.gain_margin_db == limits["least gain margin"]
+    assert asked.sensitivity_peak == limits["largest sensitivity peak"]
+    assert asked.disk_margin == limits["least disk margin"]
+    assert asked.delay_margin_s == limits["least delay margin"]
+    assert asked.rest_offset_m == limits["offset from the follow point at rest"]
+
+
+def test_conventional_law_needs_more_damping_and_nothing_else():
+    """12.3 N/m hold the barrier, and are stable in contact from 1.1 N s/m on."""
+    found = recommend_gains(load_scenario("default", ["law=conventional"]))
+    assert found.settings == {"attraction.damping_n_s_m": 2.48}
+    assert found.command == (
+        "phonotaxis simulate default --law conventional "
+        "--set attraction.damping_n_s_m=2.48"
+    )
     assert found.today.damping_ratio == pytest.approx(0.160, abs=1e-3)
     # D_r v / K_r behind a source at 0.3 m/s.
     assert found.today.following_lag_m == pytest.approx(0.15)
-
-
-@pytest.mark.parametrize("law", ["conventional", "active"])
-def test_advice_says_what_the_law_leaves_of_the_margins(law):
-    """Pushed off the source the loop across stands (r + epsilon)/r at any gains."""
-    found = recommend_gains(load_scenario("default", [f"law={law}"]), springs=(1.0,))
-    best, whole = found.recommended, found.whole_loop
-    assert best is not None
+    whole, best = found.whole_loop, found.recommended
     assert whole is not None
-    assert best.disk_margin >= found.thresholds.disk_margin
-    alone = "attraction's loop alone" in found.advice
-    assert alone == (law == "active")
-    if alone:
-        gains = [
-            f"attraction.stiffness_n_m={best.stiffness_n_m}",
-            f"attraction.damping_n_s_m={best.damping_n_s_m}",
-        ]
-        point = follow_equilibrium(load_scenario("default", [f"law={law}", *gains]))
-        factor = 1.0 + 0.175 / point.source_distance_m
-        assert whole.gain_margin_db == pytest.approx(20.0 * np.log10(factor), rel=1e-4)
-        assert f"gain margin of {whole.gain_margin_db:.2f} dB" in found.advice
-        assert not whole.meets(found.thresholds)
-        assert whole.weakest == "L at the sensor, across"
-    else:
-        assert whole.phase_margin_deg == pytest.approx(best.phase_margin_deg, abs=0.01)
-        assert whole.disk_margin == pytest.approx(best.disk_margin, abs=1e-3)
+    assert best is not None
+    assert whole.phase_margin_deg == pytest.approx(best.phase_margin_deg, abs=0.01)
+    assert whole.disk_margin == pytest.approx(best.disk_margin, abs=1e-3)
+    assert "attraction's loop alone" not in found.advice
+
+
+def test_active_law_gets_gains_that_meet_every_requirement():
+    """Pushed off the source the loop across stands (r + epsilon)/r at any gains."""
+    found = recommend_gains(load_scenario("default", ["law=active"]))
+    whole, law = found.whole_loop, found.law
+    assert whole is not None
+    assert law is not None
+    assert law.acceptable
+    assert law.check("offset behind the source").bound == 0.1
+    settings = ["law=active", *(f"{k}={v}" for k, v in found.settings.items())]
+    point = follow_equilibrium(load_scenario("default", settings))
+    factor = 1.0 + 0.175 / point.source_distance_m
+    assert whole.gain_margin_db == pytest.approx(20.0 * np.log10(factor), rel=1e-4)
+    assert f"gain margin of {whole.gain_margin_db:.2f} dB" in found.advice
+    assert not whole.meets(found.requirements)
+    assert whole.weakest == "L at the sensor, across"
+
+
+def test_gains_that_meet_everything_are_kept():
+    settings = ["law=none", "attraction.damping_n_s_m=4"]
+    found = recommend_gains(load_scenario("default", settings), springs=(1.0,))
+    assert found.settings == {}
+    assert found.advice == "The current gains meet all requirements."
+
+
+def test_long_overshoot_needs_a_longer_follow_distance():
+    settings = ["law=none", "attraction.follow_distance_m=0.5"]
+    found = recommend_gains(load_scenario("default", settings), springs=(1.0,))
+    # 0.39 m of overshoot, half the master robot, and 0.25 m, in steps of 5 cm.
+    assert found.settings["attraction.follow_distance_m"] == 0.85
 
 
 def test_law_that_is_too_stiff_has_no_gains():
@@ -155,6 +191,8 @@ def test_law_that_is_too_stiff_has_no_gains():
     assert found.choices[0].figures is None
     assert found.recommended is None
     assert found.whole_loop is None
+    assert found.command == ""
+    assert found.advice.startswith("No gains meet all requirements")
 
 
 def test_no_spring_is_refused():
