@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.comparison.compare import prepare_comparison
-from analysis.comparison.plans import comparison_plan
 from analysis.run_error import RunError
+from analysis.sweeps.batch import prepare_comparison
+from analysis.sweeps.comparison_plans import comparison_plan
 from analysis.sweeps.options import MOST_WORKERS
 from analysis.sweeps.plan import MOST_RUNS, SweepPlan
 from analysis.sweeps.sweep import prepare_sweep

@@ -23,7 +23,7 @@ QUESTIONS = """
 import contextlib, io, json
 
 import phonotaxis
-from analysis.comparison.plans import comparison_plans
+from analysis.sweeps.comparison_plans import comparison_plans
 from analysis.design.gain_search import search_gains
 from analysis.design.requirements import DesignRequirements, check_law
 from analysis.laws.law_curves import law_curves
