@@ -66,7 +66,7 @@ def test_json_document_page_and_reproduction(capsys, tmp_path):
         }
         assert cell["metrics"]["minimum_clearance_m"]["value"] == np.median(clearance)
     page = (out / "report.html").read_text("utf-8")
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 1
     assert "http" not in page.replace("http://www.w3.org", "")
 
     status, printed, complaint = call(capsys, *words)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
@@ -24,7 +25,7 @@ from analysis.reporting.html_page import (
     table,
 )
 from analysis.sweeps.batch import MOST_CELLS, Batch, Summary
-from analysis.sweeps.cells import by_cell, cell_label
+from analysis.sweeps.cells import LEAST_RUNS, by_cell, cell_label
 from analysis.sweeps.examples import picture_files
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan
@@ -108,11 +109,12 @@ def _scenario(
         **(cells if few else {}),
         "Over the grid": _maps(plan, rows, prefix),
         "In pairs": [_table(pair_rows(summary.pairs), _PAIRS)] if summary.pairs else [],
-        "Over the draws": _marginals(plan, rows, prefix),
         "Example runs": [
             *_examples(batch, summary, document),
             *_commands(batch, summary),
         ],
+        # The page of several scenarios would become too long.
+        "Over the draws": _marginals(plan, rows) if len(batch.summaries) == 1 else [],
         **({} if few else cells),
     }
     return {title: inner for title, inner in parts.items() if inner}
@@ -172,8 +174,15 @@ def _listed(fields: dict[str, Any]) -> str:
     return "; ".join(pairs) or "nothing"
 
 
-def _table(rows: Sequence[Sequence[TableCell]], caption: str) -> str:
-    return table([str(text) for text in rows[0]], rows[1:], caption=caption)
+def _table(rows: Sequence[Sequence[str]], caption: str) -> str:
+    """A table of texts, in whose numbers and intervals no line breaks."""
+
+    def whole(text: str) -> str:
+        text = re.sub(r"(^|[ (e])-(?=\d)", "\\1\u2212", text)
+        return text.replace(", ", ",\u00a0")
+
+    body = [[row[0], *map(whole, row[1:])] for row in rows[1:]]
+    return table(rows[0], body, caption=caption)
 
 
 def _endings(summary: Summary) -> list[str]:
@@ -250,16 +259,17 @@ def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
     return chosen, [path for path in plan.grid if path not in chosen]
 
 
-def _marginals(plan: SweepPlan, results: pd.DataFrame, prefix: str) -> list[str]:
+def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
     return [
         figure_html(
             plot_marginal(plan, results, key),
-            f"{prefix}marginal{k}",
+            f"marginal{k}",
             f"Every metric over `{key}`, in bins with equal numbers of runs.",
         )
         for k, (key, drawn) in enumerate(plan.draw.items())
         # A list of boxes is no number and is never drawn twice. It has no marginal.
-        if drawn.boxes is None and not results.empty
+        # Fewer runs than those of two bins show no dependence.
+        if drawn.boxes is None and len(results) >= 2 * LEAST_RUNS
     ]
 
 

@@ -257,11 +257,14 @@ def _errorbars(
     value, low, high = np.array([(each.value, *each.ends) for each in estimates]).T
     spread = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
     axes.errorbar(
-        *((value, places) if across else (places, value)),
-        **{"xerr" if across else "yerr": spread},
+        value if across else places,
+        places if across else value,
+        xerr=spread if across else None,
+        yerr=None if across else spread,
         color=colour,
         label=label,
-        fmt="o" if across else "-o",
+        linestyle="none" if across else "-",
+        marker="o",
         markersize=4,
         capsize=3,
         linewidth=1,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from analysis.reporting.plain_values import plain, write_json
@@ -13,7 +13,7 @@ from analysis.sweeps.batch import REPORT, SUMMARY, Batch, Summary, compares_laws
 from analysis.sweeps.cells import Cell, Quantity, quantities, text_table
 from analysis.sweeps.examples import example_files, example_key
 from analysis.sweeps.one_run import FAILED
-from analysis.sweeps.pairs import Pair
+from analysis.sweeps.pairs import Pair, PairedMedian, PairedRate
 from analysis.sweeps.run_rows import warning_counts
 from analysis.sweeps.sweep import reproducing_command
 
@@ -79,7 +79,7 @@ def batch_document(batch: Batch) -> dict[str, Any]:
     return document
 
 
-def run_command(batch: Batch, scenario: str, row: dict[str, Any]) -> str:
+def run_command(batch: Batch, scenario: str, row: Mapping[Any, Any]) -> str:
     """Returns the shell command that repeats a run.
 
     Args:
@@ -169,36 +169,39 @@ def _text_of(cell: Cell, quantity: Quantity) -> str:
     return "-" if found is None else quantity.text(found)
 
 
-def pair_rows(pairs: list[Pair]) -> list[list[str]]:
-    """A heading, and one row with the differences of each pair."""
+def pair_rows(pairs: Sequence[Pair], *, pictures: bool = False) -> list[list[str]]:
+    """A heading, and one row with the differences of each pair.
+
+    Args:
+        pairs: At least one pair.
+        pictures: Whether to show only the metrics that pictures show.
+    """
     shown = [
         Quantity(name)
-        for name in dict.fromkeys(name for pair in pairs for name in pair.metrics)
-        if METRICS[name].shown
+        for name, metric in METRICS.items()
+        if metric.shown == "picture" or (metric.shown and not pictures)
+        if any(name in pair.metrics for pair in pairs)
     ]
-    rows = [["first less second", "success (%)", "p", "collision (%)", "p"]]
-    rows[0] += [text for each in shown for text in (each.label, "p")]
+    rates = Quantity("success"), Quantity("collision")
+    rows = [["first less second", *(each.label for each in (*rates, *shown))]]
     for pair in pairs:
-        cells = [pair.label]
-        for name, rate in (("success", pair.success), ("collision", pair.collision)):
-            difference = Quantity(name).text(rate.difference, "+")
-            cells += [difference, f"{rate.p_value:.2g}"]
-        for quantity in shown:
-            median = pair.metrics.get(quantity.name)
-            cells += (
-                ["-", "-"]
-                if median is None
-                else [
-                    quantity.text(median.difference, "+"),
-                    f"{median.p_value:.2g}",
-                ]
-            )
-        rows.append(cells)
+        found: dict[str, PairedRate | PairedMedian] = {**pair.metrics}
+        found |= {"success": pair.success, "collision": pair.collision}
+        rows.append([pair.label, *(_difference(found, q) for q in (*rates, *shown))])
     return rows
 
 
+def _difference(
+    found: Mapping[str, PairedRate | PairedMedian], quantity: Quantity
+) -> str:
+    pair = found.get(quantity.name)
+    if pair is None:
+        return "-"
+    return f"{quantity.text(pair.difference, '+')} p {pair.p_value:.2g}"
+
+
 def _pair_lines(pairs: list[Pair]) -> list[str]:
-    return [*text_table(pair_rows(pairs)), ""] if pairs else []
+    return [*text_table(pair_rows(pairs, pictures=True)), ""] if pairs else []
 
 
 def _endings(cells: list[Cell]) -> Iterator[str]:

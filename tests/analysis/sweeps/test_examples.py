@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
+
 from analysis.reporting.intervals import estimate_rate
 from analysis.sweeps.batch import Batch, Summary
 from analysis.sweeps.cells import EXAMPLES, Cell, ExampleRun
@@ -50,7 +52,9 @@ def test_examples_of_laws_whose_names_are_alike_have_files_of_their_own():
     others = tuple(replace(run, index=run.index + 3) for run in RUNS)
     plan = SweepPlan(grid={"law": ("a.py:f", "a.py-f")})
     cells = [cell("a.py:f"), cell("a.py-f", others)]
-    batch = Batch("", Path(), {}, {"s": Summary("s", plan, None, cells, [])}, [])
+    batch = Batch(
+        "", Path(), {}, {"s": Summary("s", plan, pd.DataFrame(), cells, [])}, []
+    )
     files = example_files(batch)
     assert len(set(files.values())) == 6
     assert files["s", 0, "worst"] == "examples/s-law-a.py-f-worst.yaml"
@@ -59,5 +63,5 @@ def test_examples_of_laws_whose_names_are_alike_have_files_of_their_own():
 
 def test_a_sweep_without_laws_has_no_examples():
     for plan in (SweepPlan(grid={"hearing": ("ideal",)}), SweepPlan(pair=False)):
-        summary = Summary("s", plan, None, [cell("none")], [])
+        summary = Summary("s", plan, pd.DataFrame(), [cell("none")], [])
         assert example_files(Batch("", Path(), {}, {"s": summary}, [])) == {}
