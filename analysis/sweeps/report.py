@@ -6,6 +6,8 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import pandas as pd
+
 from analysis.reporting.plain_values import plain, write_json
 from analysis.reporting.provenance import versions
 from analysis.runs.metric_table import METRICS
@@ -35,6 +37,7 @@ def batch_document(batch: Batch) -> dict[str, Any]:
             "layouts": plan.runs,
             "runs": sum(map(len, tables)),
             "failed": sum(int((table["cause"] == FAILED).sum()) for table in tables),
+            "warnings": warning_counts(pd.concat(tables)),
             "cells": [
                 {
                     **vars(cell),
@@ -115,16 +118,15 @@ def batch_text(batch: Batch, document: dict[str, Any]) -> str:
         batch: Results of the batch.
         document: JSON document from ``batch_document``.
     """
-    lines = []
+    lines = ["Brackets are 95 % intervals.", ""]
     for name, each in batch.summaries.items():
         lines += [f"{name}:"] if len(batch.summaries) > 1 else []
         lines += [*text_table(estimate_rows(each)), ""]
         if compares_laws(each.plan):
             lines += [*_endings(each.cells), ""]
-        lines += [*warning_lines(each), *_pair_lines(each.pairs)]
+        lines += [*_pair_lines(each.pairs), *warning_lines(each)]
     if batch.pooled and len(batch.summaries) > 1:
         lines += ["all together:", *_pair_lines(batch.pooled)]
-    lines.append("Brackets are 95 % intervals.")
     if document["failed"]:
         lines.append(
             f"{document['failed']} of {document['runs']} runs failed with an error"
@@ -133,7 +135,7 @@ def batch_text(batch: Batch, document: dict[str, Any]) -> str:
     if examples:
         lines += ["", "Example runs:"]
         lines += [f"  {each['command']}   ({each['cause']})" for each in examples]
-    return "\n".join(lines)
+    return "\n".join(lines).rstrip()
 
 
 def estimate_rows(summary: Summary) -> list[list[str]]:
