@@ -245,7 +245,8 @@ def _done(
     prepared: PreparedBatch, progress: Callable[[int], None] | None
 ) -> tuple[Batch, dict[str, Any]]:
     """Runs a batch, and writes its files."""
-    from analysis.sweeps.report import batch_document, write_batch
+    from analysis.sweeps.page import write_batch
+    from analysis.sweeps.report import batch_document
 
     batch = prepared.run(progress)
     document = batch_document(batch)

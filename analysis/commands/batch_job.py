@@ -10,7 +10,8 @@ from analysis.sweeps.batch import Batch, PreparedBatch
 
 def batch_job(prepared: PreparedBatch) -> Job[Batch]:
     """Makes the job that runs a batch and writes its report."""
-    from analysis.sweeps.report import batch_document, batch_text, write_batch
+    from analysis.sweeps.page import write_batch
+    from analysis.sweeps.report import batch_document, batch_text
 
     def write(batch: Batch, document: dict[str, Any]) -> None:
         write_batch(batch, document)

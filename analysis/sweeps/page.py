@@ -24,9 +24,10 @@ from analysis.reporting.html_page import (
     section,
     table,
 )
-from analysis.sweeps.batch import MOST_CELLS, Batch, Summary
+from analysis.reporting.plain_values import write_json
+from analysis.sweeps.batch import MOST_CELLS, REPORT, SUMMARY, Batch, Summary
 from analysis.sweeps.cells import LEAST_RUNS, by_cell, cell_label
-from analysis.sweeps.examples import picture_files
+from analysis.sweeps.examples import picture_files, write_examples
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.plots import (
@@ -51,6 +52,18 @@ from diagrams.running.stop_rules import SUCCESSFUL
 #: MOST_ERRORS: number of commands for runs that raised an error.
 #: MOST_OTHERS: number of commands for runs with any other cause of failure.
 MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
+
+
+def write_batch(batch: Batch, document: dict[str, Any]) -> None:
+    """Writes the JSON document, the page and the examples into the batch's directory.
+
+    Args:
+        batch: Results of the batch.
+        document: JSON document from ``batch_document``.
+    """
+    write_json(document, batch.out / SUMMARY)
+    write_examples(batch)
+    (batch.out / REPORT).write_text(batch_page(batch, document), "utf-8")
 
 
 def batch_page(batch: Batch, document: dict[str, Any]) -> str:

@@ -8,10 +8,10 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.reporting.plain_values import plain, write_json
+from analysis.reporting.plain_values import plain
 from analysis.reporting.provenance import versions
 from analysis.runs.metric_table import METRICS
-from analysis.sweeps.batch import REPORT, SUMMARY, Batch, Summary, compares_laws
+from analysis.sweeps.batch import Batch, Summary, compares_laws
 from analysis.sweeps.cells import Cell, Quantity, quantities, text_table
 from analysis.sweeps.examples import example_files, example_key
 from analysis.sweeps.one_run import FAILED
@@ -94,21 +94,6 @@ def run_command(batch: Batch, scenario: str, row: Mapping[Any, Any]) -> str:
     return reproducing_command(
         sweep.store.out, sweep.points[row["index"]], row["engine"]
     )
-
-
-def write_batch(batch: Batch, document: dict[str, Any]) -> None:
-    """Writes the JSON document, the page and the examples into the batch's directory.
-
-    Args:
-        batch: Results of the batch.
-        document: JSON document from ``batch_document``.
-    """
-    from analysis.sweeps.examples import write_examples
-    from analysis.sweeps.page import batch_page
-
-    write_json(document, batch.out / SUMMARY)
-    write_examples(batch)
-    (batch.out / REPORT).write_text(batch_page(batch, document), "utf-8")
 
 
 def batch_text(batch: Batch, document: dict[str, Any]) -> str:

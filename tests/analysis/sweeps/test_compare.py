@@ -16,8 +16,9 @@ from analysis.sweeps.comparison_plans import (
     comparison_plans,
     library_layouts,
 )
+from analysis.sweeps.page import write_batch
 from analysis.sweeps.plan import SweepPlan, load_sweep
-from analysis.sweeps.report import batch_document, batch_text, write_batch
+from analysis.sweeps.report import batch_document, batch_text
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 

@@ -13,8 +13,9 @@ from analysis.run_error import RunError
 from analysis.sweeps.batch import prepare_comparison
 from analysis.sweeps.comparison_plans import comparison_plan
 from analysis.sweeps.options import MOST_WORKERS
+from analysis.sweeps.page import write_batch
 from analysis.sweeps.plan import MOST_RUNS, SweepPlan
-from analysis.sweeps.report import batch_document, write_batch
+from analysis.sweeps.report import batch_document
 from analysis.sweeps.sweep import prepare_sweep
 from systems.framework.input_error import InputError
 
