@@ -89,6 +89,9 @@ def run_command(batch: Batch, scenario: str, row: Mapping[Any, Any]) -> str:
         batch: Results of the batch.
         scenario: Name of the run's scenario.
         row: Row of the run in the results.
+
+    Returns:
+        Command in one line, with quotes for the shell.
     """
     sweep = batch.sweeps[scenario]
     return reproducing_command(
@@ -102,6 +105,9 @@ def batch_text(batch: Batch, document: dict[str, Any]) -> str:
     Args:
         batch: Results of the batch.
         document: JSON document from ``batch_document``.
+
+    Returns:
+        Lines of text.
     """
     lines = ["Brackets are 95 % intervals.", ""]
     for name, each in batch.summaries.items():
@@ -162,6 +168,9 @@ def pair_rows(pairs: Sequence[Pair], *, pictures: bool = False) -> list[list[str
     Args:
         pairs: At least one pair.
         pictures: Whether to show only the metrics that pictures show.
+
+    Returns:
+        Rows of texts, all of the same length.
     """
     shown = [
         Quantity(name)
