@@ -36,13 +36,7 @@ class Study:
     """Data objects of earlier parts, by key. A part without a result has no entry."""
 
     def need(self, key: str) -> Any:
-        """Returns the data object of an earlier part.
-
-        Args:
-            key: Key of the earlier part.
-
-        Returns:
-            The data object.
+        """Returns the data object of an earlier part, by the key of the part.
 
         Raises:
             InputError: The earlier part has no result.
