@@ -24,13 +24,13 @@ def _show(data: HeadingLoopMargins) -> list[Content]:
     return [
         (
             "A searching robot stops, decides on a heading, and turns to it while it "
-            "drives. The loop has a compass, a PID controller, pulse widths, motors and "
-            "the heading that the wheels produce; PID output and motor duties are held "
-            "over a tick. The loop is cut at the deviation of the heading. It is linear "
-            "for deviations within L and within all limits; with a larger deviation the "
-            "robot turns on the spot, more slowly than the linear loop would. Linear "
-            "models do not cover steps, phases and finds: docs/searches.md states how "
-            "often each occurs."
+            "drives. The loop has a compass, a PID controller, pulse widths, motors "
+            "and the heading that the wheels produce; PID output and motor duties are "
+            "held over a tick. The loop is cut at the deviation of the heading. It is "
+            "linear for deviations within L and within all limits; with a larger "
+            "deviation the robot turns on the spot, more slowly than the linear loop "
+            "would. Linear models do not cover steps, phases and finds: "
+            "docs/searches.md states how often each occurs."
         ),
         Table.of(
             [data],
