@@ -1,15 +1,15 @@
 """Defines the compiled functions that a compiled loop calls by their addresses.
 
-A part of the loop is a compiled function, for example the step of one block. If numba
-compiled the loop together with all parts, the compilation would take long. It would
-also be necessary again for every set of blocks. With calls by address, numba compiles
-each part separately, and the loop ``run_parts`` only once.
+A part of the loop is a compiled function, for example the step of one block. To compile
+the loop together with its parts would take a long time for each set of blocks. Because
+the loop calls its parts by address, numba compiles each part separately, and the loop
+``run_parts`` only once.
 
 Each part has two arguments: the number of the tick (control period), and the address of
 an array of words. A word is a whole number or the address of another array. These
 arrays must not move in memory.
 
-This file imports little. A change of another file therefore rarely makes the compiled
+This file imports little, so that a change of another file rarely makes the compiled
 code of the parts invalid.
 """
 
@@ -157,15 +157,14 @@ def run_parts(
     """Runs ticks (control periods) of a compiled loop.
 
     A part is a compiled function, for example the step of one block. At the start of
-    the run, the function publishes the outputs that are parts of a block's state. In
-    each tick, it calls the following parts:
+    the run, ``run_parts`` publishes the outputs that are parts of a block's state. In
+    each tick, it calls these parts:
 
-    1. the first parts, which compute steps;
-    2. the judge, which decides whether the run is over;
-    3. the parts before the log.
+    1. the first parts, which compute steps
+    2. the judge, which decides whether the run is over
+    3. the parts before the log
 
-    The function then logs one row. If the run continues, it also calls the parts after
-    the log.
+    It then logs one row. If the run continues, it also calls the parts after the log.
 
     Args:
         begin: First tick.
@@ -181,7 +180,7 @@ def run_parts(
             the part publishes its outputs, and 0 if it computes its step.
 
     Returns:
-        Two values: the tick after the last logged tick, and whether the run is over.
+        The tick after the last logged tick, and whether the run is over.
     """
     begins, first, judge, before, after = plan
     if begin == 0:
