@@ -10,9 +10,10 @@ import pytest
 from analysis.reporting.criterion import Criterion
 from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import Part, analyse_law
+from analysis.stability.linear_parts import OPERATING_POINTS
+from analysis.stability.margin_parts import MARGINS
 from analysis.stability.report_files import stability_document, stability_text
 from analysis.stability.report_page import stability_page
-from analysis.stability.report_parts import MARGINS, OPERATING_POINTS
 from diagrams import load_scenario
 from docs.building.page_code import page_file
 from systems.framework.input_error import InputError
