@@ -78,15 +78,10 @@ class Margins:
     at: OperatingPoint
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
-        """Returns the stability margins of the implemented loop for one cut.
+        """Returns the stability margins of one cut, or None if there is no such loop.
 
-        Args:
-            at: Place of the cut: ``sensor``, ``actuator``, or ``wheels``.
-            direction: Direction of the motion: ``along`` the line to the source, or
-                ``across`` this line.
-
-        Returns:
-            The margins. If there is no such loop, None.
+        The cut is at the ``sensor``, at the ``actuator``, or at the ``wheels``. The
+        direction of the motion is ``along`` the line to the source, or ``across`` it.
         """
         for found in self.implemented:
             if (found.at, found.direction) == (at, direction):
@@ -101,17 +96,11 @@ class Margins:
 
 
 def least_damped(poles: NDArray[np.complex128]) -> complex:
-    """Returns the pole with the least damping ratio among all slow oscillations.
+    """Returns the pole with the least damping ratio among all slow oscillations, 1/s.
 
     If nothing oscillates slowly, the function returns the pole with the largest real
-    part.
-
-    Args:
-        poles: (n,) poles in the s plane, 1/s.
-
-    Returns:
-        The pole in the s plane, 1/s. Of a conjugate pair, it is the pole with the
-        positive imaginary part.
+    part. Of a conjugate pair, it returns the pole with the positive imaginary part.
+    ``poles`` has the shape (n,) and the unit 1/s (s plane).
     """
     slow = poles[np.abs(poles) < _SLOW_RAD_S]
     swinging = slow[np.abs(slow.imag) > 1e-6]

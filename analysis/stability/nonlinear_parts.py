@@ -282,19 +282,17 @@ Maps = tuple[EquilibriumMap, ...]
 
 def _maps(text: str) -> Callable[[Maps], list[Content]]:
     def show(data: Maps) -> list[Content]:
-        rows: list[list[Cell]] = [
-            [found.sensing, len(found.values), _listed(found.jams),
-             _listed(found.collisions)]
-            for found in data
-        ]  # fmt: skip
-        columns: list[Column | str] = [
-            "sensing",
-            "values tried",
-            Column("jams at", "m"),
-            Column("collisions at", "m"),
-        ]
+        table = Table.of(
+            data,
+            {
+                "sensing": "sensing",
+                "values tried": lambda found: len(found.values),
+                Column("jams at", "m"): lambda found: _listed(found.jams),
+                Column("collisions at", "m"): lambda found: _listed(found.collisions),
+            },
+        )
         drawing = Figure(lambda: plot_equilibrium_maps(data), "Where P comes to rest.")
-        return [text, Table(columns, rows), drawing]
+        return [text, table, drawing]
 
     return show
 

@@ -89,12 +89,8 @@ _NOT_FOR_SEARCHES = (
 def parts_for(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part[Any], ...]:
     """Returns the parts of a stability report that suit the robot of the scenarios.
 
-    Args:
-        scenarios: One scenario per law. All scenarios have the same robot.
-        full: Whether the report also has the parts that take minutes.
-
-    Returns:
-        The parts, in the order of the report.
+    There is one scenario per law, and all have the same robot. A full report also has
+    the parts that take minutes.
     """
     robot = scenarios[0].only
     sound = tuple(part for part in SOUND_PARTS if full or not part.slow)

@@ -128,10 +128,6 @@ def _sampled_document(data: SampledLoop) -> dict[str, Any]:
 
 
 def _show_sampled(data: SampledLoop) -> list[Content]:
-    rows: list[list[Cell]] = [
-        [m.at, m.direction, m.delay_s, m.delay_s / data.period_s, m.frequency_rad_s]
-        for m in data.margins
-    ]
     contents: list[Content] = [
         (
             "A delay margin is the delay that may be added before the loop oscillates, "
@@ -140,22 +136,28 @@ def _show_sampled(data: SampledLoop) -> list[Content]:
             "estimate later than the tracker assumes; a delay at the wheels makes a "
             "command later."
         ),
-        Table(["late at", "motion", Column("delay", "s"), "ticks", "rad/s"], rows),
+        Table.of(
+            data.margins,
+            {
+                "late at": "at",
+                "motion": "direction",
+                Column("delay", "s"): "delay_s",
+                "ticks": lambda margin: margin.delay_s / data.period_s,
+                "rad/s": "frequency_rad_s",
+            },
+        ),
     ]
     check = data.check
     if check:
         contents += [
-            Table(
-                [
-                    "share of the margin",
-                    Column("delay", "s"),
-                    Column("growth", "1/s"),
-                    "rad/s",
-                ],
-                [
-                    [share, run.delay_s, run.growth_per_s, run.frequency_rad_s]
-                    for share, run in (("0.95", check.below), ("1.05", check.above))
-                ],
+            Table.of(
+                [("0.95", check.below), ("1.05", check.above)],
+                {
+                    "share of the margin": lambda run: run[0],
+                    Column("delay", "s"): lambda run: run[1].delay_s,
+                    Column("growth", "1/s"): lambda run: run[1].growth_per_s,
+                    "rad/s": lambda run: run[1].frequency_rad_s,
+                },
                 "Simulation of the diagram with that delay at the sensor, for "
                 f"{check.below.duration_s:g} s after a small kick",
             ),
@@ -268,16 +270,21 @@ BURST_CYCLE = Part[BurstCycles](
 
 
 def _show_loci(data: Sequence[RootLocus]) -> list[Content]:
-    rows: list[list[Cell]] = [
-        [f"`{locus.parameter}`", locus.loop, locus.today, locus.limit] for locus in data
-    ]
     return [
         (
             "The figures show the poles ln(z)/T of the sampled loop as one gain "
             "varies, for the loop to the target and for the contact mode where the law "
             "is stiffest."
         ),
-        Table(["gain", "loop", "current", "stability ends at"], rows),
+        Table.of(
+            data,
+            {
+                "gain": lambda locus: f"`{locus.parameter}`",
+                "loop": "loop",
+                "current": "today",
+                "stability ends at": "limit",
+            },
+        ),
         Figure(
             lambda: plot_root_loci(data),
             "Root loci with marks at the current poles.",
@@ -321,14 +328,16 @@ def _sampling_document(data: SamplingCharts) -> dict[str, Any]:
 
 
 def _show_sampling(data: SamplingCharts) -> list[Content]:
-    conditions: list[list[Cell]] = [
-        [c.scheme, c.condition, c.pairs, c.stable, c.mismatches]
-        for c in data.conditions
-    ]
     return [
-        Table(
-            ["scheme", "stable exactly for", "pairs tried", "stable", "mismatches"],
-            conditions,
+        Table.of(
+            data.conditions,
+            {
+                "scheme": "scheme",
+                "stable exactly for": "condition",
+                "pairs tried": "pairs",
+                "stable": "stable",
+                "mismatches": "mismatches",
+            },
             "Sampled double integrator: closed form against eigenvalues",
         ),
         (
@@ -372,15 +381,10 @@ class ContactMode:
 def contact_growth(scenario: Scenario, ticks: int) -> float | None:
     """Returns the growth rate of the motion in front of an obstacle, 1/s.
 
-    The spring to the obstacle has the largest stiffness of the law.
-
-    Args:
-        scenario: The scenario with the law.
-        ticks: Age of the measured position of the obstacle, in control periods.
-
-    Returns:
-        The growth rate in 1/s, negative if the motion decays. If the law does not push
-        away from obstacles, None.
+    The spring to the obstacle has the largest stiffness of the law, and the measured
+    position of the obstacle is some control periods (``ticks``) old. The result is
+    negative if the motion decays. If the law does not push away from obstacles, it is
+    None.
     """
     stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.reporting.plain_values import plain
-from analysis.reporting.provenance import versions
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.runs.metric_table import METRICS
 from analysis.sweeps.batch import Batch, Summary, compares_laws
 from analysis.sweeps.cells import Cell, Quantity, quantities, text_table
@@ -19,9 +19,6 @@ from analysis.sweeps.pairs import Pair, PairedMedian, PairedRate
 from analysis.sweeps.run_rows import warning_counts
 from analysis.sweeps.sweep import reproducing_command
 
-#: Version of the format of the JSON document.
-VERSION = 2
-
 
 def batch_document(batch: Batch) -> dict[str, Any]:
     """Makes the JSON document of a batch, from plain values."""
@@ -30,7 +27,7 @@ def batch_document(batch: Batch) -> dict[str, Any]:
     files = example_files(batch)
     document: dict[str, Any] = plain(
         {
-            "schema_version": VERSION,
+            "schema_version": SCHEMA_VERSION,
             "title": batch.title,
             "scenarios": list(batch.summaries),
             "seed": plan.seed,
