@@ -105,6 +105,9 @@ def panels(result: RunResult, clearance: ArrayLike | None = None) -> list[Panel]
             (control period), m (``analysis.runs.proximity``). With None, there is no
             panel of the clearance.
 
+    Returns:
+        Panels in the order of the picture.
+
     Raises:
         InputError: ``clearance`` does not have one value per tick.
     """

@@ -185,13 +185,9 @@ def circles(
     time: float,
     colour: str,
 ) -> Iterator[Circle]:
-    """Yields the rings that a loudspeaker has sent out by a time.
+    """Yields the rings around a loudspeaker at a time, s.
 
-    Args:
-        center: Position of the loudspeaker in W, m.
-        bursts: Start and end of each burst, s.
-        time: Time, s.
-        colour: Color of the rings.
+    The center is in W, m. Each burst has a start and an end, s.
     """
     for start, end in bursts:
         for left in np.arange(0.0, min(time, end) - start, RING_S):

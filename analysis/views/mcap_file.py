@@ -99,8 +99,8 @@ def _write(writer: Any, run: RecordedRun) -> None:
         for topic, kind, message in entries:
             if kind not in schemas:
                 name = kind.replace("/", "/msg/")
-                text, _ = known.generate_msgdef(name, ros_version=2)
-                schemas[kind] = writer.register_msgdef(name, text)
+                definition, _ = known.generate_msgdef(name, ros_version=2)
+                schemas[kind] = writer.register_msgdef(name, definition)
             writer.write_message(topic, schemas[kind], message, time_ns, sequence=tick)
 
 

@@ -19,12 +19,9 @@ class Mesh(NamedTuple):
 
 
 def ribbon(points: ArrayLike, z: float, width: float) -> Mesh:
-    """Makes a flat band along a line. Most browsers draw lines only one pixel wide.
+    """Makes a flat band of a width, m, along (n, 2) points, m, at a height z, m.
 
-    Args:
-        points: (n, 2) points of the line, m.
-        z: Height, m.
-        width: Width of the band, m.
+    Most browsers draw lines only one pixel wide.
     """
     middle = np.asarray(points, dtype=float)
     along = np.gradient(middle, axis=0)
@@ -51,11 +48,9 @@ def star(radius: float, z: float, width: float) -> Mesh:
 
 
 def rectangles(edges: NDArray[np.float64], z: float) -> Mesh:
-    """Makes flat rectangles at a height.
+    """Makes flat rectangles at a height z, m.
 
-    Args:
-        edges: (m, 4) least x, greatest x, least y and greatest y of each rectangle, m.
-        z: Height, m.
+    The (m, 4) edges are least x, greatest x, least y and greatest y, m.
     """
     x_low, x_high, y_low, y_high = np.asarray(edges, dtype=float).T
     x = np.column_stack([x_low, x_high, x_high, x_low]).ravel()

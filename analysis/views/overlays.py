@@ -96,6 +96,9 @@ def overlays(scene: Scene, times: NDArray[np.float64]) -> list[Layer]:
     Args:
         scene: Scene of the run.
         times: (n,) times of the frames of the replay, s.
+
+    Returns:
+        Layers with things on the robots, and things in the world frame W.
     """
     return [
         *_laws(scene),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -136,10 +137,10 @@ def draw_scene(axes: Axes, scene: Scene, *, ends_only: bool = False) -> None:
             Then the picture shows neither what the robots sensed nor the odor.
     """
     painter = _Painter(axes, scene, ends_only)
-    for kind in _ENDS if ends_only else _ORDER:
+    for kind, draw in _DRAW.items():
         for thing in scene.things:
-            if isinstance(thing.shape, kind):
-                painter.draw(thing)
+            if isinstance(thing.shape, kind) and not (ends_only and kind in _SENSED):
+                draw(painter, thing, thing.shape)
 
 
 @dataclass
@@ -159,33 +160,6 @@ class _Painter:
         """Names of the robots with a map of the floor."""
         shapes = [thing.shape for thing in self.scene.things]
         return {each.own.name for each in shapes if isinstance(each, KnownFloor)}
-
-    def draw(self, thing: Thing) -> None:
-        match thing.shape:
-            case Cone() as shape:
-                self.cones(thing, shape)
-            case KnownFloor() as shape:
-                self.known_floor(thing, shape)
-            case Walls() as shape:
-                self.walls(thing, shape)
-            case Box() as shape:
-                self.box(thing, shape)
-            case Plume() as shape:
-                self.plume(thing, shape)
-            case Trail() as shape:
-                self.trail(thing, shape)
-            case SourceBody() as shape:
-                self.source(thing, shape)
-            case Estimate() as shape:
-                self.estimates(thing, shape)
-            case Goal():
-                self.goal(thing)
-            case RobotBody() as shape:
-                self.robot(thing, shape)
-            case Touched() as shape:
-                self.hit(thing, shape)
-            case Contact():
-                self.contact(thing)
 
     def once(self, label: str) -> str | None:
         """Returns a label for the first of several equal objects, and then None."""
@@ -391,7 +365,7 @@ class _Painter:
         # first estimate.
         self.axes.scatter([], [], color=colour, label=thing.label, **cross)
 
-    def goal(self, thing: Thing) -> None:
+    def goal(self, thing: Thing, _: Goal) -> None:
         style: dict[str, Any] = {"ms": 11, "ls": "none", "zorder": 5}
         place, label = thing.poses[0, :2], thing.label
         self.axes.plot(*place, "*", color=thing.colour, label=label, **style)
@@ -432,7 +406,7 @@ class _Painter:
             zorder=8,
         )
 
-    def contact(self, thing: Thing) -> None:
+    def contact(self, thing: Thing, _: Contact) -> None:
         """Draws the outline of a star, which does not hide the bodies."""
         small = self.ends_only
         self.axes.plot(
@@ -449,9 +423,19 @@ class _Painter:
 
 
 #: Kinds of shapes in the order of drawing, which is the order of the legend.
-_ORDER = (
-    *(Cone, KnownFloor, Walls, Box, Plume, Trail, SourceBody, Estimate, Goal),
-    *(RobotBody, Touched, Contact),
-)
-#: Kinds of shapes in a picture of both ends of a run.
-_ENDS = Walls, Box, Trail, SourceBody, Goal, RobotBody, Touched, Contact
+_DRAW: dict[type, Callable[[_Painter, Thing, Any], None]] = {
+    Cone: _Painter.cones,
+    KnownFloor: _Painter.known_floor,
+    Walls: _Painter.walls,
+    Box: _Painter.box,
+    Plume: _Painter.plume,
+    Trail: _Painter.trail,
+    SourceBody: _Painter.source,
+    Estimate: _Painter.estimates,
+    Goal: _Painter.goal,
+    RobotBody: _Painter.robot,
+    Touched: _Painter.hit,
+    Contact: _Painter.contact,
+}
+#: Kinds of shapes that a picture of both ends of a run leaves out.
+_SENSED = Cone, KnownFloor, Plume, Estimate

@@ -406,8 +406,8 @@ class _Recorder:
         mast = Cylinder(0.012, height - ROBOT_HEIGHT_M)
         middle = 0.5 * (height + ROBOT_HEIGHT_M) - 0.02
         self.put(f"{path}/mast", mast, grey, _placed(x, 0.0, middle))
-        for number, place in enumerate(microphones_B(own), start=1):
-            ball, at = Sphere(0.028), _placed(*place, height)
+        for number, (u, v) in enumerate(microphones_B(own), start=1):
+            ball, at = Sphere(0.028), _placed(u, v, height)
             self.put(f"{path}/microphone_{number}", ball, "#0D0D0D", at)
 
     def _loudspeaker(self, path: str, height: float) -> None:

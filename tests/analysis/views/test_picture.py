@@ -334,8 +334,8 @@ def test_panels_of_a_guard_show_its_columns(guarded_run):
     for number, bars in enumerate(actions.collections):
         covered = np.zeros(len(middles), dtype=bool)
         for bar in bars.get_paths():
-            begin, end = np.asarray(bar.vertices)[:, 0].min(), bar.vertices[:, 0].max()
-            covered |= (begin < middles) & (middles < end)
+            times = np.asarray(bar.vertices)[:, 0]
+            covered |= (times.min() < middles) & (middles < times.max())
         assert np.array_equal(covered, columns["guard_action"] == number)
     named = [text.get_text() for text in actions.get_yticklabels()]
     assert named == ["passed", "slowed", "turned", "braked", "halted"]
