@@ -20,28 +20,14 @@ LONGEST_LINE = 80
 
 
 def tick_at(result: RunResult, time: float) -> int:
-    """Returns the number of the tick (control period) that is nearest to a given time.
-
-    Args:
-        result: Result of the run.
-        time: Time, s. For a time outside the run, the function returns the first or the
-            last tick.
-
-    Returns:
-        Row of the table ``trajectory``, counted from 0.
-    """
+    """Returns the number of the tick (control period) nearest to a time, s, from 0."""
     return int(np.argmin(np.abs(result.time - time)))
 
 
 def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
-    """Returns times at constant intervals, starting at 0.
+    """Returns at most ``most`` times, s, at constant intervals from 0 on.
 
-    Args:
-        result: Result of the run.
-        most: Largest number of times; at least 2.
-
-    Returns:
-        (n,) ascending times, s.
+    ``most`` is at least 2.
     """
     end = result.simulated_s
     period = next((p for p in _NICE_PERIODS_S if end / p < most), end / (most - 1))

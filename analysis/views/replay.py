@@ -119,15 +119,10 @@ def write_replay(
     the plume, a lamp above each robot, and a white flash for each of its radio frames
     that the operator's computer receives.
 
-    Around the scene, the page has:
-
-    - a clock with a slider
-    - a legend, with switches for its layers
-    - the warnings about the scenario
-    - curves over time, with a cursor that follows the clock
-
-    If the address ends with ``#t=2.5``, the replay begins at 2.5 s. The page needs a
-    browser with WebGL, but no network.
+    Around the scene, the page has a clock, a legend with switches for its layers, the
+    warnings about the scenario, and curves over time. If the address ends with
+    ``#t=2.5``, the replay begins at 2.5 s. The page needs a browser with WebGL, but no
+    network.
 
     Args:
         result: Result of the run.
@@ -158,10 +153,7 @@ def write_replay(
 def record(meshcat: Meshcat, scene: Scene, things: Iterable[Thing]) -> None:
     """Adds things to a replay, and records their motion.
 
-    Args:
-        meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
-        scene: Scene of the run.
-        things: Things of the scene and of its overlays.
+    Meshcat (Drake's 3D viewer) must already be recording.
     """
     recorder = _Recorder(meshcat, scene.result)
     for thing in things:
@@ -188,14 +180,9 @@ def frame_times(result: RunResult) -> NDArray[np.float64]:
 def wheel_angles(
     robot: RobotParameters, path: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """Returns the angles of both wheels for rolling without slip.
+    """Returns the (n,) angles of both wheels for rolling without slip, rad, by side.
 
-    Args:
-        robot: Sizes of the robot.
-        path: (n, 3) poses (x, y, theta) of the robot in W, m and rad.
-
-    Returns:
-        (n,) angles of the left and of the right wheel, rad, by side.
+    The path consists of (n, 3) poses (x, y, theta) of the robot in W, m and rad.
     """
     theta = np.unwrap(path[:, 2])
     between = 0.5 * (theta[1:] + theta[:-1])
@@ -209,16 +196,10 @@ def wheel_angles(
 
 
 def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
-    """Returns which ring of a source is visible at a given time.
+    """Returns which ring of a source is visible at a time, s, as an index.
 
-    While the source sounds, its rings appear one after the other.
-
-    Args:
-        time: Time, s.
-        bursts: Start and end of each burst, s. The bursts do not overlap.
-
-    Returns:
-        Index into ``RINGS_M``. The value is None if the source is silent at this time.
+    While the source sounds, its rings appear one after the other. The value is None if
+    the source is silent. Each burst has a start and an end, s.
     """
     for start, end in bursts:
         if start <= time < end:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import cycle
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.colors import to_hex, to_rgb
@@ -133,7 +133,8 @@ class Thing:
 
     path: str
     """Unique name, as a path in the scene tree of the 3D viewer."""
-    shape: NamedTuple
+    shape: Any
+    """A shape of this module or of ``overlays``."""
     colour: str
     """Color, as a hexadecimal string."""
     times: NDArray[np.float64]

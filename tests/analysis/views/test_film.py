@@ -172,10 +172,8 @@ def test_a_film_shows_the_target_and_the_goal_of_a_route():
 def test_rings_grow_from_a_source_while_it_sounds(crossing_run):
     """3 m/s: 0.2 s after its start, a burst has rings of 0.6 m and of 0.15 m."""
     source = crossing_run.vector("p_WS")[:, 168]
-    shapes = [(each, each.shape) for each in make_scene(crossing_run).things]
-    ((thing, rings),) = [
-        (each, shape) for each, shape in shapes if isinstance(shape, Rings)
-    ]
+    things = make_scene(crossing_run).things
+    (thing,) = [each for each in things if isinstance(each.shape, Rings)]
     assert thing.pose(168)[:2] == pytest.approx(source)
-    found = list(circles((0.0, 0.0), rings.bursts, 4.2, "black"))
+    found = list(circles((0.0, 0.0), thing.shape.bursts, 4.2, "black"))
     assert [ring.radius for ring in found] == pytest.approx([0.6, 0.15])
