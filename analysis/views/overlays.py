@@ -40,11 +40,11 @@ _EDGES = (
 _LAMP_M = 0.32
 #: Color of the lamp for each state of the robot.
 _LAMPS = {
-    "rests": "#999999",
-    "senses": "#F0E342",
-    "moves": "#0073B2",
-    "found": "#009E73",
-    "gave up": "#D65E00",
+    "rests": COLOURS["empty"],
+    "senses": COLOURS["sound"],
+    "moves": COLOURS["robot"],
+    "found": COLOURS["seen"],
+    "gave up": COLOURS["source"],
 }
 #: Duration of the flash for a radio frame, s.
 _FLASH_S = 0.25
@@ -310,7 +310,7 @@ def _lamps(scene: Scene) -> Iterator[Layer]:
         flash = replace(ball, path=f"{robot.path}/radio", shape=Ball(0.06), alpha=0.8)
         lit = own.time - last < _FLASH_S
         height = _LAMP_M + 0.09
-        things.append(replace(flash, colour="#FFFFFF", height=height, seen=lit))
+        things.append(replace(flash, colour="white", height=height, seen=lit))
     text = "gray: at rest; yellow: senses; blue: moves; green: found; orange: gave up"
     if things:
         yield Layer("lamps", text, (COLOURS["sound"],), things)

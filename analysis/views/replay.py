@@ -372,7 +372,7 @@ class _Recorder:
             self.meshcat.SetTransform(f"{path}/{side}", axle)
             wheel, still = f"{path}/{side}/wheel", np.zeros(len(angles))
             self.put(f"{wheel}/tyre", tyre, "#1F1F1F")
-            self.put(f"{wheel}/spoke", spoke, "#F2F2F2")
+            self.put(f"{wheel}/spoke", spoke, "whitesmoke")
             poses = np.column_stack([still, still, angles])
             self._move(Thing(wheel, Frame(), "", thing.times, poses))
         if shape.hears:

@@ -136,7 +136,7 @@ class Thing:
     shape: Any
     """A shape of this module or of ``overlays``."""
     colour: str
-    """Color, as a hexadecimal string."""
+    """Color in any form of matplotlib."""
     times: NDArray[np.float64]
     """(n,) ascending times, s."""
     poses: NDArray[np.float64]

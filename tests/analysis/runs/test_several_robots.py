@@ -92,3 +92,13 @@ def test_each_robot_moves_in_the_replay(convoy):
     assert expected <= paths
     assert "robots/leader/rings/1" in paths, "its loudspeaker"
     assert "robots/second/rings/1" not in paths
+
+
+def test_a_robot_of_several_can_be_drawn_alone(convoy):
+    for name, own in convoy.robots.items():
+        (axes,) = plot_trajectory(own).axes
+        (path,) = (
+            k for k in axes.lines if k.get_label() == "path of the control point P"
+        )
+        np.testing.assert_array_equal(path.get_xdata(), own.columns["p_WP_x"])
+        assert make_scene(own).bodies[name].path == "robot"
