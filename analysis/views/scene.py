@@ -245,7 +245,7 @@ def scene_bodies(
         Robots, sources and obstacles, by name.
     """
     found = {}
-    several, tints = len(robots) > 1, robot_colours(scenario)
+    several, tints = len(robots) > 1, _robot_colours(scenario)
     for name, poses in robots.items():
         robot = scenario.robots[name]
         path = f"robots/{name}" if several else "robot"
@@ -278,18 +278,18 @@ def _source_label(scenario: Scenario, name: str, followed: set[str]) -> str:
     return name if len(scenario.sources) > 1 else "the source"
 
 
-def robot_colours(scenario: Scenario) -> dict[str, str]:
+def _robot_colours(scenario: Scenario) -> dict[str, str]:
     """Returns the color of each robot; each of several robots has its own color."""
     if len(scenario.robots) == 1:
         return dict.fromkeys(scenario.robots, COLOURS["robot"])
     return dict(zip(scenario.robots, cycle(ROBOT_COLOURS), strict=False))
 
 
-def estimate_colours(scenario: Scenario) -> dict[str, str]:
+def _estimate_colours(scenario: Scenario) -> dict[str, str]:
     """Returns the color of the position that each robot assumes for its target."""
     if len(scenario.robots) == 1:
         return dict.fromkeys(scenario.robots, COLOURS["estimate"])
-    return robot_colours(scenario)
+    return _robot_colours(scenario)
 
 
 def _robots(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
@@ -385,14 +385,14 @@ def _cones(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
             parent=bodies[name],
         )
         for name, own in result.robots.items()
-        for sensor in logged_sensors(own)
+        for sensor in _logged_sensors(own)
     ]
     colours, meaning = (COLOURS["echo"], COLOURS["empty"]), "with or without an echo"
     if things:
         yield Layer("cones", f"ultrasonic; {meaning}", colours, things)
 
 
-def logged_sensors(result: RunResult) -> range:
+def _logged_sensors(result: RunResult) -> range:
     """Returns the numbers, from 0, of the range sensors with readings in the log."""
     robot = result.scenario.only
     if isinstance(robot, HasRangeSensors) and "range_1" in result.columns:
@@ -430,7 +430,7 @@ def compose(
 
 def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
     scenario, things = result.full_scenario, []
-    colours = estimate_colours(scenario)
+    colours = _estimate_colours(scenario)
     routes = any(robot.kind == "router" for robot in scenario.robots.values())
     for name, own in result.robots.items():
         robot, columns = own.scenario.only, own.columns
@@ -502,7 +502,7 @@ def _trails(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
         things.append(_trail(f"trail/{body.path}", places, body, "-", label))
         if own.scenario.only.kind != "router":
             continue
-        tinted = replace(body, colour=estimate_colours(scenario)[name])
+        tinted = replace(body, colour=_estimate_colours(scenario)[name])
         label = "paths of the targets" if several else "path of the target"
         path, places = f"trail/target/{body.path}", own.vector("target")
         things.append(_trail(path, places, tinted, ":", label))
@@ -511,7 +511,7 @@ def _trails(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
         if body.moves:
             path, label = f"trail/{body.path}", f"path of {body.label}"
             things.append(_trail(path, body.poses[:, :2].T, body, "--", label))
-    colours = tuple(robot_colours(scenario).values())
+    colours = tuple(_robot_colours(scenario).values())
     yield Layer("trails", "past positions", colours, things)
 
 
