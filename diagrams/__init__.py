@@ -1,6 +1,6 @@
 """Describes scenarios, connects their blocks in diagrams, and runs the diagrams.
 
-``__init__.pyi`` lists the public names. Python loads a name at its first use.
+``__init__.pyi`` lists the public names. Python loads each name when it is first used.
 """
 
 import lazy_loader

@@ -36,16 +36,19 @@ class SoundFollower:
     diagram: Diagram
     scenario: Scenario
     robots: Mapping[str, Parts]
-    """Blocks of each robot, by name of the robot. A robot that follows a sound has the
-    parts plant, odometry, hearing, tracker, collision, controller and command. If the
-    robot hears audio, it also has the part microphones. With ultrasonic sensing, it has
-    ultrasonic. With a loudspeaker, it has emitter."""
+    """Blocks of each robot, by name of the robot. The key of a block is its part: its
+    role in the robot, such as ``plant``. A robot that follows a sound has the parts
+    plant, odometry, hearing, tracker, collision, controller and command. It has the
+    part microphones if it hears audio, ultrasonic if it has range sensors, and emitter
+    if it has a loudspeaker.
+    """
     sources: Mapping[str, Parts]
     """Blocks of each source: source, and with audio also emitter."""
     obstacles: Obstacles
     world: Parts | None = None
     """Blocks that all robots share: wind, plume, radio and sink. None if no robot
-    searches."""
+    searches.
+    """
 
     @cached_property
     def only(self) -> Parts:
@@ -84,13 +87,9 @@ class SoundFollower:
     def port(self, part: str, name: str) -> Any:
         """Returns an output port of the only robot, of its source or of the obstacles.
 
-        Args:
-            part: Part of the block (its role, for example ``plant``), a key of
-                ``blocks``.
-            name: Name of the port.
-
-        Returns:
-            The port. To evaluate the port, use the context of its block.
+        ``part`` is a key of ``blocks``: the role of the block, such as ``plant``.
+        ``name`` is the name of the port. To evaluate the port, use the context of its
+        block.
         """
         return self.blocks[part].GetOutputPort(name)
 
@@ -98,9 +97,9 @@ class SoundFollower:
 def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollower:
     """Builds the diagram of a scenario with all its robots, sources and obstacles.
 
-    Each robot and each source is a separate diagram inside this diagram
-    (``make_robot``, ``make_source``). Each robot can see and hit the obstacles, the
-    other robots and the sources. Each robot hears all sounds.
+    Each robot and each source is a diagram inside this diagram (``make_robot``,
+    ``make_source``). Each robot can see and hit the obstacles, the other robots and the
+    sources, and it hears all sounds.
 
     Args:
         scenario: The scenario to build.
@@ -143,14 +142,10 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
 
 
 def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
-    """Returns the sounds of a scenario, if a robot hears them as waves.
+    """Returns the sounds of a scenario, provided that a robot hears sound as waves.
 
-    Args:
-        scenario: The scenario that is run.
-
-    Returns:
-        Sound of each source and loudspeaker, by name of the source or robot. The
-        mapping is empty if no robot hears sound waves.
+    The result has the sound of each source and loudspeaker, by name of the source or
+    robot. It is empty if no robot hears sound as waves.
     """
     listens = any(robot.listens for robot in scenario.robots.values())
     return scenario.sounds() if listens else {}
@@ -159,10 +154,10 @@ def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
 def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
     """Builds the diagram of one robot of a scenario with ``make_robot``.
 
-    If no robot hears the robot's loudspeaker, the function leaves out the loudspeaker.
+    If no robot hears the robot's loudspeaker, the diagram has no loudspeaker.
 
     Args:
-        scenario: The scenario that is run.
+        scenario: Scenario with all robots.
         name: Name of the robot.
         log: Whether the diagram logs the columns of its blocks at every tick (control
             period).

@@ -32,21 +32,21 @@ _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
 def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> Any:
     """Builds the controller block for the control law that ``scenario.law`` names.
 
-    A user can write a law. The name of the user's law is ``package.module:Name`` or
-    ``path/to/file.py:Name``. Python also searches the working directory. The law is a
-    function or a class.
+    ``scenario.law`` is the name of a law of the package, or of a user's own law. The
+    name of a user's law is ``package.module:Name`` or ``path/to/file.py:Name``. Python
+    also searches the working directory. A user's law is a function or a class:
 
-    A function ``law(c, s, laws)`` returns the force away from an obstacle, N. c is the
-    distance of the obstacle, m, and s is its speed, m/s. ``laws`` contains the gains of
-    all laws of the package. ``make_controller`` tests the function at several distances
-    and speeds.
-
-    A class derives from LeafSystem. Each input port of the class has the name of an
-    output port in the diagram. The class has exactly one of the output ports that
-    ``make_command`` accepts. The arguments of the class can be any of these: ``robot``,
-    ``attraction``, ``laws``, ``gains``, ``velocity_term``, ``sensors``, ``tick_s``,
-    ``guard``, ``bodies`` and ``seed``. If the class derives from the block of a law of
-    the package, ``gains`` are the gains of that law.
+    - A function ``law(c, s, laws)`` returns the force away from an obstacle, N. c is
+      the distance of the obstacle, m, and s is its speed, m/s. ``laws`` contains the
+      gains of all laws of the package. ``make_controller`` tests the function at
+      several distances and speeds.
+    - A class derives from LeafSystem. Each of its input ports has the name of an output
+      port in the diagram. It has exactly one of the output ports that ``make_command``
+      accepts. Its constructor can take any of the arguments ``robot``, ``attraction``,
+      ``laws``, ``gains``, ``velocity_term``, ``sensors``, ``tick_s``, ``guard``,
+      ``bodies`` and ``seed``. Only a robot that follows a sound has ``attraction``,
+      ``velocity_term`` and ``guard``. If the class derives from the block of a law of
+      the package, ``gains`` are the gains of that law.
 
     Args:
         scenario: Scenario with the law and the parameters of its block.
@@ -138,11 +138,11 @@ def make_command(
     """Builds the block that converts the commands of a controller to wheel commands.
 
     The controller must have exactly one of these output ports of size 2. P is the
-    control point ahead of the axle:
+    control point ahead of the axle, and W is the world frame:
 
-    - ``acceleration_W``: acceleration of P, m/s^2;
-    - ``velocity_W``: velocity of P, m/s;
-    - ``twist_B``: forward speed, m/s, and yaw rate, rad/s.
+    - ``acceleration_W``: acceleration of P in W, m/s^2
+    - ``velocity_W``: velocity of P in W, m/s
+    - ``twist_B``: forward speed, m/s, and yaw rate, rad/s
 
     Args:
         controller: The controller block.
@@ -153,7 +153,7 @@ def make_command(
         The block. Its input has the same name as the output of the controller.
 
     Raises:
-        InputError: The controller has none of these outputs, or has several of them.
+        InputError: The controller has none or several of these outputs.
     """
     return WheelCommand(command=commanded(controller), robot=robot, tick_s=tick_s)
 
@@ -161,15 +161,9 @@ def make_command(
 def commanded(controller: Any, name: str = "") -> str:
     """Returns the name of the output port that carries the commands of a controller.
 
-    Args:
-        controller: A controller block, see ``make_command``.
-        name: Name of the controller's law, for messages.
-
-    Returns:
-        Name of the output port.
-
-    Raises:
-        InputError: The controller has no output port for commands, or has several.
+    ``make_command`` lists the possible ports. If the controller has none or several of
+    them, the function raises an ``InputError``, whose message contains the law's name
+    ``name``.
     """
     name = name or controller.get_name()
     sizes = _output_sizes(controller)

@@ -16,15 +16,15 @@ def with_own_blocks(
 ) -> dict[str, Any]:
     """Adds a user's own blocks to the blocks of a robot.
 
-    Each block has a part, which is its role in the robot, for example ``plant``. If a
-    block of the user has the same part as a block of the package, the user's block
-    replaces the block of the package.
+    The part of a block is its role in the robot, such as ``plant``. A user's block
+    replaces the package's block with the same part.
 
     Args:
         blocks: Blocks of the package, by part.
         names: Names of the user's blocks, as ``package.module:Name`` or
             ``path/to/file.py:Name``.
-        parts: Values for the arguments of the user's blocks, by name of the argument.
+        parts: Values of the arguments that the constructor of a user's block can take,
+            by name of the argument.
 
     Returns:
         A new mapping of blocks by part.

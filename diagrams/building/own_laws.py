@@ -18,17 +18,15 @@ from systems.framework.input_error import InputError, shortened
 def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
     """Wraps a user's control law so that an invalid result raises an error.
 
-    The error states the name of the law.
-
     Args:
-        name: Name of the law, for messages.
+        name: Name of the law, for the error message.
         law: Function ``law(c, s, laws)`` that returns the force away from an obstacle,
             N. c is the distance of the obstacle, m, and s is its speed, m/s. ``laws``
             contains the gains of all laws of the package.
 
     Returns:
-        A function with the same arguments. The function returns a finite force, N, as a
-        float or AutoDiffXd. Otherwise it raises an InputError.
+        A function with the same arguments. It returns a finite force, N, as a float or
+        AutoDiffXd, or raises an InputError.
     """
 
     @functools.wraps(law)
@@ -64,7 +62,8 @@ def try_law(
     """Tests a user's control law at several distances and speeds, before the run.
 
     Args:
-        law: A function from ``checked_law``. It raises an error if a result is invalid.
+        law: A function from ``checked_law``, which raises an error if a result is
+            invalid.
         laws: Gains of all laws.
         range_m: Largest tested distance of an obstacle, m.
         top_speed_m_s: Largest tested speed of an obstacle, m/s.

@@ -56,13 +56,9 @@ class Parts:
     def port(self, part: str, name: str) -> Any:
         """Returns an output port of a block.
 
-        Args:
-            part: Part of the block (its role, for example ``plant``), a key of
-                ``blocks``.
-            name: Name of the port.
-
-        Returns:
-            The port. To evaluate the port, use the context of its block.
+        ``part`` is a key of ``blocks``: the role of the block, such as ``plant``.
+        ``name`` is the name of the port. To evaluate the port, use the context of its
+        block.
         """
         return self.blocks[part].GetOutputPort(name)
 
@@ -83,11 +79,8 @@ def parts_of(diagram: Diagram) -> Parts:
 def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ...]]:
     """Returns the names of the columns in the log of a robot, in order.
 
-    Args:
-        blocks: Blocks of the robot, by part (role of the block, for example ``plant``).
-
-    Returns:
-        Names of the columns of each output port. The keys are (part, name of the port).
+    The keys of ``blocks`` are parts; a part is the role of a block, such as ``plant``.
+    The keys of the result are pairs of a part and the name of an output port.
     """
     return {
         (part, port): names
@@ -97,15 +90,10 @@ def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ..
 
 
 def publishes_state(block: Any, port: str) -> bool:
-    """Whether an output of a block is a part of its state, as set by the last update.
+    """Whether an output port contains exactly what the block's last update computed.
 
-    Args:
-        block: A block of a robot or of the world.
-        port: Name of the output port.
-
-    Returns:
-        False if the output depends on the present inputs, or if it changes between
-        updates.
+    The answer is False if the output depends on the present inputs, or if it changes
+    between updates.
     """
     if block.num_continuous_states():
         return False
@@ -119,12 +107,7 @@ def publishes_state(block: Any, port: str) -> bool:
 def block_seed(seed: int, name: str) -> int:
     """Computes the seed of a block from the scenario's seed and the block's name.
 
-    Args:
-        seed: Seed of the scenario.
-        name: Name of the block.
-
-    Returns:
-        A whole number from 0 to 2^64 - 1.
+    The result is a whole number from 0 to 2^64 - 1.
     """
     sequence = np.random.SeedSequence([seed, crc32(name.encode())])
     return int(sequence.generate_state(1, np.uint64)[0])
@@ -133,11 +116,11 @@ def block_seed(seed: int, name: str) -> int:
 def seed_of(scenario: Scenario, block: str, owner: str) -> int:
     """Returns the random seed of a block that belongs to a robot or source.
 
-    The seed depends on the names of the block and of its owner. However, the default
-    names ``robot`` and ``source`` of owners do not affect the seed.
+    The seed depends on the names of the block and of its owner. An owner with the
+    default name ``robot`` or ``source`` does not affect the seed.
 
     Args:
-        scenario: The scenario that is run.
+        scenario: Scenario with the seed of the run.
         block: Name of the block.
         owner: Name of the robot or source to which the block belongs.
 
@@ -149,14 +132,7 @@ def seed_of(scenario: Scenario, block: str, owner: str) -> int:
 
 
 def world_seeds(scenario: Scenario) -> dict[str, int]:
-    """Returns the random seeds of the blocks that all robots share.
-
-    Args:
-        scenario: The scenario that is run.
-
-    Returns:
-        Seed of each block, by name of the block.
-    """
+    """Returns the random seed of each block that all robots share, by block name."""
     names = "wind_field", "odor_plume", "radio_channel"
     return {name: block_seed(scenario.seed, name) for name in names}
 
@@ -179,8 +155,8 @@ def robot_blocks(
         others: Names of the sources and loudspeakers that the robot does not follow.
 
     Returns:
-        Blocks by part (role of the block, for example ``plant``). They are not yet in a
-        diagram.
+        Blocks by part, which is the role of a block, such as ``plant``. They are not
+        yet in a diagram.
 
     Raises:
         InputError: The law is not known, or a block cannot be made.
@@ -245,22 +221,20 @@ def make_robot(
 ) -> Diagram:
     """Builds the diagram of a robot.
 
-    The robot can have simulated sensors or ideal sensors, as the fields ``hearing`` and
-    ``obstacle_sensing`` state. Both kinds of blocks have the same ports. If both fields
-    are ``ideal`` and ``odometry.rounding`` is off, Drake can convert the diagram to
-    AutoDiffXd. Each input of a block connects to the only output with the same name
-    (see docs/model.md).
+    The fields ``hearing`` and ``obstacle_sensing`` select simulated or ideal sensors.
+    Both kinds of blocks have the same ports. If both fields are ``ideal`` and
+    ``odometry.rounding`` is off, Drake can convert the diagram to AutoDiffXd. Each
+    input of a block connects to the only output with the same name (see docs/model.md).
 
-    The diagram can have the following inputs. Only those that the blocks need exist:
+    The diagram has each of the following inputs only if one of its blocks needs it:
 
-    - ``pose_WS`` and ``emission`` of the target;
-    - ``poses_WO`` and ``sizes`` of the other bodies;
-    - ``emission_<name>`` of each other source;
-    - ``wind``, ``plume`` and ``air`` of the world.
+    - ``pose_WS`` and ``emission`` of the target
+    - ``poses_WO`` and ``sizes`` of the other bodies
+    - ``emission_<name>`` of each other source
+    - ``wind``, ``plume`` and ``air`` of the world
 
-    The outputs are ``pose_WB`` and ``velocity_WB``. If the robot has a loudspeaker,
-    ``own_emission`` is a further output. If the robot searches, ``frames`` is a further
-    output.
+    The outputs are ``pose_WB`` and ``velocity_WB``. A robot with a loudspeaker also has
+    ``own_emission``. A robot that searches also has ``frames``.
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
@@ -314,7 +288,7 @@ def make_world(scenario: Scenario, *, log: bool = False) -> Diagram | None:
     are the ports that robots need, for example ``air``.
 
     Args:
-        scenario: The scenario that is run.
+        scenario: Scenario with all robots.
         log: Whether the diagram logs the columns of its blocks at every tick (control
             period).
 
@@ -350,12 +324,13 @@ def make_source(
 
     Args:
         scenario: Scenario with the seed, the speed of sound and the room.
-        name: Name of the source. The random numbers of the source depend on its name.
+        name: Name of the source and of the diagram. The random numbers of the source
+            depend on it.
         source: Path, drive and sound of the source.
         audible: Whether a robot hears the sound as waves.
 
     Returns:
-        The diagram. It has the name of the source.
+        The diagram.
 
     Raises:
         InputError: The sound file of the source cannot be played.
@@ -431,21 +406,20 @@ def connect_by_name(
 ) -> None:
     """Connects each input port of the blocks to the only output port of the same name.
 
-    Each quantity has the same name on all ports (see docs/model.md). A list of
-    connections is therefore unnecessary.
+    Each quantity has the same name on all ports (see docs/model.md). Therefore no list
+    of connections is necessary.
 
     Args:
-        builder: Builder of the robot or source. The builder already contains the
-            blocks.
+        builder: Builder that already contains the blocks.
         blocks: Blocks to connect.
-        outside: Quantities that come from outside and become inputs of the diagram. An
-            input also counts if its name begins with one of these names and an
-            underscore.
+        outside: Names of quantities that become inputs of the diagram. The name
+            ``emission``, for example, also selects all inputs whose names begin with
+            ``emission_``.
 
     Raises:
         InputError: Several blocks publish a quantity that a block needs.
-        InputError: No block publishes a quantity that a block needs, and the quantity
-            does not come from outside.
+        InputError: No block publishes a quantity that a block needs, and ``outside``
+            does not name it.
     """
     outputs, counts = dict[str, Any](), Counter[str]()
     for block in blocks:
@@ -476,9 +450,9 @@ def connect_by_name(
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:
     """Returns the names of the columns of a block's output ports, by port.
 
-    If a user's own block lacks the attribute ``columns``, the function uses
-    ``LAW_COLUMNS``. Column names apply to a port only if the port has as many elements
-    as there are names.
+    A user's block without the attribute ``columns`` has the columns ``LAW_COLUMNS``.
+    The result omits ports whose number of elements differs from the number of their
+    columns.
     """
     columns = getattr(block, "columns", None) or LAW_COLUMNS
     ports = {
@@ -501,15 +475,9 @@ def _add_log(builder: DiagramBuilder, blocks: Sequence[Any], tick_s: float) -> N
 
 
 def multiplexed(builder: DiagramBuilder, name: str, ports: Sequence[Any]) -> Any:
-    """Joins several output ports into one port that carries all their values in order.
+    """Joins several vector-valued output ports into one port that carries all values.
 
-    Args:
-        builder: Builder of the diagram.
-        name: Name of the multiplexer.
-        ports: Output ports that carry vectors.
-
-    Returns:
-        The joined port.
+    ``name`` is the name of the multiplexer.
     """
     block = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
     for index, port in enumerate(ports):

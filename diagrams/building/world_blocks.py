@@ -12,14 +12,7 @@ from systems import OdorPlume, RadioChannel, SinkMonitor, WindField
 
 
 def radio_nodes(scenario: Scenario) -> dict[str, int]:
-    """Returns the radio addresses of the robots that have a radio.
-
-    Args:
-        scenario: The scenario that is run.
-
-    Returns:
-        Radio addresses, by name of the robot.
-    """
+    """Returns the address of each robot that has a radio, by name of the robot."""
     return {
         name: address_of_robot(robot)
         for name, robot in scenario.robots.items()
@@ -30,16 +23,10 @@ def radio_nodes(scenario: Scenario) -> dict[str, int]:
 def world_blocks(scenario: Scenario, seeds: Mapping[str, int]) -> dict[str, Any]:
     """Makes the blocks that all robots share: wind, odor plume, radio and sink.
 
-    If no robot needs these blocks, the function makes none. The sink is the computer of
-    the operator, which receives radio frames.
-
-    Args:
-        scenario: The scenario that is run.
-        seeds: Random seeds of the blocks, by name of the block.
-
-    Returns:
-        Blocks by part (role of the block, for example ``radio``). They are not yet in a
-        diagram.
+    The sink is the computer of the operator, which receives radio frames. ``seeds`` has
+    the random seeds of the blocks, by name of the block. The keys of the result are the
+    parts (roles) of the blocks, such as ``radio``. The result is empty if no robot
+    needs these blocks. The blocks are not yet in a diagram.
     """
     blocks: dict[str, Any] = {}
     nodes, tick_s = radio_nodes(scenario), scenario.tick_s

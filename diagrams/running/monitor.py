@@ -23,7 +23,7 @@ class Monitor:
 
     Args:
         follower: The diagram with its robots and sources.
-        audio: Open files for the sound of the run. None: no sound is saved.
+        audio: Open files for the sound of the run, or None to save no sound.
     """
 
     def __init__(self, follower: SoundFollower, audio: RunAudio | None = None) -> None:
@@ -42,9 +42,8 @@ class Monitor:
     def __call__(self, context: Any) -> EventStatus:
         """Saves the sound of a tick and judges whether the run is over.
 
-        The simulator calls this method after every integration step. Steps may be
-        shorter than ticks (control periods). The method does nothing at instants
-        between ticks.
+        A tick is a control period. The simulator calls this method after every
+        integration step. Between ticks, the method does nothing.
 
         Args:
             context: Drake context of the diagram.

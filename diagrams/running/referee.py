@@ -83,9 +83,9 @@ class Referee:
         The cause of a robot is the reason why its run ended. The first robot of the
         first group that is not empty decides:
 
-        1. robots that collided or diverged;
-        2. robots that were neither successful nor interrupted;
-        3. all other robots.
+        1. robots that collided or diverged
+        2. robots that were neither successful nor interrupted
+        3. all other robots
         """
 
         def rank(name: str) -> int:
@@ -97,14 +97,7 @@ class Referee:
         return min(self.steps, key=rank)
 
     def cause_of(self, name: str) -> str:
-        """Returns the cause for which the run of a robot has ended.
-
-        Args:
-            name: Name of the robot.
-
-        Returns:
-            One of the causes that ``RunResult.cause`` lists.
-        """
+        """Returns the cause for which a robot's run ended (see ``RunResult.cause``)."""
         found = self.steps[name].state.found[0]
         if found:
             return FOUND[found]
@@ -125,30 +118,20 @@ class Referee:
         return "unsettled" if been_in_goal else "timeout"
 
     def ended(self, name: str) -> float:
-        """Returns how the search of a robot ended.
+        """Returns how the search of a robot ended, as a number.
 
-        Args:
-            name: Name of the robot.
-
-        Returns:
-            Number of the ending, see ``systems.search.search_ending``. It is 0 if the
-            search has not ended, or if the robot does not search.
+        ``systems.search.search_ending`` lists the numbers. The result is 0 if the
+        search has not ended, or if the robot does not search.
         """
         return float(self.steps[name].state.ended[0])
 
     def collision(self, name: str) -> Collision | None:
-        """Returns the collision of a robot after the run, and who is at fault.
+        """Returns the collision of a robot and who is at fault, or None.
 
-        The function compares two motions since the last tick (control period): the
-        motion of the robot alone, and the motion of the body alone. If the robot's
-        motion brings the two at least as near to each other as the body's motion, the
-        robot is at fault.
-
-        Args:
-            name: Name of the robot.
-
-        Returns:
-            The collision, or None if the robot has not collided.
+        The method considers two motions since the last tick (control period): that of
+        the robot while the body that it hit stays in place, and that of this body while
+        the robot stays in place. The robot is at fault if its motion brings the two at
+        least as near to each other as the body's motion does.
         """
         state, tick_s = self.steps[name].state, self.scenario.tick_s
         body, part, tick = state.contact.tolist()
@@ -201,11 +184,12 @@ def _numbers_of(scenario: Scenario, name: str) -> RefereeNumbers:
 def _table_of(
     bodies: Mapping[str, Body], own: Scenario, robots: list[str], *, touchable: int
 ) -> BodyTable:
-    """Tabulates the poses and sizes of bodies that a robot could touch.
+    """Tabulates the poses and sizes of the bodies around a robot.
 
-    Only the first ``touchable`` bodies can be touched. Each tick (control period) has
-    equal parts, at whose ends contacts are checked. If a body is fast, ticks have more
-    parts, so that the body moves at most ``_PART_M`` per part.
+    The robot can touch only the first ``touchable`` of the bodies; a goal may follow.
+    Each tick (control period) is divided into equal parts. The table has the pose of
+    each body on a known path at the end of each part. The number of parts is so large
+    that no such body moves more than ``_PART_M`` per part.
     """
     ticks = int(own.duration_s / own.tick_s + 1e-9)
     times: NDArray[np.float64] = own.tick_s * np.arange(ticks + 1.0)
@@ -248,14 +232,14 @@ def _table_of(
 
 
 def _instants(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
-    """Returns the instants at which contacts are checked.
+    """Returns the instants at which poses are tabulated, including the ticks.
 
     Args:
         times: (n + 1,) times of the ticks (control periods), s.
         parts: Number of equal parts per tick.
 
     Returns:
-        (n * parts + 1,) instants, s. They include the ticks themselves.
+        (n * parts + 1,) instants, s.
     """
     shares = np.arange(1, parts + 1) / parts
     between = times[:-1, None] + shares * np.diff(times)[:, None]

@@ -31,24 +31,26 @@ class RunResult:
 
     If the run has several robots, the field ``several`` has one result per robot. In
     the result of the whole run, each column name then begins with the name of the robot
-    and a dot. The field ``cause`` is then the cause of one robot, see
-    ``Referee.decisive``.
+    and a dot. Its ``cause`` is the cause of one robot (see ``Referee.decisive``).
     """
 
     scenario: Scenario
-    """The scenario that was run. In the result of one of several robots, it is the
-    scenario of that robot alone (``Scenario.of_robot``)."""
+    """Scenario of the run. In the result of one of several robots, it is the scenario
+    of that robot alone (``Scenario.of_robot``).
+    """
     cause: str
     """Cause for which the run ended: reached, completed, found, unsettled, timeout,
     astray, collision, stuck, no way found, false find, lost, diverged, or interrupted.
-    docs/model.md defines these causes."""
+    docs/model.md defines these causes.
+    """
     collision: Collision | None
     """The collision, if the cause is collision."""
     columns: dict[str, NDArray[np.float64]]
     """Columns of ``trajectory``."""
     wall_s: float
     """Computing time of the simulation, s. It excludes the time to build the diagram,
-    and the time to compile or load code with numba."""
+    and the time to compile or load code with numba.
+    """
     name: str = ROBOT
     """Name of the robot."""
     engine: Engine = "drake"
@@ -62,9 +64,10 @@ class RunResult:
     ended: float = 0.0
     """Number of the ending of a search, see ``systems.search.search_ending``."""
     world: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """Columns with the data that the sink received from each searching robot. The sink
-    is the computer of the operator. The result of each robot contains these data, too:
-    ``robot.frames`` in ``world`` equals ``sink_frames`` in ``columns`` of ``robot``."""
+    """Columns with the data that the sink (the computer of the operator) received from
+    each searching robot. The result of each robot contains these data, too:
+    ``robot.frames`` in ``world`` equals ``sink_frames`` in ``columns`` of ``robot``.
+    """
 
     @property
     def full_scenario(self) -> Scenario:
@@ -152,8 +155,8 @@ def gather_result(
         world: Columns of the blocks that all robots share.
 
     Returns:
-        The result of the run. If there are several robots, the field ``several`` of
-        this result contains the result of each robot.
+        The result of the run. With several robots, its field ``several`` contains the
+        result of each robot.
     """
     scenario = referee.scenario
     paths = {
@@ -237,8 +240,8 @@ def _completed(
 ) -> dict[str, NDArray[np.float64]]:
     """Adds columns that follow from the logged columns.
 
-    The added columns are the position of the control point P, the true pose of the
-    source, and the true and measured range and bearing of the source.
+    These columns are the position of the control point P, the true pose of the source,
+    and the true and measured range and bearing of the source.
     """
     offset, theta = scenario.only.robot.control_point_m, columns["theta_WB"]
     c, s = np.cos(theta), np.sin(theta)

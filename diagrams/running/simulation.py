@@ -57,17 +57,16 @@ def simulate(
 
     Args:
         scenario: The scenario to run.
-        follower: Existing diagram of the same scenario, built with ``log=True``. Drake
-            never frees blocks written in Python. If one process runs many scenarios,
-            the runs should therefore share one diagram. Compiled runs share blocks
-            automatically.
+        follower: Existing diagram of the same scenario, built with ``log=True``.
+            Because Drake never frees blocks written in Python, many runs in one process
+            should share one diagram. Compiled runs share blocks automatically.
         progress: Function that is called once per simulated second. Its argument is the
             simulated time, s.
-        engine: ``drake``: Drake's simulator. ``compiled``: the same blocks in one
-            compiled loop. The first compiled run takes up to 15 s to compile the
-            blocks; the compiled code stays on the disk. None: the engine of the
+        engine: ``drake`` for Drake's simulator, or ``compiled`` for the same blocks in
+            one compiled loop. The first compiled run takes up to 15 s to compile the
+            blocks; the compiled code stays on the disk. None selects the engine of the
             scenario, where ``auto`` means ``drake``.
-        audio: Open files for the sound of the run. None: no sound is saved.
+        audio: Open files for the sound of the run, or None to save no sound.
 
     Returns:
         The result of the run.
@@ -113,11 +112,11 @@ def _logged(
 ) -> dict[str, dict[str, NDArray[np.float64]]]:
     """Returns the logged columns of each robot after a run, and of the shared blocks.
 
-    Drake logs before the blocks update their states at the same instant. If an output
-    is part of a block's state, its values therefore appear one row too late in the log.
-    This function moves the columns of such outputs up by one row. Each value is then in
-    the row of the tick (control period) in which the block computed the value. The last
-    row contains the values after the updates of the last tick.
+    Drake logs before the blocks update their states at the same instant. Outputs that
+    are parts of a block's state are therefore logged one row too late. This function
+    moves their columns up by one row. Each value is then in the row of the tick
+    (control period) that computed it. The last row contains the values after the
+    updates of the last tick.
     """
     context = simulator.get_context()
     every = {**follower.robots}
@@ -142,14 +141,13 @@ def _logged(
 
 
 def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
-    """Makes the compiled loop of a scenario ready to run, without running a tick.
+    """Compiles the loop of a scenario, or loads its compiled code.
 
-    A tick is a control period. The function compiles the code of the loop, or loads the
-    code that an earlier process has compiled.
+    The function does not run any tick (control period).
 
     Args:
         scenario: The scenario to run.
-        audio: Open files for the sound of the run. None: no sound is saved.
+        audio: Open files for the sound of the run, or None to save no sound.
 
     Returns:
         The compiled loop before its first tick.
@@ -212,13 +210,12 @@ def _python_views(follower: SoundFollower, context: Any) -> list[Any]:
 def load_compiled_code(follower: SoundFollower) -> None:
     """Compiles or loads the numba code that a diagram needs, by running a few ticks.
 
-    If an earlier process has compiled the code, numba loads the code from the disk.
-    Loading takes about a tenth of the computing time of a run of 40 s. Compiling takes
-    many times longer. Neither time counts as simulation time.
+    If an earlier process has compiled the code, numba loads it from the disk. Loading
+    takes about a tenth of the computing time of a run of 40 s. Compiling takes many
+    times longer. Neither counts as simulation time.
 
-    Each process needs to call this function only once for each kind of diagram.
-    ``simulate`` calls this function. If a process forks, it should call this function
-    before the fork.
+    ``simulate`` calls this function once per process for each kind of diagram. A
+    process that forks should call it before the fork.
 
     Args:
         follower: The diagram of a scenario.

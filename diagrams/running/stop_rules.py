@@ -1,8 +1,7 @@
 """Decides at every tick whether a run ends, and for which cause.
 
-A tick is a control period. ``judge_robot`` applies these stop rules to one robot at one
-tick. Both engines call ``judge_robot`` through the referee
-(``diagrams.running.referee``).
+A tick is a control period. ``judge_robot`` applies the stop rules to one robot at one
+tick. Both engines call it through the referee (``diagrams.running.referee``).
 """
 
 from __future__ import annotations
@@ -67,12 +66,14 @@ class Collision:
     """Name of the body that the robot touched."""
     fault: str
     """Who is at fault, ``robot`` or ``obstacle``. The rule compares two motions since
-    the last tick: that of the robot alone, and that of the body alone. The motion that
-    brings the two nearer to each other decides. Turning counts as motion. A body at
-    rest is never at fault."""
+    the last tick (control period): that of the robot alone, and that of the body alone.
+    The motion that brings the two nearer to each other is at fault. Turning counts as
+    motion. A body at rest is never at fault.
+    """
     time: float
-    """Time of the first contact, s, with a resolution of a fifth of a tick or
-    better."""
+    """Time of the first contact, s, with a resolution of a fifth of a tick (control
+    period) or better.
+    """
 
 
 class RuleNumbers(NamedTuple):
@@ -141,13 +142,13 @@ def judge_tick(
 ) -> int:
     """Decides whether the run of a robot ends at a tick (control period), and why.
 
-    The function applies all stop rules except the rule for contacts. The rules apply in
-    this order: diverged, reached, lost, and stuck or no way found.
+    The function applies all stop rules except the rule for contacts, in this order:
+    diverged, reached, lost, and stuck or no way found.
 
-    ``state`` holds the start time of each condition that must last for some time. It
-    also counts the ticks since the first detection of the target. Among these ticks, it
-    counts those in which the control point P follows the target. If the run reaches its
-    time limit, ``Referee.cause_of`` evaluates these two counts.
+    ``state`` contains the start time of each condition that must last for some time. It
+    also contains two counts: the ticks since the first detection of the target, and the
+    number of these ticks in which the control point P follows the target.
+    ``Referee.cause_of`` uses both counts if the run reaches its time limit.
 
     Args:
         time: Time of the tick, s.
@@ -204,13 +205,14 @@ def judge_tick(
 def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> int:
     """Decides whether the run of a searching robot ends at a control period, and why.
 
-    The function applies all stop rules of a search except the rule for contacts:
+    The function applies all stop rules of a search except the rule for contacts. The
+    causes are:
 
-    - The robot is too far from the source: the run ends as diverged.
-    - The search succeeded, and the robot is near the source: the run ends as found. In
-      a search for an odor, the source must also be ahead of the robot.
-    - The search succeeded elsewhere: the run ends as a false find.
-    - The robot gave up the search: the run ends as lost.
+    - diverged: the robot is too far from the source.
+    - found: the search succeeded near the source. In a search for an odor, the source
+      must also be ahead of the robot.
+    - false find: the search succeeded elsewhere.
+    - lost: the robot gave up the search.
 
     Args:
         ended: Number of the ending, see ``systems.search.search_ending``.
@@ -244,21 +246,26 @@ class BodyTable(NamedTuple):
     sizes: NDArray[np.float64]
     """(n, 2) lengths and widths, m."""
     reach: NDArray[np.float64]
-    """(n,) distances between the centers of robot and body, m. Beyond this distance,
-    they cannot touch. The value is -inf for a goal, which has no body."""
+    """(n,) distances between the centers of robot and body, m, beyond which they cannot
+    touch. The value is -inf for a goal, which has no body.
+    """
     steps: NDArray[np.float64]
-    """(n,) upper bounds of the distances that the bodies move in a tick, m. The value
-    is 0 for robots."""
+    """(n,) upper bounds of the distances that the bodies move in a tick (control
+    period), m; 0 for robots.
+    """
     robots: NDArray[np.int64]
     """(n,) number of the robot if the body is a robot; otherwise -1."""
     parts: int
-    """Number of equal parts of a tick. Contacts are checked at the end of each part."""
+    """Number of equal parts of a tick. Poses are known at the end of each part."""
     rows: NDArray[np.int64]
     """(n, 2) two numbers for each body: the row in ``poses`` of the first tick, and the
-    number of rows per tick. A body at rest has 0 rows per tick."""
+    number of rows per tick (0 for a body at rest).
+    """
     poses: NDArray[np.float64]
-    """(m, 3) poses (x, y, theta) in W of the bodies that are not robots, m and rad. The
-    rows belong to the ends of all parts of the ticks."""
+    """(m, 3) poses (x, y, theta) in the world frame W of the bodies that are not
+    robots, m and rad. Each tick is divided into parts, and there is one row for the end
+    of each part.
+    """
 
 
 class RefereeNumbers(NamedTuple):
@@ -282,7 +289,8 @@ class RefereeState(NamedTuple):
     """(8,) state of ``judge_tick``."""
     before: NDArray[np.float64]
     """(robots, 3) poses of all robots at the previous tick, m and rad. At the first
-    tick, these are the present poses."""
+    tick, these are the present poses.
+    """
     now: NDArray[np.float64]
     """(robots, 3) poses of all robots at the last tick."""
     valid: NDArray[np.float64]
@@ -291,7 +299,8 @@ class RefereeState(NamedTuple):
     """(1,) number of the ending of a search; 0 while the search continues."""
     contact: NDArray[np.float64]
     """(3,) data of the contact: number of the touched body (-1: none), elapsed part of
-    the tick (0 to 1), and number of the tick."""
+    the tick (0 to 1), and number of the tick.
+    """
     found: NDArray[np.int64]
     """(1,) index of the cause in ``FOUND``; 0 while the run continues."""
 
@@ -301,14 +310,13 @@ def judge_robot(
 ) -> None:
     """Applies the stop rules to one robot at a tick (control period).
 
-    The result is a cause, the reason why the run of the robot ends. The function first
-    looks for a contact between the robot and a body. If a contact switch of the robot
-    is closed because the robot touches a body, the contact is intended and does not
-    count. If there is no contact and the robot has no cause yet, ``judge_search`` or
-    ``judge_tick`` judges the robot.
+    The result is the cause, the reason why the run of the robot ends. The function
+    first looks for a contact between the robot and a body. A contact that closes a
+    contact switch of the robot is intended and does not count. Without a contact,
+    ``judge_search`` or ``judge_tick`` judges a robot that has no cause yet.
 
-    A robot with a cause keeps this cause while the run of the other robots continues.
-    However, if the robot collides later, its cause becomes collision.
+    A robot with a cause keeps it while the run of the other robots continues. If it
+    collides later, its cause becomes collision.
 
     Args:
         tick: Number of the tick.
@@ -364,16 +372,13 @@ def _first_touched(
 ) -> tuple[int, float]:
     """Returns the first body that a robot has touched in the last control period.
 
-    A tick is a control period. The function skips a body that is too far away for a
-    contact. A body is too far away if the distance of the centers exceeds the sum of
-    these lengths: half the diagonals of robot and body, and their motions since the
-    last tick. ``first_overlap`` checks all other bodies at several instants within the
-    tick. The poses of other robots are interpolated. The poses of all other bodies are
-    known in advance.
+    The function skips bodies that are too far away. For the other bodies,
+    ``first_overlap`` gets the poses at several instants within the period, and also
+    finds contacts between these instants. The poses of other robots are interpolated.
+    The poses of all other bodies are known in advance.
 
     Returns:
-        Two values: the number of the body (-1 for none), and the elapsed part of the
-        tick (0 to 1).
+        Number of the body (-1 for none), and elapsed part of the period (0 to 1).
     """
     bodies, parts = numbers.bodies, numbers.bodies.parts
     pose, before = state.now[numbers.robot], state.before[numbers.robot]
@@ -409,14 +414,8 @@ def run_is_over(found: Any) -> bool:
 
     The cause of a robot is the reason why its run ends. The run of all robots ends when
     every robot has a cause, or when one robot collides or diverges. A robot with any
-    other cause keeps moving until the run ends.
-
-    Args:
-        found: (robots,) index of the cause of each robot in ``FOUND``; 0 without a
-            cause.
-
-    Returns:
-        True if the run is over.
+    other cause keeps moving until then. ``found`` has, for each robot, the index of its
+    cause in ``FOUND``, or 0 if the robot has no cause.
     """
     everyone = True
     for k in range(len(found)):

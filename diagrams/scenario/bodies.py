@@ -75,7 +75,8 @@ class Surroundings:
 
     bodies: Mapping[str, Body]
     """Bodies by name, in this order: obstacles, other robots, other sources, and the
-    target. A goal is not a body."""
+    target. A goal is not a body.
+    """
     target: str
     """Name of the target: the source, the leader, or the goal."""
     goal: Path | None = None

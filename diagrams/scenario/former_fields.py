@@ -1,8 +1,8 @@
 """Accepts fields of the previous version, and states what has replaced them.
 
 The file ``former_fields.tsv`` lists the fields of the previous version. For a renamed
-field, the file states the new path. Some fields have become constants. For such a
-field, the file states the value and the place of the constant.
+field, it states the new path. For a field that has become a constant, it states the
+value and the place of the constant.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ def former_fields() -> tuple[_Former, ...]:
 def renewed(data: dict[str, Any]) -> dict[str, Any]:
     """Replaces fields of the previous version, and prints a note for the user.
 
-    The previous version saved all groups of all kinds of robots. If the data contain
-    fields of the previous version, the function therefore also removes groups that the
-    robots do not have.
+    The previous version saved all groups of fields for every kind of robot. If the data
+    contain former fields, the function therefore also removes groups that the robots do
+    not have.
 
     Args:
         data: Fields of a scenario, changed in place.
@@ -85,15 +85,9 @@ def renewed(data: dict[str, Any]) -> dict[str, Any]:
 
 @lru_cache(maxsize=1024)
 def renamed(path: str) -> str:
-    """Returns the present path of a field.
+    """Returns the present path of a field, given the dotted path that a user wrote.
 
     If the field had another name in the previous version, the function prints a note.
-
-    Args:
-        path: Dotted path of a field, as written by a user.
-
-    Returns:
-        The new path if the field has been renamed; otherwise the same path.
     """
     new = path
     for former in former_fields():
@@ -107,17 +101,10 @@ def renamed(path: str) -> str:
 
 
 def is_constant_now(path: str, value: Any) -> bool:
-    """Whether a field has become a constant with a certain value.
+    """Whether a field has become a constant with the value that a user has given.
 
-    Args:
-        path: Dotted path that a user has set.
-        value: Value that the user has given.
-
-    Returns:
-        True if the constant has this value, and False if the path is no constant.
-
-    Raises:
-        InputError: The constant has another value.
+    The result is False if no constant has replaced the field at the dotted path
+    ``path``. If the constant has another value, the function raises an ``InputError``.
     """
     begin = _PREFIX.match(path)
     own = path[begin.end() :] if begin else path
@@ -137,12 +124,8 @@ def is_constant_now(path: str, value: Any) -> bool:
 def constant_now(path: str) -> str:
     """Returns the constant that has replaced a field of the previous version.
 
-    Args:
-        path: Dotted path of the field.
-
-    Returns:
-        Place and value of the constant, in words. The text is empty if no constant has
-        replaced the field.
+    ``path`` is the dotted path of the field. The result is the place and value of the
+    constant in words, or an empty text if no constant has replaced the field.
     """
     for former in former_fields():
         if former.path == path and not former.new:

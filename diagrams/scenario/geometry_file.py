@@ -20,16 +20,17 @@ _DECIMALS = 9
 def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
     """Returns the YAML text that describes the microphones of a recording.
 
-    Comments in the text describe the recording and the errors of the microphones.
+    The text has the nominal positions of the microphones in the body frame B, m, and
+    the speed of sound, m/s. Its comments describe the recording and the errors of the
+    microphones.
 
     Args:
-        scenario: The scenario that is run.
+        scenario: Scenario of the recorded run.
         robot: Name of the robot that records.
         file: Name of the recording.
 
     Returns:
-        YAML text with the nominal positions of the microphones in the body frame B, m,
-        and with the speed of sound, m/s.
+        YAML text.
     """
     own = scenario.robots[robot]
     assert isinstance(own, HasMicrophones)

@@ -32,12 +32,11 @@ def load_scenario(
     Args:
         source: A name from the library (``phonotaxis scenarios``), or the path of a
             file.
-        overrides: Fields to change. Either a list of texts ``key=value``, where the key
-            is a dotted path and the value is YAML, for example
-            ``source.speed_m_s=0.2``; or a mapping of dotted paths to values, for
-            example ``{"source.speed_m_s": 0.2}``. A path names an obstacle by its name
-            or by its index: ``obstacles.cart.size_m=[0.2, 0.1]`` or
-            ``obstacles.0.size_m=[0.2, 0.1]``.
+        overrides: Fields to change. One form is a mapping of dotted paths to values:
+            ``{"source.speed_m_s": 0.2}``. The other form is a list of texts
+            ``path=value``, where the value is YAML: ``["source.speed_m_s=0.2"]``. A
+            path names an obstacle by its name or its index: ``obstacles.cart.size_m``
+            or ``obstacles.0.size_m``.
 
     Returns:
         The validated scenario.
@@ -62,7 +61,7 @@ def written_fields(source: str | Path) -> dict[str, Any]:
 
     Names of fields from the previous version are replaced by the present names. Paths
     of sound files become absolute. If the file states no name of the scenario, the
-    function adds a name.
+    function adds one.
 
     Args:
         source: A name from the library, or the path of a file.
@@ -88,15 +87,11 @@ def dump_scenario(scenario: Scenario) -> str:
 
 
 def write_scenario(scenario: Scenario, directory: Path) -> None:
-    """Writes a whole scenario and a copy of its JSON Schema to a directory.
+    """Writes a whole scenario and a copy of its JSON Schema to an existing directory.
 
-    Text editors use the schema to check and complete fields. With the copy, they find
-    the schema even if the directory is moved to another place or machine.
-
-    Args:
-        scenario: The scenario, written to ``scenario.yaml``.
-        directory: An existing directory. The schema is written to
-            ``scenario.schema.json`` in this directory.
+    The files are ``scenario.yaml`` and ``scenario.schema.json``. Text editors use the
+    schema to check and complete fields. With the copy, they find the schema even after
+    the directory was moved.
     """
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
     (directory / "scenario.yaml").write_text(first + dump_scenario(scenario), "utf-8")
@@ -125,14 +120,8 @@ def _find(source: str | Path) -> Path:
 def read_mapping(path: Path) -> dict[str, Any]:
     """Reads the mapping of fields in a YAML file; an empty file has no fields.
 
-    Args:
-        path: Path of the file.
-
-    Returns:
-        Plain values of the fields.
-
-    Raises:
-        InputError: The file cannot be read, or does not contain a mapping.
+    If the file cannot be read or does not contain a mapping, the function raises an
+    ``InputError``.
     """
     try:
         with path.open("rb") as file:
@@ -154,8 +143,8 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
 
     Args:
         data: Fields of a scenario, changed in place.
-        folder: Folder to which the relative paths refer. It is the folder of the
-            scenario file, or the working directory.
+        folder: Folder to which the relative paths refer: the folder of the scenario
+            file, or the working directory.
     """
     for place in [
         data,

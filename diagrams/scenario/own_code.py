@@ -1,8 +1,8 @@
 """Imports a user's own functions and classes that a scenario names.
 
 Python loads a module only once per process. However, a user may edit a law in a
-notebook and run it again. ``import_own`` therefore compares the present files with the
-loaded modules. If a file has changed, it loads the module again.
+notebook and run it again. Therefore ``import_own`` loads a module again if its file has
+changed.
 """
 
 from __future__ import annotations
@@ -38,9 +38,8 @@ _KEEPS = False
 def import_own(name: str, field: str) -> Any:
     """Imports a user's function or class by its name.
 
-    The result always corresponds to the present files. If the file of a module has
-    changed since the module was loaded, the function loads the module again. This also
-    applies to the user's other modules that the module uses.
+    If the file of a module has changed since it was loaded, the function loads the
+    module again. The same is true for the user's other modules that this module uses.
 
     Args:
         name: ``package.module:Name`` or ``path/to/file.py:Name``. Python also searches
@@ -170,10 +169,10 @@ def loaded_digests(scenario: Scenario) -> dict[str, str]:
 
 @contextmanager
 def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[None]:
-    """Makes a scenario run with the code that the user had at the start of a sweep.
+    """Ensures that a scenario runs with the user's code from the start of a sweep.
 
-    A sweep is a series of runs. Within this context, Python does not load changed files
-    again, if all loaded code is the code from the start of the sweep.
+    A sweep is a series of runs. Within the context, a changed file is not loaded again
+    if all loaded code is from the start of the sweep.
 
     Args:
         scenario: The scenario to run.
@@ -212,8 +211,7 @@ def own_files(name: str, field: str) -> tuple[Path, ...]:
         field: Field of the scenario that contains the name, for messages.
 
     Returns:
-        Absolute paths in ascending order. There are none if the name belongs to the
-        package.
+        Absolute paths in ascending order; none if the name belongs to the package.
     """
     if ":" not in name:
         return ()
@@ -223,14 +221,10 @@ def own_files(name: str, field: str) -> tuple[Path, ...]:
 
 
 def digests_of(module: ModuleType) -> dict[str, str]:
-    """Returns digests of a user's module, and of the user's modules that it uses.
+    """Returns digests of an imported module, and of the user's modules that it uses.
 
-    Args:
-        module: An imported module.
-
-    Returns:
-        SHA-256 of the loaded version of each file, by absolute path. The mapping is
-        empty if the module has no file of the user.
+    The result is the SHA-256 of the loaded version of each file, by absolute path. It
+    is empty if none of the files belongs to the user.
     """
     digests: dict[str, str] = {}
     for each in _users_modules(module):
@@ -242,8 +236,9 @@ def digests_of(module: ModuleType) -> dict[str, str]:
 def _imports(file: Path, package: str) -> list[str]:
     """Returns the names of the modules that the source code of a file imports.
 
-    The objects in a loaded module do not suffice to find these names. A number, for
-    example, has no attribute ``__module__``, so only the source code shows its origin.
+    The objects in a loaded module do not suffice to find these names. For example, a
+    number has no attribute ``__module__``, and does not show from which module it
+    comes.
     """
     try:
         tree = ast.parse(file.read_bytes())
@@ -286,9 +281,7 @@ def _users_modules(module: ModuleType) -> list[ModuleType]:
 
 
 def made(name: str, field: str, maker: type, parts: Mapping[str, Any]) -> Any:
-    """Makes an object from a user's class.
-
-    The class receives only those of the available arguments that it accepts.
+    """Makes an object from a user's class, with the arguments that the class accepts.
 
     Args:
         name: Name of the class, for messages.
@@ -315,18 +308,18 @@ def made(name: str, field: str, maker: type, parts: Mapping[str, Any]) -> Any:
 
 
 def asked_for(maker: type, parts: Mapping[str, Any]) -> dict[str, Any]:
-    """Selects those arguments that a class accepts.
+    """Selects the arguments that a class accepts, by the signature of its constructor.
 
-    A class that accepts any keyword (``**kwargs``) passes the keywords on to its base
-    class. The function therefore also considers the arguments of the base class.
+    A constructor with ``**kwargs`` passes keywords on to its base class. The function
+    then also considers the constructor of the base class. If all base classes have
+    ``**kwargs``, the class accepts all arguments.
 
     Args:
         maker: The class, see ``made``.
         parts: Values of the available arguments, by name of the argument.
 
     Returns:
-        The arguments that occur in the signatures. If all base classes accept any
-        keyword, the result contains all arguments.
+        The accepted arguments.
     """
     asked: set[str] = set()
     any_keyword = False
@@ -355,12 +348,10 @@ def _is_users(module: ModuleType, file: str) -> bool:
 def is_interrupt(error: BaseException) -> bool:
     """Whether an exception comes from Ctrl-C, and not from a user's own code.
 
-    The answer depends on the handler of the signal that Ctrl-C sends:
-
-    - The handler of the command line raises a subclass of KeyboardInterrupt. With this
-      handler, a plain KeyboardInterrupt comes from the user's code.
-    - Python's default handler raises a plain KeyboardInterrupt. With this handler, a
-      plain KeyboardInterrupt counts as Ctrl-C.
+    The command line installs a signal handler that raises a subclass of
+    KeyboardInterrupt. With this handler, a plain KeyboardInterrupt comes from the
+    user's code. With Python's default handler, a plain KeyboardInterrupt counts as
+    Ctrl-C.
 
     Args:
         error: An exception raised while a user's code ran.

@@ -345,16 +345,11 @@ KINDS: Mapping[str, type[Robot]] = {
 
 
 def kind_of(robot: Any) -> str:
-    """Returns the kind of a robot, which follows from its control law.
+    """Returns the kind of a robot, a key of ``KINDS``.
 
-    If the law is a user's own law and the fields contain a route, the robot is a
-    router, which drives on a route.
-
-    Args:
-        robot: The fields of a robot, as a model or as plain values.
-
-    Returns:
-        Name of the kind, a key of ``KINDS``.
+    ``robot`` is a ``Robot`` or a mapping of plain values. The kind follows from the
+    control law among its fields. With a user's own law, the robot is a router if its
+    fields contain a route. A router drives on a route.
     """
     if isinstance(robot, Robot):
         return robot.kind

@@ -1,7 +1,8 @@
 """Defines the scenario: all that a run depends on, in one tree of fields.
 
-The tree consists of the parameter models of the blocks. Each quantity therefore has one
-name, one default and one permitted range. ``load_scenario`` reads a scenario from YAML.
+The tree consists of the parameter classes of the blocks. Each quantity therefore has
+one name, one default and one permitted range. ``load_scenario`` reads a scenario from
+YAML.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ _R = TypeVar("_R", bound=Robot)
 
 
 class Scenario(RunParameters):
-    """Describes one run; the default value of each field makes a complete scenario.
+    """Describes one run. The default values of all fields form a complete scenario.
 
     A file can state fields of robots and of sources at the top level. Such fields apply
     to all robots, or to all sources, that do not set these fields
@@ -233,7 +234,7 @@ class Scenario(RunParameters):
     def with_robot(self, **fields: Any) -> Scenario:
         """Returns a copy of the scenario in which fields of the only robot differ.
 
-        The new values are not validated.
+        The function does not validate the new values.
 
         Args:
             **fields: New values, by name of the robot's field.
@@ -264,14 +265,10 @@ class Scenario(RunParameters):
         return scenario_from_mapping(data)
 
     def require_one_robot(self, purpose: str) -> None:
-        """Raises an error if the scenario has several robots or sources.
+        """Raises an ``InputError`` if the scenario has several robots or sources.
 
-        Args:
-            purpose: What needs one robot, for the message, for example 'a linear
-                model'.
-
-        Raises:
-            InputError: The scenario has several robots or sources.
+        ``purpose`` is the task that needs one robot, for the message, for example 'a
+        linear model'.
         """
         for field, named in (("robots", self.robots), ("sources", self.sources)):
             if len(named) > 1:
@@ -282,14 +279,10 @@ class Scenario(RunParameters):
                 )
 
     def require_one_rate(self, purpose: str) -> None:
-        """Raises an error if a sensor's period is longer than the control period.
+        """Raises an ``InputError`` if a sensor's period is not the control period.
 
-        Args:
-            purpose: What needs a single sample rate, for the message, for example 'a
-                linear model'.
-
-        Raises:
-            InputError: The period of a sensor differs from the control period.
+        ``purpose`` is the task that needs a single sample rate, for the message, for
+        example 'a linear model'.
         """
         for field, period in _periods(self.follower):
             if period != self.tick_s:
@@ -368,17 +361,17 @@ class Scenario(RunParameters):
         return self.goal_radius(moves=self.source.path().moves)
 
     def goal_radius(self, *, moves: bool) -> NonNegative:
-        """Greatest distance from the target at which the robot is in its goal, m.
+        """Radius of the goal around the target, m.
 
-        The robot is in its goal if its control point P is within this distance. The
-        distance is the follow distance plus a margin.
+        The robot is in its goal if its control point P is within this radius. The
+        radius is the follow distance plus a margin. The margin is the following band if
+        the target moves, and the goal margin otherwise.
 
         Args:
-            moves: Whether the target moves. If it moves, the margin is the following
-                band; otherwise, it is the goal margin.
+            moves: Whether the target moves.
 
         Returns:
-            The distance, m.
+            The radius, m.
         """
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
         return self.only.follow_distance_m + margin

@@ -17,13 +17,8 @@ if TYPE_CHECKING:
 def check_files(scenario: Scenario) -> None:
     """Raises an error if a scenario names files that a run cannot use.
 
-    Such files are sound files and a user's own code.
-
-    Args:
-        scenario: The scenario to check.
-
-    Raises:
-        InputError: Files are missing or unusable. The error lists all of them.
+    Such files are sound files and a user's own code. The ``InputError`` lists all of
+    them.
     """
     faults: list[InputError] = []
 

@@ -18,14 +18,14 @@ def plain_settings(
     """Returns settings as pairs of a dotted path and a plain value.
 
     Args:
-        overrides: Texts ``key=value``, or a mapping of paths to values, as for
+        overrides: Texts ``path=value``, or a mapping of paths to values, as for
             ``load_scenario``.
 
     Returns:
         The pairs, in order.
 
     Raises:
-        InputError: A text does not have the form key=value, or a value is not plain.
+        InputError: A text does not have the form path=value, or a value is not plain.
     """
     if isinstance(overrides, Mapping):
         return [(key, _plain(key, value)) for key, value in overrides.items()]
@@ -49,16 +49,9 @@ def _plain(key: str, value: Any) -> Any:
 
 
 def parse_setting(text: str) -> tuple[str, Any]:
-    """Splits a text ``key=value`` into the key and the value, where the value is YAML.
+    """Splits a text ``path=value`` into the dotted path and the value, which is YAML.
 
-    Args:
-        text: The text. The key is the dotted path of a field.
-
-    Returns:
-        Two values: the key, and the plain value.
-
-    Raises:
-        InputError: The text does not have this form.
+    If the text does not have this form, the function raises an ``InputError``.
     """
     key, equals, value_text = text.partition("=")
     if not equals or not all(key.split(".")):
@@ -71,12 +64,10 @@ def parse_setting(text: str) -> tuple[str, Any]:
 def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:
     """Sets fields of a scenario to the values that a user has given for them.
 
-    The user names each field by its dotted path.
-
     Args:
         data: Fields of a scenario, changed in place.
-        settings: Plain values, by dotted path of the field. The function also accepts
-            names from the previous version.
+        settings: Plain values, by dotted path of the field. Names from the previous
+            version are possible.
 
     Raises:
         InputError: A path is invalid, see ``set_fields``.
@@ -97,8 +88,8 @@ def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
 
     Some groups have a field ``preset``, which selects defaults for the group. The
     function sets presets first, so that all other fields override them. If a group
-    already has a preset, a new preset clears the group. If a group on the path to a
-    field is missing, the function creates the group.
+    already has a preset, a new preset first clears this group. The function creates
+    missing groups.
 
     Args:
         data: Fields of a scenario, changed in place.

@@ -1,10 +1,9 @@
 """Expands the shorthand of scenario files to complete robots and sources, and back.
 
-A file can state fields of robots at the top level. Such fields then apply to all robots
-of the kinds that have these fields. However, a value under ``robots`` replaces such a
-field for one robot. In the same way, ``source`` and ``sound`` apply to all sources.
-``resolved`` expands this shorthand. ``file_form`` makes the shorthand from an expanded
-scenario.
+In a file, fields of robots at the top level apply to all robots of the kinds that have
+these fields. A value under ``robots`` replaces such a field for one robot. In the same
+way, ``source`` and ``sound`` apply to all sources. ``resolved`` expands this shorthand.
+``file_form`` restores it.
 """
 
 from __future__ import annotations
@@ -32,15 +31,9 @@ for _kind, _model in KINDS.items():
 def begins_anew(changes: Mapping[str, Any]) -> bool:
     """Returns whether changes to a group of fields select a preset for this group.
 
-    A preset selects defaults for a group. A new preset clears the other fields of the
-    group. However, ``preset`` can also be the name of a robot or source. The value of
-    ``preset`` is then a mapping.
-
-    Args:
-        changes: New plain values, by name of the field.
-
-    Returns:
-        True if the value of ``preset`` is a text.
+    A preset selects defaults for a group, and clears its other fields. The result is
+    true if the value of ``preset`` is a text. If the value is a mapping, then
+    ``preset`` is only the name of a robot or source.
     """
     return isinstance(changes.get("preset"), str)
 
@@ -54,7 +47,7 @@ def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
             select a preset for a group, they replace the whole group.
 
     Returns:
-        A new tree. The arguments stay unchanged.
+        A new tree.
     """
     result = {} if begins_anew(changes) else dict(base)
     for key, value in changes.items():
@@ -79,15 +72,15 @@ def _plain(value: Any) -> Any:
 def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
     """Expands the shorthand of a scenario file to complete robots and sources.
 
-    In a file, a field at the top level applies to all robots or sources (shorthand).
-    The function copies such fields to each robot and source.
+    In a file, a field at the top level applies to all robots or sources. The function
+    copies such fields to each robot and source.
 
     Args:
         data: Fields of a scenario, as in a file.
 
     Returns:
-        Fields of the run, with complete ``robots`` and ``sources``. If a value has a
-        wrong type, it stays unchanged, so that the validation reports it.
+        Fields of the run, with complete ``robots`` and ``sources``. Values of a wrong
+        type stay unchanged, so that the validation reports them.
 
     Raises:
         InputError: ``source`` has a sound.
@@ -128,7 +121,7 @@ def _robots(
 ) -> dict[str, Any]:
     """Applies fields at the top level of a file to the robots that have these fields.
 
-    If no robot has a field, the function gives the field to all robots, so that the
+    If none of the robots has a field, the function adds it to all robots, so that the
     validation reports an error.
     """
     kinds = {
@@ -205,10 +198,9 @@ def _has(data: Any, place: Sequence[str]) -> bool:
 
 @contextmanager
 def fields_of(group: str, name: str, **renamed: str) -> Iterator[None]:
-    """Makes errors of a block state the path of the field in the scenario.
+    """Adds the path of a robot or source to the errors of its blocks (context manager).
 
-    The function is a context manager. A block knows only the path within its own
-    parameters.
+    A block knows only the path of a field within its own parameters.
 
     Args:
         group: ``robots`` or ``sources``.
@@ -219,7 +211,7 @@ def fields_of(group: str, name: str, **renamed: str) -> Iterator[None]:
         Nothing.
 
     Raises:
-        InputError: The block raises this error. Its field is the path in the scenario.
+        InputError: The error of the block, with the path of its field in the scenario.
     """
     try:
         yield
@@ -234,8 +226,8 @@ def fields_of(group: str, name: str, **renamed: str) -> Iterator[None]:
 def field_in(group: str, name: str, field: str) -> str:
     """Returns the shortest dotted path of a robot's or source's field in a scenario.
 
-    For a robot with the default name, the path of ``start.position_m`` is the same
-    text. For a robot named ``first``, the path is ``robots.first.start.position_m``.
+    For a robot with the default name, the path of ``start.position_m`` is unchanged.
+    For a robot named ``first``, it is ``robots.first.start.position_m``.
 
     Args:
         group: ``robots`` or ``sources``.
@@ -255,8 +247,8 @@ def field_in(group: str, name: str, field: str) -> str:
 def require_effect(data: Mapping[str, Any], fields: Iterable[str]) -> None:
     """Raises an error if a field that a user has set has no effect.
 
-    A field at the top level applies to all robots or sources that do not set this
-    field. It has no effect if all robots or all sources set the field themselves.
+    A field at the top level has no effect if all robots or all sources set the field
+    themselves.
 
     Args:
         data: Fields of a scenario, as in a file.
@@ -302,12 +294,8 @@ def file_form(dump: Mapping[str, Any]) -> dict[str, Any]:
     """Returns a scenario in the shortest form that a file can have.
 
     In this form, fields that are equal in all robots or sources are at the top level.
-
-    Args:
-        dump: Plain values of all fields of a scenario.
-
-    Returns:
-        Plain values for the file. ``resolved`` turns them into ``dump`` again.
+    ``dump`` has the plain values of all fields of the scenario. ``resolved`` turns the
+    result into ``dump`` again.
     """
     run = dict(dump)
     robots, sources = run.pop("robots"), run.pop("sources")
@@ -335,9 +323,8 @@ def _hoisted(
 def _common(trees: Sequence[Mapping[str, Any]], depth: int = 0) -> dict[str, Any]:
     """Returns the values that are equal in all trees of fields.
 
-    At the top level, a tree without a field does not count, because robots of other
-    kinds lack this field. If a group has different presets, its trees have nothing in
-    common.
+    At the top level, a value may be missing in some of the trees, because robots of
+    other kinds lack this field. Groups with different presets have nothing in common.
     """
     found: dict[str, Any] = {}
     for key in dict.fromkeys(key for tree in trees for key in tree):

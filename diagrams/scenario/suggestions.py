@@ -11,13 +11,8 @@ from systems.framework.input_error import InputError
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """Returns a text that suggests similar names, for the end of an error message.
 
-    Args:
-        name: The mistyped name.
-        known: The valid names.
-        most: Greatest number of suggestions.
-
-    Returns:
-        The text. It is empty if no name is similar.
+    The text suggests up to ``most`` of the names ``known``. It is empty if none is
+    similar to ``name``.
     """
     by_folded = {each.casefold(): each for each in known}
     near = get_close_matches(name.casefold(), by_folded, n=most)
@@ -29,12 +24,7 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
 def unknown_law(name: str, known: Collection[str]) -> InputError:
     """Returns the error for a control law whose name is unknown.
 
-    Args:
-        name: The unknown name.
-        known: Names of the known laws.
-
-    Returns:
-        The error to raise.
+    ``known`` has the names of the known laws.
     """
     near = did_you_mean(name, known)
     return InputError(

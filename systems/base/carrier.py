@@ -3,8 +3,8 @@
 The carrier is a differential-drive robot. It has the same equations of motion as the
 follower robot (``plant_derivatives``). The controller of the carrier knows the exact
 pose. No other body acts on the carrier, so its motion is a function of time alone. The
-module integrates the motion once, one control period (tick) after the other. The
-integration stops at the latest time that is needed.
+module integrates the motion once, one control period (tick) after the other, up to the
+latest time that any caller needs.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def drive(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Simulates a carrier that follows planned poses by feed-forward and feedback.
 
-    The function does these steps in each control period (tick):
+    In each control period (tick), the function does these steps:
 
     1. Compute the longitudinal, lateral, and heading errors.
     2. Add the feedback of these errors to the planned speed and yaw rate.
@@ -107,8 +107,8 @@ def drive(
     Args:
         state: (7,) state of the robot at the first tick, see ``plant_derivatives``.
         poses: (n, 3) planned pose at each tick in the world frame W, m and rad.
-        twists: (n, 2) planned speed, m/s, and yaw rate, rad/s. Row k applies to the
-            time ``LEAD_S`` after tick k, when the command of tick k takes effect.
+        twists: (n, 2) planned speed, m/s, and yaw rate, rad/s. Row k is the plan for
+            the time ``LEAD_S`` after tick k, when the command of tick k takes effect.
 
     Returns:
         (n + 1, 7) states, at the n ticks and one tick later.
@@ -152,12 +152,11 @@ def poses_between(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Interpolates poses between knots by cubic Hermite polynomials.
 
-    The knots are states of the robot, one control period (tick) apart.
-
     Args:
-        knots: (m, 8) states; the columns are those of ``knot`` in ``drive_along``.
-        ticks: (n,) times since the first knot, in control periods. Times after the last
-            knot give the pose of the last knot.
+        knots: (m, 8) states of the robot, one control period (tick) apart. The columns
+            are those of ``knot`` in ``drive_along``.
+        ticks: (n,) times since the first knot, in ticks. Times after the last knot give
+            the pose of the last knot.
 
     Returns:
         (n, 3) poses in the world frame W, m and rad.

@@ -102,14 +102,8 @@ class SourceRobotParameters(Parameters):
 def driven_path(source: SourceRobotParameters) -> DrivenPath:
     """Returns the motion of a leader robot, which carries the sound source.
 
-    The function keeps the motions of the last 16 leaders in a cache. A run and the runs
-    of a sweep use the same motion many times.
-
-    Args:
-        source: Path and size of the leader.
-
-    Returns:
-        The motion. Equal parameters give the same object.
+    Equal parameters give the same object. A cache keeps the motions of the last 16
+    leaders, because many runs use the same motion.
     """
     return DrivenPath(
         source.plan(),

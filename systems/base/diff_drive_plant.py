@@ -28,8 +28,8 @@ def body_twist(
     Args:
         wheel_speeds: Left and right wheel speed, rad/s; floats or AutoDiffXd.
         robot: Radius and separation of the wheels.
-        slip: Shares of the left and of the right rim speed that are lost by slip, below
-            1.
+        slip: Shares of the left and of the right rim speed that the wheels lose by
+            slip, below 1.
 
     Returns:
         Forward speed, m/s, and yaw rate, rad/s, positive counterclockwise.
@@ -60,15 +60,7 @@ class PlantNumbers(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotParameters, plant: PlantParameters) -> PlantNumbers:
-        """Computes the constants from the parameters of the robot.
-
-        Args:
-            robot: Dimensions of the wheels, and top speed.
-            plant: Motor lag, and shares of the rim speeds that are lost by slip.
-
-        Returns:
-            The constants. Slip reduces ``left_rim_m`` and ``right_rim_m``.
-        """
+        """Computes the constants. Slip reduces ``left_rim_m`` and ``right_rim_m``."""
         left, right = plant.slip
         return cls(
             robot.wheel_radius_m * (1.0 - left),
@@ -91,21 +83,13 @@ def plant_derivatives(
 ) -> Any:
     """Computes the time derivatives of the state of a robot whose wheels roll.
 
-    The compiled function takes floats. Its attribute ``.py_func`` is the same function
-    in Python. That function takes floats or AutoDiffXd.
+    ``state`` has seven elements: x and y, m; heading theta, rad; left and right wheel
+    angle, rad; left and right wheel speed, rad/s. The result has the derivatives in the
+    same order. ``commanded`` has the commanded left and right wheel speeds, rad/s. The
+    other arguments are the fields of ``PlantNumbers``.
 
-    Args:
-        state: (7,) x and y, m; heading theta, rad; left and right wheel angle, rad;
-            left and right wheel speed, rad/s.
-        commanded: (2,) commanded left and right wheel speed, rad/s.
-        left_rim_m: See ``PlantNumbers``.
-        right_rim_m: See ``PlantNumbers``.
-        wheel_separation_m: See ``PlantNumbers``.
-        top_wheel_speed: See ``PlantNumbers``.
-        motor_lag_s: See ``PlantNumbers``.
-
-    Returns:
-        (7,) derivatives in the order of the state.
+    The compiled function takes floats. The attribute ``plant_derivatives.py_func`` is
+    the same function in Python. It takes floats or AutoDiffXd.
     """
     theta, left, right = state[2], state[5], state[6]
     v, omega = _rim_twist(left_rim_m * left, right_rim_m * right, wheel_separation_m)
@@ -128,19 +112,11 @@ def slipping_derivatives(
 ) -> Any:
     """Computes the time derivatives of the state of a robot whose tires may slip.
 
-    Args:
-        state: (10,) the 7 components of ``plant_derivatives``; then forward and
-            leftward speed of the body, m/s; then its yaw rate, rad/s.
-        commanded: (2,) commanded left and right wheel speed, rad/s.
-        left_rim_m: See ``PlantNumbers``.
-        right_rim_m: See ``PlantNumbers``.
-        wheel_separation_m: See ``PlantNumbers``.
-        top_wheel_speed: See ``PlantNumbers``.
-        motor_lag_s: See ``PlantNumbers``.
-        grip: Limit of the tire forces, see ``GripNumbers``.
-
-    Returns:
-        (10,) derivatives in the order of the state.
+    ``state`` has ten elements: the seven of ``plant_derivatives``; forward and leftward
+    speed of the body, m/s; and yaw rate, rad/s. The result has the derivatives in the
+    same order. ``commanded`` has the commanded left and right wheel speeds, rad/s.
+    ``grip`` limits the tire forces, see ``GripNumbers``. The other arguments are the
+    fields of ``PlantNumbers``.
     """
     theta, forward, sideways = state[2], state[7], state[8]
     rates = np.empty_like(state)
@@ -185,8 +161,8 @@ def saturated(value: Any, limit: Any) -> Any:
     """Limits the magnitude of a value.
 
     Args:
-        value: Float or AutoDiffXd.
-        limit: Largest magnitude, not negative.
+        value: Float or AutoDiffXd, in any unit.
+        limit: Largest magnitude, in the same unit, not negative.
 
     Returns:
         The value, if its magnitude is at most the limit. Otherwise the limit with the
@@ -201,13 +177,11 @@ def saturated(value: Any, limit: Any) -> Any:
 
 @register_jitable
 def _velocities(state, numbers):
-    """Computes the velocity of the body and the slip velocities of the wheels.
+    """Returns two tuples: the velocity of the body, and slip velocities of the tires.
 
-    Returns:
-        Two tuples. The first is the velocity (vx, vy, omega) in the world frame W, m/s
-        and rad/s. The second has the three slip velocities, m/s: the forward speed of
-        the left rim relative to the ground, that of the right rim, and the leftward
-        speed of the axle.
+    The first tuple is the velocity (vx, vy, omega) in the world frame W, m/s and rad/s.
+    The second tuple has three velocities relative to the ground, m/s: the forward speed
+    of the left rim, that of the right rim, and the leftward speed of the axle.
     """
     left, right = numbers.left_rim_m * state[5], numbers.right_rim_m * state[6]
     v, omega = _rim_twist(left, right, numbers.wheel_separation_m)
@@ -248,8 +222,8 @@ class PlantStepNumbers(NamedTuple):
 def plant_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
     """Advances the robot by one control period with Runge-Kutta steps of fifth order.
 
-    Without friction, the state is that of ``plant_derivatives``. With friction, the
-    state is that of ``slipping_derivatives``.
+    The state is that of ``plant_derivatives`` without friction, and that of
+    ``slipping_derivatives`` with friction.
     """
     (commanded,) = inputs
     derivatives, of_plant = numbers.derivatives, numbers.of_plant
@@ -282,12 +256,12 @@ def advance(
     """Advances the state by one step of the Dormand-Prince method, as Drake does.
 
     Args:
-        state: (n,) state. The function overwrites the state with the new state.
+        state: (n,) state, which the function overwrites with the new state.
         h: Length of the step, s.
         commanded: (2,) commanded left and right wheel speed, rad/s.
         derivatives: Function ``derivatives(state, commanded, *of_plant)``.
-        of_plant: The constants ``PlantNumbers``. With friction, ``GripNumbers``
-            follows.
+        of_plant: Last arguments of ``derivatives``: the fields of ``PlantNumbers`` and,
+            with friction, ``GripNumbers``.
     """
     size = len(state)
     slopes, reached = np.empty((6, size)), np.copy(state)
@@ -320,9 +294,9 @@ def DiffDrivePlant_(T):
         The model includes the lag of the motors and the saturation of the wheel speeds.
         The continuous state has x, y, theta, two wheel angles, and two wheel speeds. If
         ``plant.friction`` is set, the state also has the forward speed, the leftward
-        speed, and the yaw rate of the body. Otherwise the wheel speeds determine these
-        three values. The outputs are functions of the state, without feedthrough. The
-        heading is not wrapped to one turn.
+        speed, and the yaw rate of the body. Without friction, the wheel speeds
+        determine these three values. The outputs are functions of the state, without
+        feedthrough. The heading is not wrapped to one turn.
 
         Args:
             robot: Dimensions and top speed.
@@ -331,8 +305,8 @@ def DiffDrivePlant_(T):
                 The robot starts at rest.
 
         Raises:
-            ValueError: The initial pose, a state, or a command is not finite. With such
-                a value, an error-controlled integrator would never finish.
+            ValueError: The initial pose, a state, or a command is not finite. An
+                error-controlled integrator would never finish with such a value.
 
         Reference: Han 2019, table 6. The motor lag and the friction model are our
         additions.

@@ -26,14 +26,14 @@ _CHUNK_TICKS = 400
 class DrivenPath:
     """Pose and velocity of a robot with wheels that drives through waypoints.
 
-    The wheel commands change every 25 ms from the start time on. This period (tick)
+    From the start time on, the wheel commands change every 25 ms. This period (tick)
     does not depend on the control period of the follower robots. Between ticks, the
     pose is a cubic Hermite polynomial. This polynomial differs from the exact motion by
     at most 1 um and 10 urad.
 
-    In the scenarios of the library, the robot stays within 2 mm of its plan. At 0.7
-    m/s, it stays within 4 cm of the arcs of corners. It stops within 5 mm of the last
-    waypoint.
+    In the scenarios of the library, the robot stays within 2 mm of its plan. If it
+    turns corners at 0.7 m/s, it stays within 2 cm of its plan. It stops within 5 mm of
+    the last waypoint.
 
     Args:
         plan: Planned path.
@@ -115,16 +115,17 @@ class DrivenPath:
         )
 
     def extreme_twists(self, until: float) -> NDArray[np.float64]:
-        """Returns the speeds and yaw rates at the ticks (periods of 25 ms) of the path.
+        """Returns the speeds and yaw rates at all ticks (25 ms each) up to a time.
 
         Within a tick, the speed of each wheel approaches its command. Therefore every
         point of the body is fastest at the start or at the end of a tick.
 
         Args:
-            until: Time up to which ticks count, s. It is rounded up to a whole tick.
+            until: The time, s. It is rounded up to a whole tick.
 
         Returns:
-            (n, 2) speeds, m/s, and yaw rates, rad/s.
+            (n, 2) array. The columns are the forward speed, m/s, and the yaw rate,
+            rad/s.
         """
         ticks = max(until - self._start, 0.0) / TICK_S
         if not self.moves:

@@ -32,13 +32,15 @@ class LaggedMotion(NamedTuple):
     lag_s: float
     """Lag tau, s."""
     kept: float
-    """Share exp(-duration/tau) of w - c that is left at the end."""
+    """Share of w - c that is left at the end, exp(-duration/tau)."""
     lagged_s: float
-    """Final angle of the lagged part per rad/s of w - c, tau (1 - kept), s."""
+    """Angle of the lagged part at the end, divided by w - c. It equals tau (1 - kept),
+    s."""
     least_share: float
-    """Factor kappa in the error bound of the encoders. A wheel that reverses within a
-    control period travels farther than its net distance. Therefore the bound counts at
-    least kappa times the steady part. See docs/results_guard.md, "Encoders"."""
+    """Factor kappa in the error bound of the encoders. If a wheel reverses within a
+    control period, its path is longer than the encoder shows. Therefore the bound uses
+    a path of at least kappa times the steady part. See docs/results_guard.md,
+    "Encoders"."""
     nodes: tuple[tuple[float, float, float, float], ...]
     """Nodes of the quadrature, four numbers per node. The first two numbers are the
     shares of the steady part and of the lagged part that are complete at the node. The
@@ -46,17 +48,11 @@ class LaggedMotion(NamedTuple):
 
 
 def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
-    """Computes the constants of ``LaggedMotion``.
+    """Computes the constants of ``LaggedMotion`` for a duration and a motor lag in s.
 
-    The quadrature divides the period into panels. No panel is longer than the motor
-    lag. This keeps the error of the quadrature below 1e-10 of the path length.
-
-    Args:
-        duration_s: Duration of the period, s.
-        lag_s: Time constant of the wheel speeds, s.
-
-    Returns:
-        The constants.
+    The constants include the nodes of the quadrature in ``advance_pose``. The
+    quadrature divides the period into panels that are no longer than the motor lag. Its
+    error is therefore below 1e-10 of the path length.
     """
     panels = math.ceil(max(duration_s / lag_s, duration_s / _LONGEST_PANEL_S) - 1e-9)
     at, weight = np.polynomial.legendre.leggauss(_NODES)
@@ -90,13 +86,14 @@ def advance_pose(pose: Any, travelled: Any, steady: Any, motion: LaggedMotion) -
     Args:
         pose: (x, y, theta) at the start in the world frame W, m and rad; floats or
             AutoDiffXd.
-        travelled: Actual path length, m, and turn, rad, of the body in the period.
-        steady: Path length, m, and turn, rad, that would result if the wheels ran at
-            their commanded speeds from the start.
+        travelled: (length, turn): actual path length and turn of the body in the
+            period, m and rad.
+        steady: (length, turn) that would result if the wheels ran at their commanded
+            speeds from the start, m and rad.
         motion: Constants of the period.
 
     Returns:
-        (x, y, theta) at the end in the world frame W, m and rad.
+        (x, y, theta) at the end in W, m and rad.
     """
     lagged_way, lagged_turn = travelled[0] - steady[0], travelled[1] - steady[1]
     x, y, theta = pose[0], pose[1], pose[2]

@@ -35,8 +35,7 @@ class RobotParameters(Parameters):
     """
 
     preset: RobotPreset = "han2019"
-    """Named robot that gives the default values of the other fields. Values of fields
-    that are set take precedence over the preset."""
+    """Named robot. It gives the values of all other fields that are not set."""
     length_m: Length = 0.35
     """Extent of the body along its x axis, m."""
     width_m: Length = 0.82
@@ -61,7 +60,8 @@ class RobotParameters(Parameters):
     mass_kg: Mass = 3.94
     """Virtual mass M at P, kg. It equals the mass of the robot."""
     top_speed_m_s: Speed = 0.72
-    """Limit of |v_P| and of each wheel's rim speed, m/s (Han 2019, 5.3)."""
+    """Largest speed of the control point P, and largest rim speed of each wheel, m/s
+    (Han 2019, 5.3)."""
 
     @model_validator(mode="before")
     @classmethod

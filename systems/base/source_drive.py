@@ -26,8 +26,8 @@ WHEEL_ACCELERATION_M_S2 = 2.0 * _WHEEL_FORCE_N / _MASS_KG
 def value_weights(s: Any) -> tuple[Any, Any, Any]:
     """Computes the weights p, q, and r of a cubic Hermite polynomial over 25 ms.
 
-    The interval starts with the value a and the slope a'. It ends with the value b and
-    the slope b'. The value in between is a + p (b - a) + q a' + r b'.
+    The polynomial has the value a and the slope a' at the start, and the value b and
+    the slope b' at the end. Its value in between is a + p (b - a) + q a' + r b'.
 
     Args:
         s: Elapsed share of the interval, from 0 to 1.

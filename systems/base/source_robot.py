@@ -16,9 +16,8 @@ def SourceRobot_(T):
         """Drives the leader robot, which carries the sound source, along its waypoints.
 
         The motion is that of a robot with wheels (``DrivenPath``). No other body acts
-        on the leader. The outputs are functions of time, without state and without
-        latency. No gradient passes through this block, because the motion depends on no
-        input.
+        on the leader. The outputs depend only on time. The block has no input, no state
+        and no latency, so no gradient passes through it.
 
         Args:
             source: Path and size of the leader.

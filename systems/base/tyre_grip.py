@@ -31,13 +31,8 @@ class GripNumbers(NamedTuple):
     def of(cls, robot: RobotParameters, friction: float) -> GripNumbers:
         """Computes the constants for a uniform rectangle on two equally loaded wheels.
 
-        Args:
-            robot: Length and width of the rectangle.
-            friction: Coefficient of friction between tires and floor.
-
-        Returns:
-            The two constants. ``traction_m_s2`` is friction * gravity / 2.
-            ``gyration_m2`` is (length^2 + width^2) / 12.
+        With the coefficient of friction mu, ``traction_m_s2`` is mu * gravity / 2.
+        ``gyration_m2`` is (length^2 + width^2) / 12.
         """
         return cls(
             friction * GRAVITY_M_S2 / 2.0,
@@ -55,12 +50,15 @@ def grip_accelerations(
 ) -> tuple[Any, Any, Any]:
     """Computes the acceleration that the tire forces give to the body.
 
-    All forces are divided by the mass of the robot. First, the function computes the
-    forces that prevent all slip. If both forces are within the limit ``traction_m_s2``
-    of a wheel, they are the result. Otherwise, projected gradient descent finds the
-    forces within the limit whose motion is nearest to motion without slip (Gauss'
-    principle of least constraint). The tire of a sliding wheel then pushes along its
-    slip with the full limit. The force across the slip is zero.
+    All forces are divided by the mass of the robot. The function first computes the
+    forces that prevent all slip. If the force of each wheel is within its limit
+    ``traction_m_s2``, these forces are the result.
+
+    Otherwise some slip is inevitable. Among all forces within the limit, the function
+    chooses those that bring the motion nearest to motion without slip (Gauss' principle
+    of least constraint). Projected gradient descent finds these forces. The force on a
+    sliding wheel then opposes the slip with the full limit, and has no component
+    across the slip.
 
     Args:
         motion: Forward and leftward speed of the middle of the axle, m/s, and yaw rate,

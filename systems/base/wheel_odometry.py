@@ -22,15 +22,7 @@ from systems.framework.signals import TICK_S
 
 @register_jitable
 def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
-    """Rounds a wheel angle down to whole encoder pulses.
-
-    Args:
-        angle: Angle of the wheel since the start, rad, positive or negative.
-        pulses_per_revolution: Pulses of the encoder per revolution.
-
-    Returns:
-        Largest whole number of pulses that is not above the angle, as an angle in rad.
-    """
+    """Rounds a wheel angle, rad, down to whole encoder pulses, even below zero."""
     pulse = math.tau / pulses_per_revolution
     return math.floor(angle / pulse) * pulse
 
@@ -53,9 +45,9 @@ def odometry_step(
     """Advances the estimated pose to the present wheel angles.
 
     The state has five numbers: the pose and the two encoder angles at the last control
-    period. The step computes the path length and the turn from the new angles. It also
-    computes the path length and the turn that the held command would give without motor
-    lag. The function ``advance_pose`` computes the new pose from both pairs.
+    period. The step computes the actual path length and turn from the new angles. It
+    also computes the path length and turn that the held command would give without
+    motor lag. From these values, ``advance_pose`` computes the new pose.
     """
     left, right = inputs[0][0], inputs[0][1]
     if numbers.pulses > 0:
@@ -90,10 +82,10 @@ def WheelOdometry_(T):
 
         The encoders give the wheel angles at each control period (tick). Between two
         ticks, the block assumes that the wheel speeds approach their commands with the
-        nominal motor lag. If this assumption holds and the angles are exact, the pose
-        at each tick is exact. A simpler method would move the robot along its mean
-        heading in each tick. The errors of the simpler method would add up if the
-        forward speed varies in phase with the yaw acceleration.
+        nominal motor lag. If this is true and the angles are exact, the pose at each
+        tick is exact. A simpler method would move the robot along its mean heading in
+        each tick. Its errors would add up if the forward speed varied in phase with the
+        yaw acceleration.
 
         If the angles are rounded to whole pulses, the position error is at most (q/L) s
         + q. Here q is the path of the rim per pulse, L is the wheel separation, and s
@@ -107,8 +99,7 @@ def WheelOdometry_(T):
         Args:
             robot: Wheel radius and separation.
             odometry: Pulses of the encoders, and whether angles are rounded.
-            faults: Faults of the robot. The block applies only the fault of
-                ``odometry``.
+            faults: Faults of the robot. The block uses only the fault of ``odometry``.
             plant: Lag of the motors.
             initial_pose: Known pose (x, y, theta) in the world frame W at time zero, m
                 and rad.

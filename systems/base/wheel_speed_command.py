@@ -20,15 +20,9 @@ _ASIDE = math.tan(math.radians(5.0))
 
 @register_jitable
 def clamped_velocity(vx: Any, vy: Any, top_speed: Any) -> Any:
-    """Limits the magnitude of a velocity and keeps its direction.
+    """Limits the magnitude of a velocity (vx, vy), and keeps its direction.
 
-    Args:
-        vx: First component, m/s; float or AutoDiffXd.
-        vy: Second component in the same axes, m/s.
-        top_speed: Largest magnitude, m/s.
-
-    Returns:
-        (vx, vy), m/s.
+    The components are floats or AutoDiffXd. All arguments and results are in m/s.
     """
     speed = safe_norm(vx, vy)
     if speed > top_speed:
@@ -42,9 +36,10 @@ def integrate_velocity(
 ) -> Any:
     """Integrates an acceleration command over one period to a velocity command.
 
-    The function limits the velocity so that this state does not wind up. Without the
-    limit, the speed would grow until the damping of the control law balances the pull
-    of the target. With the default gains this speed is 2 m/s per meter of distance.
+    The function limits the velocity to ``top_speed``. Without this limit, the integral
+    would wind up: it would grow until the damping of the control law balances the pull
+    of the target. With the default gains, this is a speed of 2 m/s per meter of
+    distance to the target.
 
     Args:
         v_WP: Velocity (vx, vy) of the control point P in the world frame W, m/s; floats
@@ -54,7 +49,7 @@ def integrate_velocity(
         top_speed: Largest magnitude of the velocity, m/s.
 
     Returns:
-        (vx, vy) in W, m/s.
+        New velocity (vx, vy) of P in W, m/s.
     """
     vx = v_WP[0] + period * acceleration_W[0]
     vy = v_WP[1] + period * acceleration_W[1]
@@ -63,12 +58,12 @@ def integrate_velocity(
 
 @register_jitable
 def hand_position_twist(v_WP: Any, theta: Any, control_point_m: Any) -> Any:
-    """Computes the twist of the body that moves the control point P at a velocity v_P.
+    """Computes the twist of the body that gives the control point P a velocity.
 
-    The twist is the forward speed v and the yaw rate omega. The point P is at the
-    distance epsilon ahead of the axle. The body axes are x_B (ahead) and y_B (left).
-    The result is v = v_P . x_B and omega = v_P . y_B / epsilon. The result is exact,
-    and it is smooth at standstill.
+    The twist is the forward speed v and the yaw rate omega. P is at the distance
+    epsilon ahead of the axle. Let v_P be the velocity of P, and let x_B (ahead) and y_B
+    (left) be the axes of the body. The exact result is v = v_P . x_B and omega = v_P .
+    y_B / epsilon. It is smooth at standstill.
 
     Args:
         v_WP: Velocity v_P = (vx, vy) in the world frame W, m/s; floats or AutoDiffXd.
@@ -89,8 +84,8 @@ def hand_position_velocity(twist_B: Any, theta: Any, control_point_m: Any) -> An
     This function is the inverse of ``hand_position_twist``.
 
     Args:
-        twist_B: Forward speed, m/s, and yaw rate, rad/s, of the body; floats or
-            AutoDiffXd.
+        twist_B: (v, omega): forward speed and yaw rate of the body, m/s and rad/s;
+            floats or AutoDiffXd.
         theta: Heading of the body in the world frame W, rad.
         control_point_m: Distance of P ahead of the axle, m.
 
@@ -102,29 +97,28 @@ def hand_position_velocity(twist_B: Any, theta: Any, control_point_m: Any) -> An
 
 @register_jitable
 def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
-    """Turns a vector aside if the vector points straight backward.
+    """Turns a vector aside if the vector points almost straight backward.
 
     The vector is the wanted velocity v_P of the control point P, or the vector from P
     to the target. P is at the distance epsilon ahead of the axle.
 
     The heading follows theta' = |v_P| sin(psi - theta)/epsilon, where psi is the
-    direction of v_P. A heading along v_P is a stable equilibrium. A heading opposite to
-    v_P is an unstable equilibrium. There, the robot would drive backward for meters,
-    even into its target, until rounding errors grow. This function points the vector
-    aside, so that the body turns around. The papers do not state how a law drives the
-    wheels. Therefore this method is our own.
+    direction of v_P. A heading opposite to v_P is an unstable equilibrium. There, the
+    robot would drive backward for meters, even into its target, until rounding errors
+    grow. This function points the vector aside, so that the body turns around. The
+    papers do not state how a law drives the wheels, so this method is our own.
 
     Args:
         x: First component in the world frame W, any unit; float or AutoDiffXd.
         y: Second component in W, in the same unit.
         theta: Heading of the body in W, rad.
-        least: Threshold of the backward component, in the unit of x. The function does
-            not turn a vector whose backward component is at or below this threshold.
+        least: Threshold of the backward component, in the unit of x. A vector does not
+            change if its backward component is at or below this threshold.
 
     Returns:
-        (x, y) in W. A vector near straight backward turns toward the side to which it
-        already points. A vector exactly backward turns to the left. After the turn, the
-        vector is at most 5 deg from straight backward. All other vectors do not change.
+        (x, y) in W. A vector almost straight backward turns to the side to which it
+        already points, up to 5 deg from straight backward. A vector exactly backward
+        turns to the left. All other vectors do not change.
     """
     along, across = rotate(-theta, x, y)
     aside = _ASIDE * (-along - least)
@@ -137,8 +131,8 @@ def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
 def limited_wheel_speeds(v: Any, omega: Any, robot: RobotParameters) -> Any:
     """Computes the wheel speeds for a forward speed and a yaw rate.
 
-    If one wheel speed exceeds the limit, the function scales down both speeds. The
-    scaling keeps the curvature omega/v of the path.
+    If a wheel speed exceeds the limit, the function scales down both wheel speeds by
+    the same factor. The curvature omega/v of the path therefore does not change.
 
     Args:
         v: Forward speed, m/s; float or AutoDiffXd.
@@ -166,9 +160,9 @@ class CommandNumbers(NamedTuple):
     """Constants of the step of a wheel command."""
 
     velocity: Callable[..., Any]
-    """Function ``velocity(v_WP, command, theta, robot, tick_s)``. It returns the new
-    velocity of the control point P. Its arguments include the last velocity of P, the
-    command of the control law, and the heading."""
+    """Function ``velocity(v_WP, command, theta, robot, tick_s)`` that returns the new
+    velocity of the control point P. Its arguments include the last velocity ``v_WP`` of
+    P, the command of the control law, and the heading ``theta``."""
     robot: RobotParameters
     tick_s: float
 
@@ -231,11 +225,12 @@ def WheelCommand_(T):
         direction. If a wheel would exceed its top speed, the block scales down both
         wheel speeds. Both reductions keep the curvature of the body's path.
 
-        The discrete state has the velocity of P and the wheel speeds. They are the
-        outputs, so there is no feedthrough. The block updates the state every control
-        period (tick). An update at the time t uses the inputs at t and acts from t on.
-        The latency from an echo to the wheels is 0 ms. The latency from the end of an
-        audio frame to the wheels is one tick, which the sound-source estimator needs.
+        The discrete state has the velocity of P and the wheel speeds. The wheel speeds
+        are the outputs, so there is no feedthrough. The block updates the state every
+        control period (tick). An update at the time t uses the inputs at t and acts
+        from t on. The latency from an echo to the wheels is 0 ms. The latency from the
+        end of an audio frame to the wheels is one tick, because the sound-source
+        estimator needs one tick.
 
         Args:
             command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or

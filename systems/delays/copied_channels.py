@@ -1,9 +1,9 @@
 """Finds channels of a recording that repeat another channel.
 
-Two microphones may record the same sound at the same time. However, the noise of each
-microphone and of its converter is different. Two real channels therefore differ by at
-least this noise. The difference remains after the best gain and the best delay in whole
-samples are applied.
+Two microphones may record the same sound at the same time, but their noise and the
+noise of their converters differ. The functions match two channels by the best gain and
+the best delay in whole samples. The difference that remains is at least this noise for
+two real channels, and only rounding for a copy.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def repeats(
     lag: int,
     step: float,
 ) -> bool:
-    """Returns whether one channel equals another channel, apart from gain and rounding.
+    """Returns whether a channel equals another channel, apart from gain and rounding.
 
     Args:
         first: (n,) samples of the first channel.
@@ -78,17 +78,19 @@ def frame_repeats(
 ) -> bool:
     """Returns whether a channel of an audio frame repeats another channel.
 
-    The repetition may have a lag.
+    The function compares the channels of each pair at lag 0, and at the lag of the
+    sound.
 
     Args:
-        frame: (n, samples) channels; integers are counts.
+        frame: (n, samples) channels. Integers are counts of the converter.
         pairs: (p, 2) channels to compare.
         later: (n - 1,) delays of the channels 1 ... n - 1 relative to channel 0,
             samples.
         at_once: (p,) Boolean values: whether to compare each pair at lag 0. The value
-            is False if the two microphones may record the same signal at the same time.
+            must be False if the two microphones may record the same signal at the same
+            time.
         noisy: Whether the frames contain noise. Without noise, a sound that arrives
-            later by whole samples looks like a copy. In this case, pairs are compared
+            later by whole samples looks like a copy, so the function compares pairs
             only at lag 0.
 
     Returns:
@@ -144,9 +146,10 @@ def copied_pairs(
 ) -> list[tuple[int, int]]:
     """Finds the pairs of channels of a recording that repeat each other.
 
-    Each pair is compared at the lag of its highest correlation. A pair repeats if the
-    two channels differ only by rounding in the loudest section. If the recording has a
-    pause, the function also finds pairs that are two inputs of one microphone.
+    The function compares each pair at the lag of its highest correlation. A pair
+    repeats if the two channels differ only by rounding in the loudest section of the
+    recording. If the recording has a pause, the function also finds pairs that record
+    one microphone through two inputs.
 
     Args:
         samples: (n, samples) channels that are not silent, without NaN.
@@ -184,20 +187,11 @@ def _block(
     sample_rate_hz: float,
     choose: Callable[[NDArray[np.float64]], np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Chooses a section of a recording by its power.
+    """Returns a section (n, size) of a recording, and the (n,) powers of its channels.
 
-    The function does not choose a section in which a channel is constant (digital
-    silence).
-
-    Args:
-        samples: (n, samples) channels.
-        seconds: Length of the section, s.
-        sample_rate_hz: Rate of the samples, Hz.
-        choose: Function that returns the index of the chosen section from the powers of
-            all sections.
-
-    Returns:
-        (n, size) samples of the section, and the (n,) powers of its channels.
+    The function ``choose`` gets the powers of all sections and returns the index of the
+    chosen section. Sections in which a channel is constant (digital silence) do not
+    take part.
     """
     size = min(round(seconds * sample_rate_hz), samples.shape[1])
     count = samples.shape[1] // size
@@ -228,9 +222,8 @@ def _difference(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Computes how much the second channel differs from the first channel.
 
-    Returns:
-        Three variances: of the difference after the best gain, of the second channel,
-        and of the first channel.
+    The function returns three variances: that of the difference that remains after the
+    best gain, that of the second channel, and that of the first channel.
     """
     begin, end = max(0, lag), min(second.size, second.size + lag)
     count = end - begin

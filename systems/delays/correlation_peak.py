@@ -1,7 +1,6 @@
-"""Computes the peaks of weighted cross-correlations, and the errors of the peaks.
+"""Computes the peaks of weighted cross-correlations from cross-spectra, with errors.
 
-The input is the cross-spectra of the channels. All compiled functions that call each
-other are in this file.
+All compiled functions that call each other are in this file.
 """
 
 from __future__ import annotations
@@ -35,9 +34,10 @@ def _turned(
 ) -> None:  # pragma: no cover  (compiled)
     """Multiplies a cross-spectrum (n,) by exp(j w t), where w is the angular frequency.
 
-    The results are the real part and the imaginary part of the product. The function
-    evaluates sines and cosines only for bins whose number is a power of two. For the
-    other bins, it computes them from sums and products.
+    The function writes the real part and the imaginary part of the product to ``real``
+    and ``imaginary``. It evaluates sines and cosines only for the first bin, and for
+    steps of 1, 2, 4, 8 ... bins. The addition theorems give the values of the other
+    bins.
     """
     bins = cross.size
     cosine, sine = np.empty(bins), np.empty(bins)
@@ -65,10 +65,8 @@ def _slope_and_curve(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Computes the first and the negative second derivative of a correlation.
 
-    Let z be the cross-spectrum, W the weights, and w the angular frequency.
-
-    Returns:
-        Two sums over the bins: of -w W Im(z), and of w^2 W Re(z).
+    The derivatives are those at lag 0. They are sums over the bins of -w W Im(z) and of
+    w^2 W Re(z), with the cross-spectrum z, the weights W and the angular frequency w.
     """
     slope, curve = 0.0, 0.0
     for k in range(real.size):
@@ -111,22 +109,25 @@ def _refine(
 ]:  # pragma: no cover  (compiled)
     """Refines the peaks of weighted cross-correlations by Newton's method.
 
-    The function also computes sums for the errors of the peaks. In these sums, z is the
-    cross-spectrum after removal of the delay tau, W is the weight, and w is the angular
-    frequency.
+    The function also computes sums over the bins, from which the errors of the peaks
+    follow. In these sums, z is the cross-spectrum after removal of the delay tau, W is
+    the weight, and w is the angular frequency.
 
     Args:
         cross: (p, n) cross-spectra of p pairs of channels.
         weights: (p, n) weights W.
         first: Angular frequency w of the first bin, rad per sample.
         step: Step of w from bin to bin, rad per sample.
-        start: (p,) delays where the search begins, samples.
-        newton: Whether to search. Otherwise the delays stay at ``start``.
+        start: (p,) delays at which the search begins, samples.
+        newton: Whether to search. If not, the delays stay at ``start``.
 
     Returns:
-        Four arrays. The first is the (p,) delays tau, samples. The second is the (p,)
-        sums of Re(z). The third is the (p,) ratios of the sum of W Re(z) to the sum of
-        W |z|. The fourth is the (p, 3) sums of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
+        Four arrays:
+
+        - (p,) delays tau, samples;
+        - (p,) sums of Re(z);
+        - (p,) ratios of the sum of W Re(z) to the sum of W |z|;
+        - (p, 3) sums of w^2 W Re(z), of w^2 W^2 Re(z), and of w^2 W^2.
     """
     pairs, bins = cross.shape
     tau, plain, agreement = np.empty(pairs), np.empty(pairs), np.empty(pairs)
@@ -164,12 +165,16 @@ def _arrival_variances(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the (n,) variance of each channel's time of arrival, samples^2.
 
-    Each channel i has the noise power n_i and the signal power s_i per bin. The signal
-    power s of a pair is the geometric mean of the powers s_i and s_j. Let w be the
-    angular frequency and W the weight. The variance of the peak of a correlation is sum
-    w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2. For equal weights and
-    much signal, this is the bound of Knapp and Carter (1976). The coherences of the
-    pairs give the powers of each channel.
+    1. The coherences r of the pairs give the share of signal in each channel. The share
+       and the energy give the signal power s_i and the noise power n_i of channel i.
+    2. The position of the peak of the pair (i, j) has the variance
+
+           sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2.
+
+       The sums are over the bins, with the angular frequency w, the weight W, and s =
+       sqrt(s_i s_j). For equal weights and a high signal-to-noise ratio, this variance
+       is the bound of Knapp and Carter (1976).
+    3. Each channel gets the part of this variance that its noise causes.
     """
     channels = energy.size
     # Share q of signal in the energy of each channel, from the coherences r.
@@ -200,11 +205,10 @@ def _reconcile(
     to_delays: NDArray[np.float64],
     reconciled: NDArray[np.float64],
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the arrival times that fit all delays best by least squares.
+    """Computes the arrivals that fit the delays of all pairs best by least squares.
 
-    Returns:
-        Two values, samples: the largest change of an arrival, and the largest
-        disagreement between a delay and the arrivals.
+    The function returns the largest change of an arrival, and the largest disagreement
+    between a delay and the arrivals, both in samples.
     """
     moved, closure = 0.0, 0.0
     reconciled[0] = 0.0
@@ -231,21 +235,21 @@ def measure_peaks(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], float, float, float, float, float
 ]:  # pragma: no cover  (compiled)
-    """Computes the fields of ``Peaks``. If a pair has no peak, the correlation is 0.
+    """Computes the fields of ``Peaks``. If a pair has no peak, ``correlation`` is 0.
 
     Args:
         cross: (p, bins) cross-spectra of the pairs, units of the audio frame squared.
         weights: (p, bins) weights of the cross-spectra.
         energy: (n,) energies of the channels, units of the audio frame squared.
-        arrivals: (n,) times of arrival to start from, see ``find_peaks``, samples.
+        arrivals: (n,) times of arrival to start from, relative to channel 0, samples.
         tables: Pairs of channels and their matrices, see ``PairTables``.
-        sizes: Three numbers: the first bin; the length of the transform, samples; and
-            the length of the cut channels minus the loss at their soft edges, samples.
-        newton: See ``find_peaks``.
+        sizes: Three numbers: first bin; length of the transform, samples; and effective
+            length of the cut channels, samples. Their soft edges reduce the effective
+            length.
+        newton: Whether to refine the delays between samples by Newton's method.
 
     Returns:
-        (n,) times of arrival, samples; their (n - 1, n - 1) covariance, samples^2; and
-        the fields ``correlation`` to ``closure`` of ``Peaks``, in their order.
+        The seven fields of ``Peaks``, in their order.
     """
     pairs, to_delays, to_shares = tables
     first, length, cut_samples = sizes

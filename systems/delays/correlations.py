@@ -33,7 +33,8 @@ def correlations_at_lags(
         reach: Largest lag in either direction, in columns of the result.
 
     Returns:
-        (p, 2 reach + 1) correlations of the same precision. Lag 0 is in the middle.
+        (p, 2 reach + 1) correlations, with lag 0 in the middle. The precision is that
+        of ``cross``.
     """
     whole = np.zeros((len(cross), length // 2 + 1), dtype=cross.dtype)
     whole[:, band] = cross
@@ -42,7 +43,7 @@ def correlations_at_lags(
 
 
 def parabola_vertex(left: Any, top: Any, right: Any) -> Any:
-    """Computes where the parabola through three values is greatest.
+    """Computes where the parabola through three values has its maximum.
 
     Args:
         left: Values one step before ``top``; numbers or arrays of one shape.
@@ -50,7 +51,7 @@ def parabola_vertex(left: Any, top: Any, right: Any) -> Any:
         right: Values one step after ``top``.
 
     Returns:
-        Position of the vertex relative to ``top``, -1 to 1 step. It is 0 if the
+        Position of the maximum relative to ``top``, -1 to 1 step. It is 0 if the
         parabola has no maximum.
     """
     bend = left - 2.0 * top + right

@@ -20,11 +20,9 @@ def _pair_spectra(
 ) -> tuple[
     NDArray[np.complex64], NDArray[np.float32], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Computes the cross-spectra of pairs of channels.
+    """Returns the cross-spectra of pairs, their weights, and the channel energies.
 
-    Returns:
-        Three arrays: (p, bins) cross-spectra, (p, bins) weights, which are all 1, and
-        (n,) energies of the channels.
+    The shapes are (p, bins), (p, bins) and (n,). All weights are 1.
     """
     channels, bins = spectra.shape
     energy = np.zeros(channels)
@@ -47,12 +45,12 @@ class PairTables(NamedTuple):
     """(p, 2) all pairs of n channels."""
     to_delays: NDArray[np.float64]
     """(n - 1, p) matrix that converts the delays of all pairs to the delays t_k - t_0
-    by least squares."""
+    by least squares. t_k is the time of arrival at channel k."""
     to_shares: NDArray[np.float64]
-    """(n, p) matrix that computes the shares of signal in the channels from the
-    coherences of the pairs. The matrix converts logarithms, by least squares. A
-    coherence is the geometric mean of two shares. The result is exact for three
-    channels."""
+    """(n, p) matrix that converts the coherences of the pairs to the share of signal in
+    each channel. A coherence is the geometric mean of the shares of two channels. The
+    matrix therefore converts logarithms, by least squares. The result is exact for
+    three channels."""
 
     @classmethod
     def of(cls, pairs: NDArray[np.int64]) -> PairTables:
@@ -72,19 +70,21 @@ class Peaks(NamedTuple):
     """Peaks of the correlations of all pairs."""
 
     arrivals: NDArray[np.float64]
-    """(n,) times of arrival relative to channel 0 that fit all delays, samples."""
+    """(n,) times of arrival relative to channel 0 that fit the delays of all pairs
+    best, samples."""
     covariance: NDArray[np.float64]
     """(n - 1, n - 1) covariance of the arrivals at channels 1 ... n - 1, samples^2."""
     correlation: float
     """Least correlation coefficient of the pairs, 0 to 1."""
     angular_frequency: float
     """Root mean square angular frequency of the sound that two channels share, rad per
-    sample. It is the least value of all pairs."""
+    sample. It is the smallest value of all pairs."""
     noise_energy: float
-    """Energy in a channel that the other channels do not share. It is taken within the
-    band and averaged over the channels, units of the frame squared."""
+    """Energy in a channel that the other channels do not share, units of the frame
+    squared. It is the energy within the band, averaged over the channels."""
     moved: float
-    """Largest difference between an arrival and the given one, samples."""
+    """Largest difference between an arrival and the arrival from which the search
+    started, samples."""
     closure: float
     """Largest disagreement between the delay of a pair and ``arrivals``, samples."""
 
@@ -105,7 +105,8 @@ def find_peaks(
         frame: (n, samples) channels.
         arrivals: (n,) times of arrival to start from, relative to channel 0, samples.
         tables: The pairs of channels.
-        length: Length of the Fourier transform, at least that of the audio frame.
+        length: Length of the Fourier transform, samples; at least that of the audio
+            frame.
         band: Bins of the transform to use.
         phat: Whether to whiten the cross-spectra.
         newton: Whether to refine the delays between samples by Newton's method.

@@ -29,7 +29,7 @@ _LEAST_OVERLAP = 0.25
 class DelayPlan:
     """Constants of the measurement of delays between channels of audio frames.
 
-    The constants are computed before the first frame.
+    The class computes further constants when they are read for the first time.
 
     Raises:
         InputError: The band does not fit the sample rate, or the frames are too short
@@ -74,9 +74,9 @@ class DelayPlan:
     def edges(self) -> NDArray[np.int64]:
         """(n - 1, 2) pairs of channels that form a tree from channel 0 to all channels.
 
-        The microphones of each pair are close to each other, so that there are few lags
-        to search. The first channel of a pair is channel 0 or the second channel of an
-        earlier pair. The pairs are called the edges of the tree.
+        The first channel of a pair is channel 0 or the second channel of an earlier
+        pair. The microphones of each pair (edge of the tree) are close to each other,
+        so that there are few lags to search.
         """
         places = self.shape.p_AM
         gaps = np.linalg.norm(places[:, np.newaxis] - places, axis=2)

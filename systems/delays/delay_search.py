@@ -1,9 +1,9 @@
-"""Detects a sound in a frame of audio and finds first values of its delays.
+"""Detects a sound in a frame of audio, and makes initial estimates of its delays.
 
-The noises of different channels are independent, whatever their color. The correlation
-of two noise channels at a lag is Gaussian. The spectra of the channels give its
-variance. The height of the highest peak therefore gives the probability that noise
-alone reaches this height.
+The noises of different channels are independent, whatever their spectra. The
+correlation of two noise channels at a lag therefore has a Gaussian distribution, whose
+variance follows from the spectra. From this distribution and the height of the highest
+peak, the module computes the probability that noise alone reaches this height.
 """
 
 from __future__ import annotations
@@ -30,15 +30,16 @@ class DelaySearch(NamedTuple):
     """Result of the first search in a frame."""
 
     arrivals: NDArray[np.float64]
-    """(n,) arrivals relative to channel 0, samples."""
+    """(n,) times of arrival relative to channel 0, samples."""
     ambiguity: float
     """Ratio of the second peak to the highest peak among the allowed lags, 0 to 1. It
-    is the largest ratio of all edges (pairs of channels) of the plan."""
+    is the largest ratio over all edges (pairs of channels) of the plan."""
     chance: float
-    """Probability that noise alone has peaks as high as those of all edges."""
+    """Probability that noise alone has peaks as high as those of all edges (pairs of
+    channels)."""
     weakest: float
     """Probability that noise alone has a peak as high as the lowest peak of all edges
-    (pairs of channels). It is near 1 if the sound has not reached all channels yet."""
+    (pairs of channels). If the sound has not reached all channels yet, it is near 1."""
     energy: float
     """Energy of a channel within the band, averaged over the channels, units of the
     frame squared."""
@@ -50,13 +51,13 @@ def amdf(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the average magnitude difference of two channels (Han 2019, eq. 4-6).
 
-    The papers maximize 1 / sum_k |x_i(k) - x_j(k + lag)| over lag = 0 ... n-1. This
+    The papers maximize 1 / sum_k |x_i(k) - x_j(k + lag)| over the lags 0 to n - 1. This
     function differs from the papers in three ways:
 
     - It returns the sum itself, so that equal signals cause no division by zero.
-    - It includes both signs of the lag.
-    - It divides the sum by the number of its terms, because the printed sum favors
-      large lags.
+    - It includes negative lags.
+    - It divides the sum by the number of its terms, because the sum alone favors large
+      lags.
 
     Args:
         x_i: (n,) samples of channel i.
@@ -64,8 +65,8 @@ def amdf(
         max_lag: Largest lag, below n.
 
     Returns:
-        (2 max_lag + 1,) differences for the lags -max_lag ... max_lag. The minimum is
-        at the delay t_j - t_i.
+        (2 max_lag + 1,) differences for the lags -max_lag to max_lag. The minimum is at
+        the delay t_j - t_i, where t_i is the time of arrival at channel i.
     """
     n = x_i.size
     out = np.empty(2 * max_lag + 1)
@@ -84,8 +85,8 @@ def _peak(
 ) -> tuple[np.intp, float]:  # pragma: no cover  (compiled)
     """Finds the highest value, and the ratio of the second peak to the highest peak.
 
-    On each side, the main lobe ends where the values are at most half the highest
-    value. If the highest value is at a border, it is no peak, and the ratio is 1.
+    The main lobe around the highest value ends where the values are at most half of it.
+    If the highest value is at a border, it is no peak, and the ratio is 1.
     """
     best = np.argmax(values)
     top = values[best]
@@ -115,9 +116,8 @@ def _cross_spectra(
     zero.
 
     Returns:
-        Three values. The first is the (e, size) cross-spectra C. The second is the (e,
-        2) sums of |C|^2 and of k^2 |C|^2 over the bins k. The third is the mean energy
-        of the channels, which is 0 if a channel is silent.
+        Three values: (e, size) cross-spectra C; (e, 2) sums of |C|^2 and of k^2 |C|^2
+        over the bins k; and mean energy of the channels, or 0 if a channel is silent.
     """
     channels, bins = spectra.shape
     cross = np.zeros((len(edges), size), dtype=spectra.dtype)
@@ -143,9 +143,8 @@ def _gated_peak(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Finds the highest peak of a correlation among the lags from -gate to gate.
 
-    Returns:
-        Lag of the highest peak, samples; ratio of the second peak to the highest peak;
-        and height of the highest peak.
+    The function returns the lag of the peak, samples; the ratio of the second peak to
+    the highest peak; and the height of the highest peak.
     """
     gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
     for k in range(gate):
@@ -169,8 +168,8 @@ def _chance_of_noise(
     Args:
         heights: (e,) heights of the peaks, in standard deviations of the noise.
         counts: (e,) expected number of upward zero crossings of noise among the allowed
-            lags. At the height z, the number of crossings is smaller by the factor
-            exp(-z^2 / 2) (Rice 1944).
+            lags. The expected number of crossings of the height z is smaller by the
+            factor exp(-z^2 / 2) (Rice 1944).
 
     Returns:
         Probability that noise reaches all peaks, and probability that it reaches the
@@ -204,17 +203,16 @@ def _judge(
 ) -> tuple[NDArray[np.float64], float, float, float]:  # pragma: no cover  (compiled)
     """Computes the fields arrivals, ambiguity, chance and weakest of ``DelaySearch``.
 
-    An edge is a pair of channels. The highest peak in the correlation of each edge
-    gives the lag of the edge. The edges form a tree, and the sums of the lags along the
-    tree give the arrivals. The heights of the peaks relative to the noise give the
-    chance.
+    For each edge (pair of channels), the highest peak of the correlation gives the lag.
+    The edges form a tree, and the sums of the lags along the tree give the arrivals.
+    The heights of the peaks relative to the noise give ``chance`` and ``weakest``.
 
     Args:
         cross: (e, grid // 2 + 1) cross-spectra of the edges.
         grid: Number of samples of each correlation.
-        moments: (e, 2) sums of ``_cross_spectra``.
+        moments: (e, 2) sums from ``_cross_spectra``.
         edges: (e, 2) channels of each edge.
-        gates: (e,) largest lags, samples of the correlation.
+        gates: (e,) largest lag of each edge, samples of the correlation.
         padding: Length of the transform divided by the length of the audio frame.
         stretch: Samples of the frame per sample of the correlation.
 
@@ -244,15 +242,13 @@ def _judge(
 def weakest_sound(plan: DelayPlan, rate: float) -> float:
     """Computes the level of the weakest sound that can be distinguished from noise.
 
-    The easiest sound to detect has the spectrum of the noise. This sound has the
-    highest correlation relative to noise of all sounds with the same energy
-    (Cauchy-Schwarz inequality). The weakest sound that can be detected therefore has
-    this spectrum.
+    Let sounds have equal energy but different spectra. The sound with the spectrum of
+    the noise then has the highest correlation relative to noise (Cauchy-Schwarz
+    inequality). The weakest sound therefore has this spectrum.
 
     Args:
         plan: Rates, band and array.
-        rate: Probability. A correlation counts as a sound if noise reaches it with at
-            most this probability.
+        rate: Largest probability that noise alone is taken for a sound.
 
     Returns:
         Ratio of the energy of the sound to the energy of the noise, within the band.
@@ -329,8 +325,8 @@ def search_delays(
             correlation.
 
     Returns:
-        First values of the arrivals, samples, and measures of their reliability. None
-        if a channel is silent.
+        Initial estimates of the times of arrival, and measures of their reliability.
+        None if a channel is silent.
     """
     size = plan.grid // 2 + 1
     cross, moments, energy = _cross_spectra(spectra, plan.edges, band.start, size)

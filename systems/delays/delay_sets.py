@@ -1,14 +1,14 @@
 """Measures a set of delays for each of several overlapping sounds.
 
-Independent sounds add up in the correlations. Each sound has a peak in the correlation
-of every pair of channels. The height of the peak is the sound's share of the power. The
-lags of one sound add up to zero around every triangle of channels.
+The correlation of a pair of channels is the sum of the correlations of the independent
+sounds. Each sound has a peak in the correlation of every pair. The height of the peak
+is the sound's share of the power.
 
 In a room, each channel contains the direct sound and its echoes. Each of these arrivals
-in one channel correlates with each arrival in the other channel. The correlation of two
-channels therefore has many peaks. The peak of an echo may be the highest. The lags of
-the direct sound are consistent: the lag from channel i to k is the sum of the lags from
-i to j and from j to k.
+in one channel correlates with each arrival in the other channel. The correlation of a
+pair therefore has many peaks, and the peak of an echo may be the highest. Only the lags
+of one sound are consistent: the lag from channel i to k is the sum of the lags from i
+to j and from j to k. The module therefore searches for consistent sets of lags.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def estimate_delay_sets(
 ) -> list[DelayEstimate]:
     """Measures the delays of the sounds of an audio frame, one set of delays per sound.
 
-    The function finds and refines the set with the greatest sum of correlations. It
-    then removes the peaks of this set and repeats the search.
+    The function finds and refines the set with the largest sum of correlations. It then
+    removes the peaks of this set and repeats the search.
 
     Args:
         frame: (n, frame_samples) channels, any unit.
@@ -54,7 +54,7 @@ def estimate_delay_sets(
         count: Number of sets to search for.
 
     Returns:
-        At most ``count`` estimates. The estimate with the greatest sum of correlations
+        At most ``count`` estimates. The estimate with the largest sum of correlations
         is first. In the errors of each estimate, the other sounds count as noise.
     """
     search, band = seen
@@ -91,10 +91,9 @@ def _remove_peak(correlation: NDArray[np.float32], column: int) -> None:
 def _correlations(
     frame: NDArray[np.float32], plan: DelayPlan, band: slice
 ) -> tuple[NDArray[np.float32], int]:
-    """Computes the whitened correlations of all pairs on the grid of the plan.
+    """Returns the whitened correlations of all pairs, and the column m of lag 0.
 
-    Returns:
-        (p, 2 m + 1) correlations, and m, the index of the column of lag 0.
+    The correlations (p, 2 m + 1) are on the grid of the plan.
     """
     spectra = transform_rows(frame, plan.length)[:, band]
     i, j = plan.shape.pairs.T
@@ -111,11 +110,11 @@ def consistent_lags(
     reach: NDArray[np.int64],
     count: int,
 ) -> list[NDArray[np.int64]]:
-    """Finds the sets of lags with the greatest sum of correlations over all pairs.
+    """Finds the sets of lags with the largest sum of correlations over all pairs.
 
-    The function adds the channels one after another. It combines each set with each
-    peak of the next channel, and keeps the best combinations. The unit of a lag is one
-    column of the correlations.
+    A set has one lag per channel. The function adds the channels one after another. It
+    combines each set so far with each peak of the next channel, and keeps the best
+    combinations. The unit of a lag is one column of the correlations.
 
     Args:
         correlations: (p, 2 m + 1) correlation of each pair. Lag 0 is in the middle.
@@ -124,8 +123,8 @@ def consistent_lags(
         count: Largest number of sets.
 
     Returns:
-        Sets of (n,) lags relative to channel 0, columns. The set with the greatest sum
-        is first.
+        Sets of (n,) lags relative to channel 0, columns. The set with the largest sum
+        is first. The list is empty if no set is consistent.
     """
     wide = maximum_filter1d(correlations, 2 * _OFF + 1, axis=1)
     middle = correlations.shape[1] // 2

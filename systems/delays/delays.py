@@ -2,9 +2,9 @@
 
 The measurement has four steps:
 
-1. A search on a grid finds the delays between close microphones.
-2. The channels are cut to the section that they share, so that the edges of the frame
-   do not shift the result.
+1. A search on a grid of lags finds the delays between close microphones.
+2. The channels are cut to the section of the sound that they share. Without this step,
+   the edges of the frame would shift the result.
 3. Newton's method on the cross-spectrum finds the peak of the correlation of each pair
    of channels.
 4. The coherence of the cut channels gives the errors of the delays.
@@ -49,8 +49,8 @@ class DelayEstimate(NamedTuple):
     """Delays of one frame, and measures of their reliability."""
 
     tau: NDArray[np.float64]
-    """(n - 1,) delays t_k - t_0 of the channels k = 1 ... n - 1, s. A delay is positive
-    if the sound reaches channel 0 earlier."""
+    """(n - 1,) delays t_k - t_0 of the channels k = 1 ... n - 1, s. t_k is the time of
+    arrival at channel k."""
     covariance: NDArray[np.float64]
     """(n - 1, n - 1) covariance of the delays, s^2."""
     correlation: float
@@ -59,15 +59,16 @@ class DelayEstimate(NamedTuple):
     """Largest disagreement between the delay of a pair and ``tau``, s."""
     ambiguity: float
     """Ratio of the second peak to the highest peak among the allowed lags, 0 to 1. It
-    is the largest ratio of all edges (pairs of channels) of the plan."""
+    is the largest ratio over all edges (pairs of channels) of the plan."""
     chance: float
-    """Probability that noise alone has peaks as high as those of all edges."""
+    """Probability that noise alone has peaks as high as those of all edges (pairs of
+    channels)."""
     angular_frequency: float
     """Root mean square angular frequency of the sound that the channels share,
     rad/s."""
     noise_energy: float
-    """Energy in a channel that the other channels do not share. It is taken within the
-    band and averaged over the channels, units of the frame squared."""
+    """Energy in a channel that the other channels do not share, units of the frame
+    squared. It is the energy within the band, averaged over the channels."""
     band: slice
     """Bins of the plan's transform that were used."""
 
@@ -84,7 +85,7 @@ def look(
     Args:
         frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
-        method: A key of METHODS.
+        method: A key of ``METHODS``.
         find_band: Whether to use only the part of the band that the sound occupies.
 
     Returns:
@@ -117,12 +118,12 @@ def estimate_delays(
     Args:
         frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
-        method: A key of METHODS.
+        method: A key of ``METHODS``.
         find_band: Whether to use only the part of the band that the sound occupies.
         seen: Result of ``look`` for this frame, if it is known.
 
     Returns:
-        The estimate, whatever its reliability. None if a channel is silent, or if the
+        The estimate, even if it is not reliable. None if a channel is silent, or if the
         correlation of a pair has no peak among the allowed lags.
     """
     seen = seen or look(frame, plan, method, find_band=find_band)
@@ -140,9 +141,8 @@ def settled_delays(
     Args:
         frame: (n, frame_samples) channels, any unit.
         plan: Rates, band and array.
-        method: A key of METHODS.
-        seen: Result of ``look``, or a copy of this result with other arrivals to start
-            from.
+        method: A key of ``METHODS``.
+        seen: Result of ``look``. To start elsewhere, pass a copy with other arrivals.
 
     Returns:
         The estimate or None, as for ``estimate_delays``.

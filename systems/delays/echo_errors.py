@@ -33,13 +33,12 @@ _PARTS = 5
 def echo_errors(
     shape: ArrayShape, c: float, news: float, angular_frequency: float
 ) -> NDArray[np.float64]:
-    """Computes the covariance of delays after the suppression of echoes.
+    """Computes the covariance of delays due to echoes that were not fully suppressed.
 
     Args:
         shape: The n microphones.
         c: Speed of sound, m/s.
-        news: Share of the energy of the audio frame that is not from echoes. The share
-            must be above 0.
+        news: Share of the energy of the audio frame that is not from echoes, above 0.
         angular_frequency: Root mean square angular frequency of the remaining sound,
             rad/s.
 
@@ -54,11 +53,11 @@ def echo_errors(
 
 
 def energy_spread(frame: NDArray[np.float32]) -> float:
-    """Computes the share of a frame of audio over which its energy is spread.
+    """Computes over which share of an audio frame its energy is spread.
 
-    The frame is divided into five parts. The result is the squared mean of their
-    energies, divided by the mean of their squared energies. If a steady sound fills the
-    share p of an otherwise silent frame, the result is p.
+    The function divides the frame into five parts. The result is the squared mean of
+    their energies, divided by the mean of their squared energies. For example, if a
+    steady sound fills the share p of an otherwise silent frame, the result is about p.
 
     Args:
         frame: (n, samples) channels, not all silent.

@@ -17,7 +17,7 @@ BLOCK_SAMPLES = 64
 
 @njit(cache=True)
 def frame_energy(frame: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
-    """Computes the sum of squares of a frame (n, samples), block means subtracted."""
+    """Computes the sum of squares of a frame (n, samples) without its block means."""
     channels, samples = frame.shape
     whole = samples - samples % BLOCK_SAMPLES
     energy = 0.0

@@ -1,9 +1,9 @@
 """Halves the sample rate of frames of audio, so that their transforms are faster.
 
-The half-band filter has 19 taps. Every other tap is zero, except the middle tap. The
-filter is flat to 0.02 dB up to ``PASSED`` times the sample rate. It suppresses
-frequencies that alias to this range by 55 dB. The filter is symmetrical and the same
-for all channels, so that it does not change delays between channels.
+The half-band filter has 19 taps. Every other tap is zero, except the middle tap. Up to
+``PASSED`` times the sample rate, the filter is flat to 0.02 dB. It suppresses by 55 dB
+the frequencies that alias to this range. The filter is symmetrical and the same for all
+channels, so that it does not change the delays between channels.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def halve_rate(
 
     Returns:
         (n, samples // 2) float32 filtered values at the second, fourth ... sample. The
-        filter assumes silence before and after the frame. Therefore the first and last
-        four or five values are inexact.
+        first and last four or five values are inexact, because the filter assumes
+        silence before and after the frame.
     """
     channels, samples = frame.shape
     half = samples // 2
@@ -68,8 +68,8 @@ def _halve_row(
 ) -> None:  # pragma: no cover  (compiled)
     """Filters one channel and keeps every other sample.
 
-    The array ``odd`` (half,) and the inside of ``even`` are scratch memory. The ends of
-    ``even`` must be zero.
+    The arrays ``odd`` and ``even`` are scratch memory. The ends of ``even`` must be
+    zero.
     """
     inside = even[_PAIRS - 1 : _PAIRS - 1 + odd.size]
     for k in range(odd.size):

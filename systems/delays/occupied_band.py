@@ -28,9 +28,8 @@ def occupied_band(spectra: NDArray[np.complex64], bin_hz: float) -> tuple[int, i
         bin_hz: Width of a bin, Hz.
 
     Returns:
-        First bin of the range, and the bin after the last bin of the range. The range
-        contains all bins if the sound fills the band, or if too few bins are above the
-        floor.
+        First bin of the range, and the bin after its last bin. If the sound fills the
+        band, or if too few bins are above the floor, the range contains all bins.
     """
     bins = spectra.shape[1]
     width = max(1, round(_SMOOTHING_HZ / bin_hz))

@@ -21,13 +21,14 @@ EDGE_SAMPLES = 16
 def cut_to_overlap(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Cuts the section of the sound that all channels share, with soft edges.
+    """Cuts each channel to the section of the sound that all channels share.
+
+    The cuts are at whole samples. Each section has soft edges, which are shifted by the
+    remaining fraction of a sample.
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) times of arrival relative to channel 0, samples. The channels are
-            cut at whole samples. Their soft edges follow the remaining fractions of a
-            sample.
+        arrivals: (n,) times of arrival relative to channel 0, samples.
 
     Returns:
         (n, m) channels in the unit of the audio frame. Here m is the length of the
@@ -50,8 +51,8 @@ def cut_rows(
         columns: Columns of the output, at least the length m of the cut channels.
 
     Returns:
-        Two values. The first is the (rows, columns) array with the cut channels in its
-        first n rows and m columns. The second is m.
+        Two values: the (rows, columns) array, and the length m. The cut channels are in
+        the first n rows and m columns.
     """
     channels, samples = frame.shape
     whole = np.rint(arrivals)

@@ -1,11 +1,13 @@
 """Keeps the first wave front of every sound and suppresses its echoes.
 
 In a room, the direct sound arrives first. For some tens of milliseconds, further sound
-in the same band is more likely an echo than new sound. Therefore the module weights and
-whitens the short-time spectra of each channel. The weight is the share of the power
-that exceeds a decaying memory of the past spectra. This is the precedence effect, as in
-the echo-free onsets of Huang, Ohnishi and Sugie (1995). All weights are real, so that
-the delays between the channels do not change.
+in the same band is more likely an echo than new sound. A memory of the past spectra,
+which decays, therefore represents the possible echoes.
+
+The module computes short-time spectra of each channel and whitens them. It multiplies
+each bin by the share of its power that exceeds the memory. This is the precedence
+effect, as in the echo-free onsets of Huang, Ohnishi and Sugie (1995). All factors are
+real, so that the delays between the channels do not change.
 """
 
 from __future__ import annotations
@@ -54,16 +56,7 @@ class EchoMemory:
         self.taper = (np.sin(np.pi * phase) * math.sqrt(0.5)).astype(np.float32)
 
     def faded(self, memory: NDArray[np.float32], samples: int) -> NDArray[np.float32]:
-        """Returns the memory of past power after a silence.
-
-        Args:
-            memory: (n, bins) power that echoes may still have, units of the audio frame
-                squared.
-            samples: Length of the silence, samples.
-
-        Returns:
-            (n, bins) memory, reduced by the decay in this time.
-        """
+        """Returns the (n, bins) memory of past power after some silent samples."""
         return memory * np.float32(self.decay_a_hop ** (samples / self.hop))
 
     def least(self, noise_density: float) -> float:
@@ -79,15 +72,12 @@ def _weigh(
     floor: np.float32,
     noise: np.float32,
 ) -> float:  # pragma: no cover  (compiled)
-    """Weights spectra in place and updates the memory of past power.
+    """Weights (n, instants, bins) spectra in place, and updates the memory of power.
 
-    The spectra have the shape (n, instants, bins). The new power is the excess of the
-    power over the memory. The weight is the ratio of the new power to the power.
-    Division by the root of the power whitens the spectrum. The updated memory is the
-    largest of three values: the decayed memory, the present power, and the noise.
-
-    Returns:
-        Share of the energy that is new.
+    The new power of a bin is the excess of its power over the memory. The weight is the
+    share of new power. Division by the root of the power whitens the spectrum. The
+    updated memory is the largest of the decayed memory, the present power, and the
+    noise. The function returns the share of the energy that is new.
     """
     channels, instants, bins = spectra.shape
     kept, all_of_it = 0.0, 1e-30
@@ -141,13 +131,12 @@ def keep_first_wave_front(
         frame: (n, samples) channels, any unit.
         memory: (n, bins) memory of past power after the last frame; None after silence.
         sizes: Sizes of window and memory.
-        noise_density: Mean square per sample of white noise that is as loud as the
-            noise of the frame, units of the frame squared; 0 if it is unknown.
+        noise_density: Mean square of the samples of white noise that is as loud as the
+            noise in the frame, units of the frame squared; 0 if it is unknown.
 
     Returns:
-        Three values. The first is the (n, samples) weighted and whitened channels. The
-        second is the new memory. The third is the share of the frame's energy that is
-        new, 0 to 1.
+        Three values: the (n, samples) weighted and whitened channels; the new memory;
+        and the share of the frame's energy that is new, 0 to 1.
     """
     windows = np.lib.stride_tricks.sliding_window_view(frame, sizes.window, axis=1)
     spectra = fft.rfft(windows[:, :: sizes.hop] * sizes.taper)

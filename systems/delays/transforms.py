@@ -1,7 +1,7 @@
 """Computes Fourier transforms of the channels of an audio frame, in compiled code.
 
-The results are equal to those of SciPy to the last bit. For these short transforms,
-SciPy spends half of the time on the selection of the function.
+The results are equal to those of SciPy to the last bit. For transforms as short as
+these, SciPy spends half of the time on finding the right function.
 """
 
 from __future__ import annotations
@@ -19,15 +19,10 @@ from systems.framework.compiling import njit
 def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
     """Returns the number of rows to transform for a number of channels.
 
-    The library transforms rows of single precision four at a time. If three rows
-    remain, it transforms them one by one. A fourth row of zeros then saves a third of
-    the time for the transforms.
-
-    Args:
-        channels: Number of channels.
-
-    Returns:
-        The number of channels, or the number of channels plus 1.
+    The library rocket_fft transforms rows of single precision four at a time. If three
+    rows remain, it transforms them one by one. A fourth row of zeros then saves a third
+    of the time, so the result is the number of channels plus 1. In all other cases, the
+    result is the number of channels.
     """
     return channels + (1 if channels % 4 == 3 else 0)
 
@@ -36,13 +31,9 @@ def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
 def transform_filled_rows(
     rows: NDArray[Any],
 ) -> NDArray[Any]:  # pragma: no cover  (compiled)
-    """Computes the Fourier spectra of rows.
+    """Computes the (n, length // 2 + 1) Fourier spectra of (n, length) rows.
 
-    Args:
-        rows: (n, length) rows of single or double precision.
-
-    Returns:
-        (n, length // 2 + 1) spectra of the same precision.
+    The spectra have the precision of the rows, single or double.
     """
     precision = rows[:1, :1] * np.complex64(1.0)
     shape = rows.shape[0], rows.shape[1] // 2 + 1

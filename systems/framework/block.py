@@ -1,7 +1,7 @@
-"""Defines the base class of all blocks of the block diagrams.
+"""Defines ``Block``, the base class of all blocks of the block diagrams.
 
-A block declares its ports, its state and its columns once. From this declaration, the
-class ``Block`` creates:
+A block declares its ports, its state and its columns in the results table once.
+``Block`` creates the following from this declaration:
 
 - the Drake ports, the state and its update;
 - the check that all inputs are finite;
@@ -47,23 +47,20 @@ class Port(NamedTuple):
 
     name: str
     size: int | str
-    """Number of elements, or ``OBJECT``. A string such as ``sensors`` or ``3 bodies``
-    is a multiple of a named size. The block receives the named sizes when it is
-    constructed."""
+    """Number of elements, or ``OBJECT`` if the port carries an object. A string such as
+    ``sensors`` or ``3 bodies`` is a named size, or a multiple of a named size. The
+    block gives the values of the named sizes to ``declare``."""
     unit: str
     """Units of the elements, for example ``m, m, rad``, or the type of the object."""
     columns: str | tuple[str, ...] = ()
-    """Names of the elements in the table of a run. ``range_{}`` means ``range_1``,
-    ``range_2`` and so on. A port without columns is not in the table."""
+    """Names of the elements as columns in the results table of a run. ``range_{}``
+    stands for ``range_1``, ``range_2`` and so on. A port without names is not in the
+    table."""
 
     def elements(self, sizes: Mapping[str, int]) -> int:
         """Returns the number of elements of a port that carries numbers.
 
-        Args:
-            sizes: Sizes that the block received when it was constructed, by name.
-
-        Returns:
-            The number of elements.
+        ``sizes`` has the values of the named sizes.
         """
         if isinstance(self.size, int):
             return self.size
@@ -71,13 +68,9 @@ class Port(NamedTuple):
         return int(factor or 1) * sizes[name]
 
     def column_names(self, sizes: Mapping[str, int]) -> tuple[str, ...]:
-        """Returns the names of the elements in the results table of a run.
+        """Returns one name per element; the tuple is empty if the table omits the port.
 
-        Args:
-            sizes: Sizes that the block received when it was constructed, by name.
-
-        Returns:
-            One name per element. The tuple is empty if the port is not in the table.
+        ``sizes`` has the values of the named sizes.
         """
         if isinstance(self.columns, str):
             count = self.elements(sizes)
@@ -96,37 +89,38 @@ class Step(NamedTuple):
     - It replaces the state by the state of the next tick.
 
     ``inputs`` and ``outputs`` have one entry per port, in the order of the declaration.
-    An entry is a sequence of numbers or the object that the port carries. In compiled
-    code, the sequences are arrays. In Drake, they are lists of float or AutoDiffXd. If
-    the block declares ``arrays``, they are arrays in Drake, too.
+    An entry is the object that the port carries, or a sequence of numbers. The sequence
+    is an array in compiled code, and a list of float or AutoDiffXd in Drake. Drake also
+    passes arrays if the state is a named tuple, or if ``declare`` was called with
+    ``arrays``.
     """
 
     step: Callable[..., None]
     numbers: Any
     """Constants of the step, in a named tuple. Its fields are numbers, arrays,
-    functions, parameters, or tuples of these. If the named tuple has a field ``noise``
-    of the type ``TickNoise``, each run replaces this field according to its seed."""
+    functions, parameters, or tuples of these. A field ``noise`` of the type
+    ``TickNoise`` gets a new value in each run, according to the seed of the run."""
     state: Any = ()
     """State at the first tick (control period): a sequence of numbers or a named tuple.
     The fields of the named tuple are arrays or named tuples of arrays. The step changes
     the arrays in place."""
     publish: Callable[..., None] | None = None
-    """Function ``publish(state, outputs, numbers)`` that fills the outputs of a block
-    whose outputs depend only on its state. The step of this block does not fill the
-    outputs."""
+    """Function ``publish(state, outputs, numbers)`` that fills the outputs. Only blocks
+    whose outputs depend on nothing but the state have this function. Their step does
+    not fill the outputs."""
     host: Any = None
-    """``HostCall`` of a step that calls Python. The loop keeps a reference to it."""
+    """``HostCall`` of a step that calls Python. This reference keeps the address of the
+    function valid during the loop."""
     carries: Mapping[str, Callable[[int], Any]] = {}
-    """Functions by the name of an output port that carries an object. Each function
-    returns the object at a tick (control period)."""
+    """One function per output port that carries an object, by the name of the port.
+    Each function returns the object at a given tick (control period)."""
 
 
 class RunFacts(NamedTuple):
     """Facts about a run that a step needs in a compiled simulation loop.
 
-    Several runs use the same blocks, but differ in start, seed and layout of the
-    obstacles. Therefore these values replace the values with which a block was
-    constructed.
+    Several runs use the same blocks, but differ in start pose, seed and obstacles.
+    Therefore these values replace the values with which a block was constructed.
     """
 
     ticks: int
@@ -138,13 +132,13 @@ class RunFacts(NamedTuple):
     seed_of: Callable[[str], int]
     """Function that returns the seed of a block, given the name of the block."""
     carried: Mapping[str, Callable[[int], Any]]
-    """Functions by the name of an input port that carries an object. Each function
-    returns the object at a tick (control period)."""
+    """One function per input port that carries an object, by the name of the port. Each
+    function returns the object at a given tick (control period)."""
     mapped: Any = ()
     """(n, 5) obstacles in the robot's map. The columns are x, y, theta, length and
-    width, m and rad."""
+    width in W, m and rad."""
     goal: tuple[float, float] | None = None
-    """Position of the goal of the robot in W, m, if the robot has a goal."""
+    """Position (x, y) of the robot's goal in W, m. None: the robot has no goal."""
 
 
 def has_arrays(state: Any) -> bool:
@@ -153,13 +147,9 @@ def has_arrays(state: Any) -> bool:
 
 
 def copied(state: Any) -> Any:
-    """Copies a named tuple of arrays, including nested named tuples.
+    """Copies a named tuple of arrays and numbers, including nested named tuples.
 
-    Args:
-        state: The named tuple. Its fields may also be numbers.
-
-    Returns:
-        A named tuple with the same values. It shares no array with ``state``.
+    The copy shares no array with ``state``.
     """
     if has_arrays(state):
         return type(state)(*map(copied, state))
@@ -169,21 +159,21 @@ def copied(state: Any) -> Any:
 class _Declared:
     """The declaration of a block, and the methods that evaluate the declaration.
 
-    The private names of this class start with two underscores. Python therefore renames
-    them, so that blocks can use any name of their own.
+    Private names start with two underscores. Python then renames them, so that they
+    cannot collide with the names of a subclass.
     """
 
     part: ClassVar[str] = ""
     """The role of the block in its robot, for example ``plant`` or ``tracker``. A block
-    replaces another block that has the same part."""
+    replaces any other block with the same role."""
     stage: ClassVar[Stage] = "control"
     """The place of the block in the signal chain."""
     inputs: Sequence[Port] = ()
     """Input ports, in the order of the step."""
     outputs: Sequence[Port] = ()
-    """Output ports, in the order of the step. A port that carries an object publishes
-    the field of the state that has the name of the port. The step does not fill this
-    port."""
+    """Output ports, in the order of the step. The step fills only ports that carry
+    numbers. A port that carries an object publishes the state's field of the same
+    name."""
     states: Sequence[str] = ()
     """Names of the elements of the state, continuous elements first."""
     columns: Mapping[str, tuple[str, ...]] = {}
@@ -204,14 +194,14 @@ class _Declared:
     ) -> list[Any]:
         """Declares the input ports and the columns of a block without a ``Step``.
 
-        The block must declare its output ports with ``declare_output``.
+        Afterwards, the block must declare its output ports with ``declare_output``.
 
         Args:
-            sizes: Sizes to which the ports refer, by name.
+            sizes: Values of the named sizes in the declarations of the ports.
             omit: Names of ports that this block does not have.
 
         Returns:
-            The input ports.
+            The Drake input ports.
         """
         self.__sizes = {**(sizes or {})}
         self.__input_ports = [
@@ -237,11 +227,11 @@ class _Declared:
 
         Args:
             name: Name of the port in ``outputs``.
-            calc: ``calc(context, output)`` sets the output.
+            calc: Function ``calc(context, output)`` that sets the output.
             prerequisites: Dependency tickets of all values that ``calc`` reads.
 
         Returns:
-            The Drake port.
+            The Drake output port.
         """
         (port,) = (port for port in self.__outputs if port.name == name)
         if port.size == OBJECT:
@@ -270,11 +260,12 @@ class _Declared:
     ) -> None:
         """Declares the ports, the state, the update and the outputs of a block.
 
-        A cache entry stores the result of the step. Drake therefore computes the step
+        A cache entry stores the result of the step, so that Drake computes the step
         only once for all output ports. If the step has the function ``publish``, a
-        second cache entry stores the outputs. This entry depends only on the state, so
-        that the outputs have no direct feedthrough. The form of the state of the step
-        determines the Drake state:
+        second cache entry stores the outputs. The second entry depends only on the
+        state. Therefore the outputs have no direct feedthrough.
+
+        The initial state of the step determines the kind of the Drake state:
 
         - a sequence of numbers: a discrete state;
         - a named tuple of arrays: an abstract state;
@@ -283,7 +274,7 @@ class _Declared:
         Args:
             step: The computation of the block in one control period.
             tick_s: Period of the update, s.
-            sizes: Sizes to which the ports refer, by name.
+            sizes: Values of the named sizes in the declarations of the ports.
             omit: Names of ports that this block does not have.
             unread: Names of input ports that the step does not read. They must be the
                 last input ports, and may stay unconnected.
@@ -355,10 +346,11 @@ class _Declared:
         """Returns the step of the block for one run of a compiled simulation loop.
 
         Args:
-            run: The facts about the run.
+            run: Facts about the run.
 
         Returns:
-            The step, with its own copy of the state and the noise of the run.
+            The step, with its own copy of the state, and with noise from the seed of
+            the run.
 
         Raises:
             InputError: The block has no step.

@@ -17,8 +17,9 @@ def declare_cache(
 ) -> CacheEntry:
     """Declares a cache entry for the result of ``compute(context)``.
 
-    A port that uses the entry declares ``{entry.ticket()}`` as its prerequisite. The
-    port reads the result with ``entry.Eval(context)`` and must not change it.
+    An output port that uses the entry declares ``{entry.ticket()}`` as its
+    prerequisite. The port reads the result with ``entry.Eval(context)`` and must not
+    change it.
 
     Args:
         system: The block that owns the entry.

@@ -1,18 +1,18 @@
 """Manages the cache of functions that numba compiles.
 
-By default, numba reuses the cached code of a function until the file of this function
-changes. However, most compiled functions of this repository contain the code of
-functions from other files. Therefore the function ``njit`` below uses another key. The
-key is a hash of the file and of all files of this repository that it imports, directly
-or indirectly. If one of these files changes, the key changes. Code of other versions
-and other clones stays in the cache until it has not been used for 30 days.
+By default, numba reuses the cached code of a function until the file with this function
+changes. However, the compiled code of most functions contains code from other files.
+Therefore the function ``njit`` below uses its own cache key. The key is a hash of the
+file and of all files of this repository that the file imports, directly or indirectly.
+If one of these files changes, the function is compiled again. The cache also keeps the
+code of other versions and other clones, until nobody has used it for 30 days.
 
 No function uses the option ``fastmath`` of numba. With this option, the compiler may
 reorder sums. The last bit of a sum would then depend on the machine, on the caller and
-on the order of compilation. In a run of 40 s, the difference grows to centimeters
-(``tests/evals/test_compiled_code.py``). Without ``fastmath``, the compiled simulation
-loop of a robot that listens takes 10 to 15 % longer, and the loop of Drake takes 5 %
-longer.
+on the order of compilation. In a run of 40 s, this difference grows to centimeters
+(``tests/evals/test_compiled_code.py``). The exact order of sums costs time. It slows
+the compiled simulation loop of a robot that listens by 10 to 15 %, and the loop of
+Drake by 5 %.
 """
 
 from __future__ import annotations
@@ -57,15 +57,15 @@ _IMPORT = re.compile(
 def provide_cache(folder: Path = _FOLDER) -> Path | None:
     """Creates a temporary cache folder if the usual folder is not writable.
 
-    The temporary folder exists until the process ends. Child processes use this folder,
-    too.
+    This process and its child processes use the temporary folder. It is removed when
+    the process ends.
 
     Args:
         folder: The usual folder of the cache.
 
     Returns:
         The temporary folder. None if the usual folder is writable, or if the user has
-        chosen a folder.
+        set ``NUMBA_CACHE_DIR``.
     """
     if os.environ.get("NUMBA_CACHE_DIR") or _can_be_written(folder):
         return None
@@ -83,7 +83,7 @@ def cache_folder() -> Path:
 
 
 def njit(*arguments: Any, **options: Any) -> Any:
-    """Compiles functions with ``numba.njit``, with a cache keyed by the source files.
+    """Calls ``numba.njit``, with a cache key for the source file and all its imports.
 
     Args:
         *arguments: Positional arguments of ``numba.njit``.
@@ -112,7 +112,7 @@ def _keep_by_source() -> None:
 
 
 class SourceLocator:
-    """Determines where numba caches the code of a function of this repository.
+    """Tells numba where to cache the code of a function, and with which key.
 
     The class has the methods of ``numba.core.caching._CacheLocator``.
     """
@@ -163,16 +163,17 @@ def _remove_unused(folder: Path) -> None:
 
 
 def source_digest(*files: Path) -> str:
-    """Computes a hash of Python files and of all our files that they import.
+    """Computes a hash of Python files and of all files of this repository they import.
 
-    Our files are those of this repository. A process reads each of them only once.
-    Later changes do not affect the code that the process has loaded.
+    A process reads each file of this repository only once, because later changes do not
+    affect the code that is loaded.
 
     Args:
         *files: Files of this repository, or files of a user.
 
     Returns:
-        Hexadecimal digits. They depend on the content of the files, not on the clone.
+        Hexadecimal digits. They depend on the content of the files, not on the folder
+        of the repository.
     """
     import numpy as np
 
@@ -195,8 +196,9 @@ def _place(file: Path) -> str:
 def _read(file: Path) -> tuple[str, tuple[Path, ...]]:
     """Returns the hash of a file, and the files of this repository that it imports.
 
-    A text search finds the imports, also in functions and in comments. A superfluous
-    file costs only a compilation. A missing file would give wrong results.
+    A text search finds the imports, even those in functions and in comments. A
+    superfluous file costs only a compilation, but a missing file would give wrong
+    results.
     """
     try:
         text = file.read_bytes()

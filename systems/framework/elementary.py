@@ -1,10 +1,9 @@
 """Computes elementary functions of floats, arrays and AutoDiffXd.
 
 For floats, the functions of the module ``math`` give the same results as those of
-``pydrake.math`` and take a third of their time. However, the functions of ``math``
-raise errors if a result is infinite or not a number. In these cases, and for
-AutoDiffXd, this module uses ``pydrake.math``. For the sine and cosine of arrays, it
-uses numpy.
+``pydrake.math`` in a third of the time. However, the functions of ``math`` raise errors
+if a result is infinite or NaN. In these cases, and for AutoDiffXd, this module uses
+``pydrake.math``. For the sine and cosine of arrays, this module uses numpy.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ class Fault(Parameters):
     kind: FaultKind
     """Kind of the fault.
 
-    Microphones: ``dead`` (the counts are 0) or ``frozen`` (the counts stay at a quarter
-    of full scale). Ultrasonic sensors: ``silent`` (the sensor no longer fires),
+    Microphones: ``dead`` (the samples are 0) or ``frozen`` (the samples stay at a
+    quarter of full scale). Ultrasonic sensors: ``silent`` (the sensor no longer fires),
     ``blind`` (it never has an echo), ``frozen`` (it repeats its last reading) or
     ``noisy`` (the standard deviation of its range is 0.3 m larger). Gas sensors:
     ``dead`` (the reading is 1, clean air, without noise) or ``frozen`` (the sensor
@@ -81,8 +81,7 @@ def faults_of(
         count: Number of sensors of this kind.
 
     Returns:
-        Faults by the index of the sensor, counted from 0. Sensors without a fault are
-        omitted.
+        Fault of each sensor that fails, by the index of the sensor, counted from 0.
 
     Raises:
         InputError: The number of a sensor is above ``count``, or one sensor has two
@@ -120,8 +119,9 @@ def fault_ticks(
         tick_s: Control period (tick) of the robot, s.
 
     Returns:
-        (count, 2) array, one row per sensor. The first column is the number of the kind
-        of fault, 0 for none. The second column is the first tick of the fault.
+        (count, 2) array with one row per sensor. The first column is the kind of the
+        fault (``DEAD`` to ``LOST``), or 0 without a fault. The second column is the
+        first tick of the fault.
 
     Raises:
         InputError: See ``faults_of``.

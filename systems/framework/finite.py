@@ -1,9 +1,9 @@
 """Checks that all inputs and arguments of blocks are finite.
 
-A comparison with NaN is false and hides the error. For example, an echo flag of NaN
-looks like no echo. An obstacle at NaN looks out of reach. Each block therefore sums all
-values that it reads, which takes little time. A sum is finite only if all its terms are
-finite.
+A comparison with NaN is false, so a NaN can go unnoticed. For example, an echo flag of
+NaN looks like no echo, and an obstacle at NaN looks out of reach. Each block therefore
+sums all values that it reads, which takes little time. The sum is finite only if all
+values are finite.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def read_list(context: Any, port: Any) -> list[Any]:
         The n elements, floats or AutoDiffXd, in the unit of the port.
 
     Raises:
-        ValueError: An element is not finite. The message contains block, port, element
-            and time.
+        ValueError: An element is not finite. The message names the block, the port, the
+            element and the time.
     """
     values = port.Eval(context).tolist()
     added = sum(values)
@@ -45,9 +45,7 @@ def read_list(context: Any, port: Any) -> list[Any]:
 
 
 def read_lists(context: Any, ports: Sequence[Any]) -> list[list[Any]]:
-    """Reads several vector input ports and checks that their elements are finite.
-
-    The function is twice as fast as several calls of ``read_list``.
+    """Reads several vector input ports like ``read_list``, in half of the time.
 
     Args:
         context: Context of the block.
@@ -95,7 +93,7 @@ def check_record(context: Any, port: Any, record: Any) -> None:
     """Checks that all fields of a named tuple from an abstract port are finite.
 
     Args:
-        context: Context of the block. The message contains the time of this context.
+        context: Context of the block, for the time in the message.
         port: Abstract input port that carries the named tuple.
         record: Named tuple of numbers and arrays. Arrays of integers are not checked.
 
@@ -121,17 +119,18 @@ def total(values: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
 
 
 def check_port(context: Any, port: Any, values: Any, field: str = "") -> None:
-    """Raises an error if a value from a port is not finite.
+    """Checks that a value from a port is finite.
 
     Args:
-        context: Context of the block. The message contains the time of this context.
-        port: Input port.
-        values: Value of the port or of one of its fields: a number or an array.
-        field: A dot and the name of the field. Empty: ``values`` is the whole value.
+        context: Context of the block, for the time in the message.
+        port: Input port that carries the value.
+        values: The value of the port or of one of its fields: a number or an array.
+        field: ``.name`` if ``values`` is the field ``name`` of the value of the port;
+            otherwise empty.
 
     Raises:
-        ValueError: An element is not finite. The message contains block, port, element
-            and time.
+        ValueError: An element is not finite. The message names the block, the port, the
+            element and the time.
     """
     block = type(port.get_system()).__name__.partition(_SCALAR)[0]
     time = float_of(context.get_time())
@@ -152,7 +151,7 @@ def check_finite(name: str, values: Any, end: str = "; give a finite number") ->
         end: End of the message, which states the remedy.
 
     Raises:
-        ValueError: A number is not finite. The message contains the first such number.
+        ValueError: A number is not finite. The message shows the first such number.
     """
     array = np.asarray(values)
     for place, value in enumerate(array.ravel().tolist()):

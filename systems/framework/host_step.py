@@ -1,4 +1,4 @@
-"""Makes steps of blocks in Python that a compiled simulation loop calls.
+"""Makes steps with which a compiled simulation loop calls blocks written in Python.
 
 Blocks that process frames of sound use libraries, for example for Fourier transforms
 and room responses. Compiled code cannot call these libraries. Therefore the compiled
@@ -34,13 +34,14 @@ class HostCall:
     """A Python function that compiled code calls by its address.
 
     An exception cannot pass through compiled code. If the function raises an exception,
-    ``error`` stores the exception, and the compiled simulation loop ends with
-    ``HostError``. The address is valid while this object exists.
+    the attribute ``error`` stores it, and the compiled simulation loop ends with
+    ``HostError``. The address is valid as long as this object exists.
 
     Args:
         function: The function, see ``HostFunction``.
-        inputs: Number of inputs. In the memory that the function receives, all numbers
-            after the inputs are outputs.
+        inputs: Number of elements of all input ports. Compiled code passes one array.
+            Its first ``inputs`` elements are the inputs, and all others are the
+            outputs.
     """
 
     def __init__(self, function: HostFunction, inputs: int) -> None:
@@ -125,11 +126,10 @@ def host_step(
     Args:
         function: The function, see ``HostFunction``.
         inputs: Number of elements of all input ports.
-        outputs: Number of elements of all output ports. The step publishes these
-            elements at the next tick (control period). If there are no outputs, the
-            compiled simulation loop calls the function before the steps that publish
-            outputs.
-        period_ticks: Period of the calls, ticks.
+        outputs: Number of elements of all output ports. They change at the tick
+            (control period) after a call. Without outputs, the compiled simulation loop
+            calls the function early in a tick, before any block publishes new outputs.
+        period_ticks: Time from call to call, ticks.
 
     Returns:
         The step.

@@ -13,7 +13,7 @@ class InputError(ValueError):
     """Invalid input. The error states the field, the fault and the remedy.
 
     The text is one line of at most 280 printable characters, whatever the input
-    contains. If the field or the message is too long, its middle is omitted.
+    contains. If the field or the message is too long, the middle is omitted.
 
     Args:
         field: Dotted path of the field, name of the option, or name of the block.
@@ -44,7 +44,7 @@ class InputError(ValueError):
             below: Path that is put before the field of each error.
 
         Returns:
-            The first error. All others are its further errors.
+            The first error, which stores all others as its further errors.
         """
         texts = {
             (".".join(filter(None, (below, each.field))), each.message): None
@@ -59,7 +59,7 @@ class InputError(ValueError):
 
 
 def shortened(text: str, length: int) -> str:
-    """Converts a text into one line, and omits its middle if it is too long.
+    """Converts a text to one line, and omits its middle if it is too long.
 
     Args:
         text: Any text. White space becomes single blanks. Characters that are not
@@ -67,8 +67,8 @@ def shortened(text: str, length: int) -> str:
         length: Largest number of characters of the result, more than 10.
 
     Returns:
-        The whole line, if it is short enough. Otherwise its two ends with `` ... ``
-        between them.
+        The whole line if it is short enough. Otherwise the beginning and the end of the
+        line, with `` ... `` between them.
     """
     # A text that is far too long is cut first, because escape sequences need memory.
     if len(text) > 8 * length:

@@ -8,9 +8,7 @@ from systems.framework.input_error import InputError
 
 
 def require_file(path: str | Path, field: str, kind: str) -> Path:
-    """Checks that a path is a file.
-
-    The check runs before the libraries that could read the file are loaded.
+    """Checks that a path is a file, before the library that reads the file is loaded.
 
     Args:
         path: Path of the file.

@@ -1,8 +1,7 @@
 """Reads the meanings of the fields of a parameter model from their docstrings.
 
-The docstrings are read only on request. Pydantic could read them, but it would do so
-whenever a model is imported. This would take a quarter of the time that it takes to
-load a scenario.
+The docstrings are read only on request. Pydantic could read them whenever a model is
+imported. However, this would take a quarter of the time to load a scenario.
 """
 
 from __future__ import annotations
@@ -16,14 +15,9 @@ from systems.framework.parameters import Parameters
 
 
 def meanings(model: type[Parameters]) -> dict[str, str]:
-    """Reads the docstrings of the fields of a model and of its base classes.
+    """Returns the docstrings of the fields of a model, without indentation, by field.
 
-    Args:
-        model: The model.
-
-    Returns:
-        The docstrings without indentation, by field. Fields without a docstring are
-        omitted.
+    The result includes fields of base classes. It omits fields without a docstring.
     """
     found: dict[str, str] = {}
     for base in reversed(model.__mro__):

@@ -57,9 +57,10 @@ class _TickSeed(ISeedSequence):
 def tick_generator(seed: int, tick: int) -> Generator:
     """Makes a generator of random numbers for one control period (tick) of a block.
 
-    Blocks store no generator. Therefore the noise is the same if Drake evaluates a
-    block twice or runs a context again. SFC64 is the fastest generator of numpy. It
-    starts from hashed words, so that the numbers of different ticks are independent.
+    Blocks do not store a generator. Therefore the noise is the same if Drake evaluates
+    a block twice, or repeats a run from the same context. The generator is SFC64, the
+    fastest one of numpy. It starts from a hash of seed and tick, so that the numbers of
+    different ticks are independent.
 
     Args:
         seed: Seed of the block.
@@ -88,10 +89,10 @@ def _add_quantiles(
     quantiles: NDArray[np.float32],
     out: NDArray[np.float64],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out with normal numbers, two from each random word of splitmix64.
+    """Fills ``out`` with normal numbers, two from each random word of splitmix64.
 
-    Each number is the sum of two quantiles. Sixteen bits of the word select each
-    quantile.
+    Each number is the sum of two entries of ``quantiles``. Sixteen bits of the word are
+    the index of each entry.
     """
     state, low = _tick_word(seed, tick), np.uint64(0xFFFF)
     for k in range(0, out.size, 2):
@@ -107,20 +108,20 @@ def _add_quantiles(
 def standard_normals(
     shape: tuple[int, int], seed: int, tick: int
 ) -> NDArray[np.float64]:
-    """Draws a few normal numbers for one control period (tick) of one block.
+    """Draws a few normal numbers of unit variance for one control period of one block.
 
     Each number is the sum of two entries of a table with 65 536 quantiles. The
-    generator splitmix64 selects the entries. Its initial state is a hash of seed and
-    tick. The numbers are normally distributed up to 5.9 standard deviations. No number
-    is larger. If many numbers are needed, use ``frame_noise``.
+    generator splitmix64 selects the entries. It starts from a hash of seed and tick.
+    The distribution is normal up to 5.9 standard deviations, and no number is larger.
+    If many numbers are needed, use ``frame_noise``.
 
     Args:
         shape: Numbers of rows and columns.
         seed: Seed of the block.
-        tick: Number of the tick.
+        tick: Number of the control period (tick).
 
     Returns:
-        (rows, columns) numbers of unit variance.
+        (rows, columns) numbers.
     """
     out = np.empty(shape)
     words = np.uint64(seed & _WORD), np.uint64(tick & _WORD)
@@ -136,15 +137,7 @@ class TickNoise(NamedTuple):
 
 
 def tick_noise(seed: int) -> TickNoise:
-    """Makes the source of random numbers of a block for compiled code.
-
-    Args:
-        seed: Seed of the block.
-
-    Returns:
-        Seed and table of quantiles. They are the argument ``noise`` of
-        ``tick_normals``.
-    """
+    """Returns the seed and the table of quantiles that ``tick_normals`` needs."""
     return TickNoise(np.uint64(seed & _WORD), _QUANTILES)
 
 
@@ -152,20 +145,20 @@ def tick_noise(seed: int) -> TickNoise:
 def tick_normals(
     noise: TickNoise, tick: int, rows: int, columns: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Draws the ``standard_normals`` of a control period (tick) in compiled code.
+    """Computes in compiled code what ``standard_normals`` computes in Python.
 
-    The numbers have double precision. With single precision, compiled code and Drake
-    would give different results. The product of a single-precision number and a Python
-    float has single precision in numpy, but double precision in compiled code.
+    The numbers have double precision. Single precision would make compiled code and
+    Drake differ. The product of a single-precision number and a Python float has single
+    precision in numpy, but double precision in compiled code.
 
     Args:
-        noise: Seed and table of the block.
-        tick: Number of the tick.
+        noise: Seed and table from ``tick_noise``.
+        tick: Number of the control period (tick).
         rows: Number of rows.
         columns: Number of columns.
 
     Returns:
-        (rows, columns) numbers of unit variance.
+        (rows, columns) normal numbers of unit variance.
     """
     out = np.empty((rows, columns))
     _add_quantiles(noise.seed, np.uint64(tick), noise.quantiles, out.reshape(-1))
@@ -202,25 +195,25 @@ def _normal_pairs(
     turn: NDArray[np.int32],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out (2 n,) with normal numbers (Box and Muller, 1958).
+    """Fills ``out`` (2 n,) with n pairs of normal numbers (Box and Muller, 1958).
 
-    One random word of splitmix64 gives one pair of numbers: radius times cosine and
-    radius times sine of an angle. The bits of the word are used as follows:
+    A pair is r cos(a) and r sin(a), with a random radius r and a random angle a. Each
+    pair needs one random word of splitmix64, whose bits are used as follows:
 
-    - 23 bits give u, and the radius is sqrt(-2 ln u).
+    - 23 bits give a uniform number u, and r = sqrt(-2 ln u).
     - 24 bits give an angle between -45 and 45 deg.
-    - The last three bits swap the two numbers and choose their signs, so that the
-      angles cover the whole circle.
+    - 3 bits decide whether to swap the two numbers, and choose their signs. The angles
+      therefore cover the whole circle.
 
     Polynomials replace the functions of ``math``, because the compiler can vectorize
-    them.
+    polynomials.
 
     Args:
         state: State of splitmix64 before the first word.
-        uniform: (n,) float32, scratch memory.
-        angle: (n,) float32, scratch memory, rad.
-        turn: (n,) int32, scratch memory.
-        out: The first numbers of the n pairs, then the second numbers.
+        uniform: (n,) scratch memory.
+        angle: (n,) scratch memory.
+        turn: (n,) scratch memory.
+        out: The first numbers of all pairs, then the second numbers of all pairs.
     """
     n, half = uniform.size, np.float32(0.5)
     # Splits each word into u, the angle and three bits.
@@ -258,7 +251,7 @@ def _normal_pairs(
 def _fill_with_normals(
     seed: np.uint64, tick: np.uint64, out: NDArray[np.float32]
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out (n,) with normal numbers, one block of ``_PAIRS`` pairs at a time."""
+    """Fills ``out`` (n,) with normal numbers, ``_PAIRS`` pairs at a time."""
     state, block = _tick_word(seed, tick), 2 * _PAIRS
     uniform = np.empty(_PAIRS, dtype=np.float32)
     angle = np.empty(_PAIRS, dtype=np.float32)
@@ -276,19 +269,19 @@ def _fill_with_normals(
 
 
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
-    """Draws white Gaussian noise for one control period (tick) of one block.
+    """Draws white Gaussian noise of unit variance for one frame of audio.
 
-    This function is nine times as fast as numpy's generator. No number is larger than
-    5.8 standard deviations. The random words come from the generator splitmix64. Its
-    initial state is a hash of seed and tick.
+    The function is nine times as fast as numpy's generator. No number is larger than
+    5.8 standard deviations. The random words come from the generator splitmix64, which
+    starts from a hash of seed and tick.
 
     Args:
         shape: Numbers of rows (channels) and columns (samples).
         seed: Seed of the block.
-        tick: Number of the tick.
+        tick: Number of the control period (tick) of the frame.
 
     Returns:
-        (rows, columns) numbers of unit variance.
+        (rows, columns) numbers.
     """
     out = np.empty(shape, dtype=np.float32)
     words = np.uint64(seed & _WORD), np.uint64(tick & _WORD)

@@ -1,10 +1,10 @@
 """Defines the base class of all parameter models, and the types of their fields.
 
-The parameters of a block are one frozen pydantic model. The model is in the file
-``parameters.py`` of the folder of the block. These files import neither Drake nor
-compiled code, so that a scenario can be checked without them. A scenario is a tree of
-parameter models. Therefore each quantity has one name, one default and one range. An
-error message contains the full path of the field.
+The parameters of a block are one frozen pydantic model, in the file ``parameters.py``
+of the block's folder. These files import neither Drake nor compiled code, so that a
+scenario can be checked without both. A scenario is a tree of parameter models. Each
+quantity therefore has one name, one default and one range, and an error message
+contains the full path of the field.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ Size = Annotated[tuple[Length, Length], Strict(False)]
 
 
 class Parameters(BaseModel):
-    """A frozen pydantic model with strict types.
+    """A frozen pydantic model that does not convert types.
 
     The model accepts no unknown keys, no NaN and no infinity. The docstring of a field
     states its meaning and its unit, see ``meanings``.
@@ -68,10 +68,10 @@ class Parameters(BaseModel):
     ) -> Self:
         """Copies the model and changes some fields.
 
-        The copy computes its cached properties again.
+        The copy recomputes its cached properties.
 
         Args:
-            update: New values by field. The new values are not validated.
+            update: New values by field. They are not validated.
             deep: Whether to copy the values of the fields, too.
 
         Returns:
@@ -89,11 +89,11 @@ def with_preset(data: Any, presets: Mapping[str, Mapping[str, Any]]) -> Any:
     The field ``preset`` of the input names the preset.
 
     Args:
-        data: Input of a validator with the mode ``before``.
+        data: Input of a pydantic validator with the mode ``before``.
         presets: Values of fields, by the name of the preset.
 
     Returns:
-        The completed input. Given values override the values of the preset.
+        The completed input. Values in ``data`` override those of the preset.
     """
     name = data.get("preset") if isinstance(data, Mapping) else None
     if isinstance(name, str):  # a later check rejects any other type

@@ -1,7 +1,7 @@
 """Makes the functions of ``systems.framework.elementary`` usable in compiled code.
 
-The module defines numba overloads for these functions and for the same functions of
-``pydrake.math``. For floats, compiled code calls the functions of ``math``.
+The module defines numba overloads for these functions, and for the same functions of
+``pydrake.math``. In compiled code, all of them call the functions of ``math``.
 """
 
 from __future__ import annotations

@@ -16,10 +16,10 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 class _Template(TemplateSystem):
     """A template that creates classes without a search for their module.
 
-    Drake adds methods to each new class. These methods are templates, too. For each of
-    them, Drake searches all loaded modules once per stack frame. The result is always
-    the same module of Drake. With nested imports, the search takes 0.25 s per block.
-    This class omits the search.
+    Drake adds methods to each new class, and these methods are templates. For each of
+    them, Drake searches all loaded modules once per stack frame for the module of the
+    method. With nested imports, the search takes 0.25 s per block. The result is always
+    the same module of Drake, so this class omits the search.
     """
 
     def __init__(self, name: str, scalars: Any, pairs: Any, scope: ModuleType) -> None:
@@ -59,10 +59,10 @@ def _make_copyable(cls: Any) -> None:
 
 
 def define_for_scalars(name: str, module: str) -> Any:
-    """Returns a decorator that makes a template of a block for two scalar types.
+    """Returns a decorator that makes a template of a block for float and AutoDiffXd.
 
-    The decorator is applied to a function ``name(T)`` that defines the class of a block
-    for the scalar type T. The scalar types of the template are float and AutoDiffXd.
+    The decorated function ``name(T)`` defines the class of the block for the scalar
+    type T.
 
     Args:
         name: Name of the template, with an underscore at its end.
@@ -70,6 +70,7 @@ def define_for_scalars(name: str, module: str) -> Any:
             loaded modules, which takes 0.1 s per block.
 
     Returns:
-        The decorator. It returns the template, and ``template[T]`` is a class.
+        The decorator. It replaces the function by the template, and ``template[T]`` is
+        a class.
     """
     return _Template.define(name, T_list=[float, AutoDiffXd], scope=sys.modules[module])

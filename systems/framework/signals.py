@@ -32,11 +32,11 @@ def read_only(*arrays: NDArray[Any]) -> None:
 
 
 class Emission(NamedTuple):
-    """Emitted sound, and the path of the loudspeaker that emitted this sound.
+    """Sound that a loudspeaker emitted, and the path of the loudspeaker.
 
-    The loudspeaker emitted sample ``n`` at the time ``start_time + n /
-    sample_rate_hz``. The path has knots with position and velocity. Cubic Hermite
-    polynomials connect the knots.
+    The loudspeaker emitted sample n at the time ``start_time + n / sample_rate_hz``.
+    The path has knots with position and velocity. Cubic Hermite polynomials connect the
+    knots.
     """
 
     samples: NDArray[np.float32]
@@ -52,8 +52,8 @@ class Emission(NamedTuple):
     v_WS: NDArray[np.float64]
     """(k, 2) velocity of the loudspeaker in W, m/s."""
     level_pa: float
-    """RMS pressure at 1 m while the source sounds, Pa. Noise levels refer to this
-    pressure."""
+    """RMS pressure at 1 m while the source sounds, Pa. The noise levels of the
+    microphones are relative to this pressure."""
     sounding: bool
     """False if all samples are zero, so that listeners may skip them."""
 

@@ -18,14 +18,7 @@ _NORTH_RAD = math.radians(90.0)
 
 @register_jitable
 def wrapped_deg(angle: float) -> float:
-    """Wraps an angle to the range above -180 and up to 180 deg.
-
-    Args:
-        angle: Any angle, deg.
-
-    Returns:
-        The wrapped angle, deg.
-    """
+    """Wraps an angle in deg to the range above -180 and up to 180."""
     return 180.0 - (180.0 - angle) % 360.0
 
 
@@ -54,8 +47,7 @@ class MagneticHeading(Block):
     """Measures the heading of a robot from the magnetic field of the earth.
 
     The measured heading is clockwise from north, as in Song 2011. Angles in the world
-    frame W are counterclockwise. The model contains no distortion of the field by iron
-    in the robot.
+    frame W are counterclockwise. In the model, no iron in the robot distorts the field.
 
     The block has no state. It draws new noise at every tick (control period). There is
     no latency.

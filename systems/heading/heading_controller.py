@@ -40,10 +40,11 @@ def heading_error(
     """Computes the output of the PID controller for the heading (Song 2011, table 1).
 
     Args:
-        deviation: gamma, expected heading minus present heading, (-180, 180] deg.
-        change: Change of the deviation since the last tick (control period), wrapped,
+        deviation: Deviation gamma: expected heading minus present heading, deg, in
+            (-180, 180].
+        change: Wrapped change of the deviation since the last tick (control period),
             deg.
-        integral: I, integral part at the last tick, deg.
+        integral: Integral part I at the last tick, deg.
         tick_s: Control period, s.
 
     Returns:
@@ -65,17 +66,16 @@ def heading_error(
 def motor_duties(error: float) -> tuple[float, float]:
     """Computes the duties of the two motors (Song 2011, table 2, corrected).
 
-    e is the output epsilon of the PID controller, deg, and L is ``TURNING_BEYOND_DEG``.
-    The left duty is v + w and the right duty is v - w, with v = max(0, 1 - |e|/L) and w
-    = 0.01 e. The duties therefore change without a jump between driving at full speed
-    and turning on the spot. docs/errata.md states the errors in the printed table.
+    Let e be the output of the PID controller, deg, and L be ``TURNING_BEYOND_DEG``.
+    With v = max(0, 1 - |e|/L) and w = 0.01 e, the left duty is v + w and the right duty
+    is v - w. The duties therefore change without a jump from driving at full speed to
+    turning on the spot. docs/errata.md states the errors in the printed table.
 
     Args:
-        error: epsilon, output of the PID controller, clockwise, deg.
+        error: Output e of the controller, deg, positive clockwise.
 
     Returns:
-        Two values: the left duty and the right duty. They are not yet limited to the
-        range -1 to 1.
+        Left duty and right duty. They are not yet limited to the range -1 to 1.
     """
     ahead, turn = max(0.0, 1.0 - abs(error) / TURNING_BEYOND_DEG), 0.01 * error
     return ahead + turn, ahead - turn
@@ -93,7 +93,7 @@ def heading_controller_step(
 ) -> None:
     """Computes the duties of the two motors in one tick (control period).
 
-    The state holds three numbers, in this order:
+    The state has three numbers, in this order:
 
     - the integral part, deg;
     - the deviation of the heading at the last tick, deg;
@@ -117,14 +117,14 @@ class HeadingController(Block):
     """Turns the robot to the expected heading, and drives the robot in this direction.
 
     A PID controller computes an output from the deviation of the heading. The block
-    then converts this output to the duties of the motors. The smaller the deviation,
+    then converts this output to the duties of the motors. The smaller the deviation is,
     the faster the robot drives. While the input ``move`` is 0, the duties are 0.
 
     At the first tick (control period) of a move, the integral part starts at 0. The
     differential part is 0 at this tick, so that the output does not jump.
 
-    The discrete state holds the integral part, the last deviation, and whether the
-    robot moved at the last tick. The block updates the state at every tick. There is no
+    The discrete state has the integral part, the last deviation, and whether the robot
+    moved at the last tick. The block updates the state at every tick. There is no
     latency. The paper uses a control period of 10 ms. Our control period of 25 ms
     reduces the phase margin by one degree (``analysis.linear.heading_loop``).
 

@@ -38,9 +38,9 @@ def _publish(state: Any, outputs: Any, numbers: MotorNumbers) -> None:
 class MotorDriver(Block):
     """Computes the commanded wheel speeds from the duties of the motors.
 
-    The discrete state has the same values as the output. The block updates the state at
-    every tick (control period). A new output is valid after the update. The lag of the
-    motors is not part of this block, but of the model of the robot (plant).
+    The output is the discrete state, which the block updates at every tick (control
+    period). A new output is valid after the update. The model of the robot (plant)
+    contains the lag of the motors, so this block does not.
 
     Args:
         parameters: Rim speed of a wheel at full duty.

@@ -1,10 +1,9 @@
 """Refines the position of a source by maximum likelihood.
 
-A sound s of unknown waveform reaches microphone m at the time t_m with the gain a_m, in
-white noise. The sound s is replaced by its best estimate. The likelihood of a position
-then increases with sum_k |Y_k|^2 / sum_m a_m^2, where Y_k = sum_m a_m X_m(w_k) exp(j
-w_k t_m). Here X_m is the spectrum of channel m, and w_k is the angular frequency of bin
-k.
+A sound of unknown waveform reaches microphone m at the time t_m with the gain a_m, in
+white noise. Let X_m be the spectrum of channel m, and w_k the angular frequency of bin
+k. With the best estimate of the waveform, the likelihood of a position increases with
+sum_k |Y_k|^2 / sum_m a_m^2, where Y_k = sum_m a_m X_m(w_k) exp(j w_k t_m).
 
 Newton's method maximizes this expression. Each step has two parts:
 
@@ -13,8 +12,9 @@ Newton's method maximizes this expression. Each step has two parts:
 2. The position that fits these delays (``systems.hearing.multilateration``) is the next
    position.
 
-With the least number of microphones, the result is the maximum over all delays. With
-more microphones, the result is the maximum over all delays that belong to a position.
+If there are only as many delays as unknowns, the result maximizes the likelihood over
+all sets of delays. With more delays, it maximizes the likelihood over those sets that
+belong to a position.
 
 The gains are estimated as the principal component of the cross-spectra of the channels.
 If the microphones are alike, the gains are proportional to 1/R_m, where R_m is the
@@ -67,13 +67,13 @@ def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.fl
     """Returns the delays between the microphones for sound from an estimated source.
 
     Args:
-        fix: Estimated position relative to the array. If the range is not valid, the
-            direction of a plane wave is used.
+        fix: Estimated position relative to the array. Without a valid range, the sound
+            is a plane wave from the estimated direction.
         shape: The n microphones.
         c: Speed of sound, m/s.
 
     Returns:
-        (n - 1,) delays t_k - t_0 of the channels k = 1 ... n - 1, s.
+        (n - 1,) delays t_k - t_0, s. t_k is the time of arrival at channel k.
     """
     if fix.range_valid:
         ranges = _ranges(shape.p_AM, fix.p_AS)
@@ -103,8 +103,8 @@ def refine_source(
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        The refined estimate. Its errors follow from signal and noise in the frame. None
-        if the likelihood has no maximum nearby.
+        The refined estimate, with errors that follow from signal and noise in the
+        frame. None if the likelihood has no maximum nearby.
     """
     fix, cut_at = start, np.full(shape.count - 1, np.inf)
     for _ in range(_STEPS):
@@ -148,10 +148,9 @@ def _spectra(
     """Computes the spectra of cut channels within the band.
 
     Returns:
-        Four values. The first is the (n, bins) spectra. The second is the angular
-        frequency w of the first bin, rad per sample. The third is the step of w from
-        bin to bin, rad per sample. The fourth is the padding, which is the number of
-        adjacent bins over which the noise of one independent bin is spread.
+        Four values: (n, bins) spectra; angular frequency w of the first bin, rad per
+        sample; step of w from bin to bin, rad per sample; and padding. The padding is
+        the number of bins over which the noise of one independent bin is spread.
     """
     length = int(fft.next_fast_len(cut.shape[1], real=True))
     first = max(1, math.ceil(band_hz[0] * length / sample_rate_hz))
@@ -180,9 +179,13 @@ def _pair_sums(
         rest: (n,) delays to remove, samples.
 
     Returns:
-        Four sums over the bins. The first three are (n, n) matrices for the products
-        X_m X_j^*. The first sums the real part, the second w times the imaginary part,
-        and the third w^2 times the real part. The fourth is the sum of w^2.
+        Four sums over the bins. With the products z = X_m X_j^* of the channels m and
+        j, they are:
+
+        - (n, n) sums of Re(z);
+        - (n, n) sums of w Im(z);
+        - (n, n) sums of w^2 Re(z);
+        - sum of w^2.
     """
     n, bins = spectra.shape
     aligned = np.empty((bins, n), dtype=np.complex128)

@@ -59,9 +59,10 @@ class Direction(NamedTuple):
     """Estimated direction of a sound."""
 
     bearing: float
-    """Bearing from the middle microphone, CCW from x of B, rad."""
+    """Bearing from the middle microphone, CCW from the x axis of B, rad."""
     range_status: int
-    """Whether there is a range, or why there is none (``range_status``)."""
+    """Result of the function ``range_status``: whether there is a range, or why there
+    is none."""
     place: NDArray[np.float64] | None = None
     """(2,) position relative to the middle microphone in the axes of the body frame B,
     m. None if only the bearing is known."""
@@ -109,13 +110,9 @@ class ArrayListener:
         )
 
     def lost(self, sound: CrossPowers) -> list[int]:
-        """Returns the channels that are silent.
+        """Returns the numbers of the silent channels, counted from 0.
 
-        Args:
-            sound: Sums of spectra from the time in which the source sounded.
-
-        Returns:
-            Numbers of the silent channels, from 0.
+        ``sound`` has the sums of spectra from the time in which the source sounded.
         """
         power = sound.own.sum(axis=1)
         return np.flatnonzero(power <= _DEAF * np.median(power)).tolist()
@@ -123,15 +120,15 @@ class ArrayListener:
     def direction(self, sound: CrossPowers, noise: CrossPowers) -> Direction | None:
         """Estimates the direction from which the sound comes.
 
-        The function subtracts the cross powers of the noise and whitens the remaining
-        cross powers. It then adds up the correlations of all pairs of channels for a
-        grid of positions. The position with the largest sum gives the bearing. The
-        peaks of the correlations near the delays of this position give a range.
+        The function subtracts the cross powers of the noise, and whitens the result.
+        For each position of a grid, it adds up the correlations of all pairs of
+        channels at the delays of this position. The position with the largest sum gives
+        the bearing. The peaks of the correlations near the delays of this position give
+        a range.
 
         Args:
             sound: Sums of spectra from the time in which the source sounded.
-            noise: Sums of spectra from before the sound. They may contain no audio
-                frame.
+            noise: Sums of spectra from before the sound, or empty sums.
 
         Returns:
             The direction. None if nothing is heard, or if fewer than three microphones
@@ -171,14 +168,11 @@ class ArrayListener:
         return Direction(bearing, status, place, ambiguous, found.other)
 
     def bearing_of(self, steered: float, interpolated: float) -> float:
-        """Returns the bearing of a sound, chosen from two estimates, rad.
+        """Returns the bearing to report, rad, which is ``steered`` in this class.
 
-        Args:
-            steered: Bearing of the position with the largest sum of correlations, rad.
-            interpolated: Bearing from the delays of the peaks, rad.
-
-        Returns:
-            Bearing, rad.
+        ``steered`` is the bearing of the position with the largest sum of correlations,
+        rad. ``interpolated`` is the bearing from the delays of the peaks, rad. A
+        subclass may report ``interpolated``.
         """
         return steered
 
@@ -207,17 +201,11 @@ class ArrayListener:
         delays: NDArray[np.float64],
         lost: list[int],
     ) -> tuple[float, NDArray[np.float64] | None, int]:
-        """Computes bearing, position and status of the range from delays.
+        """Returns bearing (rad), position (m) and status of the range for given delays.
 
-        Args:
-            pairs: Pairs (i, j) of working microphones.
-            delays: (pairs,) delays t_j - t_i, s.
-            lost: Silent channels.
-
-        Returns:
-            Three values. The first is the bearing, rad. The second is the (2,) position
-            relative to the middle microphone, m, or None. The third is the status of
-            the range (``range_status``).
+        ``delays`` has t_j - t_i in s for each pair (i, j) of working microphones. The
+        position is relative to the middle microphone. It is None if a channel is silent
+        (``lost``), or if the range is not credible.
         """
         others = [k for k in range(self.facts.channels) if k not in lost]
         base, *rest = others
@@ -253,19 +241,20 @@ class _Memory(NamedTuple):
 
 
 class CrossPowerEstimator(FrameBlock):
-    """Estimates where the source is while the robot searches, rests and listens.
+    """Estimates where the source is whenever the searching robot rests and listens.
 
-    The search block sets the input ``listening``. While ``listening`` requests noise or
-    sound, the block sums cross-power spectra of frames of audio. The sums for noise and
-    for sound are separate. When ``listening`` no longer requests sound, the estimate
-    appears at the outputs. It stays there until sound is requested again. All outputs
-    then become zero.
+    The search block sets the input ``listening``, which requests noise, sound or
+    nothing. While it requests noise or sound, the block sums cross-power spectra of
+    audio frames. The sums for noise and for sound are separate. When ``listening`` no
+    longer requests sound, the estimate appears at the outputs. It stays there until
+    sound is requested again. All outputs then become zero.
 
     The outputs have these meanings:
 
     - ``lost_microphone`` is the number of the first silent channel, counted from 1, or
       0 if no channel is silent. If nothing was heard, all other outputs are zero.
-    - Bearing and range refer to the middle microphone, which is the first microphone.
+    - Bearing and range are seen from the middle microphone, which is the first
+      microphone.
     - ``p_PS_B`` is the position of the source relative to the control point P. If the
       range is unknown, it is a unit vector, and ``range_status`` gives the reason
       (``systems.hearing.source_fix``).
@@ -273,12 +262,12 @@ class CrossPowerEstimator(FrameBlock):
       equally well. It is also 1 if the bandwidth of the sound is so small that any
       direction fits.
 
-    The block evaluates the input ``audio`` only while ``listening`` requests noise or
+    The block reads the input ``audio`` only while ``listening`` requests noise or
     sound.
 
-    State: the outputs, the last frame, and the sums of spectra.
-    Rate and latency: the block updates every ``frame_s`` of the microphones. The
-    outputs change one control period later.
+    The state has the outputs, the last frame, and the sums of spectra. The block
+    updates the state every ``frame_s`` of the microphones. The outputs change one
+    control period later.
 
     Args:
         robot: Positions of the microphones.
@@ -286,7 +275,7 @@ class CrossPowerEstimator(FrameBlock):
         microphones: Sample rate and length of the frames.
 
     Raises:
-        InputError: As for ``ArrayListener``.
+        InputError: There are fewer than four microphones.
 
     Reference: Song 2011, 3.2, 4.3, eq. 9 to 17. The paper measures delays in whole
     samples. The bearing from a grid of positions is not in the paper.
@@ -325,7 +314,7 @@ class CrossPowerEstimator(FrameBlock):
         self._none = no_powers(facts)
         frame = np.zeros((facts.channels, facts.samples))
         blank = _Memory(_NOTHING, frame, self._none, self._none, self._values())
-        self.declare_frames(blank, microphones)
+        self.declare_frames(blank, blank, microphones)
 
     def hear(
         self,
@@ -333,9 +322,10 @@ class CrossPowerEstimator(FrameBlock):
         audio: Callable[[], AudioFrame],
         memory: _Memory,
     ) -> tuple[NDArray[np.float64], _Memory]:
-        """Adds an audio frame to the sums or estimates, see ``FrameBlock.hear``.
+        """Adds an audio frame to the sums, or estimates the source.
 
-        The function calls ``audio`` only if it needs the frame.
+        See ``FrameBlock.hear``. The function calls ``audio`` only if it needs the
+        frame.
         """
         after = self._gathered(round(float(inputs[0])), audio, memory)
         return after.outputs, after

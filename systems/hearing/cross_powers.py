@@ -81,16 +81,9 @@ def gather_frame(
     before: NDArray[np.float64],
     now: NDArray[np.float64],
 ) -> CrossPowers:
-    """Adds the spectra of an audio frame and of the previous frame to the sums.
+    """Joins two successive frames, and adds their powers and cross powers to the sums.
 
-    Args:
-        facts: Sizes of frames and spectra.
-        sums: Sums so far.
-        before: (channels, samples) previous frame.
-        now: (channels, samples) present frame.
-
-    Returns:
-        The new sums.
+    ``before`` and ``now`` are the previous and the present frame, (channels, samples).
     """
     joined = np.concatenate((before, now), axis=1)
     joined = (joined - joined.mean(axis=1, keepdims=True)) * _window(facts.length)
@@ -109,11 +102,11 @@ def signal_powers(
     noise: CrossPowers | None,
     band_hz: tuple[float, float],
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
-    """Computes the cross powers of the sound alone, and the bins of the sound.
+    """Computes the cross powers of the sound alone, and which bins the sound occupies.
 
-    A bin is occupied if its cross power exceeds three limits: a share of the power of
-    both channels, a share of the power of the noise, and a share of the cross power of
-    the strongest bin.
+    The sound occupies a bin of a pair of channels if the cross power exceeds three
+    limits. Each limit is a fixed share of one of these values: the power of the sound
+    in both channels, the power of the noise, or the cross power of the strongest bin.
 
     Args:
         facts: Sizes of audio frames and spectra.
@@ -123,8 +116,8 @@ def signal_powers(
         band_hz: Lowest and highest frequency to use, Hz.
 
     Returns:
-        Two arrays. The first is the (pairs, bins) mean cross powers. The second has the
-        (pairs, bins) Boolean values: whether a bin is occupied.
+        Two (pairs, bins) arrays: the mean cross powers; and Boolean values that are
+        true in occupied bins.
     """
     mean, own = sound.pairs / sound.frames, sound.own / sound.frames
     steady = np.zeros_like(own)
@@ -155,8 +148,8 @@ def cross_correlations(
         fine: Number of correlation values per sample.
 
     Returns:
-        (pairs, fine * length) correlations over the delay t_j - t_i. Delay 0 is first,
-        and negative delays are at the end.
+        (pairs, fine * length) correlations over the delay t_j - t_i of each pair (i,
+        j). Delay 0 is first, and negative delays are at the end.
     """
     count = fine * facts.length
     return scipy.fft.irfft(np.conj(weighted), count, axis=1) * count

@@ -6,12 +6,13 @@ distance from the source to microphone m exceeds the distance to the centroid by
 
     g_m = (w |p_m|^2 - 2 p_m . u) / (sqrt(1 - 2 w p_m . u + w^2 |p_m|^2) + 1).
 
-This function is smooth at infinite range (w = 0), and also for w below 0. The delays
+This function is smooth even at infinite range (w = 0) and for w below 0. The delays
 tau_m relative to microphone 0 satisfy c tau_m = g_m - g_0, where c is the speed of
 sound. The fit has two stages:
 
-1. A linear problem gives the start. The squared ranges are linear in the direction and
-   the inverse range from microphone 0 (Smith and Abel, 1987).
+1. Linear equations give start positions. Let the equations of the squared ranges be
+   divided by the range from microphone 0. They are then linear in the direction and the
+   inverse range from microphone 0 (Smith and Abel, 1987).
 2. Gauss-Newton steps in (u, w) on the whitened delays give the result. The coordinates
    of u depend on the array. For a row, and for a plane array in space, they are the
    components of u within the span of the array. For other arrays, they are rotations of
@@ -50,17 +51,17 @@ class DelayProblem(NamedTuple):
     """Delays and the array that measured them."""
 
     d: NDArray[np.float64]
-    """(n - 1,) range differences, m. An element is the range of another microphone
+    """(n - 1,) range differences, m. The range difference of a microphone is its range
     minus the range of microphone 0."""
     root: NDArray[np.float64]
-    """(n - 1, n - 1) lower triangular matrix that whitens d: the errors become
-    independent with variance 1."""
+    """(n - 1, n - 1) lower triangular matrix that whitens d: the errors of root d are
+    independent and have the variance 1."""
     p: NDArray[np.float64]
     """(n, d) positions of the microphones relative to their centroid, m."""
     span: NDArray[np.float64]
     """(r, d) orthonormal basis of the span of the microphones."""
     side: NDArray[np.float64]
-    """(d,) unit vector perpendicular to the span, towards the side where sources are
+    """(d,) unit vector perpendicular to the span, towards the side on which sources are
     reported. Zeros if the span is the whole space."""
 
 
@@ -82,9 +83,9 @@ def _whitened(
         k: Number of coordinates of the direction.
         u: (d,) direction of the source.
         w: Inverse range of the source, 1/m.
-        r: (n - 1,) output, residuals.
-        J: (n - 1, k + 1) output, slopes of the model with respect to the coordinates of
-            u and to w.
+        r: (n - 1,) output: residuals.
+        J: (n - 1, k + 1) output: derivatives of the model with respect to the
+            coordinates of u and to w.
 
     Returns:
         The sum of r^2.
@@ -127,10 +128,9 @@ def _whitened(
 def _factor(
     J: NDArray[np.float64], size: int, damping: float, prior: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the Cholesky factor of J^T J with damping.
+    """Computes the Cholesky factor of J^T J, with Marquardt damping of the diagonal.
 
-    The diagonal is damped (Marquardt). The number ``prior`` is added to the last
-    diagonal element.
+    The number ``prior`` is added to the last diagonal element.
     """
     N = np.zeros((size, size))
     trace = 0.0
@@ -215,12 +215,13 @@ def _coordinates(
 ) -> tuple[NDArray[np.float64], int]:  # pragma: no cover  (compiled)
     """Computes the derivatives of a direction u with respect to its coordinates.
 
-    If ``bound`` is set, u keeps unit length within the span of the array. The
-    coordinates are then rotations of u perpendicular to itself. Otherwise the
-    coordinates are the components of u in the span.
+    If ``bound`` is set, u keeps unit length within the span of the array, and the
+    coordinates are rotations of u perpendicular to itself. Otherwise the coordinates
+    are the components of u within the span.
 
     Returns:
-        (d, 3) derivatives, of which the first k columns are used, and k.
+        (d, 3) derivatives, and the number k of coordinates. Only the first k columns
+        are used.
     """
     span = problem.span
     rank, dim = span.shape
@@ -277,11 +278,11 @@ def _within(
 def _descend(
     problem: DelayProblem, u: NDArray[np.float64], w: float, bound: Any, far: Any
 ) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
-    """Minimizes the squared residuals by Gauss-Newton steps with Marquardt damping.
+    """Minimizes the sum of squared residuals by damped Gauss-Newton steps (Marquardt).
 
-    If a step does not increase the cost, the step is accepted, and the damping
-    decreases. Otherwise the step is discarded, and the damping increases. The steps end
-    when the largest change is below ``_SETTLED``.
+    If a step does not increase the sum, the function accepts the step and decreases the
+    damping. Otherwise it discards the step and increases the damping. The steps end
+    when no coordinate changes by more than ``_SETTLED``.
 
     Args:
         problem: Delays and array.
@@ -291,8 +292,8 @@ def _descend(
         far: Whether w is held constant.
 
     Returns:
-        The final direction u; the final inverse range w, 1/m; and the sum of the
-        squared residuals at this position.
+        Final direction u; final inverse range w, 1/m; and sum of the squared residuals
+        there.
     """
     m = problem.d.size
     basis, k = _coordinates(problem, u, bound)
@@ -340,9 +341,9 @@ def _descend_within(
 ) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
     """Runs ``_descend`` with the constraints w >= 0 and |u| <= 1.
 
-    Here u is the direction within the span of the array, and w is the inverse range. If
-    a result violates a constraint, the function repeats the steps with this constraint
-    as an equation.
+    Here w is the inverse range, and u is the direction within the span of the array. If
+    a result violates a constraint, the function repeats the steps with w = 0 or |u| =
+    1.
     """
     bound = _is_bound(problem)
     cost = 0.0
@@ -372,20 +373,21 @@ def _starts(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], int
 ]:  # pragma: no cover  (compiled)
-    """Computes positions to start from, by linear equations relative to microphone 0.
+    """Computes the start positions of the fit by linear equations.
 
-    Let v be the components of the direction in the span of the array, and w the inverse
-    range. For each microphone b, let q = p_b - p_0, and let d be the range difference.
-    The equation of this microphone is
+    Let v be the components of the direction from microphone 0 within the span of the
+    array, and w the inverse range from there. Each other microphone b is at q = p_b -
+    p_0, seen from microphone 0, and has the range difference d. It gives the equation
 
         q . v - w (q^2 - d^2) / 2 = -d.
 
-    The first start is a plane wave (w = 0). If v must have unit length, v is a linear
-    function of w, and |v| = 1 gives up to two further starts. Otherwise, if there are
-    enough delays, least squares for v and w give one further start.
+    The first start position is a plane wave (w = 0). If v must have unit length, v is a
+    linear function of w, and |v| = 1 gives up to two more start positions. Otherwise,
+    if there are enough delays, least squares for v and w give one more.
 
     Returns:
-        (3, r) components v, (3,) inverse ranges, and the number of starts.
+        (3, r) components v, (3,) inverse ranges w, 1/m, and the number of start
+        positions. Each start position has one row. Further rows have no meaning.
     """
     d, root, p, span = problem.d, problem.root, problem.p, problem.span
     m, rank = d.size, span.shape[0]
@@ -455,12 +457,10 @@ def _search(
 ]:  # pragma: no cover  (compiled)
     """Finds the two positions that fit the delays best.
 
-    The function refines each start by ``_descend_within``. The plane wave is the last
-    start. If another start already fits, the plane wave is omitted.
-
-    Returns:
-        (2, d) directions, (2,) inverse ranges and (2,) chi-squares. The best position
-        is first.
+    The function refines the start positions by ``_descend_within``. It refines the
+    plane wave last, and omits it if another position already fits. It returns (2, d)
+    directions, (2,) inverse ranges, 1/m, and (2,) chi-squares. The position that fits
+    best is first.
     """
     n, dim = problem.p.shape
     unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
@@ -496,12 +496,15 @@ def _covariance(
         problem: Delays and array.
         u: (d,) direction of the source.
         w: Inverse range of the source, 1/m.
-        prior: Prior information on w, m^2. It is the inverse of the variance of w.
+        prior: Inverse of the variance of w that is assumed before the delays are known,
+            m^2; 0 for no assumption.
 
     Returns:
-        Three values. The first is the (k + 1, k + 1) covariance of the coordinates of u
-        and of w. The second is the (d, 3) derivatives of u with respect to its
-        coordinates. The third is the number k of coordinates.
+        Three values:
+
+        - (k + 1, k + 1) covariance of the coordinates of u and of w;
+        - (d, 3) derivatives of u with respect to its coordinates;
+        - number k of coordinates.
     """
     bound = _is_bound(problem)
     basis, k = _coordinates(problem, u, bound)
@@ -563,23 +566,23 @@ def fit_delays(
     position is the result, and the nearer position is its twin. If the inverse range
     exceeds its standard deviation, the range is valid. Otherwise the function fits the
     direction again for a plane wave. The covariance of this direction includes the
-    unknown range, with the standard deviation ``prior_w`` of the inverse range.
+    effect of the unknown range.
 
     Args:
         problem: Delays, and the array that measured them.
-        prior_w: Standard deviation of the inverse range without measurement, 1/m. It is
-            used if the delays give no range.
+        prior_w: Assumed standard deviation of the inverse range if the delays give no
+            range, 1/m.
 
     Returns:
         Eight values, in this order:
 
         - (d,) direction u;
-        - inverse range w, 1/m;
-        - variance of w, infinite without a range;
+        - inverse range w, 1/m, or 0 without a range;
+        - variance of w, or infinity without a range;
         - (d, d) covariance of u;
         - (d, d) covariance of the position, or covariance of u without a range;
         - chi-square of the fit;
-        - (d,) position of the twin, zeros without a twin;
+        - (d,) position of the twin, or zeros without a twin;
         - status of the range (``range_status``).
     """
     us, ws, costs = _search(problem)

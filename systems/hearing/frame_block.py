@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import Value
+from pydrake.systems.framework import DiscreteStateIndex
 
 from systems.framework.block import Block, RunFacts, Step
 from systems.framework.finite import check_record, read_arrays
 from systems.framework.host_step import host_step
 from systems.framework.input_error import InputError
+from systems.framework.packing import Packing
 from systems.framework.signals import AudioFrame
 from systems.sound.parameters import MicArrayParameters
 
@@ -43,15 +44,9 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
-    """Raises an error if the sample rate of a frame is not the expected rate.
+    """Raises an ``InputError`` if the sample rate of a frame is not ``rate_hz``, Hz.
 
-    Args:
-        audio: The frame.
-        rate_hz: Sample rate that the block expects, Hz.
-        block: Name of the block, for messages.
-
-    Raises:
-        InputError: The rates differ.
+    ``block`` is the name of the block for the message.
     """
     if audio.sample_rate_hz != rate_hz:
         raise InputError(
@@ -61,45 +56,38 @@ def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
         )
 
 
-class _Heard(NamedTuple):
-    """State after a frame."""
-
-    values: NDArray[np.float64]
-    """Values of the output ports in order."""
-    memory: Any
-    """Values that the block keeps for the next frame."""
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> _Heard:
-        """Returns the state itself, because nothing in it changes."""
-        return self
-
-
 class FrameBlock(Block):
     """The base class of blocks that process frames of audio in Python.
 
     The first input port of a subclass is ``audio``. All other ports carry numbers. A
     subclass defines the method ``hear``.
 
-    State: the memory of ``hear`` is an abstract state. The values of the output ports
-    are a discrete state. They change one control period after the end of a frame.
+    State: two groups of discrete state. They change one control period after the end of
+    a frame. The first group has the values of the output ports. The second group has
+    the memory of ``hear``, packed into a vector. (An abstract state would need an
+    unrestricted update. After such an update, Drake computes all blocks again.)
     """
 
-    def declare_frames(self, memory: Any, microphones: MicArrayParameters) -> None:
+    def declare_frames(
+        self, memory: Any, example: Any, microphones: MicArrayParameters
+    ) -> None:
         """Declares the ports, the state and the update.
 
         Args:
-            memory: Memory before the first audio frame.
+            memory: Memory before the first audio frame, a named tuple.
+            example: A memory with the types and shapes of all later ones, see
+                ``Packing``.
             microphones: Sample rate and length of the frames.
         """
         self._microphones, self._blank = microphones, memory
+        self._packing = Packing(example)
         self._audio, *self._numbers = self.declare_ports()
         sizes = [int(port.size) for port in self.outputs]
-        silence = np.zeros(sum(sizes))
-        self.DeclareAbstractState(Value(_Heard(silence, memory)))
-        self.DeclareDiscreteState(silence.size)
-        event = {"period_sec": microphones.frame_s, "offset_sec": 0.0}
-        self.DeclarePeriodicUnrestrictedUpdateEvent(**event, update=self._listen)
-        self.DeclarePeriodicDiscreteUpdateEvent(**event, update=self._publish)
+        self.DeclareDiscreteState(sum(sizes))
+        self.DeclareDiscreteState(self._packing.pack(memory).tolist())
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=microphones.frame_s, offset_sec=0.0, update=self._listen
+        )
         ends = np.cumsum(sizes).tolist()
         for port, size, end in zip(self.outputs, sizes, ends, strict=True):
 
@@ -108,7 +96,8 @@ class FrameBlock(Block):
             ) -> None:
                 output.SetFromVector(context.get_discrete_state(0).value()[part])
 
-            self.declare_output(port.name, calc, {self.xd_ticket()})
+            ticket = self.discrete_state_ticket(DiscreteStateIndex(0))
+            self.declare_output(port.name, calc, {ticket})
 
     def hear(
         self, inputs: NDArray[np.float64], audio: Callable[[], AudioFrame], memory: Any
@@ -132,27 +121,24 @@ class FrameBlock(Block):
         check_rate(audio, self._microphones.sample_rate_hz, type(self).__name__)
         return audio
 
-    def _listen(self, context: Any, state: Any) -> None:
+    def _listen(self, context: Any, discrete_state: Any) -> None:
         def frame() -> AudioFrame:
             return self._frame(read_audio(context, self._audio, type(self).__name__))
 
         inputs = np.concatenate([np.empty(0), *read_arrays(context, self._numbers)])
-        before: _Heard = context.get_abstract_state(0).get_value()
-        after = _Heard(*self.hear(inputs, frame, before.memory))
-        state.get_mutable_abstract_state(0).set_value(after)
-
-    def _publish(self, context: Any, discrete_state: Any) -> None:
-        heard: _Heard = context.get_abstract_state(0).get_value()
-        discrete_state.set_value(0, heard.values)
+        memory = self._packing.unpack(context.get_discrete_state(1).value())
+        values, memory = self.hear(inputs, frame, memory)
+        discrete_state.set_value(0, values)
+        discrete_state.set_value(1, self._packing.pack(memory))
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step of the block for the frames of a compiled simulation loop.
+        """Returns the step of the block for a compiled simulation loop.
 
         Args:
             run: Facts about the run, which provide the frames.
 
         Returns:
-            The step, which calls Python.
+            The step, which calls ``hear`` at the end of each frame.
 
         Raises:
             InputError: No block with a step publishes audio.

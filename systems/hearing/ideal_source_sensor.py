@@ -35,7 +35,7 @@ def relative_position(pose_WB: Any, pose_WS: Any, control_point_m: Any) -> Any:
         control_point_m: Distance of P ahead of the origin of B, m.
 
     Returns:
-        x and y of the position relative to P, in the axes of B, m.
+        (x, y) of the source relative to P, in the axes of B, m.
     """
     x_P, y_P = control_point(pose_WB, control_point_m)
     return rotate(-pose_WB[2], pose_WS[0] - x_P, pose_WS[1] - y_P)
@@ -46,14 +46,14 @@ def disturbed(x: Any, y: Any, numbers: Any, hearing: Any) -> Any:
     """Adds noise of bearing and range to the position of a source.
 
     Args:
-        x: x of the position relative to the control point P, in the axes of the body
-            frame B, m.
-        y: y of this position, m.
+        x: First coordinate of the source relative to the control point P, in the axes
+            of the body frame B, m.
+        y: Second coordinate, m.
         numbers: Two standard normal numbers.
         hearing: Standard deviations of bearing and range.
 
     Returns:
-        x and y of the disturbed position, m.
+        (x, y) of the disturbed position, m.
     """
     bearing = math.atan2(y, x) + numbers[0] * math.radians(hearing.bearing_noise_deg)
     factor = 1.0 + numbers[1] * hearing.range_noise_fraction
@@ -66,9 +66,9 @@ def stated_covariance(x: Any, y: Any, hearing: Any) -> Any:
     """Computes the covariance of a position that has noise of bearing and range.
 
     Args:
-        x: x of the position relative to the control point P, in the axes of the body
-            frame B, m; float or AutoDiffXd.
-        y: y of this position, m.
+        x: First coordinate of the source relative to the control point P, in the axes
+            of the body frame B, m; float or AutoDiffXd.
+        y: Second coordinate, m.
         hearing: Standard deviations of bearing and range.
 
     Returns:
@@ -91,7 +91,7 @@ class _PerFrame:
     """Table with one row per measurement. Each row is computed when it is read.
 
     Args:
-        row: Function that returns the row for the number of a measurement.
+        row: Function that returns a row, given the number of the measurement.
     """
 
     def __init__(self, row: Callable[[int], Any]) -> None:
@@ -111,12 +111,11 @@ class IdealSourceNumbers(NamedTuple):
     frame_ticks: int
     """Ticks between two measurements."""
     sounds: Any
-    """Table that contains for each measurement whether there is sound: ``_PerFrame`` or
-    (n,) array."""
+    """One Boolean value per measurement, true if there is sound: ``_PerFrame`` or (n,)
+    array."""
     noisy: bool
     noise: Any
-    """Table that contains two standard normal numbers for each measurement:
-    ``_PerFrame`` or (n, 2) array."""
+    """Two standard normal numbers per measurement: ``_PerFrame`` or (n, 2) array."""
 
 
 def ideal_source_step(
@@ -124,8 +123,8 @@ def ideal_source_step(
 ) -> None:
     """Measures the position of the source in one control period.
 
-    The state has three numbers: x and y of the position of the source relative to the
-    control point P, m, and whether anything is heard.
+    The state has three numbers: x and y of the source relative to the control point P,
+    m; and whether anything is heard, 0 or 1.
     """
     if tick % numbers.frame_ticks != 0:
         return
@@ -165,9 +164,9 @@ def IdealSourceSensor_(T):
         the outputs of ``TDOAEstimator``. Its discrete state has the position of the
         source relative to the control point P, and ``detected``. The block updates the
         state every audio frame. Its latency is one control period, like that of the
-        estimator, so that the control loop is the same with either block. Like sound,
-        the block reaches 30 m. Unlike the estimator with a row of microphones, the
-        block distinguishes front from back.
+        estimator, so that the control loop is the same with either block. The block
+        detects the source at distances up to 30 m. Unlike the estimator with a row of
+        microphones, the block distinguishes front from back.
 
         Args:
             robot: Distance of P ahead of the axle.
@@ -229,15 +228,10 @@ def IdealSourceSensor_(T):
             self.declare(step, tick_s=frame_s)
 
         def _sounds(self, frame: Any) -> Any:
-            """Returns whether there is sound in the middle of a measured audio frame.
+            """Returns whether there is sound in the middle of a measurement's frame.
 
-            The frame ends at the time of the measurement.
-
-            Args:
-                frame: Number of the measurement, or an array of numbers.
-
-            Returns:
-                A Boolean value, or an array of Boolean values.
+            The frame ends at the time of the measurement. ``frame`` is the number of
+            the measurement, or an array of numbers.
             """
             sounds = self._sound.sounds((frame - 0.5) * self._frame_s)
             return sounds | (not self.step.numbers.hearing.burst_gaps)

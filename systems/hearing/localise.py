@@ -106,12 +106,13 @@ class HearingMemory(NamedTuple):
 
     energy: float
     """Average energy of a frame without a sound, in units of the frame squared. Rumble
-    is excluded. The value is 0 before the first frame without a sound."""
+    (low frequencies) is excluded. The value is 0 before the first frame without a
+    sound."""
     noise_energy: float
-    """Average energy of one channel of a frame without a sound. It is taken within the
-    band, at the sample rate of the plan."""
+    """Average energy of one channel of a frame without a sound, in units of the frame
+    squared. It is the energy within the band, at the sample rate of the plan."""
     echoes: NDArray[np.float32] | None = None
-    """(n, bins) memory of past spectra in ``systems.delays.precedence``. None if the
+    """(n, bins) memory of past power in ``systems.delays.precedence``. None if the
     memory is below the noise."""
     heard: bool = False
     """Whether the frame contained a sound."""
@@ -123,7 +124,7 @@ class Candidate(NamedTuple):
     fix: SourceFix
     """Estimated position or direction of its source."""
     tau: NDArray[np.float64]
-    """(n - 1,) delays t_k - t_0, s."""
+    """(n - 1,) delays t_k - t_0, s. t_k is the time of arrival at channel k."""
     covariance: NDArray[np.float64]
     """(n - 1, n - 1) covariance of the delays, s^2."""
     correlation: float
@@ -157,8 +158,8 @@ class Localiser:
     """Locates the sources of sound in successive frames of audio.
 
     The frames have the form that ``MicArray`` publishes. If the band allows it, the
-    frames are processed at half their sample rate. Delays are not restricted to whole
-    samples.
+    class halves the sample rate of the frames to save time. Delays are not restricted
+    to whole samples.
 
     Args:
         parameters: Method, band and rate of false alarms.
@@ -166,8 +167,8 @@ class Localiser:
         c: Speed of sound, m/s.
         sample_rate_hz: Sample rate of the frames, Hz.
         frame_samples: Samples per channel of a frame.
-        limited: Whether to reject estimates that are not reliable. Off: every estimate
-            counts, as in the papers.
+        limited: Whether to reject estimates that are not reliable. If not, every
+            estimate counts, as in the papers.
 
     Raises:
         InputError: The array cannot be used at this sample rate and band.
@@ -223,10 +224,10 @@ class Localiser:
         """Returns the memory before the first frame."""
         return HearingMemory(0.0, 0.0)
 
-    @property
-    def echo_shape(self) -> tuple[int, int]:
-        """Shape of ``HearingMemory.echoes``."""
-        return self._sizes.shape
+    def full(self) -> HearingMemory:
+        """Returns an example of the memory in which nothing is None."""
+        echoes = np.zeros(self._sizes.shape, np.float32)
+        return HearingMemory(0.0, 0.0, echoes)
 
     def localise(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
@@ -238,8 +239,8 @@ class Localiser:
             memory: Memory after the previous frame.
 
         Returns:
-            Two values. The first is the source on the side of ``ArrayShape.ahead``, or
-            None if there is no estimate. The second is the new memory.
+            Two values: the source on the side of ``ArrayShape.ahead``, or None if there
+            is no estimate; and the new memory.
 
         Raises:
             InputError: The shape of the frame does not fit this array, or a value of
@@ -263,12 +264,13 @@ class Localiser:
             memory: Memory after the previous frame.
 
         Returns:
-            Two values. The first is the list of sounds. It begins with the sound that
-            ``localise`` finds, if any. Further sounds follow in the order of
-            ``estimate_delay_sets``. The second is the new memory.
+            Two values: the list of sounds, and the new memory. The list begins with the
+            sound that ``localise`` finds, if any. Further sounds follow in the order of
+            ``estimate_delay_sets``.
 
         Raises:
-            InputError: As for ``localise``.
+            InputError: The shape of the frame does not fit this array, or a value of
+                the frame is not finite.
         """
         sound, after = self._sound(frame, memory)
         if sound is None:
@@ -292,11 +294,9 @@ class Localiser:
     def _one_of_several(self, delays: DelayEstimate) -> Candidate | None:
         """Locates one of several sounds from the set of its delays.
 
-        The other sounds act as noise. The delays of the pairs may therefore disagree by
-        an additional multiple of their standard deviation.
-
-        Returns:
-            The candidate, or None if the delays or the position are rejected.
+        The other sounds act as noise. Therefore the delays of the pairs may disagree
+        more than those of a single sound. The result is None if the delays or the
+        position are rejected.
         """
         scatter = math.sqrt(float(np.diag(delays.covariance).max()))
         closure = max(0.0, delays.closure - _SET_CLOSURE * scatter)
@@ -312,9 +312,8 @@ class Localiser:
         3. If the frame is the first frame of a sound, all channels must contain the
            sound.
 
-        Returns:
-            Two values. The first is the frame, or None if a test fails. The second is
-            the new memory.
+        The function returns the detected sound, or None if a test fails, and the new
+        memory.
         """
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):
@@ -366,12 +365,12 @@ class Localiser:
         """Locates the sound that ``look`` found in an audio frame.
 
         If the channels share almost all of their energy, the delays of the frame are
-        used as they are. Otherwise echoes are suppressed, and the delays are measured
-        again. The errors of the remaining echoes are then added to the covariance.
+        final. Otherwise the function suppresses the echoes and measures the delays
+        again. It then adds the errors due to the remaining echoes to the covariance.
 
         A sound that begins within the frame may include a reflection off the floor,
-        which no single channel reveals. The errors of echoes are therefore always added
-        for this sound.
+        which no single channel reveals. For such a sound, the function always adds
+        these errors.
         """
         delays = self._delays(frame, seen)
         direct = delays is not None and self._is_direct(delays, memory)
@@ -431,9 +430,9 @@ class Localiser:
     ) -> bool:
         """Returns whether two channels of an audio frame repeat each other.
 
-        Without noise, microphones at equal distances from the source record equal
-        samples. Therefore, in frames without noise, pairs of microphones at equal
-        distances from the centroid are not compared at lag 0.
+        Two microphones at equal distances from the centroid have equal distances from a
+        source straight ahead. Without noise, they then record equal samples. In frames
+        without noise, the function therefore does not compare their channels at lag 0.
         """
         shape = self.plan.shape
         # A fix without range has the delays of a plane wave. They may differ from those
@@ -459,13 +458,8 @@ class Localiser:
     ) -> HearingMemory:
         """Returns the memory after an audio frame of noise.
 
-        Args:
-            memory: Memory after the previous frame.
-            energy: Energy of the frame without rumble.
-            noise_energy: Energy within the band; None if it was not measured.
-
-        Returns:
-            The new memory.
+        ``energy`` is the energy of the frame without rumble. ``noise_energy`` is the
+        energy within the band, or None if it was not measured.
         """
         echoes = memory.echoes
         if echoes is not None:
@@ -500,17 +494,11 @@ class Localiser:
         frame: NDArray[np.float32] | None = None,
         echoes: NDArray[np.float64] | None = None,
     ) -> Candidate | None:
-        """Returns the position that explains the delays of an audio frame.
+        """Returns the position that explains the delays of a sound.
 
-        Args:
-            delays: Delays of the sound.
-            frame: The frame, which the method ``ml`` uses to refine the position. None:
-                the position is not refined.
-            echoes: (n - 1, n - 1) additional covariance of the delays after the
-                suppression of echoes, s^2.
-
-        Returns:
-            The candidate, or None if the delays or the position are rejected.
+        The method ``ml`` refines the position with the audio frame, unless ``frame`` is
+        None. ``echoes`` is the (n - 1, n - 1) covariance of the delays due to remaining
+        echoes, s^2. The result is None if the delays or the position are rejected.
         """
         plan = self.plan
         if delays is None or (self._limited and _is_doubtful(delays)):

@@ -1,8 +1,8 @@
 """Locates a source from the delays at microphones in any arrangement.
 
-For three equally spaced microphones in a row, the module uses a closed form
-(``systems.hearing.near_field``). For all other arrays, it uses
-``systems.hearing.delay_fit``.
+For three equally spaced microphones in a level row, the module uses the closed-form
+solution of ``systems.hearing.near_field``. For all other arrays, it uses the iterative
+fit of ``systems.hearing.delay_fit``.
 """
 
 from __future__ import annotations
@@ -27,12 +27,15 @@ def locate_source(
     """Computes the position or the direction from which a sound comes.
 
     If the range exceeds its standard deviation, the range is valid. Otherwise the
-    direction is that of a source far away. For arrays without a closed form, the error
-    of this direction includes the effect of the unknown range. For this purpose, the
-    standard deviation of the inverse range is assumed to be 1 / (2 apertures).
+    direction is that of a source far away.
+
+    If the iterative fit computes this direction, the error of the direction includes
+    the effect of the unknown range. The fit then assumes that the inverse range has the
+    standard deviation 1 / (2 a), where a is the aperture of the array.
 
     Args:
-        tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
+        tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s. t_k is the time of
+            arrival at microphone k.
         covariance: (n - 1, n - 1) covariance of the delays, s^2.
         shape: The n microphones.
         c: Speed of sound, m/s.
@@ -87,8 +90,8 @@ def angles_of(
         shape: The array, which may not measure every angle.
 
     Returns:
-        Three values, rad: the standard deviation of the azimuth, the elevation, and the
-        standard deviation of the elevation. If there is no elevation, the last two are
+        Three values, rad: standard deviation of the azimuth, elevation, and standard
+        deviation of the elevation. In the plane, or for a level row, the last two are
         None. If the array does not measure an angle, its standard deviation is
         infinite.
     """

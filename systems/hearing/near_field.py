@@ -1,11 +1,17 @@
 """Computes range and bearing of a source from the delays at three microphones in a row.
 
 The microphones M1, M2 and M3 are at y = l, 0, -l, and the source is ahead, at x > 0.
-R_i is the distance from the source to M_i. The delays are tau_ij = t_j - t_i. Let a = c
-tau_12 and b = c tau_13, where c is the speed of sound. Apollonius' theorem gives R1 =
-(2 l^2 + 2 a^2 - b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; in Han 2019, eq. 9 is not
-consistent with eq. 7). Then R2 = R1 + a, R3 = R1 + b and sin(bearing) = (R3^2 - R1^2) /
-(4 l R2). These equations are exact at any distance.
+R_i is the distance from the source to M_i. The delay tau_ij = t_j - t_i is the time by
+which the sound reaches M_j later than M_i. Let a = c tau_12 and b = c tau_13, where c
+is the speed of sound. The module uses these equations, which are exact at any distance:
+
+- R1 = (2 l^2 + 2 a^2 - b^2) / (2 (b - 2 a)), from Apollonius' theorem (Kim 2017, eq.
+  8);
+- R2 = R1 + a and R3 = R1 + b;
+- sin(bearing) = (R3^2 - R1^2) / (4 l R2).
+
+Han 2019 prints another equation for the range (eq. 9). It does not follow from eq. 7
+and 8 of that paper (docs/errata.md), so this module does not use it.
 """
 
 from __future__ import annotations
@@ -57,10 +63,9 @@ def source_from_delays(
         c: Speed of sound, m/s.
 
     Returns:
-        Three values. The first is the bearing in [-pi/2, pi/2], rad, positive to the
-        left. The second is the range, m. The third is the status of the range
-        (``range_status``). If there is no range, the second value is 0, and the bearing
-        is that of a source far away.
+        Three values: bearing in [-pi/2, pi/2], rad, positive to the left; range, m; and
+        status of the range (``range_status``). Without a range, the second value is 0,
+        and the bearing is that of a source far away.
     """
     a, b = c * tau_12, c * tau_13
     status, r1, r2, r3 = _ranges(a, b, spacing)
@@ -104,12 +109,11 @@ def _locate(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], float, float, int, float
 ]:  # pragma: no cover  (compiled)
-    """Computes the position of the source in the array's axes, with errors.
+    """Computes the position of the source in the axes of the array, with errors.
 
-    Returns:
-        Six values, in this order: position; covariance of the position; standard
-        deviation of the bearing; range; status of the range; and standard deviation of
-        the range.
+    The function returns the position; its covariance; the standard deviation of the
+    bearing; the range; the status of the range; and the standard deviation of the
+    range.
     """
     tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
     tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]
@@ -142,7 +146,7 @@ def locate_in_row(
     """Locates a source by ``source_from_delays``, and computes the errors.
 
     Args:
-        tau: (2,) delays t_k - t_0 of the channels k = 1 and 2, s.
+        tau: (2,) delays of the channels 1 and 2 relative to channel 0, s.
         covariance: (2, 2) covariance of the delays, s^2.
         row: The microphones.
         c: Speed of sound, m/s.

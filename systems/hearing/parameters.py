@@ -38,16 +38,16 @@ class TDOAParameters(Parameters):
     suppress_echoes: bool = True
     """Whether to suppress echoes in favor of the first wave front."""
     schedule_known: bool = False
-    """Whether the estimator knows the schedule of the source. If so, the estimator
-    ignores frames that cannot contain sound of the source. This separates the source
-    from sources that sound at other times, and from the robot's own loudspeaker."""
+    """Whether the estimator knows the schedule of the source. If so, it ignores frames
+    that cannot contain sound of the source. It then does not hear sources that sound at
+    other times, or the robot's own loudspeaker."""
     choose: Literal["loudest", "followed"] = "loudest"
     """Choice of the sound if several sounds overlap. ``loudest``: the loudest sound.
-    ``followed``: the sound of the source that was followed so far."""
+    ``followed``: the sound of the source that the robot has followed so far."""
     first_bearing_deg: Angle | None = None
     """Bearing of the source to follow at the start, deg CCW, seen from the centroid of
-    the microphones. Unset: the first source that is heard alone is followed. The field
-    requires ``choose: followed``."""
+    the microphones. Unset: the robot follows the first source that it hears alone. The
+    field requires ``choose: followed``."""
 
     @model_validator(mode="after")
     def _check(self) -> TDOAParameters:
@@ -73,7 +73,7 @@ class TrackerParameters(Parameters):
     the target moves on with its own velocity, which fades."""
     maximum_age_s: Duration = 6.0
     """Longest time since the target was last heard, s. After a longer time, the target
-    is lost. The default is three periods of the sound."""
+    counts as lost. The default is three periods of the sound."""
 
 
 class IdealHearingParameters(Parameters):

@@ -6,11 +6,13 @@ position at which it was last heard.
 
 The method has three steps:
 
-1. Convert the position of each source to expected delays (third-degree cubature,
-   Arasaratnam and Haykin 2009). An unknown range is represented by a large covariance.
+1. Convert the position of each source to expected delays by third-degree cubature
+   (Arasaratnam and Haykin 2009). An unknown range is treated as a range with a large
+   variance.
 2. Compare the expected delays with the delays of each sound. Positions on both sides of
-   a row of microphones have the same delays, so both sides are compared.
-3. Assign each sound to at most one source, so that the total likelihood is greatest
+   a row of microphones have the same delays, so the mirror image of each position is
+   compared, too.
+3. Assign each sound to at most one source, so that the total likelihood is largest
    (global nearest neighbors). A sound that belongs to no known source is a new source.
 """
 
@@ -140,7 +142,7 @@ class ChoiceMemory(NamedTuple):
     line: _Line
     """Line of the row when the followed source was last heard."""
     others: tuple[_Other | None, ...]
-    """The other sources. None: there is no source at this index."""
+    """The other sources. An entry is None if there is no source at this index."""
 
 
 class SourceChoice:
@@ -174,6 +176,14 @@ class SourceChoice:
         """Returns the memory before anything is heard."""
         return ChoiceMemory(_Line(np.zeros(2), np.zeros(2)), (None,) * _OTHERS)
 
+    @staticmethod
+    def full() -> ChoiceMemory:
+        """Returns an example of the memory in which nothing is None."""
+        line = _Line(np.zeros(2), np.zeros(2))
+        place = _Place(np.zeros(2), np.zeros((2, 2)), line)
+        other = _Other(place, 0.0, 0, together=False)
+        return ChoiceMemory(line, (other,) * _OTHERS)
+
     def choose(
         self,
         candidates: Sequence[Candidate],
@@ -184,19 +194,19 @@ class SourceChoice:
     ) -> tuple[int | None, ChoiceMemory]:
         """Chooses the sound of the followed source, and updates the other sources.
 
-        The function computes the cost of each sound for the followed source and for
-        each other known source. Assignments that are not credible get infinite costs.
-        The assignment with the least total cost gives the sound of the followed source.
+        The function computes a cost for each pair of a sound and a known source. If the
+        source cannot have caused the sound, the cost is infinite. The assignment with
+        the smallest total cost gives the sound of the followed source.
 
         Args:
             candidates: Sounds of an audio frame.
             memory: Memory after the previous frame.
-            belief: Present estimate of the source, and pose of the robot.
+            belief: Present estimate of the followed source, and pose of the robot.
             may_sound: Whether the schedule of the source permits a sound in this frame.
 
         Returns:
-            Two values. The first is the index of the sound in ``candidates``, or None
-            if the source is not heard. The second is the new memory.
+            Two values: the index of the sound in ``candidates``, or None if the source
+            is not heard; and the new memory.
         """
         doubted = belief.age > _DOUBTED_S
         others = [_aged(o, self._frame_s, doubted=doubted) for o in memory.others]
@@ -288,9 +298,9 @@ class SourceChoice:
     ) -> float:
         """Returns twice the negative log-likelihood that a sound comes from a source.
 
-        The function computes the value for both sides of the row of microphones. The
-        smaller value counts. It is infinite if the delays differ too much from the
-        expected delays on both sides.
+        The result is the smaller of the values for both sides of the row of
+        microphones. It is infinite if the delays differ too much from the expected
+        delays on both sides.
         """
         if place is None:
             return math.inf
@@ -314,7 +324,7 @@ class SourceChoice:
         turn: NDArray[np.float64],
         line: _Line,
     ) -> _Place:
-        """Returns the position of a sound in W. The arguments are as of ``_array``."""
+        """Returns the position of a sound in W, given the results of ``_array``."""
         fix = candidate.fix
         p, covariance = turn @ fix.p_AS, turn @ fix.covariance @ turn.T
         if fix.range_valid:
@@ -323,15 +333,12 @@ class SourceChoice:
 
 
 def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
-    """Assigns sounds to sources with the least total cost.
+    """Assigns sounds to sources with the smallest total cost.
 
-    Args:
-        costs: (sounds, sources) costs. A cost is infinite if the sound cannot come from
-            the source.
-
-    Returns:
-        One entry per sound: the index of its source, or None if the sound belongs to no
-        known source. Each source has at most one sound.
+    ``costs`` has one row per sound and one column per source. A cost is infinite if the
+    sound cannot come from the source. For each sound, the result has the index of its
+    source, or None if the sound belongs to no known source. Each source has at most one
+    sound.
     """
     sounds, places = costs.shape
     finite = np.where(np.isfinite(costs), costs, 1e9)
@@ -373,13 +380,10 @@ def _aged(other: _Other | None, seconds: float, *, doubted: bool) -> _Other | No
 
 
 def _remember(others: list[_Other | None], number: int | None, place: _Place) -> None:
-    """Stores the position of another source that was heard.
+    """Stores in ``others`` the position of another source that was heard.
 
-    Args:
-        others: Other sources. The function changes this list.
-        number: Number of the known source, from 1. None: a new source, which replaces
-            the source with the longest silence.
-        place: Position of the sound.
+    ``number`` is 1 plus the index of this source in ``others``. If it is None, the
+    source is new and replaces the source with the longest silence.
     """
     if number is None:
         silences = [math.inf if o is None else o.silence for o in others]
@@ -407,16 +411,9 @@ def _expected_delays(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Computes mean and covariance of the range differences for an uncertain source.
 
-    A range difference is the range of another microphone minus the range of microphone
-    0.
-
-    Args:
-        p: (2,) position of the source in the world frame W, m.
-        covariance: (2, 2) covariance of the position, m^2.
-        microphones: (n, 2) positions in W, m.
-
-    Returns:
-        (n - 1,) mean, m, and (n - 1, n - 1) covariance, m^2.
+    The range difference of a microphone is its range minus the range of microphone 0.
+    The positions ``p`` and ``microphones`` are in the world frame W, m. The results are
+    the (n - 1,) mean, m, and the (n - 1, n - 1) covariance, m^2.
     """
     root = math.sqrt(2.0) * np.linalg.cholesky(covariance + 1e-12 * np.eye(2))
     points = np.vstack((p + root.T, p - root.T))

@@ -38,14 +38,14 @@ def range_status(
     largest_error: float = 1.0,
     enough: bool = True,  # noqa: FBT001, FBT002  # compiled code calls it by position
 ) -> int:
-    """Returns whether the delays of a sound have a range, or why they have none.
+    """Returns whether the delays of a sound give a range, or why they give none.
 
     Args:
         inverse_range: Inverse range that fits best, 1/m. It is 0 or less for a plane
             wave, and NaN if no position has these delays.
         error: Error of the range, in any measure.
-        largest_error: Limit of the error in the same measure. The error must be below
-            the limit.
+        largest_error: Limit of the error in the same measure. The range is valid if the
+            error is below the limit.
         enough: Whether there are enough microphones for a range.
 
     Returns:
@@ -63,10 +63,10 @@ def range_status(
 
 @dataclass(frozen=True)
 class SourceFix:
-    """Estimated source relative to the microphones' centroid, with first-order errors.
+    """Estimated source relative to the centroid of the microphones, with its errors.
 
-    The errors are those that the delays cause. They include no errors of the microphone
-    positions or of the speed of sound.
+    The errors follow from the errors of the delays, to first order. They do not include
+    the effect of errors of the microphone positions or of the speed of sound.
     """
 
     bearing: float
@@ -75,28 +75,30 @@ class SourceFix:
     """Standard deviation of the bearing, rad. It is infinite if the array cannot
     measure the bearing."""
     elevation: float | None
-    """Elevation from the x-y plane, rad. None for positions in the plane. Also None for
-    a level row of microphones, which cannot measure the elevation."""
+    """Elevation from the x-y plane, rad. None for positions in a plane, and for a level
+    row of microphones, which cannot measure the elevation."""
     elevation_std: float | None
     """Standard deviation of the elevation, rad. It is infinite if the array cannot
     measure the elevation."""
     range: float
     """Distance from the centroid, m; 0 if it is not valid."""
     range_status: int
-    """Whether there is a range, or why there is none (``range_status``)."""
+    """Result of the function ``range_status``: whether there is a range, or why there
+    is none."""
     range_std: float
     """Standard deviation of the range, m; infinite if the range is not valid."""
     p_AS: NDArray[np.float64]
     """(d,) position of the source relative to the centroid, m. If the range is not
-    valid, it is a unit vector."""
+    valid, it is a unit vector toward the source."""
     covariance: NDArray[np.float64]
-    """(d, d) covariance of p_AS, m^2. If the range is not valid, it is the covariance
-    of the unit vector."""
+    """(d, d) covariance of ``p_AS``, m^2. If the range is not valid, it is the
+    covariance of the unit vector."""
     chi_square: float = 0.0
     """Sum of the squared residuals of the delays, whitened by the covariance of the
-    delays. Its mean is ``ArrayShape.freedom`` if the geometry is right."""
+    delays. Its expected value is ``ArrayShape.freedom``."""
     twin: NDArray[np.float64] | None = None
-    """(d,) another position that fits about equally well and is no mirror image, m."""
+    """(d,) another position that fits the delays about equally well and is no mirror
+    image, m. None if there is no such position."""
 
     @property
     def range_valid(self) -> bool:
@@ -119,7 +121,7 @@ class SourceFix:
         )
 
     def within_error(self, share: float) -> SourceFix:
-        """Returns the same estimate, but without a range that is too uncertain.
+        """Returns the same estimate, without its range if the range is too uncertain.
 
         Args:
             share: Limit of the error of the range, as a share of the range.

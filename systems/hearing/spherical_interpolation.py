@@ -21,19 +21,19 @@ def interpolate_sphere(
 ) -> tuple[NDArray[np.float64], float]:
     """Computes the least-squares position of a source from range differences.
 
-    See Song 2011, eq. 14 to 17; Smith, Abel 1987.
+    See Song 2011, eq. 14 to 17, and Smith and Abel 1987.
 
     Args:
         p_RM: (n, k) positions of the other microphones relative to the reference
-            microphone, m. The number n is at least k + 1. With n = k + 1, the equations
-            are exact.
-        d: (n,) range differences, m. A range difference is the range of another
-            microphone minus the range of the reference microphone.
+            microphone, m; k is 2 or 3. The number n is at least k + 1. With n = k + 1,
+            the equations are exact.
+        d: (n,) range differences, m. The range difference of a microphone is its range
+            minus the range of the reference microphone.
 
     Returns:
-        Two values. The first is the (k,) position of the source relative to the
-        reference microphone, m. The second is its range, m. The range is negative or
-        infinite if no position has these range differences.
+        Two values: (k,) position of the source relative to the reference microphone, m,
+        and its range, m. The range is negative or infinite if no position has these
+        range differences.
     """
     S, d = np.asarray(p_RM, dtype=float), np.asarray(d, dtype=float)
     inverse = np.linalg.pinv(S)
@@ -47,17 +47,17 @@ def interpolate_sphere(
 
 
 def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:
-    """Computes the bearing of a source on the assumption that the source is far away.
+    """Computes the bearing of a source, as if the source were far away.
 
     Args:
         p_RM: (n, 2) positions of the other microphones relative to the reference
             microphone, m.
-        d: (n,) range differences, m. A range difference is the range of another
-            microphone minus the range of the reference microphone.
+        d: (n,) range differences, m. The range difference of a microphone is its range
+            minus the range of the reference microphone.
 
     Returns:
         Bearing CCW from x, rad. The bearing is never on the wrong side. For a source at
-        0.25 m, the error of the bearing is about 5 deg.
+        0.25 m, its error is about 5 deg.
     """
     x, y = -np.linalg.pinv(np.asarray(p_RM, dtype=float)) @ np.asarray(d, dtype=float)
     return math.atan2(y, x)
@@ -69,20 +69,19 @@ def near_or_far(
     """Computes the bearing of a source, and its position if the position is credible.
 
     Errors can change the sign of the sum of the range differences. Spherical
-    interpolation then turns the bearing by 180 deg. Therefore the position is used only
-    if its range is at most 4 m, and if its bearing is near that of the plane wave
-    (within 15 deg).
+    interpolation then turns the bearing by 180 deg. The position is therefore used only
+    if its range is at most 4 m and its bearing differs by at most 15 deg from that of a
+    plane wave.
 
     Args:
         p_RM: (n, 2) positions of the other microphones relative to the reference
             microphone, m.
-        d: (n,) range differences, m. A range difference is the range of another
-            microphone minus the range of the reference microphone.
+        d: (n,) range differences, m. The range difference of a microphone is its range
+            minus the range of the reference microphone.
 
     Returns:
-        Three values. The first is the bearing, rad. The second is the (2,) position
-        relative to the reference microphone, m, or None. The third is the status of the
-        range (``range_status``).
+        Three values: bearing, rad; (2,) position relative to the reference microphone,
+        m, or None if it is not credible; and status of the range (``range_status``).
     """
     plane = plane_wave_bearing(p_RM, d)
     place, distance = interpolate_sphere(p_RM, d)

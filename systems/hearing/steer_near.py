@@ -25,7 +25,8 @@ class NearGrid(NamedTuple):
     bearings: NDArray[np.float64]
     """(b,) bearings from the reference microphone, CCW from x, rad."""
     delays: NDArray[np.float64]
-    """(pairs, r, b) delays t_j - t_i, s."""
+    """(pairs, r, b) delays t_j - t_i of each pair (i, j) for each of r ranges and b
+    bearings, s."""
 
 
 class Steered(NamedTuple):
@@ -38,8 +39,8 @@ class Steered(NamedTuple):
     other: float
     """Bearing of the strongest other peak, rad."""
     other_share: float
-    """Ratio of the response at the other peak to the strongest response. 0 if there is
-    no other peak."""
+    """Ratio of the response at the strongest other peak to the strongest response. It
+    is 0 if there is no other peak."""
     response: float
     """Response of the strongest position: the sum of the correlations there."""
 
@@ -74,19 +75,18 @@ def _wrapped(angle: Any) -> Any:
 def steer(
     grid: NearGrid, correlations: NDArray[np.float64], fine_rate_hz: float
 ) -> Steered:
-    """Finds the position of a grid with the largest sum of correlations.
-
-    The sum is called the response of the position.
+    """Finds the position of a grid with the largest sum of correlations (the response).
 
     Args:
         grid: Positions, and delays of sound from there.
-        correlations: (pairs, n) correlations over the delay, in the order of
-            ``cross_correlations``: delay 0 is first, negative delays are at the end.
+        correlations: (pairs, n) correlations over the delay. Delay 0 is first, and
+            negative delays are at the end.
         fine_rate_hz: Correlation values per second, Hz.
 
     Returns:
         The position with the strongest response, and the strongest other peak. A
-        parabola refines the strongest bearing between the bearings of the grid.
+        parabola through the responses at adjacent bearings of the grid refines the
+        bearing of the strongest position.
     """
     response = np.zeros(grid.delays.shape[1:])
     length = correlations.shape[1]

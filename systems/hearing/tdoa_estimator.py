@@ -38,7 +38,7 @@ def robot_localiser(
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound that the robot assumes, m/s.
         microphones: Sample rate and length of the audio frames.
-        limited: See ``Localiser``.
+        limited: Whether to reject estimates that are not reliable.
 
     Returns:
         The localizer, and the (2,) centroid of the microphones relative to the control
@@ -65,7 +65,8 @@ def robot_choice(
     """Makes the ``SourceChoice`` for the sounds that the localizer of a robot finds.
 
     Args:
-        localiser: Localizer that ``robot_localiser`` returns.
+        localiser: Localizer from ``robot_localiser``. Its parameters contain the first
+            bearing of the source.
         robot: Parameters of the body. The function uses the distance of the control
             point P ahead of the axle.
         p_PA_B: (2,) centroid of the microphones relative to P, in the axes of the body
@@ -73,8 +74,7 @@ def robot_choice(
         frame_s: Period of the audio frames, s.
 
     Returns:
-        The choice. It starts with the bearing ``first_bearing_deg`` of the localizer's
-        parameters.
+        The choice.
     """
     degrees = localiser.parameters.first_bearing_deg
     return SourceChoice(
@@ -134,30 +134,29 @@ class TDOAEstimator(FrameBlock):
 
     The outputs have these meanings:
 
-    - Range and bearing refer to the centroid of the microphones. For the default row,
-      this is the middle microphone, which is at the control point P.
+    - Range and bearing are seen from the centroid of the microphones. For the default
+      row, this is the middle microphone, which is at the control point P.
     - ``p_PS_B`` is the position of the source relative to P. A row of microphones
       cannot distinguish front from back, so the source is reported in the front half
       plane.
-    - If there is an estimate without range, the range is 0, and ``p_PS_B`` is the unit
-      vector along the bearing. ``range_status`` gives the reason
+    - If there is an estimate without a range, the range is 0, and ``p_PS_B`` is the
+      unit vector along the bearing. ``range_status`` gives the reason
       (``systems.hearing.source_fix``).
     - ``covariance`` is that of ``p_PS_B``, in row-major order. It includes noise and
       echoes, but no errors of microphone positions or of the speed of sound.
     - If there is no estimate, all outputs except ``range_status`` are zero.
 
     If ``choose: followed`` is set, the block locates each of the sounds of a frame. It
-    chooses the sound that comes from the expected position of the source
+    chooses the sound whose delays fit the expected position of the source
     (``systems.hearing.source_choice``). The block then has four further input ports:
     p_WS_estimated [m], covariance_W [m^2], age [s] and pose_WB_estimated [m, m, rad].
     ``SourceTracker`` publishes the first three, and ``WheelOdometry`` publishes the
     pose. The four ports affect only the state, so there is no algebraic loop.
 
-    State: ``HearingMemory``, the outputs, and with ``choose: followed`` also
-    ``ChoiceMemory``.
-    Rate and latency: the block updates once per ``frame_s`` of the microphones (25 ms).
-    It then processes the frame that ends at this moment. The outputs change one control
-    period later, which models the computing time.
+    The state has ``HearingMemory``, the outputs, and with ``choose: followed`` also
+    ``ChoiceMemory``. The block updates the state every ``frame_s`` of the microphones
+    (25 ms). It then processes the frame that ends at this moment. The outputs change
+    one control period later, which models the computing time.
 
     Args:
         parameters: Method, band and rate of false alarms.
@@ -166,7 +165,7 @@ class TDOAEstimator(FrameBlock):
         sound: The sound of the source. Its schedule has an effect only if
             ``schedule_known`` is set.
         microphones: Sample rate and length of the frames.
-        limited: See ``Localiser``.
+        limited: Whether to reject estimates that are not reliable.
 
     Raises:
         InputError: The array cannot be used at this sample rate and band.
@@ -204,13 +203,16 @@ class TDOAEstimator(FrameBlock):
         )
         self.set_name("tdoa_estimator")
         self._choice = None
+        blank = _Memory(self._localiser.blank(), None)
+        example = _Memory(self._localiser.full(), None)
         if parameters.choose == "followed":
             self._choice = robot_choice(
                 self._localiser, robot, self._p_PA_B, microphones.frame_s
             )
             self.inputs = (*self.inputs, *_BELIEF)
-        choice = None if self._choice is None else self._choice.blank()
-        self.declare_frames(_Memory(self._localiser.blank(), choice), microphones)
+            blank = blank._replace(choice=self._choice.blank())
+            example = example._replace(choice=self._choice.full())
+        self.declare_frames(blank, example, microphones)
 
     def hear(
         self,
@@ -241,7 +243,7 @@ class TDOAEstimator(FrameBlock):
 
 
 def _belief(values: NDArray[np.float64]) -> Belief:
-    """Converts the values of the ports ``_BELIEF``, in order."""
+    """Converts the values of the ports ``_BELIEF`` to a ``Belief``."""
     return Belief(
         values[:2].copy(),
         values[2:6].reshape(2, 2).copy(),

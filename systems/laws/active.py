@@ -17,27 +17,20 @@ from systems.laws.law import Equation, Law, Tuning
 def matched_decay(limit: float, ratio: float) -> float:
     """Computes the decay constant of an exponential gain from the ratio of two gains.
 
-    The gain changes by the factor ``ratio`` over half of the limit.
-
-    Args:
-        limit: Limit of the distance in m, or limit of the speed in m/s.
-        ratio: Ratio of the larger gain to the smaller gain, above 1.
-
-    Returns:
-        Decay constant limit / (2 ln ratio), in the unit of the limit.
+    The gain is exp(x/decay) or exp(-x/decay). It changes by the factor ``ratio`` when x
+    changes by half of ``limit``. Therefore the decay constant is limit/(2 ln ratio).
+    ``limit`` is a distance in m or a speed in m/s, and the decay constant has the same
+    unit. ``ratio`` is the larger gain divided by the smaller gain, above 1.
     """
     return limit / (2.0 * math.log(ratio))
 
 
 def matched_share(limit: float, decay: float) -> float:
-    """Computes the ratio of two gains from a decay constant (see ``matched_decay``).
+    """Computes the ratio exp(-limit/(2 decay)) of the smaller gain to the larger gain.
 
-    Args:
-        limit: Limit of the distance in m, or limit of the speed in m/s.
-        decay: Decay constant of the gain, in the unit of the limit.
-
-    Returns:
-        Ratio of the smaller gain to the larger gain, exp(-limit / (2 decay)).
+    The gain is exp(x/decay) or exp(-x/decay). It changes by this ratio when x changes
+    by half of ``limit``. Therefore the result is 1/``ratio``, where ``ratio`` is the
+    argument of ``matched_decay``. ``limit`` and ``decay`` have the same unit, m or m/s.
     """
     return math.exp(-limit / (2.0 * decay))
 
@@ -45,11 +38,11 @@ def matched_share(limit: float, decay: float) -> float:
 class ActiveParameters(Parameters):
     """Gains of a law whose stiffness and damping vary (Han 2019, eq. 20-22).
 
-    The stiffness varies with the distance of the obstacle. The damping varies with the
-    speed of the obstacle. The decay constants alpha and beta follow from the other
-    fields. At the distance rho_0/2, the spring term equals that of a law with the
-    constant stiffness K_0. At the speed mu_0/2, the velocity term equals that of a law
-    with the constant damping D_0.
+    The stiffness depends on the distance of the obstacle, and the damping depends on
+    its speed. The decay constants alpha and beta follow from two requirements:
+
+    - At the distance rho_0/2, the spring term is K_0 rho_0/2.
+    - At the speed mu_0/2, the velocity term is D_0 mu_0/2.
     """
 
     reference_stiffness_n_m: Stiffness = 84.5
@@ -99,17 +92,16 @@ class ActiveParameters(Parameters):
 def active_force(c: Any, s: Any, gains: ActiveParameters) -> Any:
     """Computes the force k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s).
 
-    This force is eq. 20 of Han 2019. The first term is the spring term. The spring term
-    is largest at c = alpha and zero at contact. The second term is the velocity term.
-    For an obstacle at rest, the velocity term is d_ref mu_0 at any distance.
+    This force is eq. 20 of Han 2019. The first term is the spring term. It is largest
+    at c = alpha and zero at contact (c = 0). The second term is the velocity term. For
+    an obstacle at rest (s = 0), it is d_ref mu_0 at any distance.
 
-    Eq. 19-b of the paper differs: it has another factor (rho_0 - c) at K_0(c). This
-    function follows eq. 20, because eq. 20 agrees with table 4.
+    Eq. 19-b of the paper has two more factors: (rho_0 - c) in the first term, and s in
+    the second. This function follows eq. 20, because table 4 agrees with eq. 20.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Speed of the obstacle, m/s. If s is mu_0 or more, the velocity term is 0
-            (table 4).
+        s: Speed of the obstacle, m/s. For s >= mu_0, the velocity term is 0 (table 4).
         gains: Gains of the law.
 
     Returns:

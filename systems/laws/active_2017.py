@@ -11,8 +11,9 @@ from systems.laws.law import Equation, Law, Tuning
 class Active2017Parameters(Parameters):
     """Gains of a law whose push grows near the obstacle (Kim 2017, eq. 21, fig. 6).
 
-    The push is the part of the force that depends on the distance. Below the distance
-    rho_1, the push is constant. Kim 2017 does not print the gains.
+    The push is the part of the force that depends on the distance. It grows as the
+    distance falls to rho_1, and is constant at smaller distances. Kim 2017 does not
+    print the gains.
     """
 
     distance_gain_j: Positive = 1.22
@@ -24,24 +25,26 @@ class Active2017Parameters(Parameters):
     saturation_speed_m_s: Speed = 0.72
     """Speed mu_1 above which the velocity term is constant, m/s.
 
-    Kim 2017 (section 5) prints no value. The paper chooses mu_1 by trial, so that the
-    robot stays below 720 mm/s. The default of mu_1 is this speed of 720 mm/s."""
+    Kim 2017 (section 5) prints no value: mu_1 was chosen by trial, so that the robot
+    stays below 720 mm/s. The default is these 720 mm/s.
+    """
 
 
 def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
-    """Computes the force K_a(c)/c + D_a(s) s, in which both terms saturate.
+    """Computes the saturating force K_0/max(c, rho_1) + D_0 min(s, mu_1).
 
-    Kim 2017 prints eq. 21, but describes K_a and D_a only in words and in figure 6. The
-    push K_a/c must saturate below the distance rho_1. The velocity term D_a s must
-    saturate above the speed mu_1. We therefore choose:
+    Kim 2017 prints the force as K_a(c)/c + D_a(s) s (eq. 21). The paper describes K_a
+    and D_a only in words and in figure 6: the push K_a/c is constant below the distance
+    rho_1, and the velocity term D_a s is constant above the speed mu_1. We therefore
+    choose:
 
-    - K_a is K_0 if c is above rho_1, and K_0 c/rho_1 otherwise.
-    - D_a is D_0 if s is below mu_1, and D_0 mu_1/s otherwise.
+    - K_a is K_0 above rho_1, and K_0 c/rho_1 below rho_1.
+    - D_a is D_0 below mu_1, and D_0 mu_1/s above mu_1.
 
-    According to the paper, the gain K increases as c falls to rho_1. In our reading,
-    the gain K_a stays constant in this range and the push K_a/c increases.
+    According to the paper, the gain K_a increases while c falls to rho_1. With our
+    choice, K_a is constant in this range, and only the push K_a/c increases.
 
-    The law acts at any distance. If the distance doubles, the push halves.
+    The push has no limit of reach. At twice the distance, it is half as large.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
@@ -49,7 +52,7 @@ def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
         gains: Gains of the law.
 
     Returns:
-        Force away from the obstacle, K_0/max(c, rho_1) + D_0 min(s, mu_1), N.
+        Force away from the obstacle, N.
     """
     near, fast = gains.saturation_distance_m, gains.saturation_speed_m_s
     spring = gains.distance_gain_j / (c if c > near else near + 0.0 * c)

@@ -22,7 +22,7 @@ class ConventionalParameters(Parameters):
 def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
     """Computes the force K_0 (rho_0 - c) + D_0 s (Han 2019, eq. 19-a).
 
-    If the distance c is rho_0 or more, the force is 0.
+    If c is rho_0 or more, the force is 0. Therefore it jumps by D_0 s at c = rho_0.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
@@ -30,7 +30,7 @@ def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
         gains: Gains of the law.
 
     Returns:
-        Force away from the obstacle, N. At c = rho_0 the force jumps by D_0 s.
+        Force away from the obstacle, N.
     """
     if c < gains.reach_m:
         return gains.stiffness_n_m * (gains.reach_m - c) + gains.damping_n_s_m * s

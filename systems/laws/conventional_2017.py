@@ -25,11 +25,11 @@ def conventional_2017_force(
 ) -> Any:
     """Computes the force K_0/c + D_0 s at any distance c (Kim 2017, eq. 20).
 
-    The push of the law is the term K_0/c. In the printed equation, the push becomes
-    infinite as c approaches 0. In this function, the push is constant below the least
-    range of the sensors, because the sensors cannot distinguish these distances.
+    As printed, the term K_0/c becomes infinite as c approaches 0. This function keeps
+    the term constant below the least range of the sensors, because sensors cannot
+    distinguish shorter distances.
 
-    The law acts at any distance. If the distance doubles, the push halves.
+    The term acts at any distance. At twice the distance, it is half as large.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
@@ -38,8 +38,7 @@ def conventional_2017_force(
         least_range_m: Least range of the sensors, m, above 0.
 
     Returns:
-        Force away from the obstacle, N. For s = 0 the force is at most
-        K_0/least_range_m.
+        Force away from the obstacle, N.
     """
     nearest = c if c > least_range_m else least_range_m + 0.0 * c
     return gains.distance_gain_j / nearest + gains.damping_n_s_m * s

@@ -39,31 +39,30 @@ def guarded_step(
 class GuardedController(Block):
     """Plans a route to the target and commands speed and yaw rate along the route.
 
-    The route leads through free and unknown space. The block computes the cheapest
-    route every 0.5 s. The route is for the smallest disc around the axle that contains
-    the body at every heading. An unknown cell of the map costs a little more than a
-    free cell. A cell with echoes costs much more.
+    Every 0.5 s, the block computes the cheapest route through free and unknown space.
+    The route leaves room for the smallest disc around the axle that contains the body
+    at every heading. An unknown cell of the map costs a little more than a free cell. A
+    cell with echoes costs much more.
 
-    The robot drives toward a point of the route. The block chooses the farthest point
-    that the robot can reach on a straight line at little extra cost. The speed of the
-    robot depends on the remaining distance. The robot weaves from side to side, so that
-    its narrow sensor cones sweep the space beside it.
+    The robot drives straight toward a point of the route. This is the farthest point
+    for which the straight line costs little more than the route. The speed depends on
+    the remaining distance. The robot weaves from side to side, so that its narrow
+    sensor cones also see the space beside it.
 
-    The block reacts to obstacles in these ways:
+    Four rules keep the robot from getting stuck:
 
     - Before the robot first moves, it looks to both sides.
     - If the guard stops the robot, the robot looks past both sides of the cell that
-      blocks it. If the sensors do not show that this cell is free, routes avoid the
-      cell for a time.
+      blocks it. If this cell is still not free, routes avoid it for a time.
     - If the robot still does not get away, it backs off.
-    - If every route crosses cells with echoes for 20 s, the robot stops. The port
-      ``gives_up`` is then 1 until there is a route.
+    - If every route of the last 20 s crossed cells with echoes, the robot stops. The
+      port ``gives_up`` is then 1 until there is a route without such cells.
 
-    The block tracks moving bodies (``systems.planning.hazards``). If an echo comes from
-    floor that was free before, the block assumes that a body has moved there. While a
-    body may come near, the block compares several pairs of speed and heading. The block
-    chooses the pair of least cost. The cost has three terms: the deviation from the
-    wanted motion, the distance from the bodies, and whether the sensors see the bodies.
+    The block also tracks moving bodies (``systems.planning.hazards``). An echo from
+    floor that was free before counts as a moving body. While such a body may come near,
+    the block compares several pairs of speed and heading. It chooses the pair with the
+    least cost. The cost has three terms: the deviation from the wanted motion, the
+    nearness of the bodies, and whether the sensors see the bodies.
 
     The port ``plan`` has four numbers: the mode, the position (x, y) of the point to
     which the robot drives, m, and the remaining distance, m. The modes are:
@@ -76,12 +75,12 @@ class GuardedController(Block):
 
     This law needs the guard, because the law alone does not avoid obstacles.
 
-    The abstract state is ``DriveState``. The outputs are functions of the state and the
-    present inputs in every control period. There is no latency.
+    The abstract state is ``DriveState``. The outputs depend on the state and the
+    present inputs. There is no latency.
 
     Args:
         robot: Size of the body, and position of the control point P ahead of the axle.
-        attraction: Parameters of the attraction. Only the follow distance is used.
+        attraction: ``AttractionParameters``. The block uses only the follow distance.
         sensors: Parameters of the range sensors.
         guard: Parameters of the guard and its map.
         tick_s: Control period, s.
@@ -141,15 +140,11 @@ class GuardedController(Block):
 def hazard_sensors(
     sensors: UltrasonicParameters, robot: RobotParameters, tick_s: float
 ) -> HazardSensors:
-    """Collects the properties of the sensors that the tracker of moving bodies needs.
+    """Collects the sensor properties that the tracker of moving bodies needs.
 
-    Args:
-        sensors: Parameters of the range sensors.
-        robot: Parameters of the robot, for the position of the control point P.
-        tick_s: Control period, s.
-
-    Returns:
-        Positions, directions, ranges, and errors of the sensors.
+    These are the positions, directions, ranges, and errors of the range sensors.
+    ``robot`` has the position of the control point P. ``tick_s`` is the control period,
+    s.
     """
     axes, places, half_angles = sensors.beams
     return HazardSensors(

@@ -1,15 +1,16 @@
-"""Controllers of all laws that compute a force, and the functions of these forces.
+"""Controllers of all laws that compute a force, and functions that compute forces.
 
 A virtual mass M is at the control point P, which is ahead of the axle. The mass moves
 according to::
 
     M p'' = F_m + sum of f(c, s) u,   u = -C/|C|,  c = |C|,  s = |dC/dt|
 
-F_m is the attraction to the target. C is the collision vector, which points from P to
-an obstacle. f is the push of the law.
+p is the position of P, and F_m is the attraction to the target. C is the collision
+vector, which points from P to an obstacle. f is the push of the law. The sum has one
+term per obstacle.
 
-Eq. 17-18 of Han 2019 print the repulsion with the wrong sign and with forces that grow
-with distance. Eq. 19 replaces eq. 17-18. See docs/errata.md.
+In eq. 17 and 18 of Han 2019, the signs of the repulsion contradict each other, and the
+repulsion grows with the distance. Eq. 19 replaces both equations (docs/errata.md).
 """
 
 from __future__ import annotations
@@ -51,20 +52,24 @@ def attraction_force(
 ) -> Any:
     """Computes the force that pulls the virtual mass toward the follow distance.
 
+    The target is at p_S. The mass is at p and has the velocity v. The force is::
+
+        K_r (p_S - p) (1 - d_f/|p_S - p|) - D_r v
+
+    Without a target, the force only brakes the mass.
+
     Args:
         p_WP: Position (x, y) of the control point P in the world frame W, m; floats or
             AutoDiffXd.
         v_WP: Velocity (vx, vy) of the virtual mass in W, m/s.
         p_WS: Position (x, y) of the target in W, m.
-        valid: Whether there is a target. If there is no target, the force brakes the
-            mass.
+        valid: Whether there is a target.
         attraction: ``AttractionParameters``: stiffness K_r, damping D_r, and follow
             distance d_f.
         mass: Virtual mass, kg.
 
     Returns:
-        Force (Fx, Fy) in W, N. With the target at p_S and P at p, the force is K_r (p_S
-        - p) (1 - d_f/|p_S - p|) - D_r v.
+        Force (Fx, Fy) in W, N.
     """
     if not valid:
         brake = mass / BRAKE_TIME_S
@@ -79,20 +84,19 @@ def attraction_force(
 
 @register_jitable
 def obstacle_speed(C_now: Any, C_before: Any, closing: Any, period_s: Any) -> Any:
-    """Computes the speed s of an obstacle from the change of its collision vector.
+    """Computes the speed s of an obstacle from two of its collision vectors.
 
-    A collision vector C points from the control point P to an obstacle.
+    A collision vector C points from the control point P to the obstacle.
 
     Args:
         C_now: Present collision vector (x, y) in the world frame W, m; floats or
             AutoDiffXd.
-        C_before: Collision vector (x, y) of the same feature ``period_s`` ago in W, m.
-        closing: Definition of s. If true, s is max(0, -d|C|/dt). If false, s is
-            |dC/dt|.
+        C_before: Collision vector (x, y) of the same obstacle ``period_s`` ago in W, m.
+        closing: Definition of s: max(0, -d|C|/dt) if true, |dC/dt| if false.
         period_s: Time between both vectors, s.
 
     Returns:
-        Speed s, m/s, at least 0. The scalar type is that of ``C_now``.
+        Speed s, m/s, at least 0, with the scalar type of ``C_now``.
     """
     if not closing:
         return safe_norm(C_now[0] - C_before[0], C_now[1] - C_before[1]) / period_s
@@ -110,9 +114,9 @@ def repulsion_force(C_W: Any, s: Any, force: Any, arguments: Any = ()) -> Any:
         C_W: Collision vector (x, y) from the control point P to the obstacle in the
             world frame W, m; floats or AutoDiffXd.
         s: Speed of the obstacle, m/s.
-        force: Function ``force(c, s, *arguments)`` that returns the push in N for the
+        force: Function ``force(c, s, *arguments)`` that returns the push in N at the
             distance c in m.
-        arguments: Further arguments of ``force`` after c and s.
+        arguments: Arguments of ``force`` after c and s.
 
     Returns:
         Force (Fx, Fy) in W, N.
@@ -143,22 +147,22 @@ class ImpedanceNumbers(NamedTuple):
 def impedance_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Computes the acceleration of the virtual mass, the forces, and the speeds s.
+    """Computes the acceleration of the virtual mass, and the forces that cause it.
 
-    The state has one row for each control period of a sensor round, most recent period
-    first. A sensor round is the time in which every sensor fires once. A row has three
-    numbers for each slot of the input port: the feature, C_x, and C_y. C is the
-    collision vector from the control point P to an obstacle, in the world frame W, m.
-    The feature is a number that identifies the sensors or the body that C comes from.
+    The step also computes the speed s of each obstacle. The state stores the collision
+    vectors of one sensor round, which is the time in which every sensor fires once. A
+    collision vector C points from the control point P to an obstacle, in the world
+    frame W, m. The state has one row per control period, most recent first. A row has
+    three numbers for each slot of the input port: the feature, C_x, and C_y. The
+    feature is a number that identifies the sensors or the body from which C comes.
 
-    The step works in three stages:
+    The step has three stages:
 
-    1. For each occupied slot, the step searches the oldest row for the same feature. If
-       the step finds the feature, it computes s from the old and the new vector.
-       Otherwise s is 0.
-    2. The step adds the attraction and the pushes of all occupied slots.
-    3. The step shifts the rows by one period, and writes the new vectors to the first
-       row.
+    1. Search the oldest row for the feature of each occupied slot. If it is there,
+       compute s from the old and the present vector. Otherwise s is 0.
+    2. Add the attraction and the pushes of all occupied slots, and divide the sum by
+       the virtual mass.
+    3. Shift the rows by one period, and write the present vectors to the first row.
     """
     p_WS, valid, C_B, features, pose, v_WP = inputs
     # Attraction, computed relative to P.
@@ -232,35 +236,33 @@ def ImpedanceController_(T):
     class Impl(Block_[T]):
         """Pulls the robot to the target and pushes it away from obstacles.
 
-        The push of the law depends on the length c of a collision vector and on a speed
-        s. A collision vector points from the control point P to an obstacle. The
-        feature of a vector is a number that identifies the sensors or the body that the
-        vector comes from.
+        A collision vector points from the control point P to an obstacle. The push of
+        the law depends on the length c of this vector and on a speed s. Each vector has
+        a feature: a number that identifies the sensors or the body from which the
+        vector comes.
 
-        The block computes s from two collision vectors of the same feature: the present
-        vector and the vector of one sensor round ago. If the feature was absent one
-        round ago, s is 0. A sensor round is the time in which every sensor fires once.
-        If all sensors fire in every control period, a round is one period. If three
-        sensors fire in turn, a round is three periods.
+        The block computes s from two vectors of the same feature: the present vector
+        and the vector of one sensor round ago. If the feature was absent then, s is 0.
+        A sensor round is the time in which every sensor fires once. If three sensors
+        fire in turn, for example, a round lasts three control periods.
 
-        During a round, every range is measured anew. Therefore s is exact at constant
-        velocities, even if a vector comes from two sensors. If the velocities change, s
-        is the mean over one round. The ranges in the present vector may be up to one
-        round minus one period old.
+        In one round, every sensor measures its range anew. Therefore s is exact at
+        constant velocities, even if a vector comes from two sensors. If the velocities
+        change, s is the mean over one round. A range in the present vector can be up to
+        one round minus one period old.
 
-        The discrete state has the collision vectors of the last sensor round. The state
-        is updated every control period. The outputs are functions of the state and the
-        present input. There is no latency.
+        The discrete state contains the collision vectors of the last sensor round. The
+        outputs depend on the state and the present input. There is no latency.
 
         Args:
             law: A law of ``systems.laws.catalogue`` that has a force, or a function
                 ``law(c, s, gains)``. The function returns the force away from the
-                obstacle in N for a distance c in m and a speed s in m/s. The function
-                must use pydrake.math, so that Drake can differentiate the function.
+                obstacle in N for a distance c in m and a speed s in m/s. It must use
+                pydrake.math, so that Drake can differentiate it.
             gains: Gains of the law. If None, a law of the catalogue uses its default
                 gains.
-            velocity_term: Definition of s. ``printed`` is the rate of change of the
-                collision vector. ``closing`` is the speed of approach.
+            velocity_term: Definition of s: ``printed`` for the rate of change of the
+                collision vector, ``closing`` for the speed of approach.
             robot: Virtual mass, and position of the control point P.
             attraction: ``AttractionParameters``.
             sensors: ``UltrasonicParameters``. The block uses the firing period, the
@@ -323,17 +325,7 @@ def _slot_names(round_ticks: int) -> tuple[str, ...]:
 
 
 def _define(name: str, block_name: str, documentation: str, **fixed: Any) -> Any:
-    """Defines a variant of ``ImpedanceController_`` with fixed arguments.
-
-    Args:
-        name: Name of the new class.
-        block_name: Name of the block in diagrams.
-        documentation: Docstring of the new class.
-        fixed: Arguments of ``ImpedanceController`` that the new class sets.
-
-    Returns:
-        Template of the new class for all scalar types.
-    """
+    """Defines a variant of ``ImpedanceController_`` that sets some arguments."""
 
     @define_for_scalars(f"{name}_", __name__)
     def template(T):

@@ -40,26 +40,29 @@ class Tuning:
     rule: Literal["barrier", "matched"]
     """Rule that derives the gains from the requirements.
 
-    ``barrier`` determines the two gains in ``Law.loop_gains`` one after the other. The
-    first gain follows from the required barrier. The barrier is the kinetic energy that
-    the law must remove during an approach. The push must be proportional to the first
-    gain. The second gain follows from the energy that the velocity term may return to
-    the motion.
+    ``barrier`` determines the two gains ``Law.loop_gains``. The first gain follows from
+    the required barrier, which is the kinetic energy that the law must remove during an
+    approach. The push must be proportional to this gain. The second gain follows from
+    the energy that the velocity term may return to the motion.
 
-    ``matched`` is the rule of the active law of 2019. This rule suits laws that have
-    the same gains as the active law."""
+    ``matched`` is the rule of the active law of 2019. It suits laws with the same gains
+    as that law.
+    """
     stiffest: Callable[[Any, float], float]
     """Function that returns the largest slope -df/dc of the force for an obstacle at
-    rest, N/m. The arguments of the function are the gains and the least range of the
-    sensors in m."""
+    rest, N/m. Its arguments are the gains and the least range of the sensors in m.
+    """
     spring_speed: Callable[[Any], float] = _always_at_rest
-    """Function of the gains that returns a speed s, m/s. At this speed, the force f(c,
-    s) has only its spring term."""
+    """Function of the gains. It returns the speed s, m/s, at which the force f(c, s)
+    consists only of its spring term.
+    """
     sets_follow_distance: bool = False
-    """Whether the design chooses a follow distance that allows for the push of the law.
+    """Whether the design chooses a follow distance at which the push of the law is
+    weak.
 
-    For a law without a limit of reach, the value is false. The push of such a law acts
-    at every useful follow distance."""
+    The value is false for a law without a limit of reach, because the push of such a
+    law acts at every useful follow distance.
+    """
 
 
 @dataclass(frozen=True)
@@ -77,17 +80,18 @@ class Law:
     force: Callable[..., Any] | None = None
     """Function ``force(c, s, gains)`` that returns the push away from an obstacle, N.
 
-    The arguments are a distance c in m, a speed s in m/s, and the gains. c and s are
-    floats or AutoDiffXd. The part f(c, 0) of the push must have a potential energy. If
-    the field is None, the law commands a motion instead of a force. Then the law has no
-    linear model."""
+    c is a distance in m, and s is a speed in m/s; both are floats or AutoDiffXd. f(c,
+    0) must have a potential energy. If the field is None, the law commands a motion
+    instead of a force, and has no linear model.
+    """
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
     """Model of the gains. Every field has a default."""
     controller_name: str = ""
-    """Name of the class of the law's block in ``systems``. If the name is empty, the
-    block ``RadialLawController`` computes the force."""
+    """Name of the class of the law's block in ``systems``. If it is empty, the block
+    ``RadialLawController`` computes the force.
+    """
     loop_gains: tuple[str, str] | None = None
     """Names of the gains of the distance term and the velocity term, for root loci."""
     tuning: Tuning | None = None
@@ -95,7 +99,8 @@ class Law:
     robot: RobotKind = "follower"
     """Kind of the robot that runs the law. A ``follower`` follows a sound. A ``router``
     drives to a goal on a planned route. An ``odor_searcher`` or a ``sound_searcher``
-    searches step by step."""
+    searches step by step.
+    """
     guarded: bool = False
     """Whether the robot of this law always has the guard."""
     colour: str | None = None
@@ -105,13 +110,20 @@ class Law:
     def controller(self) -> type | None:
         """Class of the law's block, or None if the law names no class.
 
-        The property imports the class only when the property is read. Therefore the
-        check of a scenario needs neither Drake nor compiled code.
+        The class is imported only when the property is read, so that a scenario can be
+        checked without Drake and without compiled code.
 
-        The constructor of the class may take these arguments: ``gains``,
-        ``velocity_term``, ``robot``, ``attraction``, ``sensors``, ``tick_s``, ``guard``
-        (parameters of the guard and its map), ``bodies`` (number of bodies), and
-        ``seed``.
+        The constructor of the class may take any of these arguments:
+
+        - ``gains``
+        - ``velocity_term``
+        - ``robot``
+        - ``attraction``
+        - ``sensors``
+        - ``tick_s``
+        - ``guard``: parameters of the guard and its map
+        - ``bodies``: number of bodies
+        - ``seed``
         """
         if not self.controller_name:
             return None
@@ -120,14 +132,10 @@ class Law:
     def arguments(self, gains: Any, least_range_m: float) -> tuple[Any, ...]:
         """Returns the arguments that the function ``force`` takes after c and s.
 
-        Args:
-            gains: Gains of the law, or None for the default gains.
-            least_range_m: Least range of the sensors, m.
-
-        Returns:
-            One or two arguments. The first argument is the gains, or None for a law
-            without gains. If the field ``least_range`` is true, the second argument is
-            the least range in m.
+        The first argument is ``gains``. If ``gains`` is None, the default gains of the
+        law replace it. For a law without gains, the first argument is None. If the
+        field ``least_range`` is true, the second argument is the least range of the
+        sensors, m.
         """
         if gains is None and self.gains is not None:
             gains = self.gains()

@@ -8,16 +8,7 @@ from systems.laws.law import Equation, Law
 
 
 def no_force(c: Any, s: Any, gains: Any) -> Any:
-    """Returns a force of zero.
-
-    Args:
-        c: Distance of the obstacle, m; float or AutoDiffXd.
-        s: Speed of the obstacle, m/s.
-        gains: Not used.
-
-    Returns:
-        Zero force, N, with the scalar type of c.
-    """
+    """Returns a force of zero, N, with the scalar type of the distance ``c``."""
     return 0.0 * c
 
 

@@ -15,7 +15,8 @@ from systems.laws.law import Equation, Law
 class PathIntegralParameters(Parameters):
     """Gains of MPPI: spread of the sampled motions, and weights of the cost terms.
 
-    The cost terms are those of the controller in Nav2.
+    MPPI is model predictive path integral control. The cost terms are those of the MPPI
+    controller in Nav2.
     """
 
     clearance_m: NonNegativeLength = 0.08
@@ -26,10 +27,12 @@ class PathIntegralParameters(Parameters):
     """Temperature of the weights of sequences, exp(-cost/temperature) (Nav2: 0.3)."""
     angle_gain: NonNegative = 0.63
     """Cost per radian of the angle between the heading and the direction of the wanted
-    position (Nav2's path angle critic: 2)."""
+    position (Nav2's path angle critic: 2).
+    """
     obstacle_gain: NonNegative = 3.4
     """Cost of a position at the distance ``clearance_m`` from an obstacle (Nav2's cost
-    critic: 3.81)."""
+    critic: 3.81).
+    """
     inflation_m: Length = 0.057
     """Distance over which the cost of ``obstacle_gain`` falls to 1/e, m."""
 

@@ -21,14 +21,14 @@ _ALONG = 0.04
 
 @register_jitable
 def airflow_reading(angle: float, side: int, crosswind: bool) -> float:  # noqa: FBT001
-    """Computes the reading of an airflow sensor, relative to its largest reading.
+    """Computes the relative reading of an airflow sensor.
 
     Args:
-        angle: Direction from which the wind comes, in the body frame B of the robot,
-            CCW from the x axis (ahead), rad.
-        side: 0 left sensor, 1 right sensor.
-        crosswind: True: the directional sensitivity is ``crosswind``. False: the
-            sensitivity is ``cosine``.
+        angle: Direction from which the wind comes, counterclockwise from straight
+            ahead, rad.
+        side: 0 for the left sensor, 1 for the right sensor.
+        crosswind: Directional sensitivity of the sensor: ``crosswind`` if true,
+            ``cosine`` if false.
 
     Returns:
         Reading divided by the wind speed and the gain, 0 to 1.
@@ -67,8 +67,8 @@ class AirflowSensors(Block):
     """Measures the wind with two airflow sensors on the left and right of the robot.
 
     With the directional sensitivity ``cosine``, the left sensor F1 points 45 deg to the
-    left, and the right sensor F2 points 45 deg to the right. Both sensors measure the
-    wind at the origin of the body frame B.
+    left. The right sensor F2 points 45 deg to the right. Both sensors measure the wind
+    at the middle of the axle.
 
     The block has no state. It draws new noise at every tick (control period). There is
     no latency.

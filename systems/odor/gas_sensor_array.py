@@ -69,8 +69,9 @@ def gas_sensor_step(
 ) -> None:
     """Computes the readings of three gas sensors in one tick (control period).
 
-    A reading is the resistance ratio Rs/R0. The state has six numbers. The first three
-    numbers are the ratios without noise, and the other three are the last readings.
+    A reading is the ratio Rs/R0 of the sensor's resistance in gas to its resistance in
+    clean air. The state has six numbers: the three ratios without noise, then the last
+    three readings.
     """
     ratios, truths = outputs
     gas = np.empty(3)
@@ -96,16 +97,15 @@ def gas_sensor_step(
 class GasSensorArray(Block):
     """Measures the concentration of gas at three positions on the robot.
 
-    A reading is the ratio Rs/R0 of resistances. The reading is 1 in clean air, and
-    smaller in gas. In steady gas, the ratio is (1 + C/C1)^-exponent. C is the
-    concentration, and C1 is a constant of the sensors. The reading follows this value
-    with a first-order lag. The lag is shorter when the concentration grows than when it
-    falls. The sensors are at the height of the floor, as the odor source is. The output
-    ``gas_concentration`` is the true C/C1.
+    A reading is the ratio Rs/R0 of the sensor's resistance in gas to its resistance in
+    clean air. It is 1 in clean air, and smaller in gas. In steady gas of the
+    concentration C, the ratio is (1 + C/C1)^-exponent, where C1 is a constant of the
+    sensors. The reading follows this value with a first-order lag, which is shorter
+    while the concentration grows than while it falls. The sensors and the odor source
+    are at the height of the floor. The output ``gas_concentration`` is the true C/C1.
 
-    The discrete state holds the ratio and the last reading of each sensor. The block
-    updates the state at every tick (control period). There is no latency apart from the
-    lag.
+    The discrete state contains the ratio and the last reading of each sensor. Apart
+    from the lag, there is no latency.
 
     Args:
         parameters: Positions, lag and errors of the sensors.

@@ -118,12 +118,9 @@ def _mean_concentration(
 def release_rate(ratio_at_2_m: float) -> float:
     """Computes the release rate of a source from a gas sensor's reading 2 m downwind.
 
-    Args:
-        ratio_at_2_m: Mean ratio Rs/R0 of the sensor in a wind of 1 m/s.
-
-    Returns:
-        Release rate Q divided by C1, m^3/s. C1 is a constant of the gas sensors, and
-        has the unit of a concentration.
+    ``ratio_at_2_m`` is the mean ratio Rs/R0 of the sensor in a wind of 1 m/s. The
+    result is the release rate divided by C1, m^3/s. C1 is a constant of the gas sensors
+    with the unit of a concentration.
     """
     wanted = ratio_at_2_m ** (-1.0 / GAS_EXPONENT) - 1.0
     return wanted / float(_mean_concentration(2.0, 0.0, 1.0, 1.0))
@@ -135,9 +132,9 @@ def concentration(
 ) -> float:  # pragma: no cover  (compiled)
     """Computes the concentration of odor at a point of the floor.
 
-    A puff is a Gaussian distribution of odor around its center on the floor. The floor
-    reflects the odor. The concentration is the sum over all puffs. A steady plume has a
-    closed form instead of puffs.
+    The result is the sum over all puffs, plus the background. A puff is a Gaussian
+    distribution of odor around its center on the floor. The floor reflects the odor.
+    For a steady plume, which has no puffs, ``steady_concentration`` replaces the sum.
 
     Args:
         plume: (PLUME_SIZE,) value of the port ``plume``.
@@ -145,8 +142,7 @@ def concentration(
         y: y coordinate of the point in W, m.
 
     Returns:
-        Concentration of plume and background, in units of C1, a constant of the gas
-        sensors.
+        Concentration in units of C1, a constant of the gas sensors.
     """
     total = plume[_AT.background]
     if plume[_AT.steady] > 0.5:
@@ -191,14 +187,14 @@ class PlumeNumbers(NamedTuple):
 def _advance(
     plume: Any, wind: Any, tick: int, numbers: PlumeNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves all odor puffs by one period of the plume, and releases new puffs.
+    """Moves all puffs by one period of the plume, and releases new puffs.
 
-    - Motion: Each puff moves with the wind at its center and with its own velocity. The
-      own velocity is an Ornstein-Uhlenbeck process. Its standard deviation is
-      proportional to the wind speed.
-    - Growth: The spreads of a puff grow with the distance that the wind covers.
-    - Removal: Puffs farther than ``_REACH_M`` from the source are removed. If there are
-      more than ``MOST_PUFFS`` puffs, the oldest puffs are removed.
+    - Motion: A puff moves with the wind at its center plus its own velocity. The own
+      velocity is an Ornstein-Uhlenbeck process with a standard deviation proportional
+      to the wind speed.
+    - Growth: The size of a puff grows with the distance that the wind covers.
+    - Removal: Puffs farther than ``_REACH_M`` from the source disappear. If there are
+      more than ``MOST_PUFFS`` puffs, the oldest disappear.
 
     The port ``plume`` contains the puffs in the order of their age, oldest first.
     """
@@ -289,10 +285,10 @@ def _publish(state: Any, outputs: Any, numbers: PlumeNumbers) -> None:
 class OdorPlume(Block):
     """Models the odor plume of a source over the whole floor.
 
-    The plume consists of puffs, or is steady. A puff moves with the wind at its center
-    and with its own velocity. The puff grows with the distance that the wind carries
-    it. The floor reflects the odor. Walls and robots do not affect the odor. At the
-    start of a run, the source has already released odor for ``age_s``. The function
+    The plume is steady or consists of puffs. A puff moves with the wind at its center
+    plus its own velocity, and grows with the distance that the wind carries it. The
+    floor reflects the odor, but walls and robots do not affect it. At the start of a
+    run, the source has already released odor for ``age_s``. The function
     ``concentration`` computes the concentration at a point.
 
     The discrete state has the same values as the output. It changes every 0.1 s, and
@@ -302,8 +298,8 @@ class OdorPlume(Block):
         parameters: Position, kind and strength of the source.
         wind: Wind before the run. A steady plume has this wind during the run, too.
         seed: Seed of the puffs' own velocities.
-        tick_s: Control period of the robots, s. The period of the plume, 0.1 s, is a
-            multiple of the control period.
+        tick_s: Control period of the robots, s. It must divide 0.1 s, the period of the
+            plume.
 
     Raises:
         InputError: The plume is steady, but there is no wind.

@@ -27,8 +27,9 @@ class WindParameters(Parameters):
 
     kind: Literal["uniform", "meandering", "jet"] = "meandering"
     """``uniform``: constant wind. ``meandering``: the velocity changes slowly, in the
-    same way everywhere. ``jet``: the jet of a fan at (-2.2, 0) m in W. The jet also
-    meanders. It becomes wider and slower along its axis."""
+    same way everywhere. ``jet``: the jet of a fan at (-2.2, 0) m in the world frame W.
+    The jet also meanders. It becomes wider and slower along its axis.
+    """
     speed_m_s: float = Field(default=1.0, ge=0.0, le=20.0)
     """Mean speed, m/s. For a jet: mean speed at its outlet."""
     direction_deg: Angle = 0.0
@@ -49,12 +50,14 @@ class OdorParameters(Parameters):
     ratio_at_2_m: float = Field(default=0.76, ge=1e-3, le=0.999)
     """Strength of the source: mean ratio Rs/R0 of a gas sensor on the axis, 2 m
     downwind, in a wind of 1 m/s. The power law of the sensor converts it to a
-    concentration."""
+    concentration.
+    """
     age_s: Time = 60.0
     """Time from the beginning of the release to the start of a run, s."""
     room_volume_m3: float | None = Field(default=None, ge=1.0, le=1e6)
-    """Volume of a closed room, m^3. In a closed room, the odor also accumulates as a
-    uniform background. null: an open room."""
+    """Volume of a closed room, m^3, in which the odor also accumulates as a uniform
+    background. null: an open room.
+    """
 
 
 class GasSensorParameters(Parameters):
@@ -85,7 +88,8 @@ class AirflowParameters(Parameters):
     gain_s_m: Positive = 3.0
     """k, reading of a sensor per m/s of wind from its most sensitive direction, s/m."""
     lobe: Literal["cosine", "crosswind"] = "cosine"
-    """Directional sensitivity. ``cosine``: the wires are most sensitive to wind from 45
-    deg to the left and to the right. ``crosswind``: the wires are parallel to the axis
-    of the robot, next to a partition. Each wire measures the crosswind if it comes from
-    the side of this wire, and a fifth of the wind along the axis."""
+    """Directional sensitivity. ``cosine``: the two hot wires are most sensitive to wind
+    from 45 deg to the left and from 45 deg to the right. ``crosswind``: the wires are
+    parallel to the axis of the robot, next to a partition. Each wire measures the
+    crosswind from its own side, and a fifth of the wind along the axis.
+    """

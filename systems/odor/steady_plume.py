@@ -13,13 +13,9 @@ _ASYMPTOTIC = 12.0
 
 @njit(cache=True)
 def scaled_erfc(x: float) -> float:  # pragma: no cover  (compiled)
-    """Computes exp(x^2) erfc(x) without overflow.
+    """Computes exp(x^2) erfc(x) without overflow, for ``x`` of at least 0.
 
-    Args:
-        x: Argument, at least 0.
-
-    Returns:
-        Value above 0 and up to 1, with a relative error of at most 1e-12.
+    The relative error is at most 1e-12.
     """
     if x < 5.0:
         return math.exp(x * x) * math.erfc(x)
@@ -56,15 +52,15 @@ def steady_concentration(
 
     The source is on the floor (H = 0). It releases puffs that grow while the wind
     carries them. The floor reflects the odor, and thereby doubles the concentration.
-    The result is the integral of eq. 1 over the time t since the release of a puff. The
-    spreads of a puff are sigma_x = a t, sigma_y = b t and sigma_z = c t. Only these
-    spreads lead to eq. 6, where a = b = gamma_1 and c = gamma_2.
+    The result is the integral of eq. 1 over t, the time since the release of a puff.
+    The spreads (standard deviations) of a puff are sigma_x = a t, sigma_y = b t and
+    sigma_z = c t. With a = b = gamma_1 and c = gamma_2, the result is eq. 6.
 
     Args:
-        x: Distance downwind of the source, m. Negative: upwind.
+        x: Distance downwind of the source, m; negative upwind.
         y: Distance from the axis of the plume, across the wind, m.
-        rate: Q, amount of odor released per second.
-        speed: u, speed of the wind, above 0, m/s.
+        rate: Amount of odor released per second.
+        speed: Speed of the wind, above 0, m/s.
         spreads: (a, b, c), growth of the spreads, m/s.
 
     Returns:

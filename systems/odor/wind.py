@@ -61,12 +61,11 @@ def wind_velocity(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Computes the velocity of the wind at a point of the floor.
 
-    If the wind is not a jet, its velocity is the same everywhere. If the wind is the
-    jet of a fan, the velocity depends on the point:
+    The velocity depends on the point only in the jet of a fan:
 
     - Upwind of the outlet of the fan, there is no wind.
     - On the axis of the jet, the speed is constant along ``_CORE`` diameters of the
-      outlet. Farther downwind, the speed falls with the distance.
+      outlet. Farther downwind, it falls with the distance.
     - Across the jet, the speed is a Gaussian function of the distance from the axis.
 
     Args:
@@ -130,15 +129,9 @@ def _publish(state: Any, outputs: Any, numbers: WindNumbers) -> None:
 def initial_wind(own: WindParameters, seed: int) -> NDArray[np.float64]:
     """Computes the value of the port ``wind`` at the start of a run.
 
-    The wind is the sum of a mean velocity and an unsteady velocity. The initial
-    unsteady velocity is drawn from its stationary distribution.
-
-    Args:
-        own: Parameters of the wind.
-        seed: Seed of the unsteady velocity.
-
-    Returns:
-        (WIND_SIZE,) value of the port.
+    The wind is the sum of a mean velocity and an unsteady velocity. The function draws
+    the unsteady velocity from its stationary distribution, with the seed ``seed``. The
+    result has the shape (WIND_SIZE,).
     """
     wind = np.zeros(WIND_SIZE)
     direction = math.radians(own.direction_deg)
@@ -160,17 +153,17 @@ class WindField(Block):
     """Models the wind over the whole floor.
 
     The wind is the sum of a mean velocity and an unsteady velocity. Each component of
-    the unsteady velocity is an Ornstein-Uhlenbeck process, with an exact
-    discretization. Obstacles and robots do not affect the wind. The function
-    ``wind_velocity`` computes the wind at a point.
+    the unsteady velocity is an Ornstein-Uhlenbeck process with an exact discretization.
+    Obstacles and robots do not affect the wind. The function ``wind_velocity`` computes
+    the wind at a point.
 
     The discrete state has the same values as the output. It changes every 0.1 s.
 
     Args:
         parameters: Kind, mean and unsteadiness of the wind.
         seed: Seed of the unsteady velocity.
-        tick_s: Control period of the robots, s. The period of the wind, 0.1 s, is a
-            multiple of the control period.
+        tick_s: Control period of the robots, s. It must divide 0.1 s, the period of the
+            wind.
 
     Reference: Song 2011, 4.1, for the speeds. The rest is ours.
     """

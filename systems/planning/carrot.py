@@ -21,10 +21,10 @@ def find_carrot(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Finds the point of a route toward which the robot may drive straight.
 
-    The function chooses the farthest point that a straight line reaches at little extra
-    cost. The cost of the straight line is its length times the mean price of the cells
-    under the line. The function compares this cost with the cost of the route to the
-    same point. The straight line may cost 10 % more.
+    A straight line to the point may cost at most 10 % more than the route to the same
+    point. The function chooses the farthest point of the route that satisfies this
+    condition. The cost of a line is its length times the mean price of the cells under
+    it.
 
     Args:
         way: Route from ``find_way``.

@@ -1,7 +1,7 @@
 """Choice of a speed and heading that avoid moving bodies and keep them in view.
 
-The position of a moving body is uncertain. Particles represent the possible positions
-and velocities of each body.
+The position of a moving body is uncertain. Therefore each body is represented by
+particles, which are possible positions and velocities of the body.
 """
 
 from __future__ import annotations
@@ -93,10 +93,10 @@ def _between(
 def _is_held(
     bodies: Sample, pose: Any, motion: Any, time: float, half_size: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether the guard would refuse a motion because of bodies nearby.
+    """Checks whether the guard would refuse a motion because bodies are near.
 
-    The function first moves the bodies on by ``time`` seconds. A body does not count if
-    the robot moves away from the body fast enough.
+    The function first moves the bodies on by ``time`` seconds. A body from which the
+    robot moves away fast enough does not count.
     """
     x, y, theta = pose
     speed, omega = motion
@@ -126,10 +126,9 @@ def risk_of(
 ) -> float:  # pragma: no cover  (compiled)
     """Predicts how many bodies come near the robot at a given speed and heading.
 
-    In the prediction, the robot turns to the heading and keeps the speed for 4 s. If
-    the guard would refuse this motion at some time, the function makes a second
-    prediction. The second prediction is for the motion that the guard permits. The
-    function then returns the larger of both risks.
+    The function assumes that the robot turns to the heading and keeps the speed for 4
+    s. If the guard would refuse this motion at some time, the function also predicts
+    the motion that the guard permits. It then returns the larger of both risks.
 
     Args:
         bodies: Particles from ``pick_hazards``.
@@ -140,7 +139,7 @@ def risk_of(
 
     Returns:
         Expected number of bodies near the robot. A body within 15 cm of the robot's
-        sides counts fully. From 15 to 43 cm, the body counts less and less.
+        sides counts fully. From there to 43 cm, the count falls linearly to zero.
     """
     let, held = _risk_along(bodies, pose, speed, heading, half_size, np.inf)
     if held:
@@ -162,17 +161,15 @@ def _risk_along(
 ) -> tuple[float, bool]:  # pragma: no cover  (compiled)
     """Predicts the risk of a motion, and whether the guard would hold the robot.
 
-    If ``held_rad_s`` is infinite, the robot moves as if it had no guard. Otherwise, the
-    robot stands wherever the guard would hold it, and turns at most at the rate
+    If ``held_rad_s`` is infinite, the robot moves as if it had no guard. Otherwise,
+    where the guard would hold the robot, the robot only turns, at most at the yaw rate
     ``held_rad_s``.
 
-    In each step, the function moves the robot and compares its rectangle with all
-    particles. A particle is one possible position of a body. Each particle counts with
-    its nearest approach. A later approach counts less.
+    Each particle (possible position of a body) counts with its nearest approach to the
+    robot's rectangle. A later approach counts less.
 
     Returns:
-        Expected number of bodies near the robot, and whether the guard would hold the
-        robot.
+        Expected number of bodies near the robot, and whether the guard would hold it.
     """
     steps, total, held = math.ceil(_AHEAD_S / _STEP_S), 0.0, False
     x, y, theta = pose[0], pose[1], pose[2]
@@ -213,14 +210,11 @@ def _least_distance(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Computes the least distance of two moving points in the next 4 s.
 
-    Args:
-        dx: Present relative position, x, m.
-        dy: Present relative position, y, m.
-        ux: Relative velocity, x, m/s.
-        uy: Relative velocity, y, m/s.
+    (dx, dy) is the present relative position, m. (ux, uy) is the relative velocity,
+    m/s.
 
     Returns:
-        Least distance, m, and time until this distance is reached, s.
+        Least distance, m, and the time until then, s.
     """
     square, time = ux * ux + uy * uy, 0.0
     if square > 1e-6:
@@ -234,11 +228,10 @@ def find_threats(
 ) -> Threats:  # pragma: no cover  (compiled)
     """Computes how much the robot has to watch each particle, and in which direction.
 
-    A particle is one possible position and velocity of a moving body. A particle is a
-    threat if it will come near the robot. The function predicts two distances to the
-    particle: for a robot that drives as wanted, and for a robot at rest. The smaller
-    distance counts. The robot has to watch a threat more if no sensor has seen the
-    threat for a while, or if the velocity of the threat is uncertain.
+    A particle is one possible position and velocity of a moving body. It is a threat if
+    it will come near the robot, either while the robot drives as wanted or while it
+    stands still. The robot has to watch a threat more if its body was not seen for a
+    while, or if the body's velocity is uncertain.
 
     Args:
         bodies: Particles from ``pick_hazards``.
@@ -246,7 +239,8 @@ def find_threats(
         wanted: Wanted speed, m/s, and wanted heading, rad.
 
     Returns:
-        Direction and weight of each particle.
+        Direction of each particle, and number of bodies that the robot has to watch
+        there.
     """
     speed, heading = max(wanted[0], 0.0), wanted[1]
     vx, vy = speed * math.cos(heading), speed * math.sin(heading)
@@ -271,13 +265,16 @@ def find_threats(
 def watch_of(threats: Threats, heading: float) -> float:  # pragma: no cover  (compiled)
     """Computes how much of the threats is out of view at a heading.
 
+    For each threat, the function multiplies the number of bodies to be watched there by
+    the angle between the threat and the field of view, rad. The angle counts up to 1
+    rad. The result is the sum over all threats.
+
     Args:
         threats: Threats from ``find_threats``.
         heading: Heading of the robot, rad.
 
     Returns:
-        Sum over all threats of the number of bodies times the angle out of view, rad.
-        Each angle counts at most 1 rad.
+        The sum, rad.
     """
     total = 0.0
     for n in range(len(threats.watched)):
@@ -298,16 +295,16 @@ def choose_motion(
 
     The price of a motion is the sum of four terms:
 
-    - the difference between its velocity and the wanted velocity.
-    - the angle between its heading and the weaving heading, times a small price.
-    - the threats that are out of view at this heading, times a price.
-    - the bodies that come near within 4 s, times a price.
+    - the difference between its velocity and the wanted velocity
+    - a small price for the angle between its heading and the weaving heading
+    - a price for the threats that are out of view at its heading
+    - a price for the bodies that come near within 4 s
 
     The weaving heading oscillates around the heading of the route. The function tries
-    all pairs of a heading and a speed. There are nine headings: five around the heading
-    of the route, the present heading, the weaving heading, and two toward the threats.
-    The last term takes long to compute. If the other terms already exceed the lowest
-    price so far, the function skips the last term.
+    several speeds at nine headings: five around the heading of the route, the present
+    heading, the weaving heading, and two toward the threats. The fourth term takes long
+    to compute. The function skips it if the other terms already exceed the lowest price
+    so far.
 
     Args:
         bodies: Particles from ``pick_hazards``.
@@ -317,9 +314,8 @@ def choose_motion(
         half_size: Half of the body's length and half of its width, m.
 
     Returns:
-        Three numbers: speed, m/s; heading, rad; and number of bodies that the robot has
-        to watch. If the last number is 0, the robot has no reason to deviate from the
-        wanted motion.
+        Speed, m/s; heading, rad; and number of bodies that the robot has to watch. If
+        this number is 0, the robot has no reason to deviate from the wanted motion.
     """
     threats = find_threats(bodies, pose, (wanted[0], wanted[1]))
     watched, cosine, sine = 0.0, 0.0, 0.0

@@ -38,7 +38,7 @@ def wanted_speed(left: float, along: float) -> float:
         along: Speed of the target in the direction of travel, m/s.
 
     Returns:
-        Wanted speed, m/s. A negative speed means that the robot backs off.
+        Wanted speed, m/s. At a negative speed, the robot backs off.
     """
     wanted = APPROACH_GAIN * left + SOURCE_SHARE * along
     return min(max(wanted, -BACK_SPEED_M_S), CRUISE_SPEED_M_S)
@@ -49,7 +49,7 @@ def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
     """Computes the speed and direction of a straight approach to the target.
 
     Args:
-        inputs: Values of the input ports. The function reads four values: position of
+        inputs: Values of the input ports. The function reads four of them: position of
             the target, m; velocity of the target, m/s; whether there is a target; and
             pose of the robot, m and rad.
         follow: Constants for following a target.

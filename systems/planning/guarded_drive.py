@@ -2,11 +2,11 @@
 
 The robot is in one of five modes:
 
-- waiting, if there is no target.
-- driving along the route that ``systems.planning.way`` finds.
-- looking around, before the first motion or at a place that blocks the robot.
-- backing off, after the robot has stayed in one place for too long.
-- giving up for a time, if all routes lead through occupied cells.
+- waiting, if there is no target
+- driving along the route that ``systems.planning.way`` finds
+- looking around, before the first motion or at a cell that blocks the robot
+- backing off, after the robot has stayed in one place for too long
+- giving up, after all routes have led through occupied cells for too long
 
 In every mode, ``systems.planning.evasion`` may replace the motion to avoid moving
 bodies.
@@ -124,10 +124,7 @@ _HELD_S = 0.4
 
 
 class DriveMemory(NamedTuple):
-    """Memory of the guarded law.
-
-    Every array has the shape (1,) unless its description states another shape.
-    """
+    """Memory of the guarded law. Arrays have the shape (1,) unless stated otherwise."""
 
     speed: NDArray[np.float64]
     """Wanted forward speed, m/s."""
@@ -190,12 +187,9 @@ class DriveNumbers(NamedTuple):
 def make_drive_state(cells: int, sensors: int) -> DriveState:
     """Makes the state before the first control period.
 
-    Args:
-        cells: Number of cells along a side of the map.
-        sensors: Number of range sensors.
-
-    Returns:
-        State without a plan. The memory contains no earlier position of the robot.
+    The state has no plan, and its memory contains no earlier position of the robot.
+    ``cells`` is the number of cells along a side of the map. ``sensors`` is the number
+    of range sensors.
     """
     pairs = "carrot", "stays_at", "headings", "block"
     memory = DriveMemory(
@@ -211,15 +205,13 @@ def drive_guarded(
 ) -> None:
     """Decides which speed and yaw rate the robot wants in one control period.
 
-    The function writes the results to ``speed`` and ``turn`` of the memory. The
-    function works in these steps:
+    The function writes the results to the fields ``speed`` and ``turn`` of
+    ``DriveMemory``. It works in these steps:
 
     1. Update the tracks of moving bodies with the new echoes.
-    2. Plan a route at regular intervals. Compute the wanted speed and the heading
-       error.
+    2. Plan a route every 0.5 s. Compute the wanted speed and the heading error.
     3. Update three timers: how long the robot has stayed in one place, how long the
-       guard has blocked the robot, and how long all routes have led through occupied
-       cells.
+       guard has blocked it, and how long all routes have led through occupied cells.
     4. If a timer has expired, change the mode. Compute the motion of the mode.
     5. If moving bodies are near, replace the motion (``_evade``).
 
@@ -308,9 +300,9 @@ def _remember_held(
 def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untyped-def]
     """Replaces the wanted speed and yaw rate if a moving body may come near.
 
-    The function first computes the weaving heading from the present yaw rate.
-    ``choose_motion`` compares other headings with the weaving heading. If the robot has
-    to evade, a look at a blocked place ends. The first look around continues.
+    If the robot evades during a look at a blocking cell, the look ends. A look before
+    the first motion continues. The function computes the weaving heading for
+    ``choose_motion`` from the wanted yaw rate.
     """
     m = state.memory
     bodies = pick_hazards(state.hazards, time, pose, _NEAR_M)
@@ -345,18 +337,17 @@ def _find_heading(  # type: ignore[no-untyped-def]
 
     The function works in four steps:
 
-    1. Every ``_REPLAN_S`` the function plans a new route. Echoes near the target and
-       near tracked bodies do not block the route.
-    2. The function chooses the carrot with ``find_carrot``. The carrot is the farthest
-       point of the route that a straight line reaches at little extra cost. The heading
-       error is the angle from the robot's heading to the carrot.
-    3. The function computes the remaining distance, which is normally the length of the
-       route. If the route is almost straight and avoids nothing, the remaining distance
-       is the direct distance. In this case, a robot close to the target drives toward
-       the target itself.
-    4. The wanted speed follows from two numbers (``wanted_speed``). The first is the
-       remaining distance minus the follow distance. The second is the speed at which
-       the target moves away.
+    1. Every ``_REPLAN_S``, plan a new route. Echoes near the target and near tracked
+       bodies do not block the route.
+    2. Choose the carrot: the farthest point of the route that a straight line reaches
+       at little extra cost. The heading error is the angle from the robot's heading to
+       the carrot.
+    3. Compute the remaining distance, which is normally the length of the route. If the
+       route is almost straight and crosses no cells that may be occupied, the straight
+       distance counts instead, and a robot close to the target drives directly toward
+       it.
+    4. Compute the wanted speed from the remaining distance, the follow distance, and
+       the speed at which the target moves away.
 
     Returns:
         Wanted speed, m/s; heading error, rad; and whether the robot has arrived.
@@ -398,15 +389,14 @@ def _find_heading(  # type: ignore[no-untyped-def]
 def _begin_look(time, pose, ahead, m, space, numbers):  # type: ignore[no-untyped-def]
     """Begins a look before the robot first moves, or when the guard blocks the robot.
 
-    A look turns the sensors to both sides of a direction, by the same angle. The nearer
-    side comes first. For the first look, the direction is that of the route
+    During a look, the robot turns to both sides of a direction, first to the side
+    nearer to its heading. The direction of the first look is that of the route
     (``ahead``).
 
     A later look begins after the guard has blocked the robot for ``_PATIENCE_S``. The
-    guard does not report which cell blocks the robot. The function assumes that the
-    blocking cell is the non-free cell nearest to a point just ahead of the axle
-    (``_blocking``). The direction of the look is the direction from the control point P
-    to this cell.
+    guard does not report which cell blocks the robot. Therefore the function assumes
+    that it is the cell from ``_blocking``, and the look is in the direction of this
+    cell.
     """
     x, y, half = pose[0], pose[1], _FIRST_LOOK_RAD
     if m.has_looked[0] > 0.5:
@@ -426,12 +416,10 @@ def _begin_look(time, pose, ahead, m, space, numbers):  # type: ignore[no-untype
 
 @register_jitable
 def _look(time, pose, report, state):  # type: ignore[no-untyped-def]
-    """Turns the robot to both sides of the blocking cell until there is room.
+    """Turns the robot to both sides of the blocking cell until the guard reports room.
 
-    If the guard reports room, the look ends at once. If the robot has turned to both
-    sides and there is no room, the robot marks the cell as blocked for ``_MARK_S``.
-    Then the robot plans a new route and drives. The first look around always turns to
-    both sides and marks no cell.
+    If there is still no room after both sides, routes avoid the cell for ``_MARK_S``.
+    The first look always turns to both sides and marks no cell.
     """
     m = state.memory
     first = m.has_looked[0] < 0.5
@@ -455,8 +443,7 @@ def _blocking(
     """Finds the non-free cell that is nearest to a point 0.1 m ahead of the axle.
 
     Returns:
-        Middle (x, y) of the cell, m. If all cells are free, the function returns the
-        point ahead of the axle.
+        Middle (x, y) of the cell, m, or the point itself if no such cell is near.
     """
     corners = np.empty((_MOST_CELLS, 2))
     count = edge_cells(space, x, y, radius + 0.3, space.rolled_m[0], corners)
@@ -474,16 +461,13 @@ def _blocking(
 def _drive(  # type: ignore[no-untyped-def]
     time, velocity, wanted, error, there, state, numbers
 ):
-    """Drives toward the carrot, the point of the route that the robot heads for.
+    """Drives toward the carrot, which is a point of the route (``_find_heading``).
 
     The heading weaves around the direction of the carrot, so that the range sensors
-    sweep the floor beside the route. The robot weaves more widely in two cases:
-
-    - The target moves, and the route is not narrow.
-    - A moving body was detected within the last ``_MOVES_S``.
-
-    In both cases, a robot that lags behind the target weaves less. If the heading error
-    is large, the robot only turns.
+    sweep the floor beside the route. The robot weaves more widely after the detection
+    of a moving body, and also while the target moves and the route is not narrow. This
+    wider weaving is reduced if the robot lags far behind the target. If the heading
+    error is large, the robot turns without driving.
     """
     m = state.memory
     if there:

@@ -1,6 +1,7 @@
 """Search for the permitted velocity that is nearest to a wanted velocity.
 
-Half planes and a top speed limit the permitted velocities.
+A velocity is permitted if it lies in all given half planes and does not exceed the top
+speed.
 """
 
 from __future__ import annotations
@@ -45,15 +46,13 @@ def _offset(
 def _nearest(
     planes: Any, wanted: Any, top: float, slack: float, hard: int
 ) -> tuple[float, float, bool]:  # pragma: no cover  (compiled)
-    """Finds the permitted velocity that is nearest to the wanted velocity.
+    """Finds the permitted velocity nearest to the wanted velocity for a given slack.
 
-    The slack is given. The solution of such a small problem is one of three candidates:
-    the wanted velocity, its projection on a border, or the intersection of two borders.
-    The function tries all candidates. Among the candidates that obey all constraints,
-    the function keeps the nearest candidate.
-
-    In the loops, index -1 means no border. The indices 0 to ``count - 1`` are the half
-    planes. The index ``count`` is the circle of the top speed.
+    The slack is the distance by which all soft half planes move outward, m/s. The
+    solution is the wanted velocity, its projection on a border, or the intersection of
+    two borders. The function tries all these candidates. In its loops, the indices 0 to
+    ``count - 1`` stand for the borders of the half planes, ``count`` stands for the
+    circle of the top speed, and -1 stands for no border.
 
     Returns:
         Velocity x, m/s; velocity y, m/s; and whether there is a permitted velocity.
@@ -113,22 +112,23 @@ def _nearest(
 def nearest_velocity(
     planes: Any, wanted: Any, top: float, hard: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Finds the velocity in all half planes that is nearest to a wanted velocity.
+    """Finds the permitted velocity that is nearest to a wanted velocity.
 
-    If no velocity lies in all half planes, the function moves all soft half planes back
-    by the same distance. Bisection finds the least distance that permits a velocity.
+    A velocity is permitted if it lies in all half planes and does not exceed ``top``.
+    If no velocity is permitted, the function moves all soft half planes outward by the
+    same distance, called the slack. Bisection finds the least slack that permits a
+    velocity. The hard half planes never move.
 
     Args:
         planes: (k, 3) half planes n . v >= offset: x and y of the unit normal n, and
             offset, m/s.
         wanted: Wanted velocity (x, y), m/s.
         top: Largest speed, m/s.
-        hard: Number of hard half planes. They are the last rows of ``planes``. The
-            function never moves hard half planes. The velocity zero obeys them.
+        hard: Number of hard half planes, which are the last rows of ``planes``. They
+            must contain the velocity zero.
 
     Returns:
-        Three numbers: velocity x, m/s; velocity y, m/s; and the distance by which the
-        function moved the soft half planes, m/s.
+        Velocity x, m/s; velocity y, m/s; and slack, m/s.
     """
     x, y, obeys = _nearest(planes, wanted, top, 0.0, hard)
     if obeys:

@@ -1,10 +1,9 @@
 """Tracks of moving bodies: one particle filter per body, based on range readings.
 
-A range sensor measures the distance of a body, but not the direction of the body within
-the aperture. Several readings together exclude most positions and velocities that were
-possible at first. Readings from different positions and at the edges of apertures
-exclude the most. Each track of a body therefore has 200 particles. Each particle is one
-possible position and velocity of the body.
+A range sensor measures the distance of a body, but not its direction within the
+aperture. Only several readings together exclude most of the possible positions and
+velocities. Therefore each track of a body has 200 particles. A particle is one possible
+position and velocity of the body.
 """
 
 from __future__ import annotations
@@ -91,7 +90,7 @@ class Particles(NamedTuple):
     """Possible positions and velocities of moving bodies.
 
     In ``Hazards``, each array has the shape (tracks, particles). A function that works
-    on one track gets the rows of this track, with the shape (particles,).
+    on one track gets one row of each array, with the shape (particles,).
     """
 
     x: NDArray[np.float64]
@@ -144,11 +143,7 @@ class Sample(NamedTuple):
 def make_hazards(sensors: int) -> Hazards:
     """Makes a memory of moving bodies without any tracks.
 
-    Args:
-        sensors: Number of range sensors.
-
-    Returns:
-        Empty memory.
+    ``sensors`` is the number of range sensors.
     """
     grid = _TRACKS, _PARTICLES
     return Hazards(
@@ -173,19 +168,20 @@ def track_hazards(
 ) -> None:  # pragma: no cover  (compiled)
     """Predicts the tracks of moving bodies by one control period and updates them.
 
-    Each track has particles, which are possible positions and velocities of a body.
-    Each new reading of a sensor passes through these steps:
+    A track is a particle filter: its particles are possible positions and velocities of
+    one body. Each new reading of a sensor passes through these steps:
 
-    1. If the echo is near the target, the function attributes the echo to the target.
-    2. Any other echo belongs to the track that explains the echo best.
-    3. The function updates the weights of the particles of all tracks with the reading
-       (``_weigh``). The track to which the echo belongs becomes more probable.
-    4. An echo that no track explains begins a new track if two conditions hold. The
-       whole arc of the echo was seen free before, so no obstacle at rest can be there.
-       The previous echo of the sensor fits the new echo, so the range rate is known.
+    1. An echo near the target belongs to the target.
+    2. Any other echo belongs to the track that explains it best.
+    3. The reading changes the weights of the particles of all tracks (``_weigh``). The
+       track to which the echo belongs becomes more probable.
+    4. An echo that no track explains begins a new track on two conditions. First, the
+       whole arc of the echo was seen free before, so that no obstacle at rest can be
+       there. Second, the previous echo of the sensor fits the new echo, so that the
+       range rate is known.
 
     Finally, the function ends improbable tracks. If only few particles of a track have
-    weight, the function draws the particles of this track again.
+    weight, it draws the particles of this track again.
 
     Args:
         hazards: Tracks of moving bodies. The function changes the tracks in place.
@@ -194,8 +190,7 @@ def track_hazards(
         readings: Three values per sensor: range, m; echo, 0 or 1; and age of the
             reading, s.
         space: Cells that were seen free.
-        target: Position (x, y) and radius of the followed target, m. Echoes near the
-            target belong to the target.
+        target: Position (x, y) and radius of the followed target, m.
         sensors: Properties of the sensors.
     """
     ages, tick_s = readings[2], sensors.tick_s
@@ -314,29 +309,29 @@ def _share_at(
 def _weigh(
     hazards: Hazards, t: int, k: int, best: int, sensors: HazardSensors
 ) -> None:  # pragma: no cover  (compiled)
-    """Updates the weights of the particles of a track with the newest look of a sensor.
+    """Updates the weights of the particles of track ``t`` with a new reading.
 
-    A look is one reading of sensor ``k``. ``best`` is the number of the track to which
-    the echo belongs, or -1. If ``best`` is the number ``t`` of this track, the track
-    has echoed.
+    The reading is from sensor ``k``. ``best`` is the number of the track to which the
+    echo belongs, or -1. If ``best`` is ``t``, the track has echoed.
 
-    By Bayes' rule, the function multiplies each weight by the likelihood of the look.
-    The likelihood assumes that the body is at the position of the particle. The
-    likelihood depends on ``gap``, the measured distance minus the distance of the
-    particle. If there is no echo, ``gap`` is infinite for particles within the greatest
-    range, and 0 for the others. There are four cases:
+    By Bayes' rule, the function multiplies each weight by the likelihood of the
+    reading, assuming that the body is at the particle. The likelihood depends on the
+    gap: the measured distance minus the distance of the particle. Without an echo, the
+    gap is infinite for particles within the greatest range, and 0 for the others. There
+    are four cases:
 
-    - The particle is outside the aperture. If its track has echoed, the particle loses
+    - The particle is outside the aperture. If the track has echoed, the particle loses
       weight.
     - The gap is large: the sensor has seen past the particle. The particle loses most
       of its weight, unless it is near the edge of the aperture.
-    - The particle fits the echo of its track. The factor of its weight depends on the
-      gap. The particle moves to the measured range.
-    - The particle is behind the echo of its track. The particle loses weight.
+    - The track has echoed, and the gap is small. The particle's weight changes by a
+      Gaussian factor of the gap. The particle moves to the measured range.
+    - The track has echoed, and the particle is behind the echo. The particle loses
+      weight.
 
-    Other particles keep their weight, because a nearer object may hide them. The sum of
-    the new weights is the likelihood of the look if the body exists anywhere in its
-    track. If the track has not echoed, this sum lowers the probability of the track.
+    All other particles keep their weight, because a nearer object may hide them. The
+    sum of the new weights is the likelihood of the reading if the body exists. If the
+    track has not echoed, this sum lowers the probability that the body exists.
     """
     p, fit_m = _particles_of(hazards, t), math.hypot(_FIT_M, sensors.noise_m[k])
     look, half = look_of(hazards.looks, 0, k), sensors.directions[k, 1]
@@ -377,9 +372,10 @@ def _weigh(
 def _pull(
     p: Particles, n: int, look: Look, distance: float, gap: float, tick_s: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves particle ``n`` to the measured range.
+    """Moves particle ``n`` to the measured range, which is ``gap`` farther away.
 
-    A part of the range error also corrects the velocity of the particle.
+    The gap per control period, times a small factor, also changes the velocity of the
+    particle.
     """
     ux = (p.x[n] - look.x) / max(distance, 1e-6)
     uy = (p.y[n] - look.y) / max(distance, 1e-6)
@@ -400,18 +396,16 @@ def _begin(
 ) -> None:  # pragma: no cover  (compiled)
     """Begins a track of a moving body with the newest echo of sensor ``k``.
 
-    The new track replaces the least probable track. The function draws each particle of
-    the track in these steps:
+    The new track replaces the least probable track. The function draws each particle in
+    these steps:
 
     1. The direction is anywhere within the aperture, and the distance is the range.
     2. The radial speed is the range rate plus the sensor's own speed in this direction,
        with a random error.
-    3. The tangential speed is unknown. The function draws the tangential speed
-       uniformly from the values for which the total speed does not exceed
-       ``TOP_SPEED_M_S``.
-    4. A body that begins to echo was out of view shortly before. The function therefore
-       checks the oldest look of each sensor (``_was_visible``). If a sensor would have
-       seen the body in this look, the function draws the particle again, up to 12
+    3. The tangential speed is unknown. It is uniformly distributed over all values with
+       which the total speed does not exceed ``TOP_SPEED_M_S``.
+    4. A body that begins to echo was out of view shortly before. If a sensor would have
+       seen the particle earlier (``_was_visible``), draw the particle again, up to 12
        times.
     """
     random, top = hazards.random, TOP_SPEED_M_S
@@ -450,16 +444,12 @@ def _was_visible(
     oldest_s: float,
     sensors: HazardSensors,
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether the oldest looks of the sensors contradict particle ``n``.
+    """Checks whether a sensor would have seen a body at particle ``n`` earlier.
 
-    A look is one reading of a sensor. The function moves the particle back to the time
-    of each look. A look contradicts the particle if two conditions hold:
-
-    - The particle was inside the aperture, at least 3 cm from the edge.
-    - The particle was at least 3 cm nearer than the reading.
-
-    The sensor would have seen such a body, but did not. Looks older than ``oldest_s``
-    do not count.
+    For each sensor, the function moves the particle back to the time of the oldest
+    stored reading. The sensor would have seen the particle if it was at least 3 cm
+    inside the aperture, and at least 3 cm nearer than the reading. Readings older than
+    ``oldest_s`` do not count.
     """
     for k in range(len(sensors.directions)):
         look, half = look_of(hazards.looks, 2, k), sensors.directions[k, 1]
@@ -478,10 +468,10 @@ def _was_visible(
 def _draw_anew(p: Particles, random: Any) -> None:  # pragma: no cover  (compiled)
     """Draws the particles of a track again in proportion to their weights.
 
-    The function draws only if the effective number of particles is at most half of
-    their number. The effective number is one divided by the sum of the squared weights.
-    The draw is systematic: the function takes particles at equal steps of the
-    cumulative weight. Small noise then separates copies of the same particle.
+    The function does so only if the effective number of particles, 1/(sum of the
+    squared weights), is at most half of their number. The draw is systematic: it takes
+    particles at equal steps of the cumulative weight. Small noise separates copies of
+    one particle.
     """
     count, squares = len(p.x), 0.0
     for n in range(count):
@@ -534,9 +524,9 @@ def find_movers(
     Args:
         hazards: Tracks of moving bodies.
         time: Current time, s.
-        places: (n, 3) array that the function fills. Each row has the mean position (x,
-            y) of a track, m, and the radius within which echoes may come from the body,
-            m.
+        places: (n, 3) array that the function fills, one row per body: mean position
+            (x, y) of the track, m, and the radius within which echoes may come from the
+            body, m.
 
     Returns:
         Number of listed bodies.
@@ -561,16 +551,16 @@ def pick_hazards(
     """Picks a sample of the particles of all tracks near the robot.
 
     The function takes 25 particles of each track, at equal steps of the cumulative
-    weight. Each picked particle gets an equal part of the probability of the track.
+    weight. The probability of the track is divided equally among them.
 
     Args:
         hazards: Tracks of moving bodies.
         time: Current time, s.
         pose: Pose (x, y, theta) of the robot, m and rad.
-        within_m: Distance from the robot, m. Tracks beyond this distance do not count.
+        within_m: Largest distance of a track from the robot, m.
 
     Returns:
-        Picked particles. If no track is near, the arrays are empty.
+        Picked particles; empty arrays if no track is near.
     """
     picked, count = np.empty((7, len(hazards.exists) * _PICKED)), 0
     for t in range(len(hazards.exists)):

@@ -40,7 +40,7 @@ class HazardSensors(NamedTuple):
 
 
 class Look(NamedTuple):
-    """One reading of one sensor, with the position and direction of the sensor.
+    """One reading of one range sensor, with the position and direction of the sensor.
 
     The fields of a single look are numbers. In the memory of all sensors, the fields
     are arrays of the shape (3, sensors), most recent look first.
@@ -60,14 +60,7 @@ class Look(NamedTuple):
 
 
 def make_looks(sensors: int) -> Look:
-    """Makes an empty memory for the readings of all sensors.
-
-    Args:
-        sensors: Number of range sensors.
-
-    Returns:
-        Memory without any readings.
-    """
+    """Makes an empty memory for the readings of ``sensors`` range sensors."""
     looks = Look(*(np.zeros((_LOOKS, sensors)) for _ in Look._fields))
     looks.time_s[:] = -np.inf
     return looks
@@ -75,16 +68,9 @@ def make_looks(sensors: int) -> Look:
 
 @njit(cache=True)
 def look_of(looks: Look, age: int, k: int) -> Look:  # pragma: no cover  (compiled)
-    """Reads one look from the memory.
+    """Reads one look of sensor ``k`` from the memory; its fields are numbers.
 
-    Args:
-        looks: Looks of all sensors.
-        age: Index of the look: 0 is the newest look, 1 the look before, and 2 the
-            oldest look.
-        k: Index of the sensor.
-
-    Returns:
-        Look whose fields are numbers.
+    ``age`` is the index of the look: 0 is the newest look, 2 the oldest.
     """
     at = age, k
     return Look(
@@ -140,15 +126,10 @@ def seen_from(
 def is_target(
     look: Look, half: float, target: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether an echo may come from the followed target.
+    """Checks whether the echo of a look may come from the followed target.
 
-    Args:
-        look: Look with the echo.
-        half: Half of the sensor's aperture, rad.
-        target: Position (x, y) and radius of the target, m.
-
-    Returns:
-        True if the echo may come from the target.
+    ``half`` is half of the sensor's aperture, rad. ``target`` is the position (x, y)
+    and radius of the target, m.
     """
     distance, off = seen_from(look, target[0], target[1])
     beside = off - half < target[2] / max(distance, target[2])
@@ -161,15 +142,8 @@ def goes_on(
 ) -> bool:  # pragma: no cover  (compiled)
     """Checks whether an echo fits the previous look of the same sensor.
 
-    If the echo fits, the rate of the range is known.
-
-    Args:
-        look: Newest look of a sensor.
-        then: Previous look of the sensor.
-        tick_s: Control period, s.
-
-    Returns:
-        True if the echo fits.
+    The range rate is known only if the echo fits. ``look`` is the newest look, and
+    ``then`` is the previous look.
     """
     since = look.time_s - then.time_s
     if then.heard < 0.5 or since > _OLDEST_TICKS * tick_s:
@@ -183,16 +157,16 @@ def came_from_free(
 ) -> bool:  # pragma: no cover  (compiled)
     """Checks whether the whole arc of an echo was seen free before.
 
-    The arc contains all points from which the echo may come. The function checks points
-    along the arc, over the width of the aperture. The nearest points are at the range
-    minus the largest range error. The farthest points are at the range plus this error
-    and a part of a cell. The cells of all points must still count as free.
+    The arc contains all points from which the echo may come. It is as wide as the
+    aperture. It extends from the range minus the largest range error to the range plus
+    this error and a part of a cell. The cells of all these points must still count as
+    free.
 
     Args:
         space: Cells that were seen free.
         look: Look with the echo.
         half: Half of the sensor's aperture, rad.
-        margin_m: Largest error of a range, m.
+        margin_m: Largest range error, m.
 
     Returns:
         True if the whole arc was seen free.

@@ -1,7 +1,7 @@
 """List of the occupied cells of the map, for the baseline laws.
 
-A cell is occupied if echoes came from there and no sensor has seen the cell free since.
-This map is an occupancy grid that does not distinguish unknown cells from free cells.
+A cell is occupied if an echo came from it and no sensor has seen it free since. All
+other cells count as free, also those that no sensor has seen.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ _LEAST_HITS, _MOST_HITS = 1.0, 6.0
 def list_occupied(
     space: FreeSpace, x: float, y: float, reach: float, clear: Any
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Lists the occupied cells around a given position.
+    """Lists the occupied cells in a square around a position.
 
     Args:
-        space: Map with the hits of the cells.
+        space: Map with the hits (weighted echoes) of the cells.
         x: Position, x in the world frame W, m.
         y: Position, y in W, m.
-        reach: Half of the side of the square in which cells are listed, m.
-        clear: Position (x, y) and radius of the followed target, m. Cells within this
-            radius are not listed.
+        reach: Half of the side of the square, m.
+        clear: Position (x, y) and radius of the followed target, m. The list omits
+            cells within this radius.
 
     Returns:
         (n, 3) array with one row per cell: x and y of the middle, m, and the certainty

@@ -41,9 +41,10 @@ def safety_filter_step(
 ) -> None:
     """Computes the wheel speeds, the velocity of P, the slack, and the action.
 
-    P is the control point of the robot. The slack is the amount by which constraints
-    are violated, m/s. The action is 1 if the filter has changed the velocity, otherwise
-    0. These values are for the next control period. They are the state of the block.
+    P is the control point of the robot. The slack is the speed by which the velocity
+    violates constraints, m/s. The action is 1 if the filter has changed the velocity,
+    otherwise 0. The results are the state of the block, and apply to the next control
+    period.
     """
     acceleration, pose, objects = inputs
     robot, theta = numbers.robot, pose[2]
@@ -71,32 +72,30 @@ def _publish(state: Any, outputs: Any, numbers: SafetyNumbers) -> None:
 class SafetyFilter(Block):
     """Moves the control point P as a law commands, but keeps P away from objects.
 
+    From all velocities that the wheels can produce and that lead into no object, the
+    filter chooses the velocity nearest to the commanded velocity. If there is no such
+    velocity, the filter violates the constraints of moving objects as little as
+    possible. It never violates the limits on the approach to objects at rest.
+
     The block replaces ``WheelCommand``. The virtual mass moves with the velocity that
-    the filter returns. This prevents windup.
+    the filter returns, which prevents windup.
 
-    The filter considers all velocities that the wheels can produce and that lead into
-    no object. Among these velocities, the filter chooses the velocity nearest to the
-    commanded velocity. If there is no such velocity, the filter violates the
-    constraints of moving objects as little as possible. The limits on the approach to
-    objects at rest always hold.
-
-    The port ``filter_report`` has two numbers. The first is the slack, which is the
-    amount by which constraints are violated, m/s. The second is 1 if the filter has
+    The port ``filter_report`` has two numbers. The first is the slack: the speed by
+    which the velocity violates constraints, m/s. The second is 1 if the filter has
     changed the velocity, and 0 otherwise.
 
     The filter knows the objects that sensors have detected, but it does not know where
-    space is free. The filter therefore guarantees less than ``MotionGuard``.
+    space is free. Therefore it guarantees less than ``MotionGuard``.
 
-    The discrete state has the outputs. The state is updated every control period. The
-    latency is that of ``WheelCommand``.
+    The outputs are the discrete state. The latency is that of ``WheelCommand``.
 
     Args:
         robot: Dimensions and top speed.
         tick_s: Control period, s.
 
     Reference: our own work; half planes of van den Berg and others (2011). Eq. 6 of
-    Engelbrecht, Steyn and Djouani (2021) only stops the robot. The parameter of this
-    equation is ``TrajectoryImpedanceParameters.block_distance_m``.
+    Engelbrecht, Steyn and Djouani (2021) only stops the robot (see
+    ``TrajectoryImpedanceParameters.block_distance_m``).
     """
 
     part = "command"

@@ -21,27 +21,24 @@ def wrapped(angle: float) -> float:
 
 @register_jitable
 def turn_rate(error: float) -> float:
-    """Computes the yaw rate that corrects an error of the heading.
+    """Computes the yaw rate that corrects a heading error.
 
-    Args:
-        error: Wanted heading minus present heading, rad.
-
-    Returns:
-        Yaw rate, rad/s, between -``TURN_RATE_RAD_S`` and ``TURN_RATE_RAD_S``.
+    ``error`` is the wanted heading minus the present heading, rad. The yaw rate, rad/s,
+    is between -``TURN_RATE_RAD_S`` and ``TURN_RATE_RAD_S``.
     """
     return min(max(TURN_GAIN * error, -TURN_RATE_RAD_S), TURN_RATE_RAD_S)
 
 
 @register_jitable
 def slowed_by(error: float, speed: float) -> float:
-    """Reduces a forward speed while the robot turns.
+    """Reduces the forward speed of a robot that has to turn.
 
     Args:
-        error: Error of the heading, rad.
+        error: Wanted heading minus present heading, rad.
         speed: Wanted speed, m/s. A negative speed does not change.
 
     Returns:
-        Speed, m/s. If the robot has to turn before it drives, the speed is 0.
+        Speed, m/s; 0 if the error is so large that the robot first has to turn.
     """
     if speed > 0.0:
         speed *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0
@@ -50,16 +47,15 @@ def slowed_by(error: float, speed: float) -> float:
 
 @register_jitable
 def turn_towards(speed: float, heading: float, theta: float) -> tuple[float, float]:
-    """Computes the motion that turns a robot to a heading while the robot drives.
+    """Computes the speed and yaw rate that turn a moving robot to a heading.
 
     Args:
-        speed: Wanted speed, m/s. The heading error reduces a forward speed. If the
-            error is large, the speed is 0.
+        speed: Wanted speed, m/s.
         heading: Wanted heading in the world frame W, rad.
-        theta: Heading of the robot in W, rad.
+        theta: Present heading in W, rad.
 
     Returns:
-        Forward speed, m/s, and yaw rate, rad/s.
+        Speed, m/s, as from ``slowed_by``, and yaw rate, rad/s.
     """
     error = wrapped(heading - theta)
     return slowed_by(error, speed), turn_rate(error)

@@ -32,14 +32,16 @@ class FilterNumbers(NamedTuple):
     """Distances that the control point P keeps, and limits of the wheels."""
 
     keep_m: float
-    """Distance that the control point P keeps from objects, m. The distance is the sum
-    of three terms: the radius of the body around the axle, the distance epsilon of P
-    ahead of the axle, and the margin."""
+    """Distance that the control point P keeps from objects, m. It is the sum of the
+    radius of the body around the axle, the distance epsilon of P ahead of the axle, and
+    the margin.
+    """
     top_speed: float
     """Top speed of each wheel's rim and of P, m/s."""
     turn_share: float
-    """Ratio L/(2 epsilon). L is the wheel separation, and epsilon is the distance of
-    the control point P ahead of the axle."""
+    """Ratio L/(2 epsilon) of the wheel separation L to twice the distance epsilon of
+    the control point P ahead of the axle.
+    """
 
 
 @njit(cache=True)
@@ -48,22 +50,21 @@ def disc_plane(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Computes the smallest change of a velocity that prevents contact with a disc.
 
-    The velocities that lead to contact form a cone with a round end. Van den Berg and
-    others call this cone the velocity obstacle. The function finds the point on the
-    border of the cone that is nearest to the given velocity. This point is on the round
-    end or on one of the two legs of the cone.
+    The velocities that lead to contact within the horizon form a cone with a round end:
+    the velocity obstacle of van den Berg and others. The function finds the point on
+    the border of the cone that is nearest to the given velocity. This point is on the
+    round end or on one of the two legs of the cone.
 
     Args:
         center: Position (x, y) of the disc relative to the control point P, m.
         radius: Sum of the radius of the disc and the radius of the robot, m.
         velocity: Velocity (x, y) of P relative to the disc, m/s.
         horizon_s: Time after which contacts do not count, s.
-        leave_s: Time within which the velocity has to end an overlap, s.
+        leave_s: Time in which the robot has to end an overlap with the disc, s.
 
     Returns:
-        Three numbers: x and y of the outward unit normal, and the depth of the velocity
-        inside the cone, m/s. If the velocity is outside the cone, the depth is
-        negative.
+        x and y of the outward unit normal, and the depth of the velocity inside the
+        cone, m/s. The depth is negative outside the cone.
     """
     x, y = center[0], center[1]
     far = math.hypot(x, y)
@@ -92,9 +93,12 @@ def wheel_planes(
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Computes the half planes of the velocities that the wheels can produce.
 
-    The limits are |v_xB +- (L/2 epsilon) v_yB| <= top speed. v_xB and v_yB are the
-    velocity of the control point P in the axes of the body. L is the wheel separation.
-    epsilon is the distance of P ahead of the axle.
+    The limits are, for both signs::
+
+        |v_xB +- L/(2 epsilon) v_yB| <= top speed
+
+    v_xB and v_yB are the velocity of the control point P in the axes of the body. L is
+    the wheel separation. epsilon is the distance of P ahead of the axle.
 
     Args:
         theta: Heading of the robot, rad.
@@ -121,23 +125,22 @@ def filtered_velocity(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Changes a wanted velocity of P as little as possible to avoid objects.
 
-    P is the control point of the robot. Each object contributes one half plane of
-    permitted velocities:
+    P is the control point of the robot. Each object adds one half plane of permitted
+    velocities:
 
-    - If the object is at rest or its motion is unknown, the speed of approach is
-      limited. The limit is the constant alpha times the remaining distance.
-    - If the object moves, P must not have a velocity that leads into the object.
-      ``disc_plane`` computes the smallest change of the present velocity that prevents
-      the contact.
-    - If the object is another robot, P makes only half of this change, because the
-      other robot uses the same filter.
+    - Object at rest or with unknown motion: the speed of approach is at most a constant
+      times the remaining distance.
+    - Moving object: the velocity of P must not lead into the object. ``disc_plane``
+      computes the smallest change that prevents the contact.
+    - Other robot: P makes only half of this change, because the other robot uses the
+      same filter.
 
-    The constraints may contradict each other. Then the function relaxes all soft
-    constraints by the same slack. Soft constraints avoid moving objects, or move P away
-    from objects at rest that are too near. The limits of the wheels and the limits on
-    the approach to objects at rest are hard. A robot that stands still satisfies the
-    hard constraints. If all constraints were soft, a fast object would push the robot
-    through walls.
+    If these constraints contradict each other, the function relaxes all soft
+    constraints by the same slack. The constraints of moving objects and robots are
+    soft. The limits of the wheels and of the approach to objects at rest are hard.
+    Therefore a fast object cannot push the robot through walls. A robot that stands
+    still satisfies all hard constraints. For an object at rest that is too near, an
+    additional soft constraint moves P away.
 
     Args:
         wanted: Wanted velocity (x, y), m/s.
@@ -147,7 +150,7 @@ def filtered_velocity(
         numbers: Distances and limits.
 
     Returns:
-        Three numbers: velocity x, m/s; velocity y, m/s; and slack, m/s.
+        Velocity x, m/s; velocity y, m/s; and slack, m/s.
     """
     # Soft planes come first, then hard planes. A robot at rest obeys all hard planes.
     planes, used = np.empty((2 * OBJECT_SLOTS + 4, 3)), 0

@@ -51,8 +51,9 @@ class Way(NamedTuple):
     price: NDArray[np.int32]
     """(m, m) price of each cell, from ``FREE`` to ``OCCUPIED``."""
     cost: NDArray[np.int32]
-    """(m, m) cost of the cheapest route from each cell to the goal. Only the cells that
-    the search has reached have a valid cost."""
+    """(m, m) cost of the cheapest route from each cell to the goal. The cost is valid
+    only for cells that the search has reached.
+    """
     towards: NDArray[np.int32]
     """(m, m) number of the next cell on the route to the goal."""
     queue: NDArray[np.int32]
@@ -72,20 +73,17 @@ class Way(NamedTuple):
     cell_m: NDArray[np.float64]
     """(1,) side of a cell, m."""
     marks: NDArray[np.float64]
-    """(q, 3) positions (x, y) marked as blocked, m, and the time until which each mark
-    counts, s."""
+    """(q, 3) marks of blocked positions: x and y, m, and the time until which the mark
+    counts, s.
+    """
     marked: NDArray[np.int64]
     """(1,) number of marks so far; a new mark replaces the oldest."""
 
 
 def make_way(cells: int) -> Way:
-    """Allocates the arrays of a route.
+    """Allocates the arrays of a route without points.
 
-    Args:
-        cells: Number of cells of the map along a side of the window.
-
-    Returns:
-        Route without points.
+    ``cells`` is the number of cells of the map along a side of the window.
     """
     size = cells // 2
     grid = size, size
@@ -118,14 +116,14 @@ def find_way(
 ) -> None:  # pragma: no cover  (compiled)
     """Finds the cheapest route from the robot to a goal.
 
-    The function works in three stages. It computes the prices of all cells. It searches
-    from the goal to the start. Then it follows the cheapest route from the start to the
-    goal. The function stores the points, the length, and the highest price of the
-    route.
+    The function sets the prices of all cells, and searches from the goal to the start.
+    It then follows the cheapest route, and stores its points, its length, and the
+    highest price of its cells.
 
     Args:
         way: Route and memory of the search. The function changes the arrays in place.
-        space: Map with the cells that were seen free and the hits of the cells.
+        space: Map with the cells that were seen free and the hits (weighted echoes) of
+            the cells.
         start: Position (x, y) of the axle, m.
         goal: Position (x, y) of the goal, m. If the goal is outside the window, the
             route leads to the nearest cell of the window.
@@ -164,12 +162,9 @@ def find_way(
 def mark_blocked(
     way: Way, place: Any, until: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Marks a position as blocked, so that routes avoid it for a given time.
+    """Marks a position as blocked, so that routes avoid it for a time.
 
-    Args:
-        way: Route and marks. The function changes the arrays in place.
-        place: Position (x, y), m.
-        until: Time until which the mark counts, s.
+    ``place`` is the position (x, y), m. The mark counts until the time ``until``, s.
     """
     k = way.marked[0] % len(way.marks)
     way.marks[k, 0], way.marks[k, 1], way.marks[k, 2] = place[0], place[1], until
@@ -182,13 +177,8 @@ def cell_at(
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
     """Returns the cell of a position, or the nearest cell of the window.
 
-    Args:
-        way: Route from ``find_way``.
-        x: Position, x in the world frame W, m.
-        y: Position, y in W, m.
-
-    Returns:
-        Indices of the cell within the window, along x and y.
+    ``x`` and ``y`` are in the world frame W, m. The result is the two indices of the
+    cell in the window, along x and y.
     """
     size, cell = way.price.shape[0], way.cell_m[0]
     i = math.floor(x / cell) - way.low[0]
@@ -202,10 +192,10 @@ def _set_prices(
 ) -> None:  # pragma: no cover  (compiled)
     """Sets the price of each cell from free space, hits, and marks.
 
-    A wide cell of the search has four narrow cells of the map. A wide cell is unknown
-    if one of its narrow cells was never seen free. Narrow cells with enough hits raise
-    the prices around them (``_keep_off``). Hits near the positions in ``clear`` do not
-    count. Marked positions count as occupied until their time has passed.
+    Four narrow cells of the map form one wide cell of the search. A wide cell is
+    unknown if one of its narrow cells was never seen free. Narrow cells with enough
+    hits raise the prices around them (``_keep_off``), except near the positions in
+    ``clear``. Marked positions count as occupied until their time has passed.
     """
     size, cells, cell = way.price.shape[0], space.free_until.shape[0], way.cell_m[0]
     low = way.low
@@ -243,11 +233,10 @@ def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (comp
 def _keep_off(
     way: Way, place: Any, radius: float, highest: int
 ) -> None:  # pragma: no cover  (compiled)
-    """Raises the prices of the cells near a narrow cell, according to their distance.
+    """Raises the prices of the wide cells near a narrow cell.
 
-    The distance is from the middle of a wide cell to the nearest point of the narrow
-    cell. Within the radius of the disc, the price is ``highest``. Farther away, the
-    price is first ``TIGHT`` and then ``NEAR``.
+    Within ``radius`` of the narrow cell, the price is ``highest``. Farther away, it is
+    first ``TIGHT`` and then ``NEAR``.
     """
     size, cell = way.price.shape[0], way.cell_m[0]
     x, y = place[0] / cell - way.low[0], place[1] / cell - way.low[1]
@@ -272,10 +261,10 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
     """Searches with Dijkstra's algorithm from the goal until the start is reached.
 
     All costs are whole numbers. Therefore a ring of buckets replaces the priority queue
-    (Dial's algorithm). Bucket ``cost % _BUCKETS`` is a linked list of all waiting cells
-    with this cost. Every step costs less than the number of buckets. Therefore all
-    cells in one bucket have the same cost. If a cell gets a lower cost, the cell enters
-    the queue again. The search skips the older entry of the cell.
+    (Dial's algorithm). Bucket ``cost % _BUCKETS`` is a linked list of the waiting cells
+    with this cost. Because every step costs less than the number of buckets, all cells
+    in a bucket have the same cost. If the search finds a lower cost for a waiting cell,
+    the cell enters the queue again, and the search later skips the older entry.
     """
     size = way.price.shape[0]
     way.cost[:, :] = _FAR

@@ -52,7 +52,7 @@ def write_frame(
 ) -> None:
     """Writes a radio frame of nine bytes.
 
-    The value is coded as follows:
+    The function codes the value as follows:
 
     - Angles are in deg. They are sent as 0 to 359.9, with one decimal.
     - Flags are 0 or 1.
@@ -62,7 +62,7 @@ def write_frame(
         out: Sequence that receives the bytes as floats.
         first: Index in ``out`` of the first byte of the frame.
         address: Radio address of the sender, 1 to 3.
-        function: Number of the function, see ``FRAME_NAMES``.
+        function: Number of the function (the kind of value), see ``FRAME_NAMES``.
         value: Value to send.
     """
     out[first], out[first + 1] = float(_FIRST_BYTE), float(_SECOND_BYTE)
@@ -89,16 +89,16 @@ def write_frame(
 def read_frame(data: Any, first: int) -> tuple[int, int, float]:
     """Decodes a radio frame of nine bytes.
 
-    The direction of the sound (function 13) is above -180 and up to 180 deg. All other
-    values have the range that ``write_frame`` states.
+    The direction of the sound (function 13) is in (-180, 180] deg. All other values,
+    including other angles, are in the range that ``write_frame`` states.
 
     Args:
         data: Sequence that contains the bytes.
         first: Index in ``data`` of the first byte of the frame.
 
     Returns:
-        Three values, in this order: the radio address of the sender, the number of the
-        function, and the value.
+        Three values: radio address of the sender; number of the function (the kind of
+        value), see ``FRAME_NAMES``; and the value.
     """
     address, function = int(data[first + 2]), int(data[first + 3])
     if _is_flag(function):

@@ -40,10 +40,8 @@ def _send(
 ) -> int:
     """Appends the radio frames of one robot to the bytes that are sent in this tick.
 
-    Each frame uses one random number, whether the frame is lost or not.
-
-    Returns:
-        Number of frames that all robots have sent so far in this tick (control period).
+    Each frame uses one random number, whether it is lost or not. The function returns
+    the number of frames that all robots have sent so far in this tick (control period).
     """
     for frame in range(int(frames[0])):
         row, sent = sent, sent + 1
@@ -63,7 +61,8 @@ def radio_channel_step(
     """Shifts the bytes in transit by one tick (control period), and adds new frames.
 
     The new frames are those that the robots send in this tick. The state has ``delay``
-    rows. Each row has the size of the port ``air``. The first row arrives next.
+    rows, one per tick of latency. Each row has the size of the port ``air``. The first
+    row arrives next.
     """
     for k in range((numbers.delay - 1) * AIR_SIZE):
         state[k] = state[k + AIR_SIZE]
@@ -96,17 +95,17 @@ class RadioChannel(Block):
     the sender. A frame is lost with the probability ``loss``, independently of other
     frames. All other frames arrive without errors.
 
-    The discrete state holds the bytes in transit. The block updates the state at every
+    The discrete state has the bytes in transit. The block updates the state at every
     tick (control period). The latency is ``latency_s``, rounded to ticks, and at least
     one tick.
 
     Args:
-        parameters: Latency and probability of losses.
+        parameters: Latency, and probability that a frame is lost.
         robots: Names of the robots that send.
         seed: Seed of the losses.
         tick_s: Control period, s.
 
-    Reference: Song 2011, 3.3. Latency and losses are ours.
+    Reference: Song 2011, 3.3. Latency and losses are our additions.
     """
 
     part, stage = "radio", "world"

@@ -29,26 +29,20 @@ def radio_level(distance: float) -> float:
     """Computes the received radio level at a distance (path loss of Song 2011, eq. 8).
 
     Args:
-        distance: d, distance between the antennas, m.
+        distance: Distance d between the antennas, m.
 
     Returns:
-        Received level R = -(10 n lg d + A), dBm. n is the exponent of the path loss,
-        and -A is the level at 1 m.
+        Received level -(10 n log10(d) + A), dBm. Here n is the exponent of the path
+        loss, and -A is the level at 1 m.
     """
     return _LEVEL_AT_1_M_DBM - 10.0 * _EXPONENT * math.log10(max(distance, _LEAST_M))
 
 
 @register_jitable
 def radio_distance(level: float) -> float:
-    """Computes the distance between two antennas from the received radio level.
+    """Computes the distance between two antennas, m, from the received level, dBm.
 
     The function is the inverse of ``radio_level``.
-
-    Args:
-        level: R, received level, dBm.
-
-    Returns:
-        Distance, m.
     """
     return 10.0 ** ((_LEVEL_AT_1_M_DBM - level) / (10.0 * _EXPONENT))
 
@@ -65,7 +59,7 @@ class RangeNumbers(NamedTuple):
 def radio_range_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: RangeNumbers
 ) -> None:
-    """Measures the received radio level once per period of the measurements.
+    """Measures the received radio level at the ticks at which a measurement is due.
 
     The state is the last measured level, dBm.
     """
@@ -80,9 +74,9 @@ def radio_range_step(
 class RadioRange(Block):
     """Measures the level of the radio signal from the robot that this robot approaches.
 
-    The block measures a level every 0.1 s. The level is the sum of the path loss and a
-    normally distributed error. The path loss depends on the distance between the
-    origins of this robot and the other robot.
+    The block measures a level every 0.1 s. The level depends on the distance between
+    the origins of both robots, according to the path loss. The block adds a normally
+    distributed error.
 
     The discrete state is the last measured level. There is no latency.
 

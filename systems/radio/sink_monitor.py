@@ -79,9 +79,8 @@ def _publish(state: Any, outputs: Any, numbers: SinkNumbers) -> None:
 class SinkMonitor(Block):
     """Receives the radio frames of all robots, and stores the last frame of each robot.
 
-    The block models the computer of the operator. The discrete state has the same
-    values as the output. The block updates the state at every tick (control period).
-    The latency is one tick.
+    The block models the computer of the operator. The output is the discrete state,
+    which the block updates at every tick (control period). The latency is one tick.
 
     Args:
         robots: Radio address of each robot, by name of the robot.

@@ -35,7 +35,8 @@ class BeamNumbers(NamedTuple):
     """Directions and range of the beams."""
 
     apart_rad: NDArray[np.float64]
-    """(n,) angle between each beam and its right neighbor, rad; 0 if it has none."""
+    """(n,) angle between each beam and its right neighbor, rad; 0 if there is no right
+    neighbor."""
     maximum_ranges_m: NDArray[np.float64]
     """(n,) largest range of each beam, m. Surfaces farther away give no echo."""
 
@@ -58,28 +59,18 @@ def _goes_on(
 def _is_open(
     ranges: Any, heard: Any, own: int, other: int, apart: float, beams: BeamNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether a surface may continue beyond its outer hit.
+    """Returns whether a surface may continue beyond its outer hit.
 
-    The beam beside the outer hit decides:
+    The outer hit is the hit of the beam ``own``. The next beam outward is ``other``.
+    ``apart`` is the angle between the two beams, rad, or 0 if there is no next beam.
+    There are four cases:
 
-    - If there is no such beam, the surface may continue.
-    - If this beam has a nearer hit, a nearer object may hide the surface. The surface
-      may continue.
-    - If this beam has a farther hit, the surface ends.
-    - If this beam has no echo, the surface may continue if it would be out of range
-      there.
-
-    Args:
-        ranges: (n,) ranges of the beams, m.
-        heard: (n,) 1 if the beam has an echo, otherwise 0.
-        own: Index of the beam of the outer hit.
-        other: Index of the beam beside the outer hit.
-        apart: Angle between the two beams, rad; 0 if there is no beam beside the outer
-            hit.
-        beams: Directions and ranges of the beams.
-
-    Returns:
-        True if the surface may continue.
+    - If there is no next beam, the surface may continue.
+    - If the next beam has a nearer hit, a nearer object may hide the surface, so the
+      surface may continue.
+    - If the next beam has a farther hit, the surface ends.
+    - If the next beam has no echo, the surface may continue only if it would be out of
+      the range of this beam.
     """
     if apart == 0.0:
         return True
@@ -95,16 +86,9 @@ def _describe(
 ) -> None:  # pragma: no cover  (compiled)
     """Fills the row of one group of hits.
 
-    The function searches the nearest point on the line segments between adjacent hits.
-
-    Args:
-        row: (GROUP_SIZE,) row that the function fills.
-        hits: (n, 2) vectors (x, y) from the control point P to the hits, m.
-        ranges: (n,) ranges of the beams, m.
-        heard: (n,) 1 if the beam has an echo, otherwise 0.
-        ends: Indices of the first and the last beam of the group. Indices of n or more
-            wrap around.
-        beams: Directions and ranges of the beams.
+    The nearest point of the group is on a line segment between two adjacent hits.
+    ``ends`` has the indices of the first and the last beam of the group. Indices wrap
+    around at the number of beams.
     """
     count = len(ranges)
     first, last = ends[0] % count, ends[1] % count
@@ -133,10 +117,10 @@ def group_beams(
     """Groups the hits of the beams into objects.
 
     The function visits the beams from left to right. Adjacent hits belong to one
-    surface if they are close enough. A surface can approach the control point P twice,
-    for example at the two walls of a corner. The nearest point alone would not describe
-    both sides of such a hollow surface. Therefore the function splits the surface where
-    it is farthest from P. The beam at the split belongs to both objects.
+    surface if they are close enough. A hollow surface, for example the two walls of a
+    corner, approaches the control point P twice. One nearest point would not describe
+    both sides of such a surface. Therefore the function splits the surface where it is
+    farthest from P. The beam at the split belongs to both objects.
 
     Args:
         hits: (n, 2) vectors (x, y) from P to the hits, m, from left to right.
@@ -145,8 +129,8 @@ def group_beams(
         beams: Directions and ranges of the beams.
 
     Returns:
-        Two values: (n, GROUP_SIZE) rows of groups, and the number of groups. The other
-        rows are not used.
+        Two values: (n, GROUP_SIZE) array with one row per group, and the number of
+        groups. Rows after the last group are zero.
     """
     count = len(ranges)
     rows, used = np.zeros((count, GROUP_SIZE)), 0

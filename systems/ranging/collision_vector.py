@@ -24,10 +24,10 @@ PAIR_SEPARATION_M = 0.5
 
 @register_jitable
 def echo_point(range_: Any, axis: Any, position: Any) -> Any:
-    """Computes the position of an echo on the axis of the sensor.
+    """Computes the position of an echo, as if it came from the axis of the sensor.
 
-    The function assumes that the obstacle is on the axis of the sensor. Eq. 11 of Han
-    2019 prints a minus sign and mixes d with r. Eq. 13 swaps the axes.
+    The function corrects two equations of Han 2019. Eq. 11 has a wrong sign and
+    confuses the symbols d and r. Eq. 13 swaps the axes.
 
     Args:
         range_: Range r_i of sensor i, m; float or AutoDiffXd.
@@ -48,14 +48,14 @@ def echo_points(ranges: Any, echo: Any, sensors: UltrasonicParameters) -> Any:
     """Computes the positions of the echoes of all sensors.
 
     Args:
-        ranges: (n,) ranges r_i, m; floats or AutoDiffXd.
+        ranges: (n,) ranges, m; floats or AutoDiffXd.
         echo: (n,) 1 if the sensor has an echo, otherwise 0.
         sensors: Directions and positions of the sensors.
 
     Returns:
-        List with one entry per sensor. An entry is the position (x, y) of the echo
-        relative to the control point P, in the axes of the body, m. Without an echo,
-        the entry is None.
+        List with one entry per sensor: the position (x, y) of the echo relative to the
+        control point P, in the axes of the body, m. The entry is None if the sensor has
+        no echo.
     """
     return [
         echo_point(range_, axis, position) if heard > 0.5 else None
@@ -92,9 +92,9 @@ def carried_point(
 def foot_on_segment(a: Any, b: Any) -> Any:
     """Computes the point of a line segment that is nearest to the origin.
 
-    The function does not use eq. 14 of Han 2019, which has a wrong sign and a singular
-    slope. This equation also does not limit the point to the segment, so that the point
-    could be in empty space.
+    The function replaces eq. 14 of Han 2019, which has a wrong sign and a singular
+    slope. Also, eq. 14 does not limit the point to the segment, so that the point could
+    be in empty space.
 
     Args:
         a: Position (x, y) of one end, m; floats or AutoDiffXd.
@@ -120,18 +120,18 @@ def collision_vectors(
 ) -> Any:
     """Computes collision vectors from the positions of the echoes.
 
-    A collision vector points from the control point P to an obstacle. The feature of a
-    vector is a number that identifies the sensors of the vector. If the sensors change,
-    the feature changes, too. Therefore a law does not mistake the change of sensors for
-    a motion.
+    A collision vector points from the control point P to an obstacle. Each vector has a
+    feature, which is a number that identifies the sensors of the vector. If the sensors
+    change, the feature changes, too. A law therefore does not mistake the change of
+    sensors for a motion.
 
     Args:
         points: List with one entry per sensor, from left to right. An entry is the
             position (x, y) of the echo relative to P, m, or None without an echo.
-        parameters: Aggregation rule.
+        parameters: Rule that combines echoes into vectors.
         neighbours: Pairs of adjacent sensors (``UltrasonicParameters.neighbours``). A
-            pair has two indices, counted from 0, with the left sensor first. If None,
-            each sensor is paired with the next sensor.
+            pair has two indices, counted from 0, with the left sensor first. None: each
+            sensor is paired with the next sensor.
 
     Returns:
         At most ``SLOTS`` entries (feature, x, y), with x and y of the vector from P, m.
@@ -152,20 +152,13 @@ def collision_vectors(
 
 @register_jitable
 def _vectors(points, heard, neighbours, joined, every):
-    """Computes collision vectors from positions and flags, in a form that compiles.
+    """Computes the results of ``collision_vectors``, in a form that compiles.
 
-    The results are those of ``collision_vectors``.
-
-    Args:
-        points: n positions (x, y) of echoes relative to the control point P, m. The
-            position of a sensor without an echo is arbitrary.
-        heard: n flags. A flag is true if the sensor has an echo.
-        neighbours: Pairs of indices of adjacent sensors, with the left sensor first.
-        joined: Whether to join the nearest echo with its nearer neighbor.
-        every: Whether to return one vector per pair and per single echo.
-
-    Returns:
-        List of entries (feature, x, y).
+    ``heard`` has one flag per sensor, true if the sensor has an echo. The position of a
+    sensor without an echo is arbitrary. If ``every`` is true, the function returns one
+    vector per pair of echoes and per single echo. Otherwise, it returns one vector to
+    the nearest echo. If ``joined`` is true, it first joins this echo with the nearer of
+    its neighbors.
     """
     # Find the nearest echo.
     nearest = -1
@@ -223,7 +216,7 @@ def _pair(points, left, right):
 
 @register_jitable
 def _all_vectors(points, heard, pairs, vectors):
-    """Returns the vectors of all pairs and unpaired echoes.
+    """Returns the vectors of all pairs of echoes, and of all echoes without a pair.
 
     If there are more than ``SLOTS`` vectors, the function returns only the nearest.
     """
@@ -312,15 +305,8 @@ def collision_step(
 ) -> None:
     """Computes the collision vectors of one control period.
 
-    See ``systems.framework.block.Step`` for the arguments of all steps.
-
-    Args:
-        tick: Not used.
-        state: Poses of the previous control periods of a sensor round, most recent
-            first, m and rad. If every sensor fires in every period, the state is empty.
-        inputs: Values of the input ports.
-        outputs: Values of the output ports.
-        numbers: ``CollisionNumbers``.
+    The state has the poses of the previous control periods of a sensor round, most
+    recent first, m and rad. If every sensor fires in every period, the state is empty.
     """
     ranges, echo, ages, pose = inputs
     points = [
@@ -366,21 +352,20 @@ def CollisionVector_(T):
         read the ports of age and pose.
 
         Otherwise the sensors hold their ranges between two readings. The block assumes
-        that a held range belongs to a point at rest in the world frame W. The block
-        converts this point to the present pose of the robot. If the obstacle has moved
-        since the sensor fired, the motion remains as an error. The time since the
-        sensor fired is at most one sensor round minus one period. A sensor round is the
-        time in which every sensor fires once.
+        that a held range belongs to a point at rest in the world frame W, and converts
+        this point to the present pose of the robot. If the obstacle has moved since the
+        sensor fired, its motion remains as an error. A sensor round is the time in
+        which every sensor fires once. The time since a sensor fired is at most one
+        round minus one control period.
 
         If ranges are held, the discrete state has the poses of the previous periods of
-        a round. The state is updated every period. For example, three sensors that fire
-        one after the other, one per period, need two poses.
+        a round, and the block updates it every period. For example, three sensors that
+        fire one after the other, one per period, need two poses.
 
         Args:
-            parameters: Aggregation rule, ``CollisionVectorParameters``.
-            sensors: Positions, firing period, and firing order of the sensors,
-                ``UltrasonicParameters``.
-            robot: Parameters of the robot, for the position of P.
+            parameters: Rule that combines echoes into vectors.
+            sensors: Positions, firing period, and firing order of the sensors.
+            robot: Distance of P ahead of the axle.
             initial_pose: Pose (x, y, theta) before time zero, m and rad.
             tick_s: Control period, s.
 

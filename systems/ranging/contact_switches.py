@@ -37,25 +37,18 @@ class SwitchNumbers(NamedTuple):
     width_m: float
     """Width of the body at ``pose_WS``, m."""
     faults: NDArray[np.int64]
-    """(2, 2) faults of the left and the right switch, see ``fault_ticks``."""
+    """(2, 2) faults of the left and the right switch, from ``fault_ticks``."""
 
 
 @njit(cache=True)
 def _feel(
     pose: Any, body: Any, points: Any, middle: float
 ) -> tuple[bool, bool]:  # pragma: no cover  (compiled)
-    """Checks whether a body closes the left and the right switch.
+    """Returns whether a body closes the left switch, and whether it closes the right.
 
-    Args:
-        pose: Pose (x, y, theta) of the robot, m and rad.
-        body: Five numbers: pose (x, y, theta) of the body in the world frame W, m and
-            rad, and length and width of the body, m.
-        points: (n, 2) test points of the front edge in the axes of the robot, m.
-        middle: A touch within this distance of the robot's x axis closes both switches,
-            m.
-
-    Returns:
-        Two flags: whether the left switch closes, and whether the right switch closes.
+    ``body`` has the pose (x, y, theta) of the body in W, m and rad, and its length and
+    width, m. ``points`` are the test points of the front edge in B, m. A touch closes
+    both switches if its distance from the robot's x axis is at most ``middle``, m.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     # Skip a body whose circumscribed circle no switch can reach. The first test point,
@@ -81,7 +74,8 @@ def contact_switches_step(
 ) -> None:
     """Determines which switches are closed and which body the robot touches.
 
-    If the robot touches several bodies, the step reports the last of them.
+    If the robot touches several bodies, the step reports the one with the highest
+    number.
     """
     pose, poses, sizes, followed = inputs
     bodies = len(poses) // 3
@@ -116,10 +110,10 @@ def contact_switches_step(
 class ContactSwitches(Block):
     """Detects bodies that touch the front of the robot.
 
-    There are two switches. Each switch belongs to one half of the front edge. A switch
-    closes when a body is within ``REACH_M`` of its half. Near the middle of the edge,
-    both switches close. The flanks and the rear of the robot have no switches. The
-    switches cannot distinguish a source from a wall.
+    There are two switches, one for each half of the front edge. A switch closes when a
+    body is within ``REACH_M`` of its half. Near the middle of the edge, both switches
+    close. The flanks and the rear of the robot have no switches. The switches cannot
+    distinguish a source from a wall.
 
     The port ``touched`` has the true number of the touched body, counted from 0. The
     body at ``pose_WS`` has the last number.

@@ -69,20 +69,12 @@ class ObjectNumbers(NamedTuple):
 def _see(
     slot: Any, p_WP: Any, before: Any, now: Any, size: Any, tick_s: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills the slot of one body.
+    """Fills the slot of one body, whose elements are zero before.
 
-    The function reports a body at rest as its nearest point. The function reports a
-    moving body as a disc around its center. There are two exceptions: if the moving
-    body is long, or if the disc contains the control point P, the function reports the
-    nearest point of the body.
-
-    Args:
-        slot: (OBJECT_SIZE,) zeros that the function fills.
-        p_WP: Position (x, y) of P in the world frame W, m.
-        before: (3,) pose of the body one control period ago, m and rad.
-        now: (3,) present pose of the body, m and rad.
-        size: Length and width of the body, m.
-        tick_s: Control period, s; 0 if the velocity is unknown.
+    The function reports a body at rest as its nearest point, and a moving body as a
+    disc around its center. In two cases, it reports the nearest point of a moving body
+    instead: if the body is long, or if the disc contains the control point P.
+    ``tick_s`` is 0 if the velocity is unknown.
     """
     rectangle = now[0], now[1], now[2], size[0], size[1]
     x, y = nearest_point_on_rectangle(p_WP, rectangle)
@@ -112,20 +104,10 @@ def _see(
 def _is_hidden(
     number: int, p_WP: Any, slot: Any, poses: Any, sizes: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether other bodies hide a body from the control point P.
+    """Returns whether other bodies hide the body ``number`` from the control point P.
 
-    A body is hidden if five lines are blocked: the line from P to the reported point of
-    the body, and the lines from P to all four corners of the body.
-
-    Args:
-        number: Index of the body.
-        p_WP: Position (x, y) of P in the world frame W, m.
-        slot: (OBJECT_SIZE,) slot of the body.
-        poses: (3 n,) poses of all bodies, m and rad.
-        sizes: (2 n,) lengths and widths of all bodies, m.
-
-    Returns:
-        True if the body is hidden.
+    A body is hidden if other bodies block five lines: the line from P to the reported
+    point of the body, and the lines from P to its four corners.
     """
     x, y, theta = poses[3 * number], poses[3 * number + 1], poses[3 * number + 2]
     c, s = 0.5 * math.cos(theta), 0.5 * math.sin(theta)
@@ -159,20 +141,11 @@ def _is_blocked(
 def _seen(
     state: Any, pose: Any, poses: Any, sizes: Any, numbers: ObjectNumbers
 ) -> Any:  # pragma: no cover  (compiled)
-    """Lists the objects in range without noise and latency.
+    """Returns the objects in range without noise and latency, nearest first.
 
-    The function also stores the present poses for the next control period.
-
-    Args:
-        state: State of the block. The first element is 1 if poses are stored, otherwise
-            0. The poses of one control period ago follow.
-        pose: Pose (x, y, theta) of the robot, m and rad.
-        poses: (3 n,) poses of all bodies, m and rad.
-        sizes: (2 n,) lengths and widths of all bodies, m.
-        numbers: ``ObjectNumbers``.
-
-    Returns:
-        (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
+    The function also stores the present poses for the next control period. The first
+    element of the state is 1 if poses are stored, otherwise 0. The poses of one control
+    period ago follow.
     """
     count = len(sizes) // 2
     p_WP = control_point(pose, numbers.control_point_m)
@@ -196,9 +169,11 @@ def ideal_object_step(
 ) -> None:
     """Computes the objects that the sensor reports in one control period.
 
-    The state has three parts. The first part is a flag that is 1 after the first
-    period. The second part is the poses of the bodies one period ago. With a latency,
-    the third part is the objects that are not reported yet, oldest first.
+    The state has these parts, in this order:
+
+    - a flag that is 1 after the first period;
+    - the poses of the bodies one period ago;
+    - with a latency, the objects that are not reported yet, oldest first.
     """
     pose, poses, sizes = inputs
     seen = _seen(state, pose, poses, sizes, numbers)
@@ -222,18 +197,19 @@ def ideal_object_step(
 
 
 class IdealObjectSensor(Block):
-    """Gives the positions and velocities of the bodies around P, in all directions.
+    """Gives the positions and velocities of the bodies around the robot.
 
-    P is the control point of the robot. The output has the eight nearest bodies within
-    the range of the sensor. ``X`` and ``Y`` of a slot are the vector from P to a point
-    of the body. The block represents a body in one of these ways:
+    Let P be the control point of the robot. The output has the eight nearest bodies
+    within the range of the sensor, in all directions. ``X`` and ``Y`` of a slot are the
+    vector from P to a point, which depends on the body:
 
-    - A body at rest is its nearest point. The point is on the rectangle of the body.
-    - A moving body is a disc that contains the body and has the same center. ``X`` and
-      ``Y`` lead to the nearest point of the disc. The velocity is that of the center.
-    - A long moving body is its nearest point, with the velocity of this point.
-      ``RADIUS`` is then half of the width of the body. The same rule applies to a
-      moving body whose disc contains P.
+    - Body at rest: the point is the nearest point of the body. The velocity is zero.
+    - Moving body: the block replaces the body by the smallest disc that contains it and
+      has the same center. The point is the nearest point of the disc. The velocity is
+      that of the center.
+    - Moving body that is long, or whose disc contains P: the point is the nearest point
+      of the body. The velocity is that of this point. ``RADIUS`` is half of the width
+      of the body.
 
     The block computes velocities from the present and the previous poses. Therefore
     velocities are known from the second control period on.
@@ -244,8 +220,8 @@ class IdealObjectSensor(Block):
     there is no latency. The block draws noise once per period.
 
     Args:
-        parameters: Range and errors, ``ObjectSensorParameters``.
-        robot: Parameters of the robot, for the position of P.
+        parameters: Range, errors and latency.
+        robot: Distance of P ahead of the axle.
         bodies: Number of bodies on the ports ``poses_WO`` and ``sizes``.
         robots: Indices of the bodies that are robots.
         seed: Seed of the noise.
@@ -255,8 +231,8 @@ class IdealObjectSensor(Block):
         InputError: The latency is not a multiple of the control period.
 
     Reference: our own work. The block replaces the scan of Engelbrecht, Steyn and
-    Djouani (2021). Their paper prints neither how beams become obstacles nor how the
-    velocities are obtained.
+    Djouani (2021). Their paper states neither how beams become obstacles nor how
+    velocities are measured.
     """
 
     part, stage = "objects", "obstacle sensing"

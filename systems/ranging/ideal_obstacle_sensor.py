@@ -25,14 +25,14 @@ from systems.world.geometry import control_point, nearest_point_on_rectangle, ro
 def nearest_vectors(
     pose_WB: Any, rectangles: Any, control_point_m: Any, maximum_range: Any, slots: Any
 ) -> Any:
-    """Computes the vectors from P to the nearest points of the nearest bodies.
+    """Computes the vectors from the control point P to the nearest bodies.
 
-    P is the control point of the robot.
+    Each vector leads to the nearest point of a body.
 
     Args:
         pose_WB: Pose (x, y, theta) of the robot, m and rad; floats or AutoDiffXd.
-        rectangles: Rectangles (x, y, theta, length, width) in the world frame W, m and
-            rad.
+        rectangles: Rectangles (x, y, theta, length, width) of the bodies in the world
+            frame W, m and rad.
         control_point_m: Distance of P ahead of the axle, m.
         maximum_range: Largest distance from P at which bodies are seen, m.
         slots: Largest number of vectors.
@@ -76,17 +76,7 @@ class ObstacleNumbers(NamedTuple):
 def ideal_obstacle_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Computes the nearest points of one control period.
-
-    See ``systems.framework.block.Step`` for the arguments of all steps.
-
-    Args:
-        tick: Not used.
-        state: None.
-        inputs: Values of the input ports.
-        outputs: Values of the output ports.
-        numbers: ``ObstacleNumbers``.
-    """
+    """Computes the nearest points of the bodies in one control period."""
     pose_WB, poses, sizes, pose_WS = inputs
     length, width = numbers.source_size
     bodies = [(pose_WS[0], pose_WS[1], pose_WS[2], length, width)]
@@ -115,7 +105,7 @@ def IdealObstacleSensor_(T):
         is unique.
 
         Args:
-            robot: Parameters of the robot, for the position of the control point P.
+            robot: Distance of the control point P ahead of the axle.
             maximum_range_m: Largest distance from P at which bodies are seen, m.
             all_bodies: Whether to report up to three bodies (``aggregation: sum``)
                 instead of only the nearest body.

@@ -52,15 +52,7 @@ def _keep_hits(
     """Stores the new hits of the beams in the world frame W.
 
     A beam without a new range keeps its last hit. If the range of a beam is too old,
-    the beam has no echo.
-
-    Args:
-        kept: (n, _BEAM_SIZE) state of the beams, changed in place.
-        ranges: (n,) ranges, m.
-        echo: (n,) 1 if the sensor has an echo, otherwise 0.
-        ages: (n,) times since each sensor fired, s.
-        pose: Pose (x, y, theta) of the robot, m and rad.
-        numbers: ``DetectorNumbers``.
+    the beam counts as a beam without an echo.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(ranges)):
@@ -81,11 +73,7 @@ def _keep_hits(
 def _detect(
     state: Any, ranges: Any, echo: Any, ages: Any, pose: Any, numbers: DetectorNumbers
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Detects the objects of one control period, and updates the state.
-
-    Returns:
-        (OBJECT_SLOTS, OBJECT_SIZE) objects, nearest first.
-    """
+    """Updates the state, and returns the objects of one control period."""
     count = len(ranges)
     kept = state[: _BEAM_SIZE * count].reshape(count, _BEAM_SIZE)
     tracks = state[_BEAM_SIZE * count :].reshape(TRACKS, TRACK_SIZE)
@@ -106,7 +94,7 @@ def object_detector_step(
 ) -> None:
     """Computes the objects that the beams hit in one control period.
 
-    The state has the last hit of each beam, then the tracks.
+    The state has the last hit of each beam, followed by the tracks of the objects.
     """
     ranges, echo, ages, pose = inputs
     found = _detect(state, ranges, echo, ages, pose, numbers)
@@ -122,7 +110,7 @@ class ObjectDetector(Block):
     as several objects. For each object, the block gives three quantities:
 
     - the vector from the control point P to the nearest point of the object. The block
-      searches this point among the present hits and the lines between them.
+      searches for this point among the present hits and the lines between them.
     - the filtered velocity, after the block has tracked the object for long enough.
     - the radius, which is half of the width of the object, or 0 if the object is wide.
 
@@ -134,28 +122,28 @@ class ObjectDetector(Block):
     - Beams detect only objects that they hit. With 7 beams, a disc of 0.2 m width is
       certain to be hit only within 0.4 m of P.
     - A motion along a surface is visible only at the edges of the surface. The
-      resolution equals the spacing of the beams. For example, boxes cross at 0.15 to
-      0.3 m/s at a distance of 1 m. One second after the boxes come into view, the
-      median error of their velocities is 25 % with 36 beams all around, 15 % with 72
-      beams, and 7 % with 360 beams.
+      resolution equals the spacing of the beams. As an example, take boxes that cross
+      at 0.15 to 0.3 m/s at a distance of 1 m. One second after the boxes come into
+      view, the median error of their velocities is 25 % with 36 beams all around, 15 %
+      with 72 beams, and 7 % with 360 beams.
     - While the robot turns, bodies at rest seem to move. Their apparent speed is up to
       0.3 m/s with 36 beams, 0.12 m/s with 72 beams, and 0 m/s with 360 beams.
-    - If the spacing of the beams exceeds 0.25 m, no velocity is known. With the 7
-      beams, this is the case at distances above 0.48 m.
+    - Where the spacing of the beams exceeds 0.25 m, no velocity is known. With 7 beams,
+      this is the case at distances above 0.48 m.
 
-    The discrete state has the hits and the tracks. The state is updated every control
+    The discrete state has the hits and the tracks. The block updates it every control
     period. The output is a function of the state and the inputs. There is no latency,
     but the velocity takes about 0.5 s to follow a change.
 
     Args:
         sensors: Positions, directions, and firing period of the beams.
-        robot: Parameters of the robot, for the position of P.
+        robot: Distance of P ahead of the axle.
         tick_s: Control period, s.
 
-    Reference: our own work. Engelbrecht, Steyn and Djouani (2021) print neither how
-    beams become obstacles nor how the velocities are obtained. If each beam were an
-    obstacle, the sum of the dampings would exceed the largest stable damping for this
-    control period.
+    Reference: our own work. Engelbrecht, Steyn and Djouani (2021) state neither how
+    beams become obstacles nor how velocities are measured. With one obstacle per beam,
+    the sum of the dampings would exceed the largest stable damping for this control
+    period.
     """
 
     part, stage = "objects", "obstacle sensing"

@@ -109,11 +109,8 @@ def _correct(
 ) -> None:  # pragma: no cover  (compiled)
     """Corrects a track by one scalar measurement of its position (Kalman update).
 
-    Args:
-        track: (TRACK_SIZE,) track, changed in place.
-        off: Measured position minus predicted position along ``h``, m.
-        h: Unit vector (x, y) of the measured direction in the world frame W.
-        variance: Variance of the measurement, m^2.
+    ``off`` is the measured position minus the predicted position along the unit vector
+    ``h``, m. ``variance`` is that of the measurement, m^2.
     """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     gain = p[:, 0] * h[0] + p[:, 1] * h[1]
@@ -129,19 +126,14 @@ def _correct(
 def _turn_surface(
     track: Any, p_WP: Any, along: Any, own: TrackNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the tracked position of a surface to the direction of its nearest point.
+    """Rotates the tracked position of a surface about P to its nearest point.
 
-    The noise of the ranges moves the nearest point along the surface by more than the
-    spacing of the beams. Therefore only the distance from the control point P shows a
-    motion. The function keeps this distance and rotates its variance to the new
-    direction. The position along the surface becomes unknown. The sensors do not
-    measure the velocity along the surface, so this velocity decays to zero.
-
-    Args:
-        track: (TRACK_SIZE,) track, changed in place.
-        p_WP: Position (x, y) of P in the world frame W, m.
-        along: Unit vector (x, y) from P to the present nearest point in W.
-        own: Constants of the tracking.
+    P is the control point. ``along`` is the unit vector from P to the nearest point of
+    the present hits. The noise of the ranges moves this point along the surface by more
+    than the spacing of the beams. Therefore only the distance of the surface from P
+    shows a motion. The function keeps the tracked distance and its variance, but in the
+    direction ``along``. The position along the surface becomes unknown. The sensors do
+    not measure the velocity along the surface, so this velocity decays to zero.
     """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     x, y = state[0] - p_WP[0], state[1] - p_WP[1]
@@ -185,23 +177,17 @@ def _hides_motion(
 def _take_in(
     track: Any, group: Any, p_WP: Any, own: TrackNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Corrects a track by its group of hits, or starts the track.
+    """Corrects a track with its group of hits, or starts the track.
 
     The measured position depends on the group:
 
-    - If motion along the surface is not visible, the position is the nearest point.
-      Only the distance of this point from the control point P is measured.
-    - Otherwise, the position is in the direction of the middle of the group. The
-      distance of the position from P is that of the nearest point plus the smoothed
-      depth. The depth is the distance of the middle minus the distance of the nearest
-      point. Both coordinates are measured. The noise perpendicular to the direction is
-      larger by the spacing of the beams.
-
-    Args:
-        track: (TRACK_SIZE,) track, changed in place.
-        group: (GROUP_SIZE,) row of ``group_beams``.
-        p_WP: Position (x, y) of P in the world frame W, m.
-        own: Constants of the tracking.
+    - If a motion along the surface is not visible, the position is the nearest point.
+      Only its distance from the control point P counts as measured.
+    - Otherwise, the position is in the direction of the middle of the group. Its
+      distance from P is that of the nearest point plus the smoothed depth. The depth is
+      the distance of the middle minus that of the nearest point. Both coordinates count
+      as measured. Perpendicular to the direction, the standard deviation is larger by
+      the spacing of the beams.
     """
     wide = _hides_motion(group, own)
     sure = group[CHORD] < _COARSE_M and (not wide or group[EXTENT] > 0.0)
@@ -251,14 +237,11 @@ def _take_in(
 def _tracks_of(
     tracks: Any, groups: Any, p_WP: Any, own: TrackNumbers
 ) -> NDArray[np.int64]:  # pragma: no cover  (compiled)
-    """Assigns groups of hits to tracks.
+    """Assigns groups of hits to tracks, at most one group to each track.
 
     The function first assigns the group and the track that are nearest to each other.
-    Then it assigns the next nearest pair, and so on up to the distance ``_GATE_M``.
-    Each track gets at most one group.
-
-    Returns:
-        (n,) index of the track of each group; -1 if the group has no track.
+    Then it assigns the next nearest pair, and so on up to the distance ``_GATE_M``. The
+    result has the index of the track of each group, or -1 for a group without a track.
     """
     count = len(groups)
     away = np.full((count, TRACKS), np.inf)
@@ -293,17 +276,17 @@ def track_objects(
     The filter works in the world frame W, so that the motion of the robot does not
     appear as a motion of objects.
 
-    A beam measures a distance. The beams do not show where an object is between two
-    beams. A position is therefore accurate in the direction of the control point P. In
-    the perpendicular direction, the position is as coarse as the spacing of the beams.
+    A beam measures a distance, but does not show where an object is between two beams.
+    A position is therefore accurate in the direction of the control point P. In the
+    perpendicular direction, the position is as coarse as the spacing of the beams.
 
-    If a surface is wide or may continue beyond its hits, the motion of the surface
-    along itself is not visible. The filter then does not measure this velocity, which
+    A wide surface, or one that may continue beyond its hits, does not show a motion
+    along itself. The filter then does not measure this component of the velocity, which
     starts at zero.
 
-    On an oblique surface, a beam shows a motion along the surface as a motion toward P.
-    Therefore no velocity is known where the spacing of the beams is large. The same
-    rule applies to a single hit that may be part of a longer surface.
+    On an oblique surface, a motion along the surface looks like a motion toward P.
+    Therefore no velocity is known where the spacing of the beams is large. Nor is it
+    known for a single hit that may be part of a longer surface.
 
     Args:
         tracks: (TRACKS, TRACK_SIZE) tracks, changed in place.

@@ -1,4 +1,4 @@
-"""Definition of the port ``objects_W``, which has the objects around a robot.
+"""Defines the port ``objects_W``, which has the objects around a robot.
 
 The port has ``OBJECT_SLOTS`` slots of ``OBJECT_SIZE`` numbers, nearest object first.
 Empty slots are zero. P is the control point of the robot, and W is the world frame. A

@@ -85,15 +85,16 @@ class UltrasonicParameters(Parameters):
     )
 
     preset: SensorPreset = "three"
-    """Named set of sensors. The set provides the defaults of the other fields. Values
-    that you set in the other fields take precedence."""
+    """Named set of sensors. It gives the values of all other fields that are not
+    set."""
     sensors: Annotated[tuple[RangeSensorParameters, ...], Strict(False)] = _THREE
     """List of the sensors, from left to right.
 
-    Each sensor has the field ``axis_deg``. A sensor may also have its own values of the
+    Each sensor has the field ``axis_deg``. It may also have its own values of the
     fields from ``position_m`` to ``dropout_probability``. A number n instead of a list
     defines n sensors with evenly spaced axes all around. The first of these sensors
-    points backward."""
+    points backward.
+    """
     period_s: Period = TICK_S
     """Time from one firing to the next, s."""
     firing: Literal["simultaneous", "sequential"] = "simultaneous"
@@ -172,13 +173,9 @@ class UltrasonicParameters(Parameters):
         return tuple(sensor.position_m for sensor in self.sensors)
 
     def each(self, field: str) -> NDArray[np.float64]:
-        """Returns the values of one field for all sensors.
+        """Returns the values of one field of ``RangeSensorParameters`` for all sensors.
 
-        Args:
-            field: Name of a field of ``RangeSensorParameters``.
-
-        Returns:
-            (n,) array with one value per sensor, or (n, 2) array for ``position_m``.
+        The shape is (n,), or (n, 2) for ``position_m``.
         """
         return np.array([getattr(sensor, field) for sensor in self.sensors])
 
@@ -211,7 +208,7 @@ class UltrasonicParameters(Parameters):
         return np.array(self.axes), np.array(self.places), np.array(self.half_angles)
 
     def period_ticks(self, tick_s: float) -> int:
-        """Computes the number of control periods (ticks) from one firing to the next.
+        """Returns the number of control periods (ticks) from one firing to the next.
 
         Args:
             tick_s: Control period, s.
@@ -255,8 +252,9 @@ class CollisionVectorParameters(Parameters):
     ``paper``: the block joins the nearest echo with a neighboring echo that is close
     enough. If both neighbors are close enough, the block uses the neighbor that is
     nearer to P. ``nearest``: the block uses only the nearest echo. ``sum``: the block
-    makes one vector per pair of close echoes and per unpaired echo, but only the
-    nearest three vectors count. The law adds the forces of these vectors."""
+    makes one vector for each pair of close echoes and for each echo without a pair, but
+    only the nearest three vectors count. The law adds the forces of these vectors.
+    """
     velocity_term: VelocityTerm = "printed"
     """Definition of the speed s of an obstacle in the laws. With ``printed``, s is
     |dC/dt|, the rate of change of the collision vector C. With ``closing``, s is the
@@ -277,4 +275,4 @@ class ObjectSensorParameters(Parameters):
     """Age of the reported objects, s. The age must be a multiple of the tick."""
     occlusion: bool = False
     """Whether bodies hide other bodies behind them. A body is hidden if its nearest
-    point and all four corners are hidden."""
+    point and its four corners are all hidden."""

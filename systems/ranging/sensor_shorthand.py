@@ -1,12 +1,12 @@
-"""Short forms of the list of range sensors in a scenario.
+"""Converts short forms of the list of range sensors in a scenario.
 
 The group ``ultrasonic`` of a scenario accepts these short forms:
 
 - ``sensors: 8`` defines 8 sensors with evenly spaced axes all around.
 - ``sensors: {1: {noise_m: 0.05}}`` changes sensor 1 of the preset, counted from 0.
-- ``noise_m: 0.01`` beside ``sensors`` applies to all sensors whose record does not have
-  this field. Without a list of sensors, the value applies to all sensors of the preset.
-  The other ``SHARED_FIELDS`` work in the same way.
+- ``noise_m: 0.01`` beside ``sensors`` gives this value to each sensor that has no
+  ``noise_m`` of its own. Without a list of sensors, the value is for all sensors of the
+  preset. The other ``SHARED_FIELDS`` work in the same way.
 - ``axes_deg`` and ``positions_m`` are the fields of earlier versions.
 """
 
@@ -41,8 +41,8 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
         data: Input of the group ``ultrasonic``. The values may be invalid.
 
     Returns:
-        Input with all records in ``sensors`` and without short forms. Records of the
-        wrong type do not change.
+        Input with all records in ``sensors`` and without short forms. A record of the
+        wrong type does not change.
 
     Raises:
         InputError: The number of sensors, or the index of a sensor, is out of range.
@@ -80,9 +80,8 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
 def _replace_former_fields(given: dict[str, Any]) -> Sequence[Any]:
     """Replaces the former fields ``axes_deg`` and ``positions_m`` in place.
 
-    Returns:
-        Positions of the sensors, if ``positions_m`` had several positions. Otherwise
-        the result is empty.
+    If ``positions_m`` has several positions, the function returns them, one per sensor.
+    Otherwise the result is empty.
     """
     if "axes_deg" in given:
         axes = given.pop("axes_deg")
@@ -101,8 +100,8 @@ def _replace_former_fields(given: dict[str, Any]) -> Sequence[Any]:
 def _ring_or_list(group: Mapping[str, Any]) -> Sequence[Any]:
     """Returns the list of sensors of a group.
 
-    If the group has a number of sensors instead of a list, the function makes sensors
-    with evenly spaced axes all around.
+    If the group has a number of sensors instead, their axes are evenly spaced all
+    around.
     """
     sensors = group["sensors"]
     number = sensors if isinstance(sensors, int) else len(sensors)
@@ -135,11 +134,12 @@ def _plain(record: Any) -> Any:
 def check_shared(data: Mapping[str, Any], model: type[Parameters]) -> None:
     """Checks the fields that a scenario sets for all sensors.
 
-    Because of this early check, error messages name these fields.
+    This early check lets error messages name these fields, and not a field of one
+    sensor.
 
     Args:
         data: Input of the group ``ultrasonic``.
-        model: Model of a sensor.
+        model: Parameter class of one sensor.
 
     Raises:
         InputError: A value has the wrong type, or is out of range.
@@ -158,10 +158,10 @@ def check_shared(data: Mapping[str, Any], model: type[Parameters]) -> None:
 
 
 def shortened_sensors(dumped: dict[str, Any]) -> dict[str, Any]:
-    """Moves the most frequent value of each shared field into the group.
+    """Moves the most frequent value of each shared field from the sensors to the group.
 
-    If a user later changes such a value in the group, the change applies to all sensors
-    that have this value.
+    If a user later changes this value in the group, it changes for all sensors that had
+    the value.
 
     Args:
         dumped: All fields of ``UltrasonicParameters`` as plain values.
@@ -187,11 +187,9 @@ def mark_shared(schema: dict[str, Any]) -> None:
 
 
 def add_shorthand(schema: dict[str, Any], model: type[Parameters]) -> None:
-    """Adds the short forms to the JSON Schema of ``UltrasonicParameters``.
+    """Adds the short forms to the JSON Schema of ``UltrasonicParameters``, in place.
 
-    Args:
-        schema: JSON Schema, changed in place.
-        model: Model of a sensor.
+    ``model`` is the parameter class of one sensor.
     """
     properties, told = schema["properties"], meanings(model)
     own = model.model_json_schema()["properties"]

@@ -38,13 +38,13 @@ _NOISY_M = 0.3
 def body_rectangles(
     poses_WO: NDArray[np.float64], sizes: NDArray[np.float64], more: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Collects the rectangles of the bodies, with further rows for other bodies.
+    """Collects the rectangles of the bodies, followed by empty rows for other bodies.
 
     Args:
         poses_WO: (3 n,) poses (x, y, theta) of the bodies in the world frame W, m and
             rad.
         sizes: (2 n,) lengths and widths of the bodies, m.
-        more: Number of further rows, which the caller fills.
+        more: Number of empty rows, which the caller fills.
 
     Returns:
         (n + more, 5) rectangles: x, y, theta in W, m and rad, and length and width, m.
@@ -98,12 +98,13 @@ def cone_ranges(
 
     Args:
         pose_WB: Pose (x, y, theta) of the robot, m and rad.
-        rectangles: (n, 5) rectangles of the bodies in the world frame W.
+        rectangles: (n, 5) rectangles (x, y, theta, length, width) of the bodies in the
+            world frame W, m and rad.
         parameters: Positions and directions of the k sensors.
         control_point_m: Distance of the control point P ahead of the axle, m.
 
     Returns:
-        (k,) distances, m. If a cone is empty, its distance is infinite.
+        (k,) distances, m. The distance is infinite if a cone is empty.
     """
     pose = np.asarray(pose_WB, dtype=np.float64)
     return fan_ranges(pose, rectangles, *parameters.beams, control_point_m)
@@ -126,14 +127,9 @@ class RangeErrors(NamedTuple):
 
 
 def range_errors(parameters: UltrasonicParameters, stretch: float = 1.0) -> RangeErrors:
-    """Collects the errors and limits of all sensors.
+    """Collects the errors and limits of all sensors, with one element per sensor.
 
-    Args:
-        parameters: Parameters of the sensors.
-        stretch: Ratio of the assumed speed of sound to the true speed of sound.
-
-    Returns:
-        Errors and limits, with one element per sensor.
+    ``stretch`` is the ratio of the assumed speed of sound to the true speed of sound.
     """
     from scipy.special import ndtri  # takes longer to load than all parameters
 
@@ -161,8 +157,9 @@ def measured_ranges(
         errors: Errors and limits of the n sensors.
 
     Returns:
-        Two arrays: (n,) ranges within the limits of each sensor, m, and (n,) echoes, 0
-        or 1. Without an echo, the range is the largest range and has no meaning.
+        Two (n,) arrays: ranges within the limits of each sensor, m; and echoes, 0 or 1.
+        Without an echo, the range is the largest range of the sensor and has no
+        meaning.
     """
     count = len(true_ranges)
     ranges, echo = np.copy(errors.high_m), np.zeros(count)
@@ -191,7 +188,7 @@ class UltrasonicNumbers(NamedTuple):
     errors: RangeErrors
     noise: TickNoise
     turns: NDArray[np.int64]
-    """(n,) tick within the round at which each sensor fires."""
+    """(n,) number of the tick in the sensor round at which each sensor fires."""
     round: int
     """Length of a round, ticks."""
     tick_s: float
@@ -202,15 +199,10 @@ class UltrasonicNumbers(NamedTuple):
 def ultrasonic_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
 ) -> None:
-    """Computes the ranges of one control period; see ``systems.framework.block.Step``.
+    """Computes the ranges of one control period.
 
-    Args:
-        tick: Number of the control period.
-        state: Last readings: ranges of all sensors, m, then echoes of all sensors, 0 or
-            1.
-        inputs: Values of the input ports.
-        outputs: Values of the output ports.
-        numbers: ``UltrasonicNumbers``.
+    The state has the last readings: the ranges of all sensors, m, followed by the
+    echoes of all sensors, 0 or 1.
     """
     pose_WB, poses_WO, sizes, pose_WS = inputs
     bodies = world_rectangles(poses_WO, sizes, pose_WS, numbers.source_size)
@@ -222,15 +214,7 @@ def sourceless_ultrasonic_step(
 ) -> None:
     """Computes the ranges of one control period in a scenario without a leader.
 
-    Otherwise the step does the same as ``ultrasonic_step``.
-
-    Args:
-        tick: Number of the control period.
-        state: Last readings: ranges of all sensors, m, then echoes of all sensors, 0 or
-            1.
-        inputs: Values of the input ports.
-        outputs: Values of the output ports.
-        numbers: ``UltrasonicNumbers``.
+    Everything else is as in ``ultrasonic_step``.
     """
     pose_WB, poses_WO, sizes = inputs
     bodies = body_rectangles(poses_WO, sizes, 0)
@@ -249,8 +233,7 @@ def _read_ranges(
     """Measures all ranges, applies the faults, and updates the sensors that fire.
 
     The function measures all sensors in every control period. A sensor stores its new
-    reading only in the periods in which it fires. The outputs are the stored readings
-    and their ages.
+    reading only when it fires. The outputs are the stored readings and their ages.
     """
     ranges, echo, ages = outputs
     beams = numbers.axes, numbers.places, numbers.half_angles
@@ -280,20 +263,18 @@ def _read_ranges(
 class UltrasonicArray(Block):
     """Measures the distance to the nearest surface in the cone of each sensor.
 
-    Each sensor has its own position, cone, range, and errors. Therefore sensors of
-    different kinds can work together. A sensor reports a range, but no direction within
-    its cone.
+    Each sensor has its own position, cone, range, and errors, so sensors of different
+    kinds can work together. A sensor reports a range, but no direction within its cone.
 
     The leader is a body like the obstacles. Without a leader, there is no port
     ``pose_WS``. Surfaces beyond the maximum range give no echo. Surfaces nearer than
-    the minimum range give the minimum range. If these surfaces gave no echo, the law
-    would not push the robot away at contact.
+    the minimum range give the minimum range. If they gave no echo, the law would not
+    push the robot away at contact.
 
     All sensors fire at multiples of ``period_s``, and hold their readings between these
-    times. With ``firing: sequential``, one sensor fires per period, from left to right,
-    and the other sensors hold their readings. For example, three sensors with periods
-    of 25 ms have ranges that are 0, 25, and 50 ms old. Each sensor fires again after a
-    round of 75 ms.
+    times. With ``firing: sequential``, only one sensor fires at each of these times,
+    from left to right. For example, three sensors with a period of 25 ms have ranges
+    that are 0, 25, and 50 ms old. Each sensor fires again after a round of 75 ms.
 
     The state has the last range and the last echo of each sensor. The output is a
     function of the state and the present poses. There is no latency. The block draws
@@ -302,7 +283,7 @@ class UltrasonicArray(Block):
     Args:
         parameters: Parameters of the sensors, and the times at which they fire.
         faults: Faults of the robot. Only faults of ``ultrasonic`` have an effect.
-        robot: Parameters of the robot, for the position of the control point P.
+        robot: Distance of the control point P ahead of the axle.
         sound_speed_m_s: True speed of sound, m/s.
         assumed_sound_speed_m_s: Speed of sound with which the sensors convert time to
             range, m/s. None: the true speed.

@@ -83,10 +83,10 @@ def _find_route_again(
 def planner_step(
     tick: int, state: PlannerState, inputs: Any, outputs: Any, numbers: PlannerNumbers
 ) -> None:
-    """Computes the route of the next tick (tick = control period).
+    """Computes the route for the next tick (control period).
 
-    The planner remembers the objects that the sensors see. If the robot stalls, the
-    planner plans a new route.
+    The planner remembers the objects that the sensors see. If the robot stalls, it
+    plans a new route.
     """
     if not numbers.replans:
         return
@@ -122,19 +122,18 @@ class GlobalPlanner(Block):
     """Plans the route to the goal, and plans a new route when the robot stalls.
 
     A route is a curve for P, the control point ahead of the wheel axle. The first route
-    leads from the initial position of P past the known obstacles (``plan_route``). The
-    planner remembers the nearest points of objects that are not known to move. It
-    remembers at most one point per cell of its grid.
+    leads from the initial position of P past the known obstacles (``plan_route``).
+    During the run, the planner remembers the nearest points of objects that are not
+    known to move. It remembers at most one point per cell of its grid.
 
-    The robot stalls if P advances by less than 10 cm along the route in 6 s, and is
-    farther from the goal than 15 cm. Then the block plans a new route from the position
-    of P. The new route also avoids the remembered points and robots at rest. If there
-    is no such route, the block keeps the old route and tries again after 6 s.
+    The robot stalls if P advances by less than 10 cm along the route in 6 s. Within 15
+    cm of the goal, it does not count as stalled. If the robot stalls, the block plans a
+    new route from the position of P. This route also avoids the remembered points and
+    robots at rest. If there is no such route, the block keeps the old route and tries
+    again after 6 s.
 
-    The discrete state is ``PlannerState``. The block updates the state at every tick
-    (control period). An update at time t reads the inputs at t. The block publishes the
-    resulting route from t on, so other blocks read this route in their next update. The
-    outputs are parts of the state; there is no feedthrough.
+    The discrete state is ``PlannerState``. A new route appears at the output one
+    control period after the inputs that cause it. There is no feedthrough.
 
     Args:
         parameters: Goal, clearance, and whether the block plans new routes.

@@ -61,11 +61,11 @@ def search_cells(
 ) -> Any:  # pragma: no cover  (compiled)
     """Searches for a shortest path on a grid with A*, where each cell has 8 neighbors.
 
-    A diagonal step costs sqrt(2) times as much as a straight step. The path takes a
-    diagonal step only if both cells beside this step are free. The priority queue is a
-    binary heap of cells. The heap is sorted by the cost so far plus the octile distance
-    to the goal. When the search finds a cheaper path to a cell, the cell enters the
-    heap again. The search then skips the older entries of this cell.
+    A diagonal step costs sqrt(2) times as much as a straight step. It is possible only
+    if both cells beside it are free. The priority queue is a binary heap of cells,
+    sorted by the cost so far plus the octile distance to the goal. If the search finds
+    a cheaper path to a cell, the cell enters the heap again. The search later skips the
+    older entries of the cell.
 
     Args:
         blocked: (n, m) whether each cell is blocked.

@@ -29,7 +29,8 @@ class OccupancyGrid(NamedTuple):
 
     blocked: NDArray[np.bool_]
     """(n, m) whether each cell is blocked, because its middle is too near to an
-    obstacle. The axes are x and y."""
+    obstacle. The first axis is x, and the second is y.
+    """
     low: tuple[float, float]
     """Least x and y, m."""
 
@@ -37,14 +38,14 @@ class OccupancyGrid(NamedTuple):
 def map_grid(
     points: ArrayLike, rectangles: ArrayLike, clearance_m: float
 ) -> OccupancyGrid:
-    """Makes the grid of a map, in which cells near known obstacles are blocked.
+    """Makes a grid in which the cells near known obstacles are blocked.
 
     Args:
         points: (n, 2) start and goal in the world frame W, m.
         rectangles: (k, 5) known obstacles in W. Each row is (x, y, theta, length,
             width), m and rad.
-        clearance_m: Distance, m. A cell is blocked if its middle is nearer to an
-            obstacle than this distance.
+        clearance_m: A cell is blocked if its middle is nearer to an obstacle than this
+            distance, m.
 
     Returns:
         The grid. It covers all points and obstacles, plus a margin of 2 m.
@@ -64,15 +65,8 @@ def map_grid(
 def make_occupancy_grid(arena: tuple[float, float, float, float]) -> OccupancyGrid:
     """Makes a grid of free cells that covers a rectangle of the floor.
 
-    Args:
-        arena: Rectangle (least x, least y, greatest x, greatest y) in the world frame
-            W, m.
-
-    Returns:
-        The grid.
-
-    Raises:
-        InputError: The grid would have too many cells.
+    ``arena`` is (least x, least y, greatest x, greatest y) in the world frame W, m. If
+    the grid would have too many cells, the function raises an ``InputError``.
     """
     low_x, low_y, high_x, high_y = arena
     size = [
@@ -95,14 +89,8 @@ def cell_of(
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
     """Returns the cell that contains a point of the floor.
 
-    Args:
-        grid: The grid.
-        x: x coordinate of the point in the world frame W, m.
-        y: y coordinate of the point in W, m.
-
-    Returns:
-        (i, j), indices of the cell along x and y. They are (-1, -1) if the point is
-        outside the grid.
+    ``x`` and ``y`` are in the world frame W, m. The result is (i, j), the indices of
+    the cell along x and y, or (-1, -1) if the point is outside the grid.
     """
     i = math.floor((x - grid.low[0]) / CELL_M)
     j = math.floor((y - grid.low[1]) / CELL_M)
@@ -114,16 +102,7 @@ def cell_of(
 def cell_middle(
     grid: OccupancyGrid, i: int, j: int
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Returns the position of the middle of a cell.
-
-    Args:
-        grid: The grid.
-        i: Index of the cell along x.
-        j: Index of the cell along y.
-
-    Returns:
-        (x, y) of the middle in the world frame W, m.
-    """
+    """Returns the middle (x, y) of cell (i, j) in the world frame W, m."""
     return grid.low[0] + (i + 0.5) * CELL_M, grid.low[1] + (j + 0.5) * CELL_M
 
 
@@ -131,10 +110,10 @@ def cell_middle(
 def _span(
     low: float, high: float, first: float, count: int
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Return the range of cells along one axis whose middles may lie in an interval.
+    """Returns the cells along one axis whose middles may lie in an interval.
 
     Returns:
-        Index of the first cell in the range, and index after the last cell.
+        Index of the first of these cells, and index after the last of them.
     """
     begin = math.floor((low - first) / CELL_M - 0.5)
     end = math.ceil((high - first) / CELL_M - 0.5) + 1
@@ -147,12 +126,9 @@ def block_rectangles(
 ) -> None:  # pragma: no cover  (compiled)
     """Marks cells as blocked if their middles are too near to a rectangle.
 
-    The function computes exact distances. A distance transform would be unsuitable for
-    two reasons:
-
-    - A distance transform measures between middles of cells, so its error is up to 0.7
-      cells.
-    - Compiled steps of blocks cannot call a distance transform.
+    The function computes exact distances. A distance transform would measure between
+    middles of cells, with errors of up to 0.7 cells. Compiled steps of blocks could not
+    call it either.
 
     Args:
         grid: The grid, modified in place.

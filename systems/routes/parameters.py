@@ -16,19 +16,23 @@ class RouteParameters(Parameters):
     """
 
     speed_m_s: float = Field(default=0.15, ge=0.02, le=100.0)
-    """Speed of the target along the route, m/s. If the speed were lower than the limit,
-    the planner would treat the robot as stalled."""
+    """Speed of the target along the route, m/s. Below 0.02 m/s, the planner would treat
+    the robot as stalled.
+    """
     acceleration_m_s2: Acceleration = 0.15
     """Acceleration of the target from rest and to rest, m/s^2."""
     timing: Literal["timed", "waiting"] = "timed"
     """Motion of the target. ``timed``: the motion depends only on time, as in the
-    paper. ``waiting``: when the target is 0.5 m ahead of P, it waits for the robot."""
+    paper. ``waiting``: when the target is 0.5 m ahead of the control point P, it waits
+    for the robot.
+    """
     goal_m: Point = (4.0, 0.0)
     """Goal of P in W, m."""
     clearance_m: float = Field(default=0.35, ge=0.15, le=1_000.0)
-    """Planned distance between the route and known obstacles, m. After rounding, the
-    route keeps at least 92 % of this distance. The planner's grid has cells of 0.05 m,
-    which are too coarse for less than 0.15 m."""
+    """Planned distance between the route and known obstacles, m. Rounded corners may
+    reduce it to 92 %. The planner's grid has cells of 0.05 m, which are too coarse for
+    less than 0.15 m.
+    """
     replan: bool = True
-    """Whether a robot that stalls plans a new route around the obstacles that it has
+    """Whether a stalled robot plans a new route around the obstacles that it has
     seen."""

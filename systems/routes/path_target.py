@@ -46,10 +46,11 @@ class TargetNumbers(NamedTuple):
 def route_fingerprint(
     route: Any,
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Computes four numbers that identify a route, to detect a new route.
+    """Computes four numbers that identify a route.
 
-    The numbers are the count of the route's points, the spacing of these points, a
-    weighted sum of their x coordinates, and a weighted sum of their y coordinates.
+    ``PathTarget`` notices a new route by these numbers: the count of the points, their
+    spacing, a weighted sum of their x coordinates, and a weighted sum of their y
+    coordinates.
     """
     count, x, y = int(route[0]), 0.0, 0.0
     for k in range(count):
@@ -64,9 +65,7 @@ def nearest_on_route(
 ) -> float:  # pragma: no cover  (compiled)
     """Finds the point of a route that is nearest to a given position.
 
-    The function searches only a part of the route, given by two arc lengths. It
-    projects the position on each segment of this part, and limits the projection to the
-    segment and to the part. It returns the projection with the least distance.
+    The function searches only the part of the route between two arc lengths.
 
     Args:
         route: (ROUTE_SIZE,) value of the port ``route``.
@@ -108,15 +107,14 @@ def point_on_route(
     """Returns a point of a route, and the direction of the route at this point.
 
     The function interpolates the route with cubic Hermite polynomials (Catmull and
-    Rom). The direction is therefore continuous.
+    Rom), so that the direction is continuous.
 
     Args:
         route: (ROUTE_SIZE,) value of the port ``route``.
         along: Arc length s of the point, m.
 
     Returns:
-        Four numbers: the position x and y in the world frame W, m; and the derivatives
-        dx/ds and dy/ds.
+        Position x and y in the world frame W, m, and derivatives dx/ds and dy/ds.
     """
     count, spacing = int(route[0]), route[1]
     along = min(max(along, 0.0), (count - 1) * spacing)
@@ -140,14 +138,16 @@ def point_on_route(
 def next_speed(
     speed: float, way: float, top: float, acceleration: float, tick_s: float
 ) -> float:
-    """Returns the largest next speed that still permits a stop within a distance.
+    """Returns the largest speed from which the target can still stop in time.
 
-    The speed changes uniformly within a tick (control period). The change per second is
-    at most the given acceleration.
+    The result is the speed at the end of the present tick (control period). The speed
+    changes linearly during the tick. If no speed lets the target stop in time, the
+    target brakes at the largest deceleration.
 
     Args:
         speed: Present speed, m/s.
-        way: Remaining distance to the stop, m. It is negative if the stop was missed.
+        way: Remaining distance to the point of the stop, m. It is negative beyond this
+            point.
         top: Largest permitted speed, m/s.
         acceleration: Largest acceleration and deceleration, m/s^2.
         tick_s: Duration of a tick, s.
@@ -170,10 +170,10 @@ def path_target_step(
 
     The state contains, in this order:
 
-    - the arc length of the target along the route, m;
-    - the speed of the target, m/s;
-    - the arc length of the route's point nearest to the control point P, m;
-    - four numbers that identify the route (``route_fingerprint``).
+    - the arc length of the target along the route, m
+    - the speed of the target, m/s
+    - the arc length of the route's point nearest to the control point P, m
+    - four numbers that identify the route (``route_fingerprint``)
     """
     route, (target, progress, valid) = np.asarray(inputs[0]), outputs
     valid[0] = 1.0
@@ -220,24 +220,22 @@ class PathTarget(Block):
 
     P is the control point of the robot, ahead of its axle. The output ``target_state``
     is the position and velocity of the target in the world frame W. The output
-    ``route_progress`` has two arc lengths along the route. The first belongs to the
-    target, and the second to the point of the route nearest to P.
+    ``route_progress`` has two arc lengths along the route: that of the target, and that
+    of the route's point nearest to P.
 
-    A route may come near to itself. The block therefore searches for the nearest point
-    only on a part of the route. This part contains the previous nearest point and the
-    target.
+    Because a route may come near to itself, the block searches for the nearest point
+    only between the previous nearest point and the target.
 
     The field ``timing`` selects how the target moves:
 
-    - ``timed``: The speed of the target depends only on time. The speed rises, stays
-      constant, and falls, whatever the robot does.
-    - ``waiting``: The target brakes so that its lead over P is at most ``LEAD_M`` along
-      the route. The lead can be larger only if P moves back.
+    - ``timed``: The speed of the target depends only on time. It rises, stays constant,
+      and falls, whatever the robot does.
+    - ``waiting``: The target brakes so that it leads P by at most ``LEAD_M`` along the
+      route. Its lead can be larger only if P moves back.
 
-    When a new route arrives, the target begins at rest at the route's point nearest to
-    P. The discrete state is described at ``path_target_step``. The outputs are
-    functions of the state and the present inputs at every control period. There is no
-    latency.
+    When a new route arrives, the target starts again at rest, at the route's point
+    nearest to P. ``path_target_step`` describes the discrete state. The outputs depend
+    on the state and the present inputs. There is no latency.
 
     Args:
         parameters: Speed, acceleration and timing of the target.

@@ -1,7 +1,6 @@
 """Finds smooth routes from a start to a goal, past known rectangles and seen discs.
 
-``find_route`` searches a path of grid cells, pulls this path taut, and rounds its
-corners.
+``find_route`` finds a path of grid cells, pulls this path taut, and rounds its corners.
 """
 
 from __future__ import annotations
@@ -112,10 +111,10 @@ def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compile
 def _clearance(
     a: Any, b: Any, rectangles: Any, discs: Discs, least: float, most: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Return the distance of a segment from the nearest obstacle, at most ``most``.
+    """Returns the distance of a segment from the nearest obstacle, at most ``most``.
 
-    If the function finds an obstacle nearer than ``least``, it stops the search and
-    returns the distance of this obstacle.
+    At the first obstacle nearer than ``least``, the function stops and returns the
+    distance of this obstacle.
     """
     best = most
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -215,13 +214,11 @@ def _sees(
 def _pulled(
     points: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> Any:  # pragma: no cover  (compiled)
-    """Remove points of a path so that the remaining path is taut.
+    """Removes points of a path so that the remaining path is taut.
 
-    Two points see each other if the segment between them keeps the clearance. The
-    function starts at the first point and keeps this point. From each kept point, it
-    checks the following points in order. It stops before the first point that the kept
-    point does not see. The point before this one is the next kept point. The direct
-    neighbor of a kept point always counts as seen.
+    From each kept point, the function goes along the path until it finds a point out of
+    sight, and keeps the point before it. A point is in sight if the straight segment to
+    it keeps the clearance. The next point always counts as in sight.
     """
     kept = np.empty_like(points)
     kept[0] = points[0]
@@ -240,7 +237,7 @@ def _pulled(
 
 @njit(cache=True)
 def _averaged(points: Any, half: int) -> Any:  # pragma: no cover  (compiled)
-    """Return the moving average of the points of a path.
+    """Returns the moving average of the points of a path.
 
     The window becomes shorter toward the ends of the path, so that the end points do
     not move.
@@ -260,12 +257,11 @@ def _averaged(points: Any, half: int) -> Any:  # pragma: no cover  (compiled)
 def _rounded(
     pulled: Any, rectangles: Any, discs: Discs, clearance: float
 ) -> Any:  # pragma: no cover  (compiled)
-    """Round the corners of a taut path as far as the clearance permits.
+    """Rounds the corners of a taut path as far as the clearance permits.
 
-    The function divides the path into fine points, and applies moving averages to these
-    points. It tries the widest window first, and then narrower ones; the last attempt
-    does not average. The function accepts the first route that keeps the clearance of
-    the taut path, minus a small allowance.
+    The function applies moving averages to closely spaced points of the path. It tries
+    the widest window first, then narrower windows, and finally none. It accepts the
+    first route that keeps the clearance of the taut path, minus a small allowance.
     """
     count = max(math.ceil(_length(pulled) / _FINE_M), 1) + 1
     fine = _spaced(pulled, count)
@@ -292,12 +288,12 @@ def _way_out(
     discs: Discs,
     clearance: float,
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Return the nearest free grid cell that a safe straight segment joins to ``end``.
+    """Returns the nearest free grid cell that a safe straight segment joins to ``end``.
 
-    ``end`` is the start or the goal of a route. A segment is safe if it keeps a least
-    distance from obstacles. If ``end`` is nearer to an obstacle than the clearance, the
-    least distance is the distance of ``end``, minus a small allowance. Otherwise, the
-    least distance is the clearance, minus this allowance.
+    ``end`` is the start or the goal of a route. A safe segment keeps the clearance,
+    minus a small allowance. If ``end`` itself is nearer to an obstacle than the
+    clearance, the segment has to keep only the distance of ``end`` from this obstacle,
+    minus the allowance.
 
     Returns:
         (i, j), indices of the cell along x and y. They are (-1, -1) if there is no such
@@ -332,17 +328,15 @@ def find_route(
     discs: Discs,
     clearance: float,
 ) -> Any:  # pragma: no cover  (compiled)
-    """Finds a smooth route from a start to a goal, for planning during a run.
+    """Finds a smooth route from a start to a goal. Compiled code can call the function.
 
-    The function does these steps:
+    The function works in these steps:
 
-    1. It connects the start with a free grid cell by a straight segment, and the goal
-       with another free cell. Start and goal may be nearer to obstacles than the
-       clearance. Both segments come only slightly nearer to obstacles.
+    1. It joins the start and the goal to free grid cells by straight segments. If an
+       end is nearer to an obstacle than the clearance, its segment comes only slightly
+       nearer.
     2. A* finds a path of cells between the two free cells.
     3. The function pulls this path taut and rounds its corners.
-
-    Compiled code can call this function.
 
     Args:
         grid: Grid in which the cells nearer to obstacles than the clearance are
@@ -355,8 +349,8 @@ def find_route(
         clearance: Distance that the route keeps from obstacles, m.
 
     Returns:
-        (p, 2) points with equal spacing from start to goal in W, m. There are at most
-        ``ROUTE_POINTS`` points. The array is empty if there is no route.
+        (p, 2) points with equal spacing from start to goal in W, m, at most
+        ``ROUTE_POINTS``. The array is empty if there is no route.
     """
     none = np.empty((0, 2))
     if math.hypot(goal[0] - start[0], goal[1] - start[1]) < _SHORTEST_M:
@@ -407,18 +401,18 @@ def plan_route(
 ) -> Route:
     """Plans a short and smooth route for the center of a disc-shaped robot.
 
-    The function does these steps:
+    The function works in these steps:
 
     1. A* searches a grid. The middles of the free cells keep the clearance.
-    2. The function pulls the path of cells taut, where the straight segments also keep
-       the clearance.
-    3. Two moving averages over 0.3 m round the path. Rounding may reduce the distance
-       from an obstacle by at most 15 mm and at most 5 % of the clearance. If the
-       reduction would be larger, the function uses shorter averages.
+    2. The function pulls the path of cells taut. The straight segments keep the
+       clearance, too.
+    3. Two moving averages over 0.3 m round the path. If this reduces the distance from
+       an obstacle by more than 15 mm or 5 % of the clearance, the averages become
+       shorter.
 
     The route keeps at least 92 % of the clearance from all known obstacles. A route
-    longer than 30 m may come nearer at sharp corners. Its ``ROUTE_POINTS`` points are
-    then too far apart to follow the arc.
+    longer than 30 m may come nearer at sharp corners, because its ``ROUTE_POINTS``
+    points are then too far apart.
 
     Args:
         start: (x, y) in the world frame W, m. If the start is nearer to an obstacle

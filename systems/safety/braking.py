@@ -52,15 +52,17 @@ class BrakingNumbers(NamedTuple):
     """Deceleration of the commanded speed of the faster rim, m/s^2."""
     tick_s: float
     parts: int
-    """Number of parts of a control period. The guard checks the position of the robot
-    against the cells at the end of each part."""
+    """Number of parts of a control period. At the end of each part, the guard compares
+    the position of the robot with the cells.
+    """
     part: LaggedMotion
     """Motion of the wheels in one part."""
     top_wheel_speed: float
     """Top speed of a wheel, rad/s."""
     keep_m: float
-    """Distance that the axle has to keep from non-free space, m. The distance is the
-    sum of the radius of the body and the margins."""
+    """Distance that the axle has to keep from non-free space, m: the radius of the body
+    plus the margins.
+    """
     least_m: float
     """Smaller distance, m, that applies to a robot nearer than ``keep_m``."""
     obstacle_speed_m_s: float
@@ -70,8 +72,8 @@ class BrakingNumbers(NamedTuple):
 class Danger(NamedTuple):
     """Non-free cells and ends of sensor views that the robot has to avoid.
 
-    The view of a sensor is the region in which the sensor has seen free floor. The data
-    are for one control period.
+    The view of a sensor is the region in which it has seen free floor. The data are
+    those of one control period.
     """
 
     corners: NDArray[np.float64]
@@ -91,13 +93,13 @@ class Danger(NamedTuple):
 
 @register_jitable
 def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, float]:
-    """Computes the wheel speeds after a time with a constant command.
+    """Computes the wheel speeds at the end of a time with a constant command.
 
     Args:
         speeds: Speeds of the left and right wheel at the start, rad/s.
         commanded: Commanded speeds of the left and right wheel, rad/s.
         kept: Share of the difference between actual and commanded speed that remains at
-            the end.
+            the end, 0 to 1.
 
     Returns:
         Speeds of the left and right wheel at the end, rad/s.
@@ -118,13 +120,12 @@ def roll_on(
     Args:
         pose: Pose (x, y, theta) at the start, m and rad.
         speeds: Speeds of the left and right wheel at the start, rad/s.
-        commanded: Commanded speeds of the left and right wheel, rad/s. They are
-            constant during the part.
+        commanded: Constant commanded speeds of the left and right wheel, rad/s.
         numbers: Model of the robot.
 
     Returns:
-        Two values: the pose (x, y, theta) at the end, m and rad, and the speeds of the
-        left and right wheel at the end, rad/s.
+        Pose (x, y, theta) at the end, m and rad, and speeds of the left and right wheel
+        at the end, rad/s.
     """
     part = numbers.part
     duration, lagged = part.duration_s, part.lagged_s
@@ -149,7 +150,7 @@ def roll_on(
 def braked(
     commanded: Any, numbers: BrakingNumbers
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the next command of a robot that brakes along the same curve.
+    """Computes the next command of a robot that brakes without leaving its curve.
 
     Args:
         commanded: Present commanded speeds of the left and right wheel, rad/s.
@@ -170,11 +171,11 @@ def braked(
 def _nearest_view(
     danger: Danger, x: float, y: float, ahead_s: float, speed: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance from a position to the nearest end of a sensor view, m.
+    """Computes the distance from a position to the nearest possible obstacle, m.
 
-    The function assumes that an obstacle moves from the end of the view at ``speed``.
-    The obstacle moves from the time of the reading until ``ahead_s`` from now. The
-    function subtracts the distance that the obstacle covers.
+    The function assumes that an obstacle was at the end of each sensor's view when the
+    sensor took its last reading. From then until ``ahead_s`` from now, the obstacle
+    approaches the position at ``speed``.
     """
     nearest = np.inf
     for sensor in range(danger.arcs.shape[0]):
@@ -195,33 +196,26 @@ def can_be_braked(
 ) -> bool:  # pragma: no cover  (compiled)
     """Checks whether the robot may obey a command for one control period.
 
-    The function predicts this motion: the robot obeys the command for one period, and
-    then brakes to rest. The function checks the position of the axle after each part of
-    a period. The required distance from the axle to non-free cells depends on the
-    present distance:
+    The function predicts that the robot obeys the command for one period and then
+    brakes to rest. After each part of a period, it computes the distance of the axle
+    from the non-free cells. The limit of this distance depends on the present distance:
 
-    - If the present distance is at least ``keep_m`` plus ``_SLACK_M``, the axle has to
-      keep the distance ``keep_m``.
-    - If the present distance is smaller, but not below ``least_m``, the axle may come
-      nearer by at most ``_SLACK_M``. The axle must not come nearer than ``least_m``.
-    - If the present distance is below ``least_m``, the axle must not come nearer and
-      has to end farther away. The axle also must not come nearer to any point of a cell
-      within ``least_m``. The distance can be this small because the map has forgotten
-      nearby cells.
+    - Present distance of at least ``keep_m`` plus ``_SLACK_M``: the limit is
+      ``keep_m``.
+    - Smaller present distance, but at least ``least_m``: the axle may come nearer by
+      ``_SLACK_M``, but not nearer than ``least_m``.
+    - Present distance below ``least_m``, because the map has forgotten nearby cells:
+      the axle must not come nearer to any point of a cell within ``least_m``, and must
+      end farther away.
 
-    A turn on the spot does not move the disc that contains the body. These limits
-    therefore do not apply to a turn on the spot.
+    These limits do not apply to a turn on the spot, because it does not move the disc
+    that contains the body.
 
-    If obstacles may move, the function assumes an obstacle that starts at the end of a
-    sensor's view at the time of the reading. The obstacle moves at
-    ``obstacle_speed_m_s``. One of two conditions must then hold:
-
-    - The axle keeps the distance ``keep_m`` from all points that such an obstacle may
-      reach.
-    - The robot withdraws from the end of the view.
-
-    A slow turn on the spot counts as rest, so the function does not check this turn
-    against moving obstacles.
+    If obstacles may move, the function also assumes obstacles at the ends of the sensor
+    views. From the time of the reading on, these obstacles move at
+    ``obstacle_speed_m_s``. Then the axle must stay ``keep_m`` away from all points that
+    these obstacles may reach, or the robot must withdraw from the end of the view. A
+    slow turn on the spot counts as rest and needs no such check.
 
     Args:
         pose: Present pose (x, y, theta), m and rad.
@@ -281,24 +275,12 @@ def can_be_braked(
 def _enters(
     begin: Any, pose: Any, danger: Danger, radius: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether the robot's disc has come nearer to a point of a non-free cell.
+    """Checks whether a point of a non-free cell may have entered the robot's disc.
 
-    The disc at the start contains no obstacle, whatever the map states about its cells.
-    Some points of the present disc are nearer to the center of the disc at the start
-    than to the present center. These points were also in the disc at the start, so
-    there is no obstacle at these points. They lie on one side of the perpendicular
-    bisector between both centers. A cell lies on this side if all its corners lie on
-    this side.
-
-    Args:
-        begin: Center (x, y) of the disc at the start, m.
-        pose: Present pose (x, y, theta), m and rad. The center of the present disc is
-            at (x, y).
-        danger: Non-free cells.
-        radius: Radius of the disc, m.
-
-    Returns:
-        True if a point of a non-free cell may have entered the disc.
+    The robot's disc at the start of the motion contains no obstacle, whatever the map
+    states. A point of the present disc was already in that disc if it is nearer to the
+    center at the start than to the present center. The function ignores cells that
+    contain only such points.
     """
     x, y, cell = pose[0], pose[1], danger.cell_m
     back_x, back_y = begin[0] - x, begin[1] - y
@@ -325,14 +307,11 @@ def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (c
 def _keeps_off_moving(
     place: Any, ahead_s: float, moved: float, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether the robot keeps away from obstacles in view that may move.
+    """Checks whether the robot keeps away from moving obstacles.
 
-    The result is true in two cases:
-
-    - At the time ``ahead_s`` from now, no moving obstacle can be within ``keep_m`` of
-      the position ``place``.
-    - The robot moves away from the limit of the sensors' view. Obstacles that the
-      sensors do not see can be beyond this limit.
+    The result is true if no obstacle in view can be within ``keep_m`` of ``place`` at
+    the time ``ahead_s`` from now. It is also true if the robot moves away from the end
+    of the sensors' view.
     """
     x, y = place
     speed = numbers.obstacle_speed_m_s
@@ -352,9 +331,9 @@ def danger_of(
         space: Map of free space.
         time: Current time, s.
         pose: Present pose (x, y, theta), m and rad.
-        reach: Two distances, m. The first is the distance from the axle within which
-            cells are collected. The second is the rolled distance of the wheels during
-            which free cells have to stay free.
+        reach: Two distances, m. The function collects non-free cells within the first
+            distance of the axle. A cell is free only if it will still count as free
+            after the wheels have rolled the second distance.
         numbers: Model of the robot.
 
     Returns:
@@ -391,14 +370,13 @@ def chosen(
 ) -> tuple[int, tuple[float, float]]:  # pragma: no cover  (compiled)
     """Chooses a command from which the robot can brake to rest.
 
-    The function tries these commands in order, and returns the first command that
-    ``can_be_braked`` permits:
+    The function returns the first of these commands that ``can_be_braked`` permits:
 
-    1. the wanted wheel speeds, then smaller shares of them along the same curve.
-    2. the wanted turn, while the forward motion brakes.
-    3. the same turn, but slow enough to count as rest.
-    4. braking along the present curve. The check in the previous control period
-       included this motion. Therefore the function does not check this motion again.
+    1. the wanted wheel speeds, then smaller shares of them along the same curve
+    2. the wanted turn, while the forward motion brakes
+    3. the same turn, but slow enough to count as rest
+    4. braking along the present curve, without a check, because the previous control
+       period has already checked it
 
     Args:
         pose: Present pose (x, y, theta), m and rad.
@@ -409,8 +387,8 @@ def chosen(
         numbers: Model of the robot.
 
     Returns:
-        Two values: the action, ``PASSED`` to ``BRAKED``, and the commanded speeds of
-        the left and right wheel, rad/s.
+        Action (a number from ``PASSED`` to ``BRAKED``), and commanded speeds of the
+        left and right wheel, rad/s.
     """
     for number in range(len(_SHARES)):
         share = _SHARES[number]

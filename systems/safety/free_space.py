@@ -31,9 +31,9 @@ _FULL_HIT_M = 0.6
 class FreeSpace(NamedTuple):
     """Map of a square window of n x n cells of the floor, which moves with the robot.
 
-    Cell (i, j) of the floor covers x from i to i + 1 and y from j to j + 1, in cells,
-    in the frame of the odometry. The arrays store the values of this cell at the index
-    [i % n, j % n].
+    Positions are in the frame of the odometry. Measured in cell sides, cell (i, j) of
+    the floor covers x from i to i + 1 and y from j to j + 1. The arrays store its
+    values at the index [i % n, j % n].
 
     The rolled distance is the mean distance that the rims of both wheels have rolled
     since the start.
@@ -42,20 +42,23 @@ class FreeSpace(NamedTuple):
     free_until: NDArray[np.float64]
     """(n, n) rolled distance up to which a cell counts as free, m. After this distance,
     the position of the cell is too uncertain. The value is ``NEVER`` if the cell was
-    not seen free."""
+    not seen free.
+    """
     seen_s: NDArray[np.float64]
     """(n, n) time at which a cell was last seen free, s, or ``NEVER``."""
     hits: NDArray[np.float64]
     """(n, n) weighted number of echoes from each cell since the cell was last seen
-    free."""
+    free.
+    """
     first: NDArray[np.int64]
     """(2,) i and j of the first cell of the window."""
     rolled_m: NDArray[np.float64]
     """(1,) rolled distance, m."""
     arcs: NDArray[np.float64]
     """(sensors, points, 2) arc of points (x, y) at which the view of each sensor ends,
-    m. The points are in order from the right to the left edge of the aperture. The arc
-    follows from the last reading of the sensor."""
+    m. The arc follows from the last reading of the sensor. Its points go from the right
+    to the left edge of the aperture.
+    """
     arcs_s: NDArray[np.float64]
     """(sensors, 1) time of the last reading of each sensor, s, or ``NEVER``."""
     cell_m: float
@@ -65,16 +68,16 @@ class FreeSpace(NamedTuple):
 def make_free_space(
     cells: int, cell_m: float, sensors: int, arc_points: int
 ) -> FreeSpace:
-    """Makes a map without any free cells.
+    """Makes a map without any free cells, around the origin of the floor.
 
     Args:
         cells: Number of cells along each side.
         cell_m: Side of a cell, m.
         sensors: Number of sensors.
-        arc_points: Number of points of the arc of each sensor.
+        arc_points: Number of points of the arc at which the view of a sensor ends.
 
     Returns:
-        Map with the origin of the floor in its middle.
+        The map.
     """
     return FreeSpace(
         np.full((cells, cells), NEVER),
@@ -92,18 +95,19 @@ def make_free_space(
 def cell_is_free(
     space: FreeSpace, i: int, j: int, until: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether a cell counts as free.
+    """Checks whether a cell still counts as free after the wheels have rolled.
+
+    The position of a cell becomes uncertain as the wheels roll. Therefore a cell that
+    was seen free counts as free only for some rolled distance.
 
     Args:
         space: Map of free space.
         i: Index of the cell on the floor along x.
         j: Index of the cell on the floor along y.
-        until: Rolled distance of the wheels up to which the cell has to count as free,
-            m.
+        until: Mean distance that both wheels have rolled since the start, m.
 
     Returns:
-        True if the cell counts as free. A cell outside the window does not count as
-        free.
+        True if the cell counts as free. Cells outside the window never do.
     """
     cells = space.free_until.shape[0]
     di, dj = i - space.first[0], j - space.first[1]
@@ -118,16 +122,10 @@ def cells_within(
 ) -> tuple[int, int, int, int]:  # pragma: no cover  (compiled)
     """Finds the cells of the window that a rectangle meets.
 
-    Args:
-        space: Map of free space.
-        low_x: Least x of the rectangle, m.
-        low_y: Least y of the rectangle, m.
-        high_x: Greatest x of the rectangle, m.
-        high_y: Greatest y of the rectangle, m.
-
-    Returns:
-        Four indices of cells: least i, least j, greatest i, and greatest j. If a least
-        index exceeds the greatest index, the rectangle meets no cells.
+    The corners of the rectangle are (``low_x``, ``low_y``) and (``high_x``, ``high_y``)
+    in the frame of the odometry, m. The result is four indices of cells: least i, least
+    j, greatest i, and greatest j. If a least index is larger than the greatest, the
+    rectangle meets no cells.
     """
     cell, cells, (first_i, first_j) = space.cell_m, len(space.hits), space.first
     return (
@@ -147,7 +145,7 @@ def move_window(
     Args:
         space: Map of free space. The function changes the map in place.
         x: Position of the robot, x in the frame of the odometry, m.
-        y: Position of the robot, y, m.
+        y: Position of the robot, y in the frame of the odometry, m.
     """
     cells = space.free_until.shape[0]
     slack = min(_SLACK, cells // _SLACK_SHARE)
@@ -177,9 +175,10 @@ def clear_disc(
     Args:
         space: Map of free space. The function changes the map in place.
         x: Center of the disc, x in the frame of the odometry, m.
-        y: Center of the disc, y, m.
+        y: Center of the disc, y in the frame of the odometry, m.
         radius: Radius of the disc, m.
-        until: Rolled distance of the wheels up to which the cells count as free, m.
+        until: The cells count as free until the wheels have rolled this mean distance
+            since the start, m.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
     low_i, low_j, high_i, high_j = cells_within(
@@ -200,21 +199,21 @@ def edge_cells(
 ) -> int:  # pragma: no cover  (compiled)
     """Lists the non-free cells of a square that are next to a free cell.
 
-    These cells are the edge of the non-free space. For any point in free space, the
-    nearest non-free cell belongs to this edge.
+    These cells are the edge of the non-free space. The non-free cell nearest to a point
+    in free space always belongs to this edge.
 
     Args:
         space: Map of free space.
         x: Middle of the square, x in the frame of the odometry, m.
-        y: Middle of the square, y, m.
+        y: Middle of the square, y in the frame of the odometry, m.
         reach: Half of the side of the square, m.
-        until: Rolled distance of the wheels up to which cells have to be free, m.
-        out: (m, 2) array that the function fills: the corner of least x and y of each
-            cell, m.
+        until: A cell is free if it counts as free until the wheels have rolled this
+            mean distance since the start, m.
+        out: (m, 2) array that the function fills with one corner of each cell: least x
+            and least y, m.
 
     Returns:
-        Number of cells on the edge. If this number exceeds m, ``out`` contains only m
-        cells.
+        Number of cells on the edge. If it exceeds m, ``out`` contains only m of them.
     """
     cell, count = space.cell_m, 0
     low_i, low_j = math.floor((x - reach) / cell), math.floor((y - reach) / cell)
@@ -260,14 +259,14 @@ def nearest_cell(
     """Computes the distance from a position to the nearest of several cells.
 
     Args:
-        corners: (m, 2) corners of least x and y of the cells, m.
-        count: Number of cells in this array.
+        corners: (m, 2) one corner of each cell: least x and least y, m.
+        count: Number of cells in ``corners``.
         cell: Side of a cell, m.
         x: Position, x in the frame of the odometry, m.
-        y: Position, y, m.
+        y: Position, y in the frame of the odometry, m.
 
     Returns:
-        Distance, m. If there are no cells, the distance is infinite.
+        Distance, m; infinite if there are no cells.
     """
     best = np.inf
     for k in range(count):
@@ -290,25 +289,25 @@ def see(
     """Enters the newest readings of the sensors into the map of free space.
 
     Sensors at the same position form a group. For each group, the function visits the
-    cells in the sectors of the group, up to the greatest distance that the group has
-    seen. As seen from the group, the circumscribed circle of a cell covers an angle.
-    The readings affect a cell in one of these ways:
+    cells in its view, up to the greatest distance that the group has seen. For each
+    cell, it combines the readings in all directions that the circle around the cell
+    covers:
 
-    - If the group has seen free floor in this whole angle up to the far side of the
-      circle, the cell becomes free. The cell then loses all hits.
+    - If the group has seen free floor in all these directions, up to the far side of
+      the circle, the cell becomes free and loses all hits.
     - Otherwise, the cell gets a hit if an echo comes from the direction of its middle
       and from about its distance.
 
     Args:
         space: Map of free space. The function changes the map in place.
         time: Current time, s.
-        turn: Number that selects the rows of cells. Only every fourth row is updated.
+        turn: Number of the call. One call updates only every fourth row of cells. The
+            next call updates other rows.
         pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
-        readings: (sensors, 2) array with two distances per sensor, m. The first is the
-            distance up to which the sensor has seen free floor, or 0 without a new
-            reading. The second is the distance of the echo, or infinity without an
-            echo.
+        readings: (sensors, 2) array with two distances per sensor, m. The sensor has
+            seen free floor up to the first distance, which is 0 without a new reading.
+            The second is the distance of the echo, infinite without an echo.
         error: Errors that limit how long a cell stays free.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
@@ -358,9 +357,9 @@ def _of_sectors(
     """Combines the readings of the sensors that see each sector.
 
     Returns:
-        (sectors, 3) array with three distances per sector, m: the distance seen free,
-        the distance of the nearest echo, and the greater of both. Without an echo, the
-        third distance equals the first.
+        (sectors, 3) three distances per sector, m: the distance seen free; the distance
+        of the nearest echo, infinite without an echo; and the larger of both, or the
+        distance seen free if there is no echo.
     """
     seen = np.empty((len(sectors.right), 3))
     for k in range(len(seen)):
@@ -380,23 +379,15 @@ def _in_direction(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Returns how far a group of sensors has seen toward a cell.
 
-    As seen from the group, the circumscribed circle of the cell covers an angle. The
-    distance seen free is the least distance of all sectors that overlap this angle. If
-    a part of the angle is outside the sectors of the group, the distance seen free is
-    0. The echo is that of the sector that contains the middle of the cell.
-
-    Args:
-        bearing: Bearing of the cell from the right edge of the group, rad, from 0 to a
-            full turn.
-        hides: Half of the angle that the circle covers, rad.
-        sectors: Sectors of all groups.
-        seen: Result of ``_of_sectors``.
-        begin: Index of the first sector of the group.
-        end: Index of the last sector of the group, plus 1.
+    ``bearing`` is the angle from the right edge of the group's view to the middle of
+    the cell, rad. The circle around the cell covers ``bearing`` plus and minus
+    ``hides``, rad.
+    The distance seen free is the least distance of all sectors that overlap the circle.
+    It is 0 if a part of the circle is out of view. The echo is that of the sector that
+    contains the middle of the cell.
 
     Returns:
-        Distance seen free, m, and distance of the echo, m. Without an echo, the second
-        distance is infinite.
+        Distance seen free, m, and distance of the echo, m, infinite without an echo.
     """
     right = sectors.right[begin, 0]
     span = sectors.left[end - 1, 0] - right
@@ -454,10 +445,10 @@ def end_view(
 def _sector_box(
     x: float, y: float, right: float, left: float, reach: float
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Computes the rectangle that encloses a sector of a disc.
+    """Computes the rectangle, parallel to the axes, that encloses a sector of a disc.
 
-    The extremes of the sector are at three kinds of points: the center, the two ends of
-    the arc, and the points at which the arc crosses the direction of a coordinate axis.
+    The extremes are at the center, at an end of the arc, or where the arc crosses the
+    direction of a coordinate axis.
 
     Returns:
         Least x, least y, greatest x, and greatest y, m.

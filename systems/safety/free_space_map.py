@@ -46,13 +46,14 @@ class MapNumbers(NamedTuple):
     """(sensors, 2) position relative to the axle in B, m."""
     limits: NDArray[np.float64]
     """(sensors, 3) three distances per sensor, m: least range, greatest range, and the
-    largest amount by which a range is too long."""
+    largest amount by which a range is too long.
+    """
     error: PlaceError
     """Quantities that determine the position error of a cell due to odometry."""
     least_way: float
     """Least rolled distance of a rim in one control period, per commanded speed of the
-    faster wheel, m/(rad/s). The value is 0 if the angles of the encoders are not
-    rounded."""
+    faster wheel, m/(rad/s). It is 0 if the angles of the encoders are not rounded.
+    """
     radius: float
     """Radius of the disc that contains the body, m."""
     bubble: float
@@ -67,22 +68,15 @@ class MapState(NamedTuple):
 
     free_space: FreeSpace
     was_at: NDArray[np.float64]
-    """(3,) pose in the last control period, m and rad. The values are NaN before the
-    first period."""
+    """(3,) pose (x, y, theta) in the last control period, m and rad; NaN before the
+    first period.
+    """
 
 
 def map_step(
     tick: int, state: MapState, inputs: Any, outputs: Any, numbers: MapNumbers
 ) -> None:
-    """Updates the map in one control period; see ``systems.framework.block.Step``.
-
-    Args:
-        tick: Number of the control period.
-        state: ``MapState``.
-        inputs: Values of the input ports.
-        outputs: Not used.
-        numbers: ``MapNumbers``.
-    """
+    """Updates the map in one control period; see ``systems.framework.block.Step``."""
     ranges, echo, ages, pose, commanded = inputs
     space, was_at, error = state.free_space, state.was_at, numbers.error
     time = tick * numbers.tick_s
@@ -135,19 +129,19 @@ def map_step(
 def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float:
     """Computes the mean distance that both wheel rims roll in one control period.
 
-    The function counts the distance in the same way as ``place_error``.
+    ``place_error`` computes the position error from the sum of these distances.
 
     Args:
-        was_at: Pose one control period ago, m and rad.
-        pose: Present pose, m and rad.
+        was_at: Pose (x, y, theta) one control period ago, m and rad.
+        pose: Present pose (x, y, theta), m and rad.
         least: Least distance that counts for each wheel, m. A wheel may have moved back
             and forth without a change of the pose.
         error: Errors of the odometry, with the wheel separation and the pulse of the
             encoders.
 
     Returns:
-        Mean rolled distance, m. The distance includes half a pulse, because the true
-        distance may exceed the count of the encoders by this amount.
+        Mean distance, m, plus half a pulse of the encoders, because the true distance
+        may exceed the counted distance.
     """
     turn = pose[2] - was_at[2]
     # The path is longer than its chord by at most the factor 1/cos(turn/2). The factor
@@ -163,22 +157,20 @@ class FreeSpaceMap(Block):
     """Remembers which cells range sensors have seen free, and where echoes came from.
 
     The floor around the robot is divided into square cells. The sensors at one position
-    see a cell free if two conditions hold:
+    see a cell free if the circle around the cell is in their view, and if the whole
+    circle is nearer than their readings minus a margin.
 
-    - The circumscribed circle of the cell lies within the apertures of these sensors.
-    - The whole circle is nearer than the readings of these sensors minus a margin.
-
-    The cell stays free as long as the error of its position relative to the robot is at
-    most ``place_error_m``. The error grows for two reasons: encoders count whole
-    pulses, and the travel of each wheel has the relative error ``wheel_error``. The
-    block enters each reading in the control period in which the sensor fires.
+    A cell stays free while the error of its position relative to the robot is at most
+    ``place_error_m``. The error grows as the robot drives, for two reasons: encoders
+    count whole pulses, and the travel of each wheel has the relative error
+    ``wheel_error``.
 
     At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
-    free. The disc that contains the body counts as free in every period, because
-    ``MotionGuard`` keeps this disc free.
+    free. The disc that contains the body always counts as free, because ``MotionGuard``
+    keeps it free.
 
-    The abstract state has ``FreeSpace`` and the pose of the last period. The output is
-    a function of the state and the present inputs in every period. There is no latency.
+    The abstract state contains ``FreeSpace`` and the pose of the last control period.
+    The output depends on the state and the present inputs. There is no latency.
 
     Args:
         parameters: Cells, start bubble, and errors of positions.

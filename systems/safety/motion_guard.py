@@ -43,25 +43,27 @@ class GuardNumbers(NamedTuple):
     braking: BrakingNumbers
     kept: float
     """Share of the difference between actual and commanded wheel speed that remains
-    after one control period."""
+    after one control period, 0 to 1.
+    """
     reach: tuple[float, float]
-    """Two distances, m. The first is the distance from the axle within which the guard
-    checks cells. The second is the rolled distance of the wheels during which free
-    cells have to stay free."""
+    """Two distances, m. The guard checks cells within the first distance of the axle.
+    Free cells must still count as free after the wheels have rolled the second
+    distance.
+    """
 
 
 def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
     """Computes the wheel speeds of one control period.
 
-    See ``systems.framework.block.Step`` for the arguments of all steps.
+    ``systems.framework.block.Step`` explains the arguments of all steps.
 
     Args:
         tick: Number of the control period.
-        state: Ten numbers: velocity of the control point P, m/s, x and y; commanded
-            wheel speeds, rad/s, left and right; report, four numbers; and modeled wheel
-            speeds, rad/s, left and right.
-        inputs: Four values: command of the law, pose by the odometry, fault of the
-            sensing, and map of free space.
+        state: Ten numbers: velocity (x, y) of the control point P, m/s; commanded
+            speeds of the left and right wheel, rad/s; report, four numbers; and modeled
+            speeds of the left and right wheel, rad/s.
+        inputs: Command of the law, pose by the odometry, fault of the sensing, and map
+            of free space.
         outputs: Not used, because the outputs are part of the state.
         numbers: ``GuardNumbers``.
     """
@@ -114,38 +116,37 @@ def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
 class MotionGuard(Block):
     """Passes the commands of a law as far as the robot can brake to rest in free space.
 
-    The block replaces ``WheelCommand``. It has the same input and converts the command
-    of the law to wheel speeds. The block passes these wheel speeds for one control
-    period if the robot can brake to rest after this period. A disc around the axle
-    contains the body. Until the robot is at rest, this disc has to stay ``margin_m``
-    away from all cells that are not known to be free.
+    The block replaces ``WheelCommand``: it converts the command of the law to wheel
+    speeds. It passes these speeds for one control period if the robot could then brake
+    to rest in free space. For this check, the block uses the smallest disc around the
+    axle that contains the body. The disc must stay ``margin_m`` away from all cells
+    that are not known to be free.
 
-    If this condition does not hold, the block passes lower speeds along the same curve.
-    If these speeds are not possible either, the block passes the turn alone, or it
-    brakes. The virtual mass moves with the command that the guard passes.
+    Otherwise, the block passes lower speeds along the same curve. If these do not help,
+    it passes the turn alone, or it brakes. The virtual mass moves with the command that
+    the block passes.
 
     If ``obstacle_speed_m_s`` is above zero, the block assumes that obstacles in the
-    sensors' view come nearer at this speed. The disc then also has to stay ``margin_m``
-    away from all points that such obstacles may reach. This second condition does not
+    sensors' view approach at this speed. The disc then also has to stay ``margin_m``
+    away from all points that these obstacles may reach. This second condition does not
     apply while the robot withdraws from the obstacles.
 
-    If the sensing has a fault, the guard brakes the robot to rest, whatever the law
+    If the sensing has a fault, the block brakes the robot to rest, whatever the law
     commands.
 
     The port ``guard_report`` has four numbers:
 
-    - the action: 0 passed, 1 slowed, 2 turned, 3 braked, 4 halted because of a fault of
-      the sensing.
+    - the action: 0 passed, 1 slowed, 2 turned, 3 braked, 4 halted because of a fault
     - the distance of the disc from non-free space, minus the distance that the disc has
-      to keep, m.
-    - the stopping distance, m.
+      to keep, m
+    - the stopping distance, m
     - the distance of the disc from the end of the sensors' view, minus the distance
-      that the disc has to keep, m.
+      that the disc has to keep, m
 
-    The discrete state has the velocity of P, the wheel speeds, the report, and the
-    modeled wheel speeds. P is the control point ahead of the axle. The modeled wheel
-    speeds follow the commanded wheel speeds with the lag of the motors. The state is
-    updated every control period. The latency is that of ``WheelCommand``.
+    The discrete state contains the velocity of the control point P, the commanded wheel
+    speeds, the report, and the modeled wheel speeds. The modeled wheel speeds follow
+    the commanded wheel speeds with the lag of the motors. The latency is that of
+    ``WheelCommand``.
 
     Args:
         parameters: ``GuardParameters``.
@@ -155,9 +156,9 @@ class MotionGuard(Block):
             ``twist_B``.
         tick_s: Control period, s.
 
-    Reference: our own work; docs/guard.md has theorem and proof. The concept of passive
-    safety is from Bouraine, Fraichard and Salhi (2012). The concept of passive
-    orientation safety is from Mitsch, Ghorbal, Vogelbacher and Platzer (2017).
+    Reference: our own work; docs/guard.md has theorem and proof. Passive safety:
+    Bouraine, Fraichard and Salhi (2012). Passive orientation safety: Mitsch, Ghorbal,
+    Vogelbacher and Platzer (2017).
     """
 
     part = "command"

@@ -55,11 +55,8 @@ class GuardParameters(Parameters):
     def check(self, robot: RobotParameters) -> None:
         """Checks that the start bubble is large enough for a robot.
 
-        Args:
-            robot: Dimensions of the robot's body.
-
-        Raises:
-            InputError: The start bubble is too small.
+        The start bubble is the disc around the axle that the guard assumes to be free
+        at the start. If it is too small, the function raises an ``InputError``.
         """
         radius = body_radius(robot)
         if self.start_bubble_m < radius + 2.0 * self.cell_m:

@@ -55,12 +55,14 @@ class MonitorNumbers(NamedTuple):
     """Largest motion of the axle, m, and of the heading, rad, in one tick."""
     ranges: NDArray[np.float64]
     """(n, 2) least and greatest range of each sensor, m. The block compares echoes only
-    if the range is between these limits."""
+    if the range is between these limits.
+    """
     silent_s: float
     """A sensor is silent if its range is older than this, s."""
     equal: NDArray[np.float64]
-    """(n,) number of equal echoes after which each sensor is frozen. The number is
-    infinite for a sensor without noise."""
+    """(n,) number of equal echoes after which a sensor counts as frozen; infinite for a
+    sensor without noise.
+    """
     turn_rad: NDArray[np.float64]
     """(n,) largest turn during which echoes may stay equal, rad."""
     step_m: NDArray[np.float64]
@@ -69,9 +71,9 @@ class MonitorNumbers(NamedTuple):
 
 
 class MonitorState(NamedTuple):
-    """State of ``SensingMonitor``. All arrays change.
+    """State of ``SensingMonitor``. The step changes all arrays.
 
-    An array has one entry per sensor, unless its description states another shape.
+    Arrays have one entry per sensor, unless stated otherwise.
     """
 
     pose: NDArray[np.float64]
@@ -98,12 +100,12 @@ class MonitorState(NamedTuple):
 
 @register_jitable
 def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untyped-def]
-    """Checks a new echo of sensor ``k`` for faults.
+    """Checks a new echo of sensor ``k`` for the faults frozen and noisy.
 
-    The function counts equal echoes and remembers the heading at which the equal echoes
-    began. While the robot turns slowly, the function computes the second difference of
-    the last three ranges. If the second difference is too large, the reading is
-    strange. The function updates the mean share of strange readings.
+    A sensor is frozen after too many equal echoes, or if the echoes stay equal while
+    the robot turns far. While the robot turns slowly, a reading is strange if the
+    second difference of the last three ranges is large. A sensor is noisy if too many
+    recent readings are strange.
 
     Returns:
         Number of the fault, 0 if there is none.
@@ -161,27 +163,27 @@ def monitor_step(
 class SensingMonitor(Block):
     """Detects faults of range sensors and odometry, so that the guard stops the robot.
 
-    These are the faults with their numbers (``SENSING_FAULTS``):
+    The faults have these numbers (``SENSING_FAULTS``):
 
     1. The odometry is lost: in one control period, the pose has changed by more than
        twice the largest motion that the wheels can cause. This fault remains for the
        rest of the run.
-    2. A sensor is silent: the sensor has not fired for three rounds, and for at least
-       0.2 s. A round is the time in which every sensor fires once.
-    3. A sensor is frozen: the echoes of the sensor stay equal. For a sensor with noise,
-       12 equal echoes are a fault. For any sensor, equal echoes are a fault if the
-       robot meanwhile turns by 0.1 rad more than the sensor's aperture.
-    4. A sensor is noisy: more than half of the recent ranges have changed by more than
-       motion and the specified noise can cause. The block checks ranges in this way
-       only while the robot turns slowly.
+    2. A sensor is silent: it has not fired for three rounds, and for at least 0.2 s. A
+       round is the time in which every sensor fires once.
+    3. A sensor is frozen: its echoes stay equal. For a sensor with noise, 12 equal
+       echoes are a fault. For any sensor, equal echoes are a fault if the robot has
+       meanwhile turned by the sensor's aperture plus 0.1 rad.
+    4. A sensor is noisy: more than half of its recent ranges have changed by more than
+       motion and the specified noise can cause. The block makes this check only while
+       the robot turns slowly.
 
     Faults 2 to 4 still count for 2 s after their last detection.
 
-    The block cannot distinguish two cases: a sensor that never reports an echo because
-    of a fault, and a sensor that points at empty space.
+    The block cannot distinguish a sensor that never reports an echo because of a fault
+    from a sensor that points at empty space.
 
-    The abstract state is ``MonitorState``. The output is a function of the state and
-    the inputs in every control period. There is no latency.
+    The abstract state is ``MonitorState``. The output depends on the state and the
+    present inputs. There is no latency.
 
     Args:
         sensors: Parameters of the range sensors.

@@ -29,18 +29,19 @@ _PART_S = 0.025
 
 
 class Sectors(NamedTuple):
-    """Sectors into which the apertures of range sensors are cut where they overlap.
+    """Sectors into which the edges of the apertures divide the view of range sensors.
 
-    A group consists of all sensors at the same position. The sectors of a group are
-    adjacent and in counterclockwise order. If there is a gap between two apertures, no
-    sensor sees the sector of the gap.
+    All sensors at the same position form a group. The sectors of a group are adjacent
+    and in counterclockwise order. In a gap between two apertures, there is a sector
+    that no sensor sees.
     """
 
     places: NDArray[np.float64]
     """(groups, 2) position relative to the axle in B, m."""
     first: NDArray[np.int64]
     """(groups + 1,) index of the first sector of each group. The last element is the
-    number of all sectors."""
+    number of all sectors.
+    """
     right: NDArray[np.float64]
     """(sectors, 1) direction in B at which a sector begins, rad."""
     left: NDArray[np.float64]
@@ -59,7 +60,8 @@ class PlaceError(NamedTuple):
     """Relative error of each wheel's travel."""
     pulse_m: float
     """Distance that the rim rolls per pulse of the encoder, m; 0 if angles are not
-    rounded."""
+    rounded.
+    """
     wheel_separation_m: float
     allowed_m: float
     """Largest position error of a cell that counts as free, m."""
@@ -73,13 +75,8 @@ class PlaceError(NamedTuple):
     ) -> PlaceError:
         """Collects the quantities from the parameters.
 
-        Args:
-            guard: Wheel error, and allowed position error.
-            robot: Dimensions of the wheels.
-            odometry: Pulses of the encoders.
-
-        Returns:
-            Collected quantities.
+        ``guard`` has the wheel error and the allowed position error. ``robot`` has the
+        dimensions of the wheels. ``odometry`` has the pulses of the encoders.
         """
         pulse_m = 0.0
         if odometry.rounding:
@@ -93,15 +90,20 @@ class PlaceError(NamedTuple):
 def place_error(distance: float, way: float, error: PlaceError) -> float:
     """Computes the largest position error of a remembered cell relative to the robot.
 
+    The error is the sum of two parts (docs/guard.md):
+
+    - Wheels with the relative error e cause the part e s + 2 e s/L (d + s).
+    - Encoder pulses of the length q at the rim cause the part q (s + d)/L + q.
+
+    L is the wheel separation.
+
     Args:
         distance: Distance d from the axle to the cell when a sensor saw the cell, m.
         way: Mean distance s that the rims of both wheels have rolled since then, m.
         error: Errors of wheels and encoders.
 
     Returns:
-        Sum of two errors, m. Wheels with the relative error e cause the error e s + 2 e
-        s/L (d + s). Pulses of the length q at the rim cause the error q (s + d)/L + q.
-        L is the wheel separation (docs/guard.md).
+        Largest position error, m.
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     by_wheels = e * way + 2.0 * e * way / separation * (distance + way)
@@ -109,19 +111,18 @@ def place_error(distance: float, way: float, error: PlaceError) -> float:
 
 
 def lasting(distance: float, error: PlaceError) -> float:
-    """Computes the rolled distance after which a cell is forgotten.
+    """Computes how far the wheels may roll before a remembered cell is forgotten.
 
-    The rolled distance is the mean distance that the rims of both wheels roll.
+    A cell is forgotten when ``place_error`` reaches the allowed error.
 
     Args:
-        distance: Distance from the axle to the cell when a sensor saw the cell, m. An
-            upper bound of this distance is possible, too.
+        distance: Distance from the axle to the cell when a sensor saw the cell, or an
+            upper bound of this distance, m.
         error: Errors of wheels and encoders.
 
     Returns:
-        Rolled distance at which ``place_error`` reaches the allowed error, m. If the
-        error does not grow, the result is infinite. If the error is too large from the
-        start, the result is minus infinity.
+        Mean distance that both wheel rims roll, m. It is infinite if the error does not
+        grow, and minus infinity if the error is too large from the start.
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
     a = 2.0 * e / separation
@@ -137,13 +138,9 @@ def lasting(distance: float, error: PlaceError) -> float:
 
 
 def range_errors(sensors: UltrasonicParameters) -> NDArray[np.float64]:
-    """Computes the largest amounts by which the ranges of each sensor are too long.
+    """Computes by how much the range of each sensor can be too long.
 
-    Args:
-        sensors: Parameters of the range sensors.
-
-    Returns:
-        (sensors,) largest range errors, m.
+    The result has the shape (sensors,), m.
     """
     return RANGE_MARGIN_M + _SIGMAS * sensors.each("noise_m")
 
@@ -151,12 +148,7 @@ def range_errors(sensors: UltrasonicParameters) -> NDArray[np.float64]:
 def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sectors:
     """Divides the view of range sensors into sectors.
 
-    Args:
-        sensors: Parameters of the range sensors.
-        control_point_m: Distance of the control point P ahead of the axle, m.
-
-    Returns:
-        Sectors of all groups of sensors.
+    ``control_point_m`` is the distance of the control point P ahead of the axle, m.
     """
     axes, halves = sensors.axes, sensors.half_angles
     places: dict[tuple[float, float], list[int]] = {}
@@ -219,13 +211,8 @@ def stopping_way(
 def tick_parts(tick_s: float) -> int:
     """Computes the number of parts into which the guard divides a control period.
 
-    The guard checks the position of the robot at the end of each part.
-
-    Args:
-        tick_s: Control period, s.
-
-    Returns:
-        Number of parts. A part lasts at most 25 ms.
+    The guard checks the position of the robot at the end of each part. A part lasts at
+    most 25 ms. ``tick_s`` is the control period, s.
     """
     return math.ceil(tick_s / _PART_S - 1e-9)
 
@@ -233,19 +220,20 @@ def tick_parts(tick_s: float) -> int:
 def unseen_approach(
     robot: RobotParameters, plant: PlantParameters, tick_s: float
 ) -> float:
-    """Computes how much nearer to a cell the axle may come than the guard detects, m.
+    """Computes how much nearer the axle may come to a cell than the guard detects.
 
-    The guard checks the position of the axle against the cells at the end of each part
-    of a control period. The checks end when the rims will move by less than ``REST_M``.
-    Between and after these checks, four effects may bring the axle nearer to a cell:
+    Cells are those of the map of free space. The guard checks the position of the axle
+    at the end of each part of a control period. It makes no further check when the
+    wheel rims will move by less than ``REST_M``. Between two checks and after the last
+    check, four effects may bring the axle nearer to a non-free cell:
 
-    - The axle passes a corner of a cell. Both ends of the chord of its path are at the
-      radius of the body from the corner, but the middle of the chord is nearer.
-    - The path deviates from the chord by a quarter of the chord's length times the
-      turn.
-    - If the wheels reverse within the part, the axle goes on and comes back.
-    - The axle coasts after the last check. The axle may also coast in a turn on the
-      spot.
+    - The axle passes a corner of a cell on a straight path. At two successive checks,
+      the corner is just outside the disc that contains the body. Halfway between these
+      checks, the corner is inside the disc.
+    - The path is curved. Between two checks, it deviates from a straight line by up to
+      a quarter of the line's length times the turn in rad.
+    - The wheels reverse between two checks: the axle goes on and comes back.
+    - The axle coasts after the last check, or during a turn on the spot.
 
     Args:
         robot: Body, wheels, and top speed.
@@ -253,8 +241,8 @@ def unseen_approach(
         tick_s: Control period, s.
 
     Returns:
-        Sum of the four effects, m. The sum is 1.6 mm with all defaults.
-        ``LEAST_MARGIN_M`` has to be at least as large as this sum.
+        Sum of the four effects, m; 1.6 mm with all defaults. ``LEAST_MARGIN_M`` has to
+        be at least as large.
     """
     top, lag, part_s = (
         robot.top_speed_m_s,

@@ -53,13 +53,15 @@ class _Places(NamedTuple):
     readings: int
     """Number of readings in this stop."""
     smelt: int
-    """Lowest gas ratio. It is the minimum over the mean ratios of the last two stops
-    and over all readings since the last stop."""
+    """Lowest gas ratio: the minimum of the mean ratios of the last two stops and of all
+    readings since the last stop.
+    """
     before: int
     """Lowest mean gas ratio at the last stop."""
     sum: int
     """Sums of the five readings in this stop. The next three fields are the first
-    indices of the smallest, the largest and the mean readings."""
+    indices of the smallest, the largest and the mean readings.
+    """
     least: int
     most: int
     mean: int
@@ -121,11 +123,10 @@ def _sense(state: Any, gas: Any, airflow: Any) -> None:
 
 @register_jitable
 def _average(state: Any) -> int:
-    """Computes the mean readings of a stop, in which the robot rests and measures.
+    """Computes the mean readings of a stop, and detects dead gas sensors.
 
-    Each mean excludes the largest and the smallest reading. The function also detects
-    dead gas sensors. It replaces the mean of a dead gas sensor by the mean of the other
-    gas sensors.
+    Each mean excludes the largest and the smallest reading. The mean of the other gas
+    sensors replaces that of a dead gas sensor.
 
     Returns:
         Number of gas sensors that work.
@@ -195,8 +196,8 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
 def _check_switches(state: Any, contact: Any) -> bool:
     """Returns whether the robot touches an object, according to its contact switches.
 
-    If a switch is closed at the first tick (control period), the switch is stuck, and
-    the search ignores it. If both switches are stuck, the search ends.
+    A switch that is closed at the first tick (control period) is stuck, and does not
+    count. If both switches are stuck, the search ends.
     """
     if state[AT.started] < 0.5:
         state[AT.started] = 1.0
@@ -251,8 +252,8 @@ def plume_search_step(
     """Computes one tick (control period) of the search by smell.
 
     Each step of the search has three activities: wait, sense and move. ``AT.left``
-    counts the remaining ticks of the present activity. If the robot touches an object,
-    the search ends in any activity.
+    counts the remaining ticks of the present activity. If the robot touches an object
+    during any activity, the search ends.
     """
     gas, airflow, headings, contact = inputs
     heading = headings[0]
@@ -289,34 +290,32 @@ def _publish(state: Any, outputs: Any, numbers: PlumeSearchNumbers) -> None:
 class PlumeSearch(Block):
     """Searches for an odor source with a robot that stops, smells and moves in steps.
 
-    Each step has three activities. First, the robot rests for ``wait_s``, until the gas
-    sensors have settled. Then the robot averages its readings for ``SENSE_S``, and the
-    selected rules choose a heading from the averages. Finally, the robot turns and
-    drives for ``MOVE_S``.
+    In each step, the robot first rests for ``wait_s``, until the gas sensors have
+    settled. It then averages its readings for ``SENSE_S``, and the selected rules
+    choose a heading from the averages. Finally, it turns and drives for ``MOVE_S``.
 
-    If the robot touches an object, the search ends at once. If the touched object
-    smells, the object counts as the odor source, and the robot calls other robots by
-    sound. Otherwise the robot gives up the search. ``systems.search.search_ending``
-    lists the numbers of the endings and faults.
+    When the robot touches an object, the search ends. If the object smells, it counts
+    as the odor source, and the robot calls other robots by sound. Otherwise the robot
+    gives up. ``systems.search.search_ending`` lists the numbers of the endings and
+    faults.
 
-    If the readings of a gas sensor do not change during a whole stop, the sensor is
-    dead. The block then uses the mean of the other gas sensors instead. If a contact
-    switch is closed at the start, the switch is stuck, and the block ignores it. The
-    block does not detect a switch that is stuck open.
+    A gas sensor is dead if its readings do not change during a whole stop. The block
+    then uses the mean of the other gas sensors instead. A contact switch that is closed
+    at the start is stuck, and the block ignores it. The block does not detect a switch
+    that never closes.
 
     The rules ``song2011`` have the four phases of the paper. The rules
     ``upwind_gradient`` have two phases: 1 upwind and 2 across the wind.
 
-    The discrete state holds the outputs, the measurements of the stop, and the memory
-    of the rules. The block updates the state at every tick (control period). The
-    latency is one tick.
+    The discrete state contains the outputs, the measurements of the stop, and the
+    memory of the rules. The latency is one tick (control period).
 
     Args:
         parameters: Rules, and conditions that end the search.
         tick_s: Control period, s.
 
     Reference: Song 2011, 2.3.3 and 4.2. The rules ``upwind_gradient`` and the test
-    whether a touched object smells are ours.
+    whether the object smells are ours.
     """
 
     part = "controller"

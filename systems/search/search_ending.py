@@ -50,13 +50,9 @@ _FAULTS = (
 
 
 def fault_names(fault: float) -> list[str]:
-    """Returns the faults that a searching robot has detected.
+    """Returns one text for each fault that a searching robot has detected.
 
-    Args:
-        fault: Last value of the port ``search_report``: the sum of the bits of all
-            detected faults.
-
-    Returns:
-        One text per fault.
+    ``fault`` is the last value of the port ``search_report``: the sum of the bits of
+    all detected faults.
     """
     return [text for bit, text in enumerate(_FAULTS) if int(fault) >> bit & 1]

@@ -42,15 +42,9 @@ AT = SearchPlaces(*range(10))
 
 
 def ticks_of(time_s: float, tick_s: float, least: int = 1) -> int:
-    """Converts a time to a number of ticks (control periods).
+    """Converts a time in s to the nearest number of ticks (control periods).
 
-    Args:
-        time_s: Time, s.
-        tick_s: Duration of a tick, s.
-        least: Smallest result.
-
-    Returns:
-        The nearest number of ticks, at least ``least``.
+    ``tick_s`` is the duration of a tick, s. The result is at least ``least``.
     """
     return max(least, round(time_s / tick_s))
 
@@ -58,12 +52,8 @@ def ticks_of(time_s: float, tick_s: float, least: int = 1) -> int:
 def search_ports(flag: str, unit: str) -> tuple[Port, ...]:
     """Makes the output ports of a block that searches.
 
-    Args:
-        flag: Name of the third port, ``calling`` or ``listening``.
-        unit: Unit of the third port.
-
-    Returns:
-        The ports, in the order in which ``publish_search`` fills them.
+    ``flag`` is the name of the third port, ``calling`` or ``listening``, and ``unit``
+    is its unit. The ports are in the order in which ``publish_search`` fills them.
     """
     return (
         Port(
@@ -90,8 +80,8 @@ def publish_search(state: Any, outputs: Any, first: int) -> None:
 
     Args:
         state: State of the search.
-        outputs: Output arrays: heading, move, flag, report and radio frames. The
-            function fills them.
+        outputs: Arrays that the function fills: heading, move, flag, report and radio
+            frames.
         first: Index in the state at which the radio frames begin.
     """
     expected, move, flag, report, frames = outputs
@@ -108,15 +98,15 @@ def add_frame(
 ) -> None:
     """Adds a radio frame to the frames that the robot sends in this tick.
 
-    If the tick (control period) already has ``MOST_FRAMES`` frames, the function does
-    nothing.
+    A tick is a control period. If the robot already sends ``MOST_FRAMES`` frames in
+    this tick, the function does nothing.
 
     Args:
-        state: State of the search. A part of the state holds the number of frames, and
-            then the bytes of the frames.
-        first: Index of the number of frames in the state.
+        state: State of the search.
+        first: Index in the state of the number of frames. The bytes of the frames
+            follow.
         address: Radio address of the sender.
-        function: Fn, number of the function (Song 2011, table 5).
+        function: Number Fn of the function (Song 2011, table 5).
         value: Value to send, in the unit that ``write_frame`` states.
     """
     count = int(state[first])

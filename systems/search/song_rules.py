@@ -30,14 +30,14 @@ def song2011_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, int, int]
     """Computes the turning angle after a stop (Song 2011, 2.3.3 and 4.2).
 
     Phase 1 lasts until the robot is in the plume for the first time. Afterwards, the
-    airflow sensors determine the phase:
+    phase depends on the airflow sensors:
 
-    - phase 2 if one sensor has wind;
-    - phase 3 if no sensor has wind;
-    - phase 4 if both sensors have wind.
+    - phase 2 if one sensor detects wind
+    - phase 3 if no sensor detects wind
+    - phase 4 if both sensors detect wind
 
-    Phases 3 and 4 both compare R1 with R3. Section 4.2 of the paper prints for point G
-    "output of R1 was less than R2". This text can only mean R3.
+    Phases 3 and 4 both compare R1 with R3. For point G, section 4.2 of the paper prints
+    "output of R1 was less than R2", which can only mean R3.
 
     Args:
         gas: (R1, R2, R3), ratios Rs/R0 of the gas sensors at the right front, the rear
@@ -47,8 +47,8 @@ def song2011_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, int, int]
             has been in the plume, and 0 before.
 
     Returns:
-        Three values, in this order: the turning angle, clockwise, deg; the phase, 1 to
-        4; and ``UNDECIDED``, because the rules never end the search.
+        Turning angle, clockwise, deg; phase, 1 to 4; and ``UNDECIDED``, because the
+        rules never end the search.
     """
     right, rear, left = gas
     least = min(right, rear, left)

@@ -56,8 +56,9 @@ class _Places(NamedTuple):
     called: int
     """Report of the caller: 1 found, -1 found nothing, 0 none yet."""
     arrived: int
-    """0 or 1. 1: the robot that goes first has reported a result, or ``HOLD_S`` are
-    over."""
+    """1 if the robot that goes first has reported a result, or if ``HOLD_S`` are over;
+    otherwise 0.
+    """
     bearing: int
     """Bearing of the source, CCW, deg."""
     distance: int
@@ -177,15 +178,19 @@ def _missed(state: Any, ended: int, numbers: SoundSearchNumbers) -> None:
 def _decide(
     state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
 ) -> None:
-    """Decides at the end of a step whether the robot moves, listens again or stops.
+    """Decides after the computing whether the robot moves, listens again or stops.
 
     The radio level gives the distance from the caller. The microphones give a bearing,
-    and sometimes a range. The function decides as follows:
+    and sometimes a range. The first of these rules that applies decides:
 
-    - If the distance or the range is below its threshold, the robot has arrived and
-      stops. The range counts only if the distance is small.
-    - If the bearing is missing or not unique, the robot listens again.
-    - Otherwise, the robot moves. Near the caller, the move is shorter than ``MOVE_S``.
+    1. If the distance is below its threshold, the robot has arrived.
+    2. If the bearing is missing or not unique, the robot listens again. After too many
+       such steps in a row, the search ends.
+    3. If the distance is small and the range is below its threshold, the robot has
+       arrived. This rule applies only if the field ``stop`` is ``range``.
+    4. If the robot has made all permitted steps, the search ends.
+    5. Otherwise, the robot moves. With ``stop: range``, a move near the caller may be
+       shorter than ``MOVE_S``.
     """
     bearing, distance, detected, ranged, ambiguous, lost = heard
     own = numbers.own
@@ -309,25 +314,26 @@ def _publish(state: Any, outputs: Any, numbers: SoundSearchNumbers) -> None:
 class SoundSearch(Block):
     """Searches for a calling robot in steps of listening, computing and moving.
 
-    First, the robot listens to the noise for ``noise_s``. Then the robot waits for the
-    call. The call is a radio frame from the robot with the address ``CALLER``. The
-    frame says that this robot has found the odor source. In each step, the robot
-    listens for ``listen_s`` and computes for ``COMPUTE_S``. Then it turns and drives
-    for ``MOVE_S``, or for a shorter time near the caller.
+    First, the robot listens to the noise for ``noise_s``. It then waits for the call: a
+    radio frame from the robot with the address ``CALLER``, which has found the odor
+    source. In each step, the robot listens for ``listen_s`` and computes for
+    ``COMPUTE_S``. It then turns and drives for ``MOVE_S``, or for a shorter time near
+    the caller.
 
-    Two robots approach the same caller one after the other. In the second robot,
-    ``waits_for`` is the address of the first robot. The second robot waits near the
-    caller until the first robot has reported its result, or until ``HOLD_S`` are over.
+    Two robots approach the same caller one after the other. The field ``waits_for`` of
+    the second robot is the address of the first robot. Near the caller, the second
+    robot waits until the first robot has reported its result, or until ``HOLD_S`` are
+    over.
 
     If the sound fits several directions, the robot does not move, but listens again.
-    After three such steps in a row, the robot gives up.
-    ``systems.search.search_ending`` lists the numbers of the endings and faults.
+    After three such steps in a row, it gives up. ``systems.search.search_ending`` lists
+    the numbers of the endings and faults.
 
     The phase in the report is the activity: 1 waiting for the call, 2 waiting for the
     first robot, 3 listening, 4 computing, 5 moving, 6 finished.
 
-    The discrete state holds the outputs and the measurements of the step. The block
-    updates the state at every tick (control period). The latency is one tick.
+    The discrete state contains the outputs and the measurements of the step. The
+    latency is one tick (control period).
 
     Args:
         parameters: Radio addresses, times of listening, and conditions that end the

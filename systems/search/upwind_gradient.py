@@ -56,16 +56,13 @@ _CALM_STOPS = 3
 def upwind_angle(airflow: Any) -> float:
     """Computes the upwind direction from two sensors at 45 deg to the left and right.
 
-    Assume that each reading is proportional to the cosine of the angle between the wind
-    and the sensor. Then the result is exact if the upwind direction is at most 39 deg
-    from the heading. If the upwind direction is farther to one side, the result is a
-    fixed turn of 80 deg to that side.
+    The method assumes that each reading is proportional to the cosine of the angle
+    between the wind and the sensor. The result is exact if the upwind direction is
+    within 39 deg of the heading. Otherwise, it is 80 deg to the side from which the
+    wind comes.
 
-    Args:
-        airflow: (F1, F2), left and right reading.
-
-    Returns:
-        Turning angle to the upwind direction, clockwise, deg.
+    ``airflow`` has the left and the right reading. The result is the turning angle to
+    the upwind direction, clockwise, deg.
     """
     left, right = airflow
     larger = max(left, right)
@@ -80,11 +77,11 @@ def upwind_gradient_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, in
 
     There are three cases:
 
-    - In the plume, the robot goes upwind. The function adds an angle toward the side
-      with more gas.
+    - In the plume, the robot goes upwind, and turns a little toward the side with more
+      gas.
     - After the robot has lost the plume, it crosses the wind to find the plume again.
-      It goes one step to the side of the last angle, two steps to the other side, three
-      steps back, and so on.
+      It makes one step to the side of its last turn toward the gas, then two steps to
+      the other side, then three steps to the first side, and so on.
     - Without wind, the robot turns by 180 deg. The search ends after ``_CALM_STOPS``
       consecutive stops without wind.
 
@@ -95,8 +92,8 @@ def upwind_gradient_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, in
         memory: ``RULE_MEMORY`` numbers, initially 0. The function changes them.
 
     Returns:
-        Three values, in this order: the turning angle, clockwise, deg; the phase, 1
-        upwind or 2 across; and ``NO_WIND`` if the search ends, else ``UNDECIDED``.
+        Turning angle, clockwise, deg; phase, 1 upwind or 2 across; and ``NO_WIND`` if
+        the search ends, else ``UNDECIDED``.
     """
     if max(airflow[0], airflow[1]) < _STILL_AIR:
         memory[_AT.calm] += 1.0

@@ -43,9 +43,9 @@ def convert(
     """Converts sound pressure to counts of the A/D converter, rounded and clipped.
 
     Args:
-        pressure: (m, n) sound pressure, Pa; None for silence.
+        pressure: (m, n) sound pressure of m channels, Pa; None for silence.
         noise: (m, n) noise of unit variance.
-        noise_pa: RMS of the noise, Pa.
+        noise_pa: RMS of the noise, Pa. The function multiplies ``noise`` by it.
         parameters: Full scale and resolution.
         gains: (m,) true gain divided by stated gain of each channel. None: all are 1.
 
@@ -53,8 +53,8 @@ def convert(
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
 
     Raises:
-        ValueError: A pressure, a noise value, or a gain is not finite. The counts would
-            not show this error.
+        ValueError: A pressure, a noise value, or a gain is not finite. Without this
+            check, the counts would hide the error.
     """
     if gains is None:
         gains = np.ones(len(noise))

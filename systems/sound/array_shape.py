@@ -27,18 +27,19 @@ class EqualRow(NamedTuple):
     spacing_m: float
     """Distance between adjacent microphones, m."""
     to_delays: NDArray[np.float64]
-    """(2, 2) matrix that converts delays relative to the first channel to tau_12 and
-    tau_13. The delays to convert are in the order of the channels of the array. The
-    delay tau_ij is the time by which the sound reaches Mj later than Mi."""
+    """(2, 2) matrix that converts delays relative to the first channel of the array to
+    tau_12 and tau_13. The delay tau_ij is the time by which the sound reaches
+    microphone j of the row later than microphone i."""
     axes: NDArray[np.float64]
-    """(d, 2) unit vectors ahead and to the left, as columns."""
+    """(d, 2) matrix of two unit vectors. The first column points ahead of the row, and
+    the second column points to the left."""
 
 
 @dataclass(frozen=True)
 class ArrayShape:
     """Positions of microphones relative to their centroid, in the frame A of the array.
 
-    The axes of A are the axes in which the positions were given. The origin of A is the
+    The frame A has the axes in which the positions were given. Its origin is the
     centroid. To make a shape, call ``ArrayShape.of``.
     """
 
@@ -47,15 +48,15 @@ class ArrayShape:
     kind: Literal["row", "plane", "space"]
     """Kind of set that the microphones span: a line, a plane, or space."""
     span: NDArray[np.float64]
-    """(r, d) orthonormal vectors in A that span the array. The vector of a row points
-    to the left as seen in the direction ``ahead``."""
+    """(r, d) orthonormal vectors in A that span the array. For a row, the vector points
+    to the left of the direction ``ahead``."""
     ahead: NDArray[np.float64] | None
-    """(d,) unit vector that is perpendicular to the line or plane and points to the
-    reported side. None if no side is ambiguous.
+    """(d,) unit vector perpendicular to the row or plane of microphones. It points to
+    the side on which sources are reported. None if the array distinguishes both sides.
 
-    By default, the vector points towards +x for a row of microphones. If the row is
-    along x, the vector points towards +y. For a plane in space, the vector points
-    towards +z. If the plane is upright, the rule for rows applies.
+    By default, the vector points towards +x for a row of microphones, or towards +y if
+    the row is along x. For a plane in space, it points towards +z. The rule for rows
+    also applies to an upright plane.
     """
     aperture_m: float
     """Largest distance between two microphones, m."""
@@ -68,16 +69,16 @@ class ArrayShape:
 
         Args:
             positions: (n, 2) or (n, 3) positions in any frame, m; n is at least 3.
-            flat_m: Largest distance from a line or a plane at which a microphone still
-                counts as on it, m. None: 1 % of the aperture.
+            flat_m: The microphones form a row or plane if none of them is farther than
+                this distance from a line or plane, m. None: 1 % of the aperture.
 
         Returns:
             The microphones relative to their centroid, and the line, plane, or space
             that they span.
 
         Raises:
-            InputError: There are fewer than 3 positions, two positions coincide, or a
-                position is not finite.
+            InputError: There are fewer than 3 positions, two positions nearly coincide,
+                a position is not finite, or the shape of the positions is wrong.
         """
         p = np.array(positions, dtype=np.float64)
         if p.ndim != 2 or p.shape[1] not in (2, 3):
@@ -118,8 +119,9 @@ class ArrayShape:
 
         ``none``: there are no such directions. ``front_back``: a direction and its
         mirror image behind the row have equal delays. ``mirror``: a direction and its
-        mirror image at the plane have equal delays. A row in space has a larger
-        ambiguity: all positions on a circle around the row have equal delays.
+        mirror image on the other side of the plane have equal delays. A row in space
+        has a larger ambiguity: all positions on a circle around the row have equal
+        delays.
         """
         if self.ahead is None or self.side is not None:
             return "none"
@@ -162,7 +164,7 @@ class ArrayShape:
         return _distances(self.p_AM)[tuple(self.pairs.T)]
 
     def facing(self, side: Literal["ahead", "behind", "above", "below"]) -> ArrayShape:
-        """Returns the same array, with all sources known to be on one side.
+        """Returns the same array, for sources that are all on one known side.
 
         Args:
             side: ``ahead`` is towards +x, or towards +y for a row along x. ``above`` is
@@ -172,7 +174,8 @@ class ArrayShape:
             The shape that faces this side. Its ``ambiguity`` is ``none``.
 
         Raises:
-            InputError: The array does not distinguish these sides, or has no ambiguity.
+            InputError: The delays of the array do not confuse this side with the
+                opposite side.
         """
         level = self.ahead is None or abs(self.ahead[-1]) <= _FLATNESS
         names = ("ahead", "behind") if self.dimension == 2 or level else _UPRIGHT

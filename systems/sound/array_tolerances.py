@@ -23,13 +23,12 @@ class Tolerances:
     """Errors of the n channels of an array."""
 
     position_errors: NDArray[np.float64]
-    """(n, 2) true minus stated positions of the microphones, in the axes of the body
-    frame B, m."""
+    """(n, 2) true positions minus stated positions of the microphones, in the axes of
+    the body frame B, m."""
     channel_delays: NDArray[np.float64]
     """(n,) times by which the channels are sampled later than stated, s."""
     gains: NDArray[np.float64]
-    """(n,) true gain divided by stated gain of each channel, as a ratio of
-    amplitudes."""
+    """(n,) true gain divided by stated gain of each channel; 1 means no error."""
 
 
 def draw_tolerances(
@@ -43,7 +42,7 @@ def draw_tolerances(
         generator: Source of the random numbers.
 
     Returns:
-        Errors of n positions, delays, and gains.
+        Errors of n positions, n delays, and n gains.
     """
     places = generator.uniform(-1.0, 1.0, (count, 2))
     delays = generator.uniform(-1.0, 1.0, count)
@@ -59,9 +58,11 @@ class RealArray(NamedTuple):
     """True properties of array and air, which may differ from the stated ones."""
 
     p_BM: NDArray[np.float64]
-    """(n, 2) microphones in B, m."""
+    """(n, 2) positions of the microphones in B, m."""
     instants: NDArray[np.float64]
-    """(n, knots) times of the knots of each channel after the start of the frame, s."""
+    """(n, k) times after the start of a frame, s. For each channel, they are the k
+    times at which the travel time of the sound is computed exactly (knots of
+    ``propagate``)."""
     gains: NDArray[np.float64]
     """(n,) true gain divided by stated gain of each channel."""
     c: float
@@ -74,21 +75,20 @@ def real_array(
     tolerances: Tolerances,
     c: float,
 ) -> RealArray:
-    """Computes the true properties of an array from the stated array and its errors.
+    """Computes the true properties of an array from its stated properties and errors.
 
     Args:
         p_BM: (n, 2) stated positions of the microphones in the body frame B, m.
-        parameters: Stated skew (sampling delays) of the channels, and length of an
+        parameters: Stated sampling delays (skew) of the channels, and length of an
             audio frame.
         tolerances: Errors of positions, delays and gains.
         c: Speed of sound, m/s.
 
     Returns:
-        The true array: positions, sampling times of the knots, gains, and speed of
-        sound.
+        The true array.
 
     Raises:
-        ValueError: The number of skew values differs from the number of microphones.
+        ValueError: The number of stated delays differs from the number of microphones.
     """
     late = channel_skew(parameters, len(p_BM)) + tolerances.channel_delays
     spans = math.ceil(parameters.frame_s / _SPACING_S - 1e-9)

@@ -35,14 +35,9 @@ from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 def microphone_reach(room: RoomParameters | None, sound_speed_m_s: float) -> float:
     """Returns the longest distance that sound travels to the microphones, m.
 
-    A loudspeaker must store its emissions for the travel time of this distance.
-
-    Args:
-        room: Room whose reflections are also heard; None for the free field.
-        sound_speed_m_s: Speed of sound, m/s.
-
-    Returns:
-        Distance, m, at least MAXIMUM_RANGE_M.
+    A loudspeaker must store the sound that it emits for the travel time of this
+    distance. The result is ``MAXIMUM_RANGE_M`` in the free field (no room), and larger
+    if reflections need it.
     """
     if room is None:
         return MAXIMUM_RANGE_M
@@ -57,21 +52,20 @@ class MicArray(Block):
     published at the time t covers the interval [t - frame_s, t). The module
     ``systems.sound.propagation`` describes how the sound travels.
 
-    Within a frame, the robot moves along a cubic Hermite polynomial. The polynomial
-    starts at the pose at the end of the last frame. In two cases, the block has no pose
-    from exactly one frame ago: before the first frame, and if the output is evaluated
-    between the ends of two frames. The block then assumes that the robot has moved at
-    its present velocity.
+    Within a frame, the robot moves along a cubic Hermite polynomial that starts at the
+    pose at the end of the last frame. In two cases, the block has no pose from exactly
+    one frame ago: before the first frame, and if the output is evaluated between the
+    ends of two frames. The block then assumes that the robot has moved at its present
+    velocity.
 
     In a room, the direct sound is the same as without a room. For the reflections, the
-    block assumes that robot and source are at rest. It uses their positions at the last
-    update, every ``UPDATE_PERIOD_S`` (0.1 s). These positions are therefore older than
-    the sound by up to this period plus the travel time of the sound. The frame that
-    ends at an update fades from the previous positions to the new positions.
+    block assumes that robot and source are at rest. It updates their positions only
+    every ``UPDATE_PERIOD_S`` (0.1 s). In the frame that ends at an update, the
+    reflections fade from those of the previous positions to those of the new positions.
 
-    A trial may set these numeric parameters in its context before the first control
-    period (tick). For each parameter, the class has a constant of the same name with
-    the index of the parameter:
+    A Monte Carlo trial may set four numeric parameters of the block in the context
+    before the first control period (tick). The index of each parameter is a constant of
+    this class:
 
     - ``POSITION_ERRORS``: (2 n,) x and y of one microphone after the other, m;
     - ``CHANNEL_DELAYS``: (n,) delays, s;
@@ -82,7 +76,7 @@ class MicArray(Block):
     Their defaults are drawn from the seed, within the tolerances of the parameters.
 
     The state has the time, the pose and the velocity of the robot at the end of the
-    last frame. In a room, the state also has the values at the last update of the
+    last frame. In a room, the state also has three values from the last update of the
     reflections: the time, the pose of the robot, and the position of each source. The
     block updates the state every ``frame_s``. The output is a function of the state and
     the present inputs, without latency.
@@ -91,9 +85,8 @@ class MicArray(Block):
         parameters: Microphones, amplifier and converter.
         robot: Positions of the microphones.
         sound_speed_m_s: Speed of sound, m/s.
-        room: Walls, if there are any.
-        faults: Faults of the robot. The block applies only the faults of
-            ``microphones``.
+        room: Walls; None for the free field.
+        faults: Faults of the robot. The block uses only the faults of ``microphones``.
         others: Names of further sources that the robot does not follow. Each name adds
             an input port ``emission_<name>`` [Emission].
         seed: Seed of the noise and of the errors of the array.
@@ -222,14 +215,17 @@ class MicArray(Block):
         output.set_value(frame)
 
     def step_for(self, run: RunFacts) -> Step:
-        """Returns the step for each audio frame of a compiled simulation loop.
+        """Returns the step of the block for a compiled simulation loop.
+
+        The step stores the motion of the robot. It also provides a function that
+        returns the audio frame that ends at a given tick (control period). This
+        function computes a frame only when another block reads it.
 
         Args:
             run: Seed and period of the run, and emissions of the sources.
 
         Returns:
-            The step. It provides the audio as a function of the tick (control period).
-            The audio of a frame is computed only when another block reads it.
+            The step.
         """
         recorder = self._recorder.of_seed(run.seed_of(self.get_name()))
         emitted = [run.carried[port.get_name()] for port in self._sources]

@@ -52,14 +52,14 @@ class SoundParameters(Parameters):
     tone_hz: Frequency = 2_000.0
     """Frequency of the tone and fundamental of the horn, Hz."""
     level_pa: Positive = 0.05
-    """RMS pressure at 1 m while the source sounds, Pa (0.05 Pa is 68 dB). The
-    loudspeaker limits peaks to four times this value. If a sound has higher peaks, it
-    is played at a lower level."""
+    """RMS pressure at 1 m while the source sounds, Pa (0.05 Pa is 68 dB). The peaks
+    are at most four times this value. A sound with higher peaks is played at a lower
+    level."""
     on_s: float = Field(default=0.5, ge=2 * EDGE_S, le=60.0)
     """Length of a burst, s."""
     period_s: Duration = 2.0
     """Time from the start of one burst to the start of the next, s. If it equals
-    ``on_s``, the sound is continuous, apart from the edges."""
+    ``on_s``, the sound is continuous, apart from the soft edges of the bursts."""
     start_s: Time = 0.0
     """Start of the first burst, s."""
 
@@ -122,11 +122,10 @@ class MicArrayParameters(Parameters):
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
     channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
-    """Delay with which each channel is sampled, s. Each delay is shorter than one
-    sample.
+    """Delay with which each channel is sampled, s. It is shorter than one sample.
 
-    Give one time for each microphone. If all channels are sampled at once, give an
-    empty list.
+    Give one delay per microphone. If all channels are sampled at once, give an empty
+    list.
     """
 
     ego_noise_file: str | None = None
@@ -234,19 +233,19 @@ class RoomParameters(Parameters):
     reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
     """Time in which sound decays by 60 dB according to Sabine's formula, s.
 
-    The simulated decay agrees with this time in compact rooms that absorb little. As an
+    The simulated decay agrees with this time in compact rooms that absorb little. For
     example, take a room of 7 x 7 x 3 m and the settings 0.25, 0.4 and 0.6 s. The decay
     from -5 to -35 dB then corresponds to 0.25, 0.45 and 0.72 s.
     """
     absorption: float | None = Field(default=None, gt=0.0, le=1.0)
     """Share of the energy that the walls, floor and ceiling absorb at each reflection.
 
-    If the absorption is set, it determines the reverberation time.
+    If this field is set, it determines the reverberation time.
     """
     maximum_order: int | None = Field(default=None, ge=1, le=GREATEST_ORDER)
-    """Largest number of reflections of one sound.
+    """Largest number of reflections that one sound undergoes.
 
-    If the number is not set, all reflections that arrive within the reverberation time
+    If the field is not set, all reflections that arrive within the reverberation time
     are computed.
     """
 
@@ -279,8 +278,9 @@ class RoomParameters(Parameters):
             c: Speed of sound, m/s.
 
         Returns:
-            Share of the energy that is absorbed at each reflection; reverberation time,
-            s; and largest number of reflections of one sound.
+            Three values: share of the energy that is absorbed at each reflection;
+            reverberation time, s; and largest number of reflections that one sound
+            undergoes.
 
         Raises:
             InputError: The reverberation time is too short for the size of the room, or

@@ -1,10 +1,11 @@
 """Computes sound from a moving source at moving microphones in the free field.
 
-A microphone at p_M hears at the time t the sound that left the source at the retarded
-time t_e. The equation is c (t - t_e) = |p_M(t) - p_S(t_e)|, where p_S is the position
-of the source. The Doppler shifts (Han 2019, eq. 1) follow from this equation. Sound
-pressure falls as 1/R, where R is the distance. The text of the paper says that it falls
-with the square of the distance, which is true of intensity.
+At the time t, a microphone hears the sound that left the source at an earlier time t_e
+(the retarded time). The equation for t_e is c (t - t_e) = |p_M(t) - p_S(t_e)|. Here c
+is the speed of sound, and p_M and p_S are the positions of microphone and source. The
+Doppler shifts (Han 2019, eq. 1) follow from this equation. Sound pressure falls as 1/R,
+where R is the distance. The text of the paper says that it falls with the square of the
+distance, which is true only of intensity.
 """
 
 from __future__ import annotations
@@ -35,12 +36,14 @@ _BETA = 10.0
 
 
 def _interpolation_kernel() -> NDArray[np.float32]:
-    """Fits polynomials to a windowed sinc function, with an error of 1e-6.
+    """Fits polynomials to the weights of a windowed sinc function (error 1e-6).
+
+    The interpolation between samples uses 12 taps. Let u be the fractional part of the
+    position among the samples, minus 1/2. For n = 0 to 5, the taps n and 11 - n have
+    the weights E + O and E - O, with E = sum_k e_k u^2k and O = u sum_k o_k u^2k.
 
     Returns:
-        (pairs, 2, 4) polynomial coefficients of the taps n and 11 - n. The polynomials
-        depend on the fraction of a sample. Let u = fraction - 1/2. The weights of the
-        two taps are E + O and E - O, where E = sum_k e_k u^2k and O = u sum_k o_k u^2k.
+        (6, 2, 4) coefficients: for each n, the four e_k and the four o_k.
     """
     u = np.linspace(-0.5, 0.5, 257)
     x = np.arange(_TAPS) - (KERNEL_REACH - 0.5) - u[:, None]
@@ -62,18 +65,10 @@ INTERPOLATION_KERNEL = _interpolation_kernel()
 def _hermite(
     s: float, h: float, a: float, b: float, da: float, db: float
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Evaluates the cubic Hermite polynomial between two knots, and its derivative.
+    """Returns the value and the slope of a cubic Hermite polynomial between two knots.
 
-    Args:
-        s: Position in the interval, as a share of its length, 0 to 1.
-        h: Length of the interval, s.
-        a: Value at the first knot.
-        b: Value at the second knot.
-        da: Derivative at the first knot, per second.
-        db: Derivative at the second knot, per second.
-
-    Returns:
-        Value at the position, and derivative per second.
+    The knots have the values a and b and the slopes da and db, and are h seconds apart.
+    The position ``s`` is a share of this interval.
     """
     s2, s3 = s * s, s * s * s
     value = (
@@ -104,7 +99,7 @@ def microphone_paths(
     Between two given poses, the robot moves along a cubic Hermite polynomial.
 
     Args:
-        times: (m, k) times for each microphone, s.
+        times: (m, k) times, s. Row i belongs to microphone i.
         begin: Time of the first pose, s.
         pose_0: (3,) first pose x, y, theta in the world frame W, m and rad.
         velocity_0: (3,) vx, vy in W and omega at the first pose, m/s and rad/s.
@@ -114,8 +109,7 @@ def microphone_paths(
         p_BM: (m, 2) positions of the microphones in the body frame B, m.
 
     Returns:
-        Two arrays. The first has the (m, k, 2) positions in W, m. The second has the
-        (m, k, 2) velocities in W, m/s.
+        Two (m, k, 2) arrays: positions in W, m, and velocities in W, m/s.
     """
     h = end - begin
     turn = pose_1[2] - pose_0[2]
@@ -151,10 +145,10 @@ def retarded_delays(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     """Computes the travel times of sound that arrives at given times.
 
-    Newton's method solves c d = |p_M(t) - p_S(t - d)| for the travel time d. Here p_M
-    is the position of the microphone and p_S that of the source. The solution is unique
-    because the source is slower than sound. The solution at one time is the start value
-    for the next time.
+    Newton's method solves c d = |p_M(t) - p_S(t - d)| for the travel time d. Here t is
+    the time of arrival, p_M is the position of the microphone, and p_S is that of the
+    source. The solution is unique because the source is slower than sound. The solution
+    for one time of arrival is the start value for the next.
 
     Args:
         times: (m, k) times of arrival, s.
@@ -166,8 +160,7 @@ def retarded_delays(
         c: Speed of sound, m/s.
 
     Returns:
-        Two arrays. The first has the (m, k) travel times d, s. The second has the (m,
-        k) rates of change of d, s/s.
+        Two (m, k) arrays: travel times d, s, and their rates of change, s/s.
     """
     delays = np.empty(times.shape)
     rates = np.empty(times.shape)
@@ -219,21 +212,12 @@ def _sample_delays(
 ]:  # pragma: no cover  (compiled)
     """Computes the delays of ``retarded_delays`` in units of emitted samples.
 
-    Args:
-        times: (m, k) times of arrival, s.
-        p_WM: (m, k, 2) positions of the microphones at the times of arrival, m.
-        v_WM: (m, k, 2) velocities of the microphones at the times of arrival, m/s.
-        knot_times: (n,) knots of the motion of the source, s.
-        p_WS: (n, 2) positions of the source at the knots, m.
-        v_WS: (n, 2) velocities of the source at the knots, m/s.
-        c: Speed of sound, m/s.
-        samples: Time of the first emitted sample, s, and rate of the samples, Hz.
+    ``samples`` has the time of the first emitted sample, s, and the sample rate, Hz.
 
     Returns:
-        Four values. The first is the (m,) positions of the first times among the
-        emitted samples. The second is the (m, k) delays, samples. The third is the (m,
-        k) rates of change of the delays. The fourth is the position of the earliest
-        sample that is heard.
+        Four values: (m,) time from the first emitted sample to the first knot of each
+        channel, samples; (m, k) delays, samples; (m, k) rates of change of the delays;
+        and the position of the earliest heard sound among the emitted samples.
     """
     delays, rates = retarded_delays(times, p_WM, v_WM, knot_times, p_WS, v_WS, c)
     first, earliest = np.empty(len(times)), np.inf
@@ -278,23 +262,23 @@ def _interpolate(
     units: tuple[float, float, float],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills out (m, length) with the delayed sound, divided by the distance.
+    """Fills ``out`` (m, length) with the delayed sound, divided by the distance.
 
-    All times are in units of emitted samples. Between two knots, the delay is a cubic
-    polynomial. The function computes the position of each output sample among the
-    emitted samples, and the amplitude 1 / (c d), where d is the delay. It then
-    interpolates runs of output samples at once. Within a run, the whole part of the
+    All times are in units of emitted samples. Between two knots, the delay d is a cubic
+    polynomial of time. For each output sample, the function computes the position among
+    the emitted samples and the amplitude 1 / (c d). It then interpolates one run of
+    output samples at a time. A run is a sequence in which the integer part of the
     position increases by one from each output sample to the next.
 
     Args:
         samples: Emitted samples.
         kernel: ``INTERPOLATION_KERNEL``.
-        first: (m,) time of the first output sample of each channel, as a position among
-            the emitted samples.
+        first: (m,) time from the first emitted sample to the first output sample of
+            each channel.
         delays: (m, k) delays at evenly spaced knots.
         rates: (m, k) rates of change of the delays.
-        units: Time from one output sample to the next; speed of sound, m per sample;
-            and smallest distance, m.
+        units: Three numbers: time from one output sample to the next; speed of sound, m
+            per sample; and smallest distance, m.
         out: (m, length) output, where length is a multiple of k - 1.
     """
     step, c, nearest = units
@@ -351,14 +335,15 @@ def _sampled_at(
 def sampled_at(
     sound: NDArray[np.float32], first: int, step: float, count: int
 ) -> NDArray[np.float32]:
-    """Resamples a sound to another rate, with the kernel of ``propagate``.
+    """Resamples a sound to another rate, with the interpolation of ``propagate``.
 
     Args:
         sound: (m, n) samples.
         first: Position of the first output sample among the samples of the sound; at
             least ``KERNEL_REACH``.
-        step: Distance from one output sample to the next, in samples. At least
-            ``KERNEL_REACH`` samples of the sound must follow the last output sample.
+        step: Distance from one output sample to the next, in samples of the sound. At
+            least ``KERNEL_REACH`` samples of the sound must follow the last output
+            sample.
         count: Number of output samples.
 
     Returns:
@@ -408,10 +393,11 @@ def propagate(
 ) -> NDArray[np.float32]:
     """Computes the sound pressure at moving microphones over one audio frame.
 
-    The sample rate of the microphones may differ from that of the emission. The delay
-    is exact at knots and follows cubic polynomials between them. With knots every 2.5
-    ms and the bodies of this model, the errors of delays are at most 1e-3 sample from
-    0.1 to 18 kHz. The errors of amplitudes are at most 1e-4.
+    The microphones and the emission may have different sample rates. The travel time of
+    the sound is exact at certain times (knots), and a cubic polynomial between them.
+    With knots every 2.5 ms and the speeds and yaw rates of this model, the errors of
+    the travel times are at most 1e-3 sample from 0.1 to 18 kHz. The errors of
+    amplitudes are at most 1e-4.
 
     Args:
         emission: Stored sound and motion of the source.

@@ -44,10 +44,12 @@ def record_frame(
     """Records the frame of audio that ends at the present time.
 
     Args:
-        emissions: Sounds of the sources. The noise level refers to the first sound.
+        emissions: Sounds of the sources. The noise level is relative to the first
+            sound.
         time: Present time, s.
-        before: Pose and velocity of the robot one frame ago, (3,) each.
-        now: Present pose and velocity of the robot, (3,) each.
+        before: Pose (3,), m and rad, and velocity (3,), m/s and rad/s, of the robot in
+            the world frame W at the beginning of the audio frame.
+        now: Present pose and velocity of the robot, in the form of ``before``.
         array: True array, from ``real_array``.
         parameters: Microphones, amplifier, converter and length of the frame.
         seed: Seed of the noise.
@@ -127,16 +129,16 @@ class MicMemory(NamedTuple):
 
 
 class Recorder:
-    """Records audio frames as a ``MicArray`` does, but without a Drake context.
+    """Records audio frames like ``MicArray``, but without a Drake context.
 
     Args:
         parameters: Microphones, amplifier and converter.
         robot: Positions of the microphones.
         c: Speed of sound, m/s.
-        room: Walls, if there are any.
+        room: Walls; None for the free field.
         sources: Number of sources.
         seed: Seed of the noise and of the errors of the array.
-        faults: Faults of the robot. Only the faults of ``microphones`` apply.
+        faults: Faults of the robot. Only the faults of ``microphones`` have an effect.
 
     Raises:
         ValueError: See ``MicArray``.
@@ -198,11 +200,11 @@ class Recorder:
         Args:
             emissions: Sounds of the sources, the followed source first.
             time: Present time, s.
-            now: Present pose and velocity of the robot, (3,) each.
+            now: Present pose (3,) and velocity (3,) of the robot.
             memory: State after the previous frame.
 
         Returns:
-            New state.
+            The new state.
         """
         last = np.empty(7)
         last[0], last[1:4], last[4:] = time, *now
@@ -250,7 +252,7 @@ class Recorder:
         Args:
             emissions: Sounds of the sources, the followed source first.
             time: Present time, s.
-            now: Present pose and velocity of the robot, (3,) each.
+            now: Present pose (3,) and velocity (3,) of the robot.
             memory: State after the previous frame.
             array: Microphones with their errors.
 

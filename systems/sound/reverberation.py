@@ -30,11 +30,11 @@ def _place(places: NDArray[np.float64], source: int) -> tuple[float, ...]:
 class Reverberation:
     """Computes the sound of the reflections in a room.
 
-    The class convolves the sound of each source with the impulse response of the room.
-    A response assumes that robot and source are at rest in given positions. If the
+    The class convolves the sound of each source with an impulse response of the room. A
+    response is valid for a robot and a source at rest in given positions. If the
     positions change, an audio frame fades from the response for the old positions to
-    the response for the new positions. The class keeps the most recent responses in a
-    cache. Therefore it computes only one response while robot and source are at rest.
+    the response for the new positions. A cache keeps the most recent responses, so that
+    robots and sources at rest need only one computation.
 
     Args:
         room: Size and walls of the room.
@@ -76,12 +76,12 @@ class Reverberation:
         """Computes the sound pressure of the reflections over one audio frame.
 
         Args:
-            emissions: Sounds of the k sources. Each must reach back by the length of
-                the response.
+            emissions: Sounds of the k sources. Each must begin earlier than the frame
+                by at least the length of the response.
             time: End of the frame, s.
-            old: (3 + 2 k,) values at the beginning of the frame: x, y, theta of the
-                robot in the world frame W, then x and y of each source, m and rad.
-            new: (3 + 2 k,) values at the end of the frame, in the same order.
+            old: (3 + 2 k,) x, y, theta of the robot and x, y of each source at the
+                beginning of the frame, in the world frame W, m and rad.
+            new: (3 + 2 k,) values at the end of the frame, in the form of ``old``.
             array: Array with its errors.
 
         Returns:
@@ -146,7 +146,7 @@ class Reverberation:
     ) -> NDArray[np.complex64]:
         """Computes the spectrum of the room response for given positions.
 
-        The arrays are passed as bytes, because bytes can be keys of the cache.
+        The arrays are bytes, so that the cache can use them as keys.
         """
         x, y, theta, *p_WS = places
         dx, dy = rotate(theta, *np.frombuffer(p_BM).reshape(-1, 2).T)

@@ -29,11 +29,12 @@ class RoomImages:
     """Image sources of a room. An image of a source at p is at signs * p + offsets."""
 
     signs: NDArray[np.float64]
-    """(n, 3) signs of the coordinates of the source from the corner of the room."""
+    """(n, 3) factors 1 or -1 for the coordinates p of the source, which are relative to
+    the corner of the room."""
     offsets: NDArray[np.float64]
     """(n, 3) offsets, m."""
     gains: NDArray[np.float64]
-    """(n,) factor of the amplitude after all reflections."""
+    """(n,) factors of the amplitude after all reflections."""
     length: int
     """Number of samples of a response. The response ends at the reverberation time, or
     with the last image."""
@@ -49,8 +50,7 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
             response.
 
     Returns:
-        Signs, offsets in m, and gains of the images; and the length of the response in
-        samples.
+        The images and the length of the response.
 
     Raises:
         InputError: See ``RoomParameters.walls``.
@@ -101,19 +101,20 @@ def _add_arrivals(
 ) -> None:  # pragma: no cover  (compiled)
     """Adds the impulse of each image source at each microphone to ``out``.
 
-    The function computes the distance and the time of arrival for each pair of image
-    and microphone. It then adds the interpolation kernel, scaled by gain over distance.
+    For each pair of image and microphone, the function computes the distance and the
+    time of arrival. At this time, it adds the interpolation kernel, multiplied by the
+    gain of the image and divided by the distance.
 
     Args:
-        images: Signs, offsets and gains of the images.
+        images: Signs, offsets and gains of ``RoomImages``.
         p_S: (3,) position of the source from the corner of the room, m.
         p_M: (m, 3) positions of the microphones from the corner of the room, m.
-        early: (m,) number of samples by which the impulses appear earlier in each
-            channel.
+        early: (m,) number of samples by which each channel is sampled late. Its
+            impulses appear earlier by this number of samples.
         per_m: Number of samples in which sound travels one meter.
         nearest: Distance below which the amplitude no longer grows, m.
         kernel: ``INTERPOLATION_KERNEL``.
-        out: (m, length) responses. The function changes this array.
+        out: (m, length) responses, changed in place.
     """
     signs, offsets, gains = images
     pairs = kernel.shape[0]
@@ -154,8 +155,9 @@ def room_impulse_responses(
 ) -> NDArray[np.float32]:
     """Computes impulse responses from a source at rest to microphones at rest.
 
-    Delays are exact below 18 kHz, as in ``systems.sound.propagation``. Each amplitude
-    is the gain of the reflections divided by the distance.
+    Delays are interpolated as in ``systems.sound.propagation``, which is accurate up to
+    18 kHz. The amplitude of each arrival is the gain of its reflections divided by the
+    distance.
 
     Args:
         room: Size and walls of the room.
@@ -168,8 +170,8 @@ def room_impulse_responses(
         images: Result of ``room_images``, if it is already known.
 
     Returns:
-        (m, length) pressure at 100 kHz, relative to the pressure at 1 m. The source
-        emits the impulse at the first sample.
+        (m, length) pressure at a sample rate of 100 kHz, relative to the pressure at 1
+        m. The source emits the impulse at the first sample.
 
     Raises:
         InputError: See ``RoomParameters.walls``.

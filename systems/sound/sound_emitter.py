@@ -39,12 +39,12 @@ def emitted_samples(
     Args:
         waveform: Bursts of sound, end to end, from ``make_waveform``.
         sound: Schedule of the bursts.
-        first: Number of the first sample. Sample n is emitted at n / 100 kHz.
+        first: Number of the first sample. Sample n is emitted at the time n / 100 kHz.
         count: Number of samples.
 
     Returns:
-        (count,) sound pressure at 1 m, Pa. If a single burst covers all samples, the
-        array is a view of the waveform. None if all samples are zero.
+        (count,) sound pressure at 1 m, Pa; None if all samples are zero. If a single
+        burst covers all samples, the array is a view of the waveform.
     """
     burst, period, start = _gate(sound.on_s, sound.period_s, sound.start_s)
     bursts = len(waveform) // burst
@@ -81,7 +81,7 @@ def make_emission(
     v_WS: NDArray[np.float64],
     tick_s: float = TICK_S,
 ) -> Emission:
-    """Makes the record of the sound that has left the loudspeaker up to a time.
+    """Makes the record of the sound that has left the loudspeaker up to the present.
 
     Args:
         time: Present time, a multiple of 10 us, s.
@@ -93,7 +93,7 @@ def make_emission(
         tick_s: Time from one tick to the next, s.
 
     Returns:
-        Sound pressure at 1 m, Pa, and motion of the source. The arrays are read-only.
+        The sound and the motion of the source, in read-only arrays.
     """
     ages, count = _history(len(p_WS), tick_s)
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
@@ -128,15 +128,15 @@ def _silence(count: int) -> NDArray[np.float32]:
 
 @cache
 def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParameters:
-    """Returns the sound of a loudspeaker that sounds only after the robot calls it.
+    """Returns the sound of a loudspeaker that is silent until the robot calls it.
 
     Args:
         sound: Sound of the loudspeaker. Its first burst is ``start_s`` after the call.
         on_since_s: Time of the call, s; None before the call.
 
     Returns:
-        The sound with a fixed start time. Before the call, the start time is one day,
-        so that the loudspeaker stays silent.
+        The sound, with the time of its first burst in ``start_s``. Before the call,
+        this time is one day, so that the loudspeaker stays silent.
     """
     since = _NEVER_S if on_since_s is None else on_since_s + sound.start_s
     return sound.model_copy(update={"start_s": since})
@@ -145,10 +145,10 @@ def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParam
 def history_ticks(
     maximum_range_m: float, c: float, frame_s: float = TICK_S, tick_s: float = TICK_S
 ) -> int:
-    """Returns the number of control periods (ticks) of the source's motion to store.
+    """Returns the number of control periods (ticks) in the stored motion of the source.
 
     Sound needs time to travel. The stored motion must therefore begin before the
-    emission of the earliest sound that can arrive in the present audio frame.
+    emission of the earliest sound in the present audio frame.
 
     Args:
         maximum_range_m: Largest distance that sound travels, m.
@@ -166,14 +166,14 @@ class SoundEmitter(Block):
     """Plays the sound at the position of the source.
 
     The discrete state has the positions and velocities of the source at the last
-    control periods (ticks). The state reaches back to the time at which sound from the
-    maximum range was emitted. The block updates the state every tick. Before time zero,
-    the source is silent and at rest at its initial position. The output is a function
-    of time, state and present input, without latency.
+    control periods (ticks). The state reaches back far enough for sound from the
+    maximum range. The block updates the state every tick. Before time zero, the source
+    is silent and at rest at its initial position. The output is a function of time,
+    state and present input, without latency.
 
     If ``called`` is set, the block has a further input port ``calling`` (0 or 1). The
-    block stores the tick at which this port is 1 for the first time, and plays from
-    this tick on. The schedule of the sound then starts at this tick.
+    block stores the tick at which this port is 1 for the first time. The schedule of
+    the sound starts at this tick.
 
     Args:
         sound: Waveform, level and schedule of the sound.
@@ -266,14 +266,15 @@ class SoundEmitter(Block):
     def step_for(self, run: RunFacts) -> Step:
         """Returns the step of the block for a compiled simulation loop.
 
-        The step stores the motion of the source.
+        The step stores the motion of the source. It also provides a function that
+        returns the emission at a given tick (control period). This function makes an
+        emission only when another block reads it.
 
         Args:
             run: Seed and period of the run.
 
         Returns:
-            The step. It provides the emission as a function of the tick (control
-            period). The emission is made only when another block reads it.
+            The step.
 
         Raises:
             InputError: The sound file cannot be played.

@@ -38,11 +38,11 @@ _BLOCK = 2**16
 
 
 def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
-    """Reads a WAV or FLAC file, of known or unknown length.
+    """Reads a WAV or FLAC file, even if its header does not state the length.
 
     Args:
         path: Sound file.
-        field: Name of the parameter that holds the path, for the messages.
+        field: Name of the parameter with the path, for the messages.
 
     Returns:
         (channels, n) samples, where 1 is full scale, and the sample rate in Hz.
@@ -82,15 +82,16 @@ def read_played(
 
     Args:
         path: Sound file.
-        low_hz: Lower end of the band that is heard, Hz.
-        field: Name of the parameter that holds the path, for the messages.
+        low_hz: Lower end of the band of the sound, Hz. The sample rate must be at least
+            twice this frequency.
+        field: Name of the parameter with the path, for the messages.
 
     Returns:
-        (n,) samples, where 1 is full scale, and the rate in Hz.
+        (n,) samples, where 1 is full scale, and the sample rate in Hz.
 
     Raises:
         InputError: ``read_sound`` refuses the file, the file has several channels, or
-            its rate is too low.
+            its sample rate is too low.
     """
     channels, rate = read_sound(path, field)
     if len(channels) != 1:
@@ -109,15 +110,15 @@ def read_played(
 def read_noise(
     path: str | Path, count: int, field: str
 ) -> tuple[NDArray[np.float64], int]:
-    """Reads noise that is repeated at each of several microphones.
+    """Reads ego noise, which is repeated without end at each of several microphones.
 
     Args:
         path: Sound file.
         count: Number of microphones.
-        field: Name of the parameter that holds the path, for the messages.
+        field: Name of the parameter with the path, for the messages.
 
     Returns:
-        (1 or count, n) samples, where 1 is full scale, and the sample rate in Hz.
+        (1, n) or (count, n) samples, where 1 is full scale, and the sample rate in Hz.
 
     Raises:
         InputError: ``read_sound`` refuses the file, the number of its channels is
@@ -140,11 +141,10 @@ def read_noise(
 
 
 class _Stream(soundfile.SoundFile):
-    """A sound file that is read once from beginning to end.
+    """A sound file that claims not to be seekable, so that reading to its end works.
 
-    The library soundfile queries the position of a seekable file after each block. At
-    the end of a FLAC file of unknown length, this query fails. Therefore this class
-    states that the file is not seekable.
+    In a seekable file, the library soundfile queries the position after it has read a
+    block. At the end of a FLAC file of unknown length, this query fails.
     """
 
     def seekable(self) -> bool:
@@ -210,12 +210,12 @@ def _check_samples(samples: NDArray[np.float64], field: str, where: str) -> None
 
 
 def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
-    """Returns the path, or a copy of the file with a repaired header, for libsndfile.
+    """Returns the path of a file, or a copy of the file with a repaired header.
 
-    The library libsndfile reads a truncated WAV file without an error message. If a
-    recorder left 0 as the length of the samples, libsndfile reads nothing. This
-    function refuses truncated files. It replaces a length of 0 by the mark of an
-    unknown length.
+    The library libsndfile reads a truncated WAV file without an error message, so this
+    function refuses such a file. If a recorder left 0 as the length of the samples,
+    libsndfile would read nothing. In this case, the function returns a copy whose
+    header marks the length as unknown.
     """
     file_size = path.stat().st_size
     with path.open("rb") as file:
@@ -240,12 +240,10 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
 
 
 def _data_size(file: BinaryIO) -> int | None:
-    """Reads the stated number of bytes of the samples of a WAV file.
+    """Returns the size of the samples of a WAV file that its header states, in bytes.
 
-    Afterwards, the position in the file is the beginning of the samples.
-
-    Returns:
-        Number of bytes; None if no samples follow.
+    The result is None if the file has no chunk of samples. Afterwards, the position in
+    the file is the beginning of the samples.
     """
     while len(chunk := file.read(8)) == 8:
         name, size = struct.unpack("<4sI", chunk)

@@ -27,20 +27,17 @@ def pcm_of_counts(counts: NDArray[np.int16], full_scale: int) -> NDArray[np.int1
         full_scale: Full scale of the converter in counts; a power of two, up to 2^15.
 
     Returns:
-        (channels, n) counts multiplied by a power of two. Full scale remains full
-        scale, and the counts can be restored exactly.
+        (channels, n) counts multiplied by 2^15 / full_scale. The factor is a power of
+        two, so the counts can be restored exactly.
     """
     return counts * np.int16(2**15 // full_scale) if full_scale < 2**15 else counts
 
 
 def loudest_pa(level_pa: float) -> float:
-    """Returns the full-scale sound pressure of a file with a loudspeaker's sound.
+    """Returns the sound pressure that is full scale in a loudspeaker's sound file, Pa.
 
-    Args:
-        level_pa: RMS pressure at 1 m while the source sounds, Pa.
-
-    Returns:
-        Smallest power of two that the peaks of the loudspeaker do not exceed, Pa.
+    The result is the smallest power of two that the peaks of the sound do not exceed.
+    ``level_pa`` is the RMS pressure at 1 m during a burst of the sound, Pa.
     """
     return 2.0 ** math.ceil(math.log2(LARGEST_CREST * level_pa))
 
@@ -48,14 +45,14 @@ def loudest_pa(level_pa: float) -> float:
 def pcm_of_pressure(
     pressure: NDArray[np.float32], full_scale_pa: float
 ) -> NDArray[np.int32]:
-    """Converts sound pressure to samples of 32 bits.
+    """Converts sound pressure to samples of 32 bits, rounded and clipped.
 
     Args:
         pressure: (n,) sound pressure, Pa.
-        full_scale_pa: Pressure that corresponds to full scale, Pa.
+        full_scale_pa: Pressure at full scale (2^31), Pa.
 
     Returns:
-        (n,) samples, rounded to 2^-31 of full scale, and clipped.
+        (n,) samples.
     """
     scaled = np.rint(pressure.astype(np.float64) * (2**31 / full_scale_pa))
     return np.clip(scaled, -(2**31), 2**31 - 1).astype(np.int32)
@@ -64,8 +61,8 @@ def pcm_of_pressure(
 class WavWriter:
     """Writes a WAV file piece by piece.
 
-    After each ``write``, the header states the present length. If the process stops for
-    any reason, the samples written so far can be read.
+    After each ``write``, the header states the present length. Even if the process
+    stops suddenly, the samples written so far can therefore be read.
 
     Args:
         path: A file that does not exist yet.

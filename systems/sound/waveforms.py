@@ -23,21 +23,22 @@ _NOISE_SECONDS = 2.0
 def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
     """Makes the waveform of the loudspeaker: sound pressure at a distance of 1 m.
 
-    The source sounds in bursts. The waveform has whole bursts, end to end.
+    The source sounds in bursts. The waveform has m bursts, end to end, without the
+    pauses between them. Burst k of a run (k = 0, 1 ...) plays burst k mod m of the
+    waveform. The sound of a file continues from burst to burst, and starts again after
+    the end of the file.
 
     Args:
         sound: Waveform, level and length of the bursts.
         seed: Seed of the noise.
 
     Returns:
-        (m n,) sound pressure at 100 kHz, Pa: m whole bursts of n samples. Each burst
-        has soft edges. The k-th burst of a run plays burst k mod m of the waveform. The
-        sound of a file continues from burst to burst. After the end of the file, it
-        starts again.
+        (m n,) sound pressure at a sample rate of 100 kHz, Pa: m bursts of n samples
+        with soft edges.
 
     Raises:
-        InputError: The file cannot be played. The message names the file and the
-            remedy.
+        InputError: The file cannot be played, or the sound is outside the band of the
+            microphones. The message states the remedy.
     """
     burst = round(sound.on_s * SAMPLE_RATE_HZ)
     raw = _SYNTHESES[sound.kind](sound, seed)

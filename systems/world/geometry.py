@@ -50,13 +50,13 @@ rectangle_clearance = njit(cache=True)(plane.rectangle_clearance)
 
 @register_jitable
 def safe_norm(x: Any, y: Any) -> Any:
-    """Computes the length of a vector (x, y).
+    """Computes the length of a vector (x, y), with a gradient of zero at (0, 0).
 
-    The gradient at (0, 0) is zero instead of NaN. The function accepts floats and
-    AutoDiffXd. The result differs from the exact norm by at most 1e-12.
+    The gradient of the exact length would be NaN there. The result differs from the
+    exact length by at most 1e-12.
 
     Args:
-        x: First component, in any unit.
+        x: First component, in any unit; float or AutoDiffXd.
         y: Second component, in the same unit.
 
     Returns:
@@ -68,7 +68,7 @@ def safe_norm(x: Any, y: Any) -> Any:
 
 @register_jitable
 def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[Any, Any]:
-    """Computes the velocity of a point P that is fixed ahead of the origin of a body.
+    """Computes the velocity of the control point P, which is ahead of the body origin.
 
     Args:
         theta: Heading of the body in the world frame W, rad; a number or an array.
@@ -149,13 +149,13 @@ def cone_range(
     """Computes the distance from a sensor to the nearest surface inside its cone.
 
     The function cuts each edge of each rectangle to the part inside the cone. Then it
-    computes the exact distance from the sensor to this part. The range is the least of
-    these distances. Hidden surfaces need no special case, because only the nearest
-    surface counts.
+    computes the exact distance from the sensor to this part. The range is the smallest
+    of these distances. A hidden surface is never the nearest, so the function does not
+    check whether surfaces are hidden.
 
     Args:
-        x: First component of the position of the sensor, m.
-        y: Second component of the position of the sensor, m.
+        x: First coordinate of the sensor, m.
+        y: Second coordinate of the sensor, m.
         axis: Direction of the axis of the cone, rad.
         half_angle: Half of the opening angle, rad, below pi/2.
         rectangles: (n, 5) rectangles (x, y, theta, length, width) in the same frame, m
@@ -211,12 +211,12 @@ def fan_ranges(
     half_angles: NDArray[np.float64],
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the range of each range sensor of a body by ``cone_range``.
+    """Computes the range of each range sensor of a body with ``cone_range``.
 
     Args:
         pose_WB: (3,) x, y, theta of the body frame B in the world frame W, m and rad.
         rectangles: (m, 5) rectangles (x, y, theta, length, width) in W, m and rad.
-        axes: (n,) directions of the cones in B, rad.
+        axes: (n,) directions of the axes of the cones in B, rad.
         places: (n, 2) positions of the sensors relative to the control point P, in the
             axes of B, m.
         half_angles: (n,) halves of the opening angles, rad.
@@ -244,10 +244,10 @@ def fan_ranges(
 def segment_clearance(
     start: Any, end: Any, box: Any
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance of a line segment from a filled rectangle.
+    """Computes the distance from a line segment to a filled rectangle.
 
-    The function works in the axes of the rectangle. If the segment does not meet the
-    rectangle, the nearest point is an end of the segment or a corner of the rectangle.
+    If the segment does not meet the rectangle, an end of the segment or a corner of the
+    rectangle is nearest.
 
     Args:
         start: Start (x, y) of the segment, m.
@@ -295,14 +295,15 @@ def contact_time(
 
     The function projects both rectangles onto the normal of each side. On each normal,
     the two projections overlap during one interval of time. The rectangles are in
-    contact at a time that is in all intervals. Therefore the first contact is at the
-    start of the intersection of all intervals.
+    contact at a time that lies in all intervals. The contact therefore begins when the
+    last of these intervals begins. If one of the intervals has ended by then, the
+    rectangles never touch.
 
     Args:
         a: (5,) first rectangle (x, y, theta, length, width), m and rad.
         b: (5,) second rectangle in the same frame.
-        vx: Velocity of a relative to b, x component, m/s.
-        vy: Velocity of a relative to b, y component, m/s.
+        vx: First component of the velocity of a relative to b, m/s.
+        vy: Second component of the velocity of a relative to b, m/s.
 
     Returns:
         Time, s. It is 0 if the rectangles overlap now. It is infinite if they never
@@ -332,16 +333,16 @@ def first_overlap(
     rectangle moves straight and turns evenly from one pose to the next.
 
     If the rectangles overlap at the end of a part, the function returns the time of
-    that end. Otherwise the function searches within the part by conservative
-    advancement:
+    that end. Otherwise it searches within the part by conservative advancement:
 
-    1. Compute the clearance between the rectangles.
-    2. Compute the time in which no two of their points can approach each other by more
-       than the clearance. The rectangles cannot touch in this time.
+    1. Compute the clearance between the rectangles, or use 0.1 mm if the clearance is
+       less.
+    2. Divide this distance by the largest speed at which points of the two rectangles
+       can approach each other. The rectangles cannot overlap by more than 0.1 mm
+       before this time has passed.
     3. Advance by this time and repeat.
 
-    Each advance allows at least 0.1 mm of approach. Therefore the function finds every
-    overlap deeper than 0.1 mm, at any speed.
+    The function therefore finds every overlap deeper than 0.1 mm, at any speed.
 
     Args:
         before: (x, y, theta) of the first rectangle before the step, m and rad.
@@ -352,8 +353,8 @@ def first_overlap(
         other_size: Length and width of the second rectangle, m.
 
     Returns:
-        Elapsed share of the step, 0 to 1. It is infinite if the rectangles do not
-        overlap.
+        Share of the step before the first overlap, 0 to 1. It is infinite if the
+        rectangles do not overlap.
     """
     a, b = np.zeros(5), np.zeros(5)
     a[3], a[4], b[3], b[4] = size[0], size[1], other_size[0], other_size[1]

@@ -19,8 +19,7 @@ def Obstacles_(T):
         """Publishes the poses, velocities, and sizes of the obstacles.
 
         Each output port lists the values of all obstacles, one obstacle after the
-        other. The outputs are functions of time only, without state and without
-        latency.
+        other. The outputs depend only on time. The block has no state and no latency.
 
         Args:
             obstacles: A sequence of ``ObstacleParameters``.

@@ -1,9 +1,11 @@
 """Describes the path of a body that moves through waypoints.
 
 Circular arcs replace the corners between the waypoints. The speed rises and falls with
-a limited acceleration. Position and velocity are continuous and have closed forms. The
-yaw rate jumps at the ends of an arc. The yaw rate of a robot with wheels cannot jump,
-so ``systems/base/carrier.py`` computes the motion of such a robot.
+a limited acceleration. Position and velocity are continuous, and explicit formulas give
+them at any time.
+
+The yaw rate jumps at the ends of an arc. The yaw rate of a robot with wheels cannot
+jump, so ``systems/base/carrier.py`` computes the motion of such a robot.
 """
 
 from __future__ import annotations
@@ -67,14 +69,14 @@ class WaypointPath:
         waypoints: Points in the world frame W, m. With one point, the body is at rest.
         speed: Speed along the path, m/s, >= 0.
         acceleration: Acceleration along the path, m/s^2, > 0.
-        corner_radius: Largest radius of the rounded corners, m, > 0. An arc replaces at
-            most half of each of the two lines that meet at the corner.
+        corner_radius: Largest radius of the rounded corners, m, > 0. Two lines meet at
+            a corner, and the arc replaces at most half of each line.
         start_time: Time until which the body rests at the first waypoint, s.
         at_end: ``stop``: the body rests at the last waypoint. ``shuttle``: the body
             goes back and forth between both ends. It stops for an instant at each end
             and returns backward, without turning around.
-        heading: Heading if there is one waypoint, rad. Otherwise the heading is the
-            tangent of the path.
+        heading: Heading of a body with one waypoint, rad. With several waypoints, the
+            heading is the tangent of the path.
         top_yaw_rate: Largest yaw rate in corners, rad/s, > 0. It limits the speed on
             arcs.
 
@@ -174,9 +176,10 @@ class WaypointPath:
         return poses_on(np.array(self._pieces), self._elapsed(times)[0])
 
     def twists(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Returns (n, 2) forward speeds, m/s, and yaw rates, rad/s, at n times in s.
+        """Returns an (n, 2) array: forward speed and yaw rate at each of n times.
 
-        A shuttle drives backward on its way back, so its speed is then negative.
+        The times are in s, the speeds in m/s, and the yaw rates in rad/s. On its way
+        back, a shuttle drives backward, so its speed is negative.
         """
         elapsed, direction = self._elapsed(np.asarray(times, dtype=float))
         index = np.searchsorted(self._begins, elapsed, side="right") - 1
@@ -191,10 +194,11 @@ class WaypointPath:
         Therefore every point of the body is fastest at one end of the piece.
 
         Args:
-            until: Time in s. Pieces that begin later are omitted.
+            until: Time, s. Pieces that begin later are omitted.
 
         Returns:
-            (n, 2) forward speeds, m/s, and yaw rates, rad/s.
+            (n, 2) array. The columns are the forward speed, m/s, and the yaw rate,
+            rad/s.
         """
         rows, last = [], until - self._start_time
         for piece, end in zip(self._pieces, self._begins[1:], strict=False):
@@ -235,20 +239,14 @@ def _along(
 def _pieces(
     segments: Sequence[_Segment], limits: Sequence[float], acceleration: float
 ) -> tuple[list[_Piece], float]:
-    """Computes the fastest motion along segments, which starts and ends at rest.
+    """Returns the pieces of the fastest motion along segments, and its duration in s.
 
-    The function works with squared speeds, because they are linear in the distance. A
-    forward pass limits the squared speeds at the joints of segments by the
-    acceleration. A backward pass limits them by the braking. Then the function splits
-    each segment into up to three pieces: speeding up, constant speed, and braking.
-
-    Args:
-        segments: Lines and arcs, end to end.
-        limits: Top speed on each segment, m/s.
-        acceleration: Acceleration along the path, m/s^2.
-
-    Returns:
-        The pieces, and the duration of the motion, s.
+    The motion starts and ends at rest. The function works with squared speeds, which
+    are linear in the distance. A forward pass over the ends of the segments limits each
+    squared speed to what the acceleration can reach. A backward pass limits it to a
+    value from which the body can brake in time. Then the function splits each segment
+    into up to three pieces: speeding up, constant speed, and braking. ``limits`` has
+    the top speed on each segment, m/s.
     """
     tops = [limit * limit for limit in limits]
     joints = [0.0, *(min(pair) for pair in pairwise(tops)), 0.0]

@@ -22,13 +22,13 @@ from systems.framework.elementary import cos, sin
 def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """Transforms a vector from an inner frame to an outer frame.
 
-    The inner frame is turned by theta relative to the outer frame. The function applies
-    the matrix R = [[cos, -sin], [sin, cos]]. Han 2019 prints the transpose of R in eq.
-    15. The function accepts floats and AutoDiffXd.
+    The inner frame is turned by theta relative to the outer frame. The function
+    multiplies the vector by R = [[cos, -sin], [sin, cos]]. Eq. 15 of Han 2019 prints
+    the transpose of R.
 
     Args:
-        theta: Angle of the inner frame in the outer frame, rad.
-        x: First component in the inner frame, any unit.
+        theta: Angle of the inner frame in the outer frame, rad; float or AutoDiffXd.
+        x: First component in the inner frame, any unit; float or AutoDiffXd.
         y: Second component in the inner frame, in the same unit.
 
     Returns:
@@ -39,7 +39,7 @@ def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
 
 
 def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
-    """Computes the position of a point P that is fixed ahead of the origin of a body.
+    """Computes the position of the control point P, which is ahead of the body origin.
 
     Args:
         pose: (x, y, theta) of the body in the world frame W, m and rad; floats or
@@ -54,7 +54,7 @@ def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
 
 
 def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
-    """Computes the vector to a point from the nearest point of a filled rectangle.
+    """Computes the vector from the nearest point of a filled rectangle to a point.
 
     Args:
         point: (x, y), m; floats, AutoDiffXd, or arrays.
@@ -62,7 +62,7 @@ def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
             component may be an array.
 
     Returns:
-        (du, dv) along the rectangle's own axes, m. The vector is (0, 0) if the point is
+        Vector (du, dv) in the rectangle's own axes, m. It is (0, 0) if the point is
         inside the rectangle.
     """
     x, y, theta, length, width = rectangle
@@ -71,7 +71,7 @@ def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
 
 
 def outside(u: Any, half: Any) -> Any:
-    """Computes the distance of u beyond the interval [-half, half], for any type of u.
+    """Computes by how much u is outside the interval [-half, half], for any type of u.
 
     The function calls ``beyond`` for a number and ``beyond_each`` for an array.
 
@@ -80,13 +80,13 @@ def outside(u: Any, half: Any) -> Any:
         half: Half of the length of the interval, in the unit of u.
 
     Returns:
-        Distance with the sign, type, and unit of u; 0 inside the interval.
+        Distance with the sign, type, and unit of u. It is 0 inside the interval.
     """
     return beyond_each(u, half) if isinstance(u, np.ndarray) else beyond(u, half)
 
 
 def beyond(u: Any, half: Any) -> Any:
-    """Computes the distance of u beyond the interval [-half, half].
+    """Computes by how much a number u is outside the interval [-half, half].
 
     Compiled code may call this function.
 
@@ -95,7 +95,7 @@ def beyond(u: Any, half: Any) -> Any:
         half: Half of the length of the interval, in the unit of u.
 
     Returns:
-        Distance in the unit of u, with the sign of u; 0 inside the interval.
+        Distance with the sign and unit of u. It is 0 inside the interval.
     """
     if u > half:
         return u - half
@@ -105,16 +105,16 @@ def beyond(u: Any, half: Any) -> Any:
 
 
 def beyond_each(u: NDArray[np.float64], half: ArrayLike) -> NDArray[np.float64]:
-    """Computes the distance beyond [-half, half] for each element of an array.
+    """Computes by how much each element of an array is outside [-half, half].
 
     Args:
         u: Coordinates of any shape and in any unit.
-        half: Half lengths of the intervals, in the unit of u. The shape must broadcast
-            with the shape of u.
+        half: Half of the length of each interval, in the unit of u. The shape must
+            broadcast with the shape of u.
 
     Returns:
-        Distances in the broadcast shape, with the signs and the unit of u; 0 inside the
-        interval.
+        Distances in the broadcast shape, with the signs and the unit of u. They are 0
+        inside the interval.
     """
     return u - np.clip(u, -np.asarray(half), half)
 
@@ -124,8 +124,8 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
 
     If the rectangles overlap, the result is minus the depth of the overlap. The depth
     is the length of the shortest motion that separates the rectangles (separating-axis
-    test). If the rectangles do not overlap, a corner of one rectangle is the point
-    nearest to the other rectangle.
+    test). Otherwise a corner of one rectangle is nearest to the other rectangle, and
+    the result is the distance of this corner.
 
     Args:
         a: (5,) first rectangle (x, y, theta, length, width), m and rad.
@@ -153,7 +153,7 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
 def side_normals(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> tuple[tuple[float, float, float, float], ...]:
-    """Computes the normals of the sides of two rectangles a and b.
+    """Returns the unit normals of the sides of two rectangles, each with two distances.
 
     The first two normals are those of a. The last two normals are those of b.
 
@@ -162,10 +162,10 @@ def side_normals(
         b: (5,) second rectangle in the same frame.
 
     Returns:
-        One tuple (x, y, ahead, touching) per normal. (x, y) is the unit normal.
-        ``ahead`` is the signed distance in m from the center of a to the center of b
-        along the normal. ``touching`` is the distance in m at which the projections of
-        both rectangles just touch.
+        One tuple (x, y, ahead, touching) per normal (x, y). ``ahead`` is the signed
+        distance from the center of a to the center of b along the normal, m.
+        ``touching`` is the value of this distance at which the projections of both
+        rectangles onto the normal just touch, m.
     """
     ca, sa, cb, sb = math.cos(a[2]), math.sin(a[2]), math.cos(b[2]), math.sin(b[2])
     c, s = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)
@@ -184,7 +184,7 @@ def nearest_corner(
 ) -> float:
     """Computes the squared distance from a box to the nearest corner of a rectangle.
 
-    The coordinates are those along the axes of the box, with the origin at its center.
+    All coordinates are along the axes of the box, from its center.
 
     Args:
         u: First coordinate of the center of the rectangle, m.

@@ -1,4 +1,4 @@
-"""The five pages of the path: a reader who types what they show gets through."""
+"""Pages with code: a reader who types what they show gets through."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from ruamel.yaml import YAML
 from diagrams.scenario.scenario import scenario_from_mapping
 from docs.building.page_code import page_blocks, page_file
 
-PATH_PAGES = (
+PAGES = (
     "first_run.md",
     "your_scenario.md",
     "your_law.md",
+    "extending.md",
     "stability_report.md",
     "your_recording.md",
 )
@@ -33,7 +34,7 @@ def test_the_scenario_of_the_page_is_one() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", PATH_PAGES)
+@pytest.mark.parametrize("page", PAGES)
 def test_what_the_page_shows_works(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

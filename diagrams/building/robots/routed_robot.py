@@ -29,11 +29,7 @@ def _adapting(own: Any) -> AdaptiveTrajectoryParameters | None:
 def make_trajectory_controller(scenario: Scenario) -> Any:
     """Makes the controller block of a robot that drives on a route.
 
-    Args:
-        scenario: Scenario of this robot alone.
-
-    Returns:
-        The controller block.
+    ``scenario`` is the scenario of this robot alone.
     """
     router = scenario.router
     return TrajectoryImpedanceController(
@@ -47,11 +43,8 @@ def make_trajectory_controller(scenario: Scenario) -> Any:
 def trajectory_command(scenario: Scenario) -> Any | None:
     """Makes the safety filter that drives the wheels of a robot on a route.
 
-    Args:
-        scenario: Scenario of this robot alone.
-
-    Returns:
-        The block, or None if the law of the robot has no safety filter.
+    ``scenario`` is the scenario of this robot alone. The result is None if the law of
+    the robot has no safety filter.
     """
     router = scenario.router
     own = router.gains

@@ -24,13 +24,9 @@ from systems.odor.parameters import CONTAINER_M
 
 
 def search_controller(scenario: Scenario) -> Any:
-    """Makes the block that searches for an odor or a sound.
+    """Makes the controller block of a robot that searches for an odor or a sound.
 
-    Args:
-        scenario: Scenario of this searching robot alone.
-
-    Returns:
-        The block, which is the controller of the robot.
+    ``scenario`` is the scenario of this robot alone.
     """
     robot = scenario.only
     if isinstance(robot, OdorSearcher):
@@ -46,11 +42,7 @@ def search_controller(scenario: Scenario) -> Any:
 def search_command(scenario: Scenario) -> Any:
     """Makes the block that drives the wheels of a searching robot.
 
-    Args:
-        scenario: Scenario of this robot alone.
-
-    Returns:
-        The block.
+    ``scenario`` is the scenario of this robot alone.
     """
     robot = scenario.only
     assert isinstance(robot, OdorSearcher | SoundSearcher)
@@ -71,8 +63,8 @@ def searching_blocks(
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
-        others: Names of the sources and loudspeakers that the robot does not search
-            for.
+        others: Names of the sources and loudspeakers for which the robot does not
+            search.
         seed_of: Function that returns the random seed of a block from its name.
 
     Returns:

@@ -78,12 +78,12 @@ class RunAudio:
     the robot or source and a dot. The time in a file equals the time in the run. While
     a robot does not listen, its file contains silence.
 
-    This class is a context manager. ``simulate`` fills the files. On exit, the class
-    closes the files. If nothing was written, the class also removes the files.
+    Use the class as a context manager, and pass it to ``simulate``, which fills the
+    files. On exit, the class closes the files, and removes them if they are empty.
 
     Args:
         scenario: The scenario to run.
-        directory: Directory of the files. It is created if necessary.
+        directory: Directory of the files. The class creates it if necessary.
 
     Raises:
         InputError: The scenario has no sound that can be saved, see ``check_audible``.
@@ -153,7 +153,7 @@ class RunAudio:
         self.close()
 
     def close(self) -> None:
-        """Closes the files. If nothing was written, the method also removes the files.
+        """Closes the files, and removes them if nothing was written.
 
         Raises:
             OSError: The disk fails.
@@ -166,13 +166,9 @@ class RunAudio:
                 path.unlink(missing_ok=True)
 
     def check_unused(self, scenario: Scenario) -> None:
-        """Checks that the files belong to a scenario and do not contain sound yet.
+        """Checks that the files are empty and belong to ``scenario``.
 
-        Args:
-            scenario: The scenario to run.
-
-        Raises:
-            InputError: The files belong to another scenario, or contain sound already.
+        Otherwise, the method raises an ``InputError``.
         """
         if scenario != self.scenario or self.until_s > 0.0:
             raise InputError(
@@ -192,13 +188,14 @@ class RunAudio:
         For each robot that listens, the method appends the audio frame that ends at the
         tick, if there is one. For each loudspeaker, it appends the sound since the last
         tick. Both engines call this method before any block changes its state at the
-        tick. The sound at tick 0 precedes the run and is not saved.
+        tick. At tick 0, the method saves nothing, because the sound up to this tick
+        precedes the run.
 
         Args:
             tick: Number of the present tick.
-            read: Function that returns the present value of an output port. Its
-                arguments are the name of a robot or source, and the name of the port.
-                If there is no such port, the function returns None.
+            read: Function that returns the present value of an output port, or None if
+                there is no such port. Its arguments are the name of a robot or source,
+                and the name of the port.
 
         Raises:
             InputError: A robot that listens has no block with an output port ``audio``.
@@ -223,12 +220,12 @@ class RunAudio:
             self.play(name, tick, read(name, "emission"))
 
     def hear(self, robot: str, tick: int, frame: AudioFrame | None) -> None:
-        """Appends the audio frame of a robot that ends at a tick (control period).
+        """Appends a robot's audio frame, which ends at a tick (control period).
 
         Args:
             robot: Name of the robot.
             tick: Number of the last tick of the frame, above 0.
-            frame: Audio frame of the robot's microphones. None: the robot does not
+            frame: Audio frame of the robot's microphones, or None if the robot does not
                 listen.
 
         Raises:

@@ -1,12 +1,11 @@
 """Runs the blocks of a scenario in one compiled loop over ticks (control periods).
 
-Drake's diagram remains the model. Each block has a ``Step``, and the loop calls the
-same step functions as Drake does. The connections in the diagrams determine the order
-of the calls. The integrator and the random numbers are the same as in Drake. The loop
-logs the same columns.
+Drake's diagram remains the model: the loop calls the same step functions of the blocks
+as Drake does, in an order that follows from the connections in the diagram. The
+integrator, the random numbers and the logged columns are also the same.
 
-Some outputs are parts of a block's state (state outputs). Each tick has the following
-order, which is the same as in Drake:
+Some outputs depend only on the state of their block (state outputs). As in Drake, each
+tick has this order:
 
 1. The state outputs are already published.
 2. The blocks with other outputs compute their steps. Each block comes after the blocks
@@ -14,7 +13,7 @@ order, which is the same as in Drake:
 3. The stop rules decide whether the run is over.
 4. The blocks with state outputs, except plants, compute their steps and publish their
    outputs.
-5. The loop logs one row, which contains the results of this tick.
+5. The loop logs one row with the results of this tick.
 6. The plants (models of the robots' motion) move on by one tick.
 """
 
@@ -56,8 +55,9 @@ class CompiledLoop:
     """A run in compiled code that advances tick by tick."""
 
     log: NDArray[np.float64]
-    """(ticks + 1, columns) logged values of all robots. Rows from ``done`` on are not
-    yet filled."""
+    """(ticks + 1, columns) logged values of all robots. The loop has not yet filled the
+    rows from ``done`` on.
+    """
     tick_s: float
     referee: Referee
     """Referee of the run, which states why the run ended."""
@@ -78,11 +78,8 @@ class CompiledLoop:
     def logged(self, robot: str) -> dict[str, NDArray[np.float64]]:
         """Returns the logged columns of a robot, including the time.
 
-        Args:
-            robot: Name of the robot, or ``world`` for the blocks that all robots share.
-
-        Returns:
-            (ticks,) array of each column, by name of the column.
+        ``robot`` is the name of the robot, or ``world`` for the blocks that all robots
+        share. Each column has the shape (ticks,).
         """
         log = np.ascontiguousarray(self.log[: self.done].T)
         times: NDArray[np.float64] = np.arange(float(self.done)) * self.tick_s
@@ -126,11 +123,7 @@ class CompiledLoop:
     def advance(self, ticks: int) -> None:
         """Advances the run by a number of ticks (control periods), at most to its end.
 
-        Args:
-            ticks: Number of ticks.
-
-        Raises:
-            InputError: A value became NaN or infinite.
+        If a value becomes NaN or infinite, the method raises an ``InputError``.
         """
         end = min(self.done + ticks, len(self.log))
         self.done, over = self._call(self.done, end)
@@ -156,7 +149,7 @@ def compile_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledL
 
     Args:
         scenario: The scenario to run.
-        audio: Open files for the sound of the run. None: no sound is saved.
+        audio: Open files for the sound of the run, or None to save no sound.
 
     Returns:
         The loop before its first tick (control period).

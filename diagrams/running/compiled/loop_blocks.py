@@ -48,8 +48,7 @@ PortKey = tuple[str, str]
 class LoopBlocks:
     """Contains the blocks of a diagram, and the connections of their ports.
 
-    The key of each block is its part, the role of the block in the diagram, for example
-    ``plant``.
+    The key of each block is its part: its role in the diagram, such as ``plant``.
 
     Args:
         diagram: Diagram of a robot, a source or the world.
@@ -97,18 +96,18 @@ class LoopBlocks:
     def steps(
         self, run: RunFacts
     ) -> tuple[dict[str, Step], dict[PortKey, Callable[[int], Any]]]:
-        """Returns the step of each block in a run, and the objects on ports.
+        """Returns the steps of the blocks in a run, and the objects on their ports.
 
-        Most ports carry numbers, but some ports carry objects such as sound. The
-        function also covers ports from outside of the diagram.
+        Most ports carry numbers, but some ports carry objects such as sound.
 
         Args:
             run: Facts about the run, such as seed and initial pose.
 
         Returns:
-            Two mappings. The first contains the step of each block, by part (role of
-            the block). The second contains one function for each port that carries an
-            object. This function returns the object at a tick (control period).
+            Two mappings. The first has the step of each block, by part (role of the
+            block). The second has one function for each port or input of the diagram
+            that carries an object. The function returns the object at a tick (control
+            period).
 
         Raises:
             InputError: A user's own block has no step.
@@ -128,17 +127,15 @@ class LoopBlocks:
     def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
         """Returns the order in which the blocks compute their steps in a tick.
 
-        A tick is a control period. A part is the role of a block, for example
-        ``plant``.
+        A tick is a control period.
 
         Args:
-            steps: Step of each block, by part.
+            steps: Step of each block, by part (role of the block, such as ``plant``).
 
         Returns:
-            Two lists of parts. The first list has the blocks whose outputs depend on
-            present inputs. Each block in this list comes after the blocks whose outputs
-            it reads. The second list has the blocks whose outputs are parts of their
-            state.
+            Two lists of parts. The first has the blocks whose outputs depend on present
+            inputs, each after the blocks whose outputs it reads. The second has the
+            blocks whose outputs depend only on their state.
         """
         late = [part for part, step in steps.items() if step.publish is not None]
         early = [part for part in self.blocks if part not in late]
@@ -185,13 +182,9 @@ class LoopDiagram:
     def output(self, port: str, tick: int = 0) -> Any:
         """Returns the values of an output port, or the object that the port carries.
 
-        Args:
-            port: Name of the port.
-            tick: Number of the present tick (control period). It matters only for an
-                object.
-
-        Returns:
-            The values or the object. None if there is no such port.
+        ``port`` is the name of the port. ``tick`` is the number of the present tick
+        (control period), which matters only for an object. The result is None if there
+        is no such port.
         """
         key = self.published.get(port)
         if key in self.made.objects:
@@ -213,10 +206,9 @@ def _step_for(block: Any, run: RunFacts) -> Step:
 def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
     """Returns the blocks of all robots for a compiled loop.
 
-    The function reuses the blocks of an earlier scenario if both scenarios differ only
-    in fields that do not affect the blocks. Examples of such fields are the arrangement
-    of the obstacles, the start pose and the seed. Reuse matters because Drake never
-    frees blocks written in Python.
+    The function reuses the blocks of an earlier scenario where possible. The earlier
+    scenario may differ in fields that do not affect the blocks, such as start pose and
+    seed. Reuse matters because Drake never frees blocks written in Python.
 
     Args:
         scenario: The scenario to run.
@@ -247,16 +239,9 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
 def shared_sources(scenario: Scenario) -> dict[str, LoopBlocks]:
     """Returns the blocks of all sources that a robot hears as sound waves.
 
-    The function reuses the blocks of earlier scenarios where possible.
-
-    Args:
-        scenario: The scenario to run.
-
-    Returns:
-        Blocks of each source, by name of the source.
-
-    Raises:
-        InputError: A sound file cannot be played.
+    The keys are the names of the sources. The function reuses the blocks of earlier
+    scenarios where possible. If a sound file cannot be played, it raises an
+    ``InputError``.
     """
     air = f"{scenario.sound_speed_m_s} {scenario.room}"
     blocks = {}
@@ -273,13 +258,8 @@ def shared_sources(scenario: Scenario) -> dict[str, LoopBlocks]:
 def shared_world(scenario: Scenario) -> LoopBlocks | None:
     """Returns the blocks that all robots share, such as radio and wind.
 
-    The function reuses the blocks of earlier scenarios where possible.
-
-    Args:
-        scenario: The scenario to run.
-
-    Returns:
-        The blocks, or None if no robot searches.
+    The function reuses the blocks of earlier scenarios where possible. The result is
+    None if no robot searches.
     """
     nodes = radio_nodes(scenario)
     if not nodes:
@@ -301,8 +281,8 @@ def _shared(key: str, made: Callable[[], Any]) -> LoopBlocks:
 def _made_from(own: Scenario) -> str:
     """Returns a text of all field values that affect the blocks of the only robot.
 
-    The goal of a route does not affect the blocks. The steps of the blocks receive the
-    goal of the run through ``RunFacts``.
+    The goal of a route does not affect the blocks, because the steps receive it through
+    ``RunFacts``.
     """
     robot = own.only
     if isinstance(robot, Router):

@@ -50,10 +50,8 @@ class LoopPlan:
         """Adds the blocks of a robot, or the blocks that all robots share, to the plan.
 
         Blocks of loudspeakers come first in a tick (control period), because several
-        robots hear their sound.
-
-        Args:
-            diagram: The blocks, with their steps and port values.
+        robots hear their sound. ``diagram`` has the blocks with their steps and port
+        values.
         """
         made, values = diagram.made, diagram.values
         early, late = made.order(diagram.steps)
@@ -81,8 +79,8 @@ class LoopPlan:
         """Adds a source with a loudspeaker to the plan.
 
         Args:
-            source: Path of the source. The method tabulates the poses and velocities
-                for all ticks (control periods).
+            source: Path of the source. The method tabulates the poses and velocities at
+                all ticks (control periods).
             emitter: Step of the loudspeaker's block.
         """
         path, times = source.path(), self._times
@@ -95,11 +93,9 @@ class LoopPlan:
     def call(self, function: HostFunction) -> None:
         """Adds a Python function that the loop calls at every tick (control period).
 
-        The loop calls the function directly before the stop rules judge the robots.
-
-        Args:
-            function: Function whose arguments are the tick and two arrays. It ignores
-                the arrays.
+        The loop calls the function before the stop rules judge the robots. The
+        arguments of the function are the tick and two arrays. The function ignores the
+        arrays.
         """
         nothing = (np.zeros(1),)  # compiled code has no empty state
         self._early.append(self._step(host_step(function, 1, 0, 1), nothing, ()))
@@ -109,10 +105,11 @@ class LoopPlan:
     ) -> int:
         """Adds the step of a block as a part with generated source code.
 
-        If the outputs of the block are parts of its state, the part normally computes
-        the step. If the loop calls the part with ``PUBLISH`` as the tick, the part
-        publishes the outputs instead. The part of any other block sets the outputs to
-        zero, and then the step fills the outputs.
+        If the outputs of the block depend only on its state, the loop calls the part
+        twice per tick. With the number of the tick, the part computes the step. With
+        ``PUBLISH`` as the tick, it publishes the outputs. For any other block, the loop
+        calls the part once per tick. The part sets the outputs to zero, and then the
+        step fills them.
 
         Returns:
             Number of the part.
@@ -136,9 +133,9 @@ class LoopPlan:
     def surround(self, name: str, around: Surroundings) -> None:
         """Adds parts that fill a robot's inputs with poses and sizes of other bodies.
 
-        The method tabulates the poses of bodies on known paths for all ticks (control
-        periods). At every tick, the loop copies the poses of other robots from their
-        ports. Sizes never change, so the method sets them once.
+        The method sets the sizes once, because they never change. It tabulates the
+        poses of bodies on known paths for all ticks (control periods). At every tick,
+        the loop copies the poses of other robots from their ports.
 
         Args:
             name: Name of the robot.
@@ -177,9 +174,6 @@ class LoopPlan:
 
         A part is a compiled function that the loop calls. The referee applies the stop
         rules to all robots.
-
-        Args:
-            referee: Referee of the run.
         """
         for name, step in referee.steps.items():
             robot = self._robots[name]

@@ -2,12 +2,11 @@
 
 A part is a function of the tick (control period), for example the step of one block.
 numba saves compiled code only for functions in files, and separately for each
-combination of argument types. The generated source is therefore written to a file in
-the cache folder. The name of this file is a hash of everything that the code depends
-on.
+combination of argument types. Therefore the generated source goes to a file in the
+cache folder. The name of this file is a hash of everything that the code depends on.
 
-Functions and named tuples appear in the source as names. The code reads all numbers
-from a few arrays by address. The source therefore does not depend on these numbers.
+The source names functions and named tuples, but reads all numbers from a few arrays by
+address. It therefore does not depend on these numbers.
 """
 
 from __future__ import annotations
@@ -62,13 +61,8 @@ class LoopPart:
     def source(self, lines: Sequence[str]) -> str:
         """Returns the complete source code of the part, a function of ``tick``.
 
-        The generated function returns 0 unless one of the lines returns another value.
-
-        Args:
-            lines: Lines of code in the function.
-
-        Returns:
-            The source code.
+        ``lines`` is the code in the function. The generated function returns 0 unless
+        one of the lines returns another value.
         """
         words = f"{self.name(ARRAYS[np.dtype(np.int64)])}(address, (1,))"
         floats = f"{self.name(ARRAYS[np.dtype(np.float64)])}(words[0], (words[1],))"
@@ -83,11 +77,11 @@ class LoopPart:
         return np.array(self._words, dtype=np.int64)
 
     def expression(self, value: Any) -> str:
-        """Returns source code that stands for a value.
+        """Returns source code that evaluates to a value.
 
-        Some values change their form. Parameters become a named tuple of their fields
-        and cached properties. A list becomes an array, and an empty list becomes an
-        array of pairs. None becomes 0.
+        Parameters become a named tuple of their fields and cached properties. A list
+        becomes an array, and an empty list becomes an array of shape (0, 2). None
+        becomes 0.
 
         Args:
             value: A number, text, array, function, list, tuple of values, parameters,
@@ -135,11 +129,11 @@ class LoopPart:
         return f"words[{len(self._words) - 1}]"
 
     def _array(self, value: Any) -> str:
-        """Returns source code that stands for an array.
+        """Returns source code that evaluates to an array.
 
-        The code contains no values of the array. It reads the address and the shape of
-        the array from the words of the part. The same source therefore serves all
-        layouts.
+        The code reads the address and the shape of the array from the words of the
+        part. Because the code contains neither the values nor the sizes of the array,
+        the same source serves arrays of other values and sizes.
         """
         if id(value) not in self._arrays:
             # An empty list becomes an array of pairs. A scalar becomes an array with
@@ -181,10 +175,10 @@ def _tuple_type(model: type[Parameters]) -> Any:
 def _compilable(function: FunctionType) -> Any:
     """Makes a function callable from compiled code, without the checks that wrap it.
 
-    The result is a function that numba identifies by its type alone. A compiled
-    function in a named tuple would be a pointer, and numba does not cache code with
-    pointers. If the function calls plain functions in a user's own modules, compiled
-    code can call these functions, too.
+    The result is a plain function, because numba identifies a plain function by its
+    type alone. A compiled function in a named tuple would be a pointer, and numba does
+    not cache code with pointers. ``function`` may also call plain functions in a user's
+    own modules.
     """
     plain = inspect.unwrap(function)
     for called in _users_helpers(plain, set()):
@@ -211,12 +205,8 @@ def _users_helpers(
 def compiled_part(source: str, names: Mapping[str, Any]) -> Any:
     """Compiles the function ``part`` of generated source, or loads its compiled code.
 
-    Args:
-        source: Source code from ``LoopPart.source``.
-        names: Objects that the source code uses, by their names in the source.
-
-    Returns:
-        The compiled function. For the same source and names, the function is the same.
+    ``source`` comes from ``LoopPart.source``. ``names`` has the objects that the source
+    uses, by their names in the source. Equal arguments give the same function.
     """
     return _loaded(source, tuple(names.items()))
 
@@ -241,14 +231,9 @@ def _say_that_it_takes_time() -> None:
 
 
 def address_of(part: Any) -> int:
-    """Returns the address of the machine code of a compiled part.
+    """Returns the address by which ``run_parts`` calls a part from ``compiled_part``.
 
-    Args:
-        part: A function from ``compiled_part``.
-
-    Returns:
-        The address by which ``run_parts`` calls the part. It is valid as long as the
-        caller keeps the part.
+    The address is valid as long as the caller keeps the part.
     """
     (found,) = part.overloads.values()
     address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
@@ -258,11 +243,9 @@ def address_of(part: Any) -> int:
 def _file(source: str, names: Mapping[str, Any]) -> Path | None:
     """Writes generated source code to a file in the cache folder.
 
-    The name of the file is a hash of all that the code depends on. If the names do not
-    determine what the code does, the function writes no file.
-
-    Returns:
-        The file. None if the code cannot be cached, or if the file cannot be written.
+    The name of the file is a hash of all that the code depends on. The result is None
+    if the file cannot be written, or if the code calls a function whose source files do
+    not determine what it does, such as a closure.
     """
     origins = (
         [*map(str, _origins(names))] if all(map(_is_known, names.values())) else []

@@ -27,7 +27,7 @@ def check_guard(
     """Raises an error if a robot's guard would never let it start or drive ahead.
 
     The guard limits the commands so that the robot stays in free space. At the start,
-    it assumes that a disc around the robot (start bubble) is free.
+    it assumes that a disc around the robot, the start bubble, is free.
 
     Args:
         prefix: Prefix of the robot's fields in messages.
@@ -83,11 +83,11 @@ def _check_view(prefix: str, robot: Follower) -> None:
 def _check_memory(
     prefix: str, robot: Follower, guard: GuardParameters, tick_s: float
 ) -> None:
-    """Raises an error if the guard's place error is too small for its braking distance.
+    """Raises an error if ``place_error_m`` is too small for the braking distance.
 
     A body at the braking distance ahead must stay on the map until the robot has
-    stopped. During this time, odometry adds an error to the position of the body on the
-    map. The field ``place_error_m`` must be at least as large as this error.
+    stopped. Meanwhile, odometry adds an error to the position of the body on the map,
+    and ``place_error_m`` must be at least this error.
     """
     body = robot.robot
     stopping = stopping_way(guard, body, robot.plant, tick_s)

@@ -37,8 +37,8 @@ def explain(
         error: Error from pydantic.
         schema: JSON Schema of the validated data.
         what: Name of the data for users, for example 'a scenario'.
-        written: Function that returns the path of a field in the user's data. Its
-            argument is the path of this field in the validated data.
+        written: Function that converts the path of a field in the validated data to its
+            path in the user's data.
 
     Returns:
         The error to raise.

@@ -27,7 +27,8 @@ class Field:
 
     path: str
     """Dotted path, as for ``--set``. In a path, 0 represents any element of a list, and
-    NAME any name."""
+    NAME any name.
+    """
     kind: str
     """Type of the values, in words."""
     unit: str
@@ -43,15 +44,9 @@ class Field:
 
 
 def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
-    """Lists all fields of a scenario, in the order of the schema.
+    """Lists all fields of a scenario, in the order of its JSON Schema.
 
-    Some fields are groups of further fields. Each group comes before its own fields.
-
-    Args:
-        schema: JSON Schema of a scenario.
-
-    Yields:
-        The fields.
+    Some fields are groups of further fields. A group comes before its own fields.
     """
     yield from _fields(schema, schema, "", None, ())
 
@@ -59,14 +54,15 @@ def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
 def fields_of_law(fields: Iterable[Field], law: str, kind: str) -> list[Field]:
     """Returns the fields of a robot that runs a certain control law.
 
+    The result omits the gains of other laws and the fields of the run.
+
     Args:
         fields: The fields to select from.
         law: Name of the law.
         kind: Kind of the robots that run the law.
 
     Returns:
-        The fields of robots of this kind. Gains of other laws and fields of the run are
-        not included.
+        The fields of robots of this kind.
     """
     return [
         field
@@ -83,9 +79,9 @@ def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
 
     Args:
         schema: JSON Schema of a scenario.
-        pattern: A part of the path or meaning. If the pattern contains a wildcard
-            (``*``, ``?`` or ``[...]``), it must match the whole path or a part of the
-            meaning. If the pattern is empty, all fields match.
+        pattern: A part of the path or meaning. A pattern with a wildcard (``*``, ``?``
+            or ``[...]``) must match the whole path or a part of the meaning. An empty
+            pattern matches all fields.
 
     Returns:
         One or more fields.

@@ -22,18 +22,17 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
 
     The function suggests the first of these fields that exists:
 
-    1. a field in the same group with a similar name;
-    2. a field in the same group with the same meaning;
-    3. a field in a lower group with the same name;
-    4. a field anywhere with the same name.
+    1. a field in the same group with a similar name
+    2. a field in the same group with the same meaning
+    3. a field in a lower group with the same name
+    4. a field anywhere with the same name
 
     Args:
         schema: JSON Schema of the whole data.
         place: Parts of the path of the unknown field.
 
     Returns:
-        A text for the error message, as from ``did_you_mean``. It is empty if there is
-        no such field.
+        A text for the error message, empty if there is no such field.
     """
     *parents, last = place
     siblings = at_place(schema, parents)

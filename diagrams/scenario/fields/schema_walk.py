@@ -11,13 +11,8 @@ Schema = Mapping[str, Any]
 def resolved(schema: Schema, node: Schema) -> Schema:
     """Replaces the reference in a node of a JSON Schema by the referenced node.
 
-    Args:
-        schema: The whole schema.
-        node: A node of the schema.
-
-    Returns:
-        The referenced node, extended by the other entries of ``node``. If ``node`` has
-        no reference, the result is ``node`` itself.
+    The result also has the other entries of ``node``. Without a reference, it is
+    ``node`` itself. ``schema`` is the whole schema.
     """
     if "$ref" not in node:
         return node
@@ -25,14 +20,9 @@ def resolved(schema: Schema, node: Schema) -> Schema:
 
 
 def options(schema: Schema, node: Schema) -> list[Schema]:
-    """Returns the alternatives that a node of a JSON Schema permits.
+    """Returns the alternatives that a node of a JSON Schema permits, except null.
 
-    Args:
-        schema: The whole schema.
-        node: A node of the schema.
-
-    Returns:
-        All alternatives except null. References are replaced by the referenced nodes.
+    References are replaced by the referenced nodes. ``schema`` is the whole schema.
     """
     node = resolved(schema, node)
     several = node.get("anyOf", [node]) if "type" not in node else [node]
@@ -40,7 +30,7 @@ def options(schema: Schema, node: Schema) -> list[Schema]:
 
 
 def at_place(schema: Schema, place: Sequence[str]) -> Schema:
-    """Returns the fields of a group, as given by the path of the group.
+    """Returns the schemas of the fields of the group at a given path.
 
     Args:
         schema: The whole JSON Schema.
@@ -75,7 +65,7 @@ def _below(node: Schema, part: str) -> Iterator[Schema]:
 def leaf_paths(schema: Schema, place: Sequence[str] = ()) -> Iterator[tuple[str, ...]]:
     """Yields the paths of all fields and groups below a place in a JSON Schema.
 
-    In a path, 0 stands for any element of a list.
+    In a path, 0 represents any element of a list.
 
     Args:
         schema: The whole schema.

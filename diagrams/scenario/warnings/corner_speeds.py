@@ -21,8 +21,8 @@ def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
         robot: Name of a robot in the scenario.
 
     Returns:
-        Greatest speed in the run, m/s, by name of the body. For another robot, the
-        value is the greatest speed that its wheels permit.
+        Greatest speed in the run, m/s, by name of the body. For another robot, it is
+        the greatest speed that its wheels permit.
     """
     until = scenario.duration_s
     speeds = {
@@ -52,9 +52,8 @@ def _corner_speed(
 def _reachable_speed(robot: Robot) -> float:
     """Greatest possible speed of a corner of a robot, m/s.
 
-    The function compares two motions, and returns the greater corner speed. In the
-    first motion, the robot drives straight ahead at top speed. In the second motion,
-    the robot turns on the spot with both wheels at top speed.
+    The robot drives straight ahead at top speed, or turns on the spot with both wheels
+    at top speed. The larger corner speed counts.
     """
     body, faster = robot.robot, 1.0 + max(map(abs, robot.plant.slip))
     lever = 2.0 * body_radius(body) / body.wheel_separation_m

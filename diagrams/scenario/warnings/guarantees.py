@@ -52,7 +52,8 @@ class Assumption:
     value: float
     limit: float
     """Greatest value at which the assumption holds. If ``at_least`` is set, it is the
-    least value at which the assumption holds."""
+    least value at which the assumption holds.
+    """
     unit: str
     at_least: bool = False
     field: str = "guard"
@@ -122,13 +123,13 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
 
     The distance is the sum of these parts:
 
-    - body radius, margin of the guard, place error, and range error;
+    - body radius, margin of the guard, place error, and range error
     - motion of the robot during two control periods, during the motor lag, and while it
-      brakes;
+      brakes
     - if all bodies are at rest: the diagonal of a map cell, and the motion of the robot
-      during four rounds of sensor readings;
+      during four rounds of sensor readings
     - if bodies move: their motion during one round of sensor readings, and until the
-      robot has stopped.
+      robot has stopped
 
     Args:
         scenario: Scenario of one robot. Its guard defines braking and margin.
@@ -163,14 +164,9 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
 
 
 def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> float:
-    """Returns the total angle around a robot that its range sensors see.
+    """Returns the total angle around a robot that its range sensors see, 0 to 360 deg.
 
-    Args:
-        sensors: The range sensors.
-        control_point_m: Distance of the control point P ahead of the axle, m.
-
-    Returns:
-        The angle, deg, 0 to 360.
+    ``control_point_m`` is the distance of the control point P ahead of the axle, m.
     """
     sectors = sensor_sectors(sensors, control_point_m)
     turns = np.arange(-180.0, 180.0, _STEP_DEG) + 0.5 * _STEP_DEG
@@ -281,8 +277,8 @@ def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
 
     A2 states that no body is nearer than a range reading minus the margin. The
     conditions limit the share of missed echoes, the number of blind sensors, and the
-    error of ranges due to the assumed speed of sound. If the sensors differ, the
-    greatest share of missed echoes and the greatest maximum range count.
+    error of ranges due to the assumed speed of sound. If the sensors differ, the worst
+    sensor counts.
     """
     sensors = scenario.follower.ultrasonic
     stretch = scenario.believed_sound_speed_m_s / scenario.sound_speed_m_s

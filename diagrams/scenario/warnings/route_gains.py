@@ -146,30 +146,30 @@ def goal_warnings(
 ) -> list[ScenarioWarning]:
     """Warns if obstacles at rest keep a robot away from its goal.
 
-    P is the control point of the robot. P comes to rest where the pull of the goal and
-    the pushes of the obstacles balance::
+    The control point P of the robot comes to rest where the pull of the goal and the
+    pushes of the obstacles balance::
 
         K (p_d - p) + sum of K_e (S - d_j) n_j = 0
 
     p is the position of P, and p_d is the goal. d_j is the distance of P from obstacle
     j, and n_j is the unit vector away from this obstacle. K and K_e are stiffnesses,
-    and S is the range of the push. If the goal is at distance b from a single wall, P
-    comes to rest at the distance (S - b) K_e/(K + K_e) from the goal.
+    and S is the range of the push. For example, if the goal is at the distance b from a
+    single wall, P comes to rest at the distance (S - b) K_e/(K + K_e) from the goal.
 
-    The function finds the equilibrium by an iteration. The iteration starts at the goal
-    and follows the force until the steps are tiny. If the law adapts its gains, the
-    function uses their initial values.
+    The function finds this equilibrium by an iteration, which starts at the goal and
+    follows the force until the steps are tiny. If the law adapts its gains, their
+    initial values count.
 
     Args:
         prefix: Prefix of the robot's fields in messages.
         robot: A robot on a route.
-        resting: Rectangle of each obstacle at rest, by name. A rectangle is (x, y,
-            theta, length, width) in the world frame W, m and rad.
+        resting: Rectangle of each obstacle at rest, by name: (x, y, theta, length,
+            width) in the world frame W, m and rad.
         margin_m: ``stop.goal_margin_m``, the permitted distance from the goal, m.
 
     Returns:
-        One warning if P comes to rest farther than the margin from the goal. Otherwise,
-        the list is empty.
+        One warning if P comes to rest farther from the goal than ``margin_m``,
+        otherwise none.
     """
     if robot.route is None or robot.law not in ROUTE_LAWS:
         return []

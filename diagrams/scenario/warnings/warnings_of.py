@@ -28,12 +28,6 @@ def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
       robot's route.
     - The robot cannot come to rest with its gains, or can hit obstacles.
     - Obstacles at rest keep the robot away from its goal.
-
-    Args:
-        scenario: Any scenario.
-
-    Returns:
-        The warnings, robot by robot. There may be none.
     """
     found: list[ScenarioWarning] = []
     for name, robot in scenario.robots.items():

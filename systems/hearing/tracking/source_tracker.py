@@ -31,22 +31,24 @@ def SourceTracker_(T):
         (``systems.hearing.tracking.target_filter``). Each new estimate of the position
         was measured ``measurement_age_s`` ago. The block converts the estimate to W
         with the odometry pose at the time of the measurement. An estimate without a
-        range corrects the position only across the bearing. If the source cannot have
-        moved to the position of an estimate, the block rejects the estimate. If several
-        consecutive estimates agree, the block accepts them nevertheless.
+        range corrects the position only perpendicular to the bearing. If the source
+        cannot have moved to an estimated position, the block rejects the estimate. If
+        several consecutive rejected estimates agree with each other, the block accepts
+        them nevertheless.
 
-        Between bursts, the target follows one of three rules, which ``hold`` selects:
-        it stays at its place in W, it moves with the robot, or it moves on with its
-        velocity. The covariance includes the distance between this target and the
-        expected position of the source. The output ``target_valid`` is 0 if nothing was
-        heard yet, or if the source was last heard more than ``maximum_age_s`` ago. The
-        controllers then stop the robot.
+        Between bursts, the position of the target follows one of three rules, which
+        ``hold`` selects. The target stays at its place in W, moves with the robot, or
+        moves on with its velocity. The covariance includes the distance between the
+        target and the expected position of the source.
+
+        The output ``target_valid`` is 0 if nothing was heard yet, or if the source was
+        last heard more than ``maximum_age_s`` ago. The controllers then stop the robot.
 
         The discrete state has the past poses and the tracks, see ``track_step``. The
         block updates the state every control period (tick). The outputs include the
         present estimate, so there is no latency. If the period of the estimates is
-        longer than the tick, each estimate is used once, one tick after the end of its
-        frame.
+        longer than the tick, the block uses each estimate once, one tick after the end
+        of its frame.
 
         Args:
             robot: Distance of the control point P ahead of the axle, and microphones.

@@ -7,11 +7,13 @@ standard deviation of the velocity stays bounded, however long the source is sil
 A row of microphones gives two candidates for the position: the position ahead and its
 mirror image behind the row. Hypothesis 0 says that the source is ahead now. Hypothesis
 1 says that it is behind. Each hypothesis keeps the better of the two histories that
-lead to it (the Viterbi recursion). The cost of a hypothesis is a negative
-log-likelihood. Each innovation (difference between an estimate and its prediction) adds
-half of two terms. The terms are the squared normalized innovation and the logarithm of
-the determinant of its covariance. When the robot moves, the mirror image moves too,
+lead to it (the Viterbi recursion). When the robot moves, the mirror image moves too,
 which is unlikely for a source.
+
+The cost of a hypothesis is a negative log-likelihood. The innovation is the difference
+between an estimate and its prediction. Each innovation adds half of the sum of two
+terms: the squared normalized innovation, and the logarithm of the determinant of its
+covariance.
 
 All functions use only flat arrays and numbers. numba therefore compiles them for
 floats, and ``fold.py_func`` and ``expected.py_func`` run them with AutoDiffXd. ``fold``
@@ -26,7 +28,7 @@ A track (16) has these elements:
 - position (2), velocity (2), covariance of the position (xx, xy, yy), covariance of
   position and velocity (xx, xy, yx, yy), and covariance of the velocity (xx, xy, yy),
   all at the moment of the last estimate;
-- scatter (1), the ratio of the actual variance of sightings to their stated covariance.
+- scatter (1), the ratio of the actual variance of estimates to their stated covariance.
 
 A hypothesis (34) has these elements:
 
@@ -39,8 +41,8 @@ A memory has these elements:
 - index of the chosen hypothesis (1);
 - one hypothesis, or two hypotheses if front and back are to be distinguished.
 
-A sighting is an estimate of the position from one audio frame. It has these elements
-(10):
+A sighting (10) is an estimate of the position from one audio frame. It has these
+elements:
 
 - position of the source, or the unit vector to the source if there is no range (2);
 - covariance of this position (xx, xy, yy);
@@ -194,16 +196,16 @@ def _innovation(
     Args:
         track: Track at the moment of the sighting.
         sighting: The sighting.
-        floor: Standard deviation added to that of the sighting, m.
+        floor: Standard deviation of errors that are not in the covariance of the
+            sighting, m.
         scale: Factor of the covariance of the sighting.
         extra: Variance added to that of the innovation, m^2.
 
     Returns:
-        Four parts, in this order: the innovation (2); the inverse of its covariance
-        (xx, xy, yy); the squared normalized innovation; and the logarithm of the
-        determinant of the covariance. Without a range, the inverse has rank one. If the
-        track is in the direction opposite to the bearing, the squared innovation is
-        infinite.
+        Seven numbers: the innovation (2); the inverse of its covariance (xx, xy, yy);
+        the squared normalized innovation; and the logarithm of the determinant of the
+        covariance. Without a range, the inverse has rank one. If the track is in the
+        direction opposite to the bearing, the squared innovation is infinite.
     """
     zx, zy, rxx, rxy, ryy, ox, oy, _, _, ranged = sighting
     _, x, y, _, _, axx, axy, ayy = track[:8]
@@ -232,17 +234,16 @@ def _innovation(
 def _robust_innovation(
     track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> tuple[bool, Any, tuple[Any, ...]]:
-    """Computes the innovation that the filter uses, with bounded effect of outliers.
+    """Computes the innovation that the filter uses, and limits the effect of outliers.
 
-    If an innovation is above ``GATE``, it does not agree with the model. Its sighting
-    then gets a larger covariance, so that its effect stays bounded (Huber's weight). If
-    the innovation is also above a second limit, which ``GATE_FLOOR_M`` widens, the
-    sighting is rejected.
+    A squared normalized innovation above ``GATE`` does not agree with the model. If it
+    remains above ``GATE`` even with the additional standard deviation ``GATE_FLOOR_M``,
+    the filter rejects the sighting. Otherwise the sighting gets a larger covariance, so
+    that its effect stays bounded (Huber's weight).
 
     Returns:
-        Three values. The first is whether the sighting is accepted. The second is the
-        squared normalized innovation before the covariance was enlarged. The third is
-        the innovation in the form of ``_innovation``.
+        Three values: whether the sighting is accepted; the squared normalized
+        innovation with the original covariance; and the result of ``_innovation``.
     """
     floor, scale = settings.floor, track[15]
     found = _innovation(track, sighting, floor, scale, 0.0)
@@ -261,9 +262,10 @@ def _learn_scatter(track: NDArray[Any], squared: Any, dimensions: Any) -> None:
     """Adapts the scatter of a track to the innovations.
 
     The scatter is the ratio of the actual variance of estimates to their stated
-    covariance. Reflections scatter estimates far more than noise does. If an innovation
-    is above ``SCATTER_MARGIN`` times its covariance, the scatter rises. Otherwise it
-    falls. The scatter adapts within about ``1 / SCATTER_RATE`` sightings.
+    covariance. Reflections scatter estimates far more than noise does. The scatter
+    rises if the squared normalized innovation is above ``SCATTER_MARGIN`` times its
+    expected value. Otherwise it falls, but not below 1. It adapts within about
+    ``1 / SCATTER_RATE`` sightings (estimates).
     """
     excess = min(squared, GATE) / (dimensions * SCATTER_MARGIN)
     track[15] = max(1.0, track[15] * (1.0 + SCATTER_RATE * (excess - 1.0)))
@@ -324,11 +326,10 @@ def _begin(
 def _follow(
     track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
 ) -> tuple[bool, Any]:
-    """Updates one track with a sighting (estimate of the position), if it is accepted.
+    """Updates one track with a sighting (estimate of the position) that it accepts.
 
-    Returns:
-        Whether the sighting is accepted, and the cost that the sighting adds. If the
-        sighting is rejected, the track is unchanged.
+    The function returns whether the track accepts the sighting, and the cost that the
+    sighting adds. A track that rejects the sighting does not change.
     """
     moved = track.copy()
     seconds = track[0] - settings.measurement_age
@@ -368,11 +369,12 @@ def _inherit(
 ) -> tuple[Any, Any, int]:
     """Updates one of the two hypotheses of the filter with a sighting.
 
-    The hypotheses are that the source is ahead (0) or behind (1). Each hypothesis may
-    follow from either of the two previous hypotheses. The function continues the
-    likelier of these two histories. If a sighting
-    (estimate of the position) is an outlier to every history, it updates the track of
-    the outliers. If there are enough consecutive outliers that agree, their track
+    A sighting is an estimate of the position. The hypotheses are that the source is
+    ahead (0) or behind (1). Either previous hypothesis may lead to the updated
+    hypothesis, so there are two histories. The function continues the likelier history.
+
+    If the sighting is an outlier to both histories, the function updates the track of
+    the outliers instead. After enough consecutive outliers that agree, their track
     replaces the track of the hypothesis.
 
     Args:
@@ -383,9 +385,8 @@ def _inherit(
         settings: Floor of the errors, and age of the sightings.
 
     Returns:
-        Three values. The first is the cost of the history. The second is the cost that
-        the sighting adds, infinite if it is an outlier to every history. The third is
-        the index of the history.
+        Three values: cost of the history; cost that the sighting adds, infinite if it
+        is an outlier to both histories; and index of the history.
     """
     child = _hypothesis(memory, index)
     cost, step, history = child[0], np.inf, index
@@ -420,9 +421,11 @@ def _choose(
 ) -> None:
     """Updates the costs of both hypotheses, and chooses between them.
 
-    The hypotheses are that the source is ahead (0) or behind (1). If the chosen
-    hypothesis costs more than the other hypothesis by ``SWITCH_MARGIN``, the choice
-    changes.
+    The hypotheses are that the source is ahead (0) or behind (1). Each hypothesis has
+    one candidate for the position of the source: the sighting for hypothesis 0, and its
+    mirror image for hypothesis 1. The choice changes if the chosen hypothesis costs
+    more than the other by ``SWITCH_MARGIN``. It also changes if only the candidate of
+    the other hypothesis continues the track of the chosen hypothesis.
 
     Args:
         memory: Memory of the filter, which the function changes.
@@ -492,8 +495,8 @@ def expected(memory: NDArray[Any]) -> NDArray[Any]:
             hypotheses. The ages of the tracks are those at present.
 
     Returns:
-        (TRACK,) elements as in TRACK_NAMES. If the source was never heard, the track is
-        copied without prediction.
+        (TRACK,) elements in the order of ``TRACK_NAMES``. The track of a source that
+        was never heard is not predicted.
     """
     track = chosen_track(memory).copy()
     if track[0] < NEVER_HEARD_S:

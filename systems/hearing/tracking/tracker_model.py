@@ -65,8 +65,8 @@ class TrackerNumbers(NamedTuple):
     microphones: _Microphones
     settings: FilterSettings
     older: NDArray[np.float64]
-    """(n,) vector that is added to the memory of the filter in each control period. It
-    contains the period, s, for each age, and zeros for all other elements."""
+    """(n,) vector that the step adds to the memory of the filter, so that ages grow. It
+    has the control period, s, for each age, and 0 for all other elements."""
 
 
 def tracker_numbers(
@@ -87,9 +87,9 @@ def tracker_numbers(
         measurement_age_s: Time from a measurement to the arrival of its estimate, s.
         frame_s: Period of the estimates, s, a multiple of ``tick_s``.
         tick_s: Control period of the robot, s.
-        resolve_front_back: Whether the motion of the robot distinguishes the source
-            from its mirror image behind a row of microphones. Off: every source is in
-            front.
+        resolve_front_back: Whether the tracker uses the motion of the robot to
+            distinguish the source from its mirror image behind a row of microphones. If
+            not, every source is in front.
         floor_m: Standard deviation of errors that are not in the covariance of an
             estimate, m.
 
@@ -114,15 +114,11 @@ def tracker_numbers(
 
 
 def blank_track(numbers: TrackerNumbers, pose: Sequence[float]) -> NDArray[np.float64]:
-    """Returns the state of the tracker before anything is heard.
+    """Returns the (n,) state of ``track_step`` before anything is heard.
 
-    Args:
-        numbers: Constants of the tracker.
-        pose: (3,) odometry pose of the robot now and before, m and rad.
-
-    Returns:
-        (n,) state of ``track_step``. The function ``track_names`` returns the names of
-        its elements.
+    ``pose`` is the odometry pose (x, y, theta), m and rad, at which the robot has been
+    at rest. The function ``track_names`` returns the names of the elements of the
+    state.
     """
     poses = np.tile(np.asarray(pose, dtype=float), numbers.past_ticks + 1)
     return np.concatenate((poses, blank_memory(_hypotheses(numbers))))
@@ -171,7 +167,7 @@ def _for_scalars(function: Any) -> Any:
 
 @register_jitable
 def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
-    """Returns the odometry pose some control periods (ticks) ago.
+    """Returns the odometry pose that the robot had some control periods (ticks) ago.
 
     Between two ticks, the function interpolates linearly.
 
@@ -179,7 +175,7 @@ def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
         pose: (3,) present x, y, theta in the world frame W, m and rad; floats or
             AutoDiffXd.
         past: (3 n,) x, y, theta at the last n ticks, most recent first, m and rad.
-        ticks: Number of ticks, 0 to n, not necessarily whole.
+        ticks: Number of ticks ago, 0 to n, not necessarily whole.
 
     Returns:
         x, y, theta in W, m and rad.
@@ -250,17 +246,11 @@ _expected = _for_scalars(expected)
 def _held_position(
     hold: int, chosen: Any, likely: Any, pose_heard: Any, pose: Any
 ) -> tuple[Any, Any]:
-    """Computes the position of the target, by the rule that applies between bursts.
+    """Returns (x, y) of the target in the world frame W, by the rule between bursts.
 
-    Args:
-        hold: Index of the rule in ``_HOLDS``.
-        chosen: Chosen track of the filter at the moment of its last estimate.
-        likely: Chosen track of the filter, predicted to the present.
-        pose_heard: Pose of the robot at the moment of the last estimate.
-        pose: Present pose of the robot.
-
-    Returns:
-        x and y of the target in the world frame W, m.
+    ``hold`` is the index of the rule in ``_HOLDS``. ``chosen`` is the chosen track of
+    the filter at its last estimate, and ``likely`` is the same track, predicted to the
+    present.
     """
     if hold == 0:
         return likely[1], likely[2]
@@ -279,11 +269,11 @@ def track_step(
 
     The step converts a new estimate to the world frame W and updates the filter. The
     outputs follow from the chosen track of the filter and the rule of ``hold``. The
-    state then shifts by one tick.
+    state has three parts, in this order:
 
-    The state has three parts, in this order: the odometry poses at the last ticks, most
-    recent first; the pose at the moment of the last accepted estimate; and the memory
-    of the filter.
+    - the odometry poses at the last ticks, most recent first;
+    - the pose at the moment of the last accepted estimate;
+    - the memory of the filter.
     """
     p_PS_B, covariance, detected, range_valid, pose = inputs
     position, velocity, covariance_W, age, valid = outputs

@@ -37,19 +37,17 @@ class MapController(BaselineController):
 
 @register_jitable
 def occupied_around(inputs: Any, reach_m: float) -> NDArray[np.float64]:
-    """Lists the occupied cells around the robot, except the cells near the target.
+    """Lists the occupied cells around the robot, except those near the target.
 
-    A cell of the map is occupied if echoes came from there and no sensor has seen the
-    cell free since.
+    A cell is occupied if an echo came from it and no sensor has seen it free since.
 
     Args:
         inputs: Values of the input ports of a ``MapController``.
-        reach_m: Half of the side of the square around the robot in which cells are
-            listed, m.
+        reach_m: Half of the side of the square around the robot that is searched, m.
 
     Returns:
-        (n, 3) cells in the format of ``list_occupied``: x and y of the middle in the
-        world frame W, m, and the certainty, 0 to 1.
+        (n, 3) cells: x and y of the middle in the world frame W, m, and the certainty
+        that the cell is occupied, 0 to 1.
     """
     target, pose = inputs[0], inputs[3]
     clear = target[0], target[1], SOURCE_CLEARANCE_M

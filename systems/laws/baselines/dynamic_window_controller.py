@@ -59,21 +59,21 @@ class DynamicWindowNumbers(NamedTuple):
 def time_to_contact(
     places: Any, motion: tuple[float, float], half: tuple[float, float]
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes when a body that continues on its arc first covers a given point.
+    """Computes when the moving robot first covers one of several points.
 
-    The computation uses the body frame B. In this frame the points move. If the yaw
-    rate is zero, the points move straight back. Otherwise the points move on circles
-    around the center of the arc. The function skips circles that do not meet the
-    rectangle of the body.
+    The robot keeps its speed and yaw rate. Seen from the robot, the points then move:
+    straight backward if the yaw rate is zero, otherwise on circles around the center of
+    the robot's arc. The function computes for each point when its line or circle first
+    meets the rectangle of the body.
 
     Args:
-        places: (n, 2) points that the body must not cover, in B, m.
+        places: (n, 2) points in the body frame of the robot, m.
         motion: Speed, m/s, and yaw rate, rad/s.
         half: Half of the body's length and half of its width, m.
 
     Returns:
-        Time until the first contact, s. The time is infinite if there is no contact.
-        Points that the body already covers do not count.
+        Time of the first contact, s; infinite if there is none. Points that the body
+        already covers do not count.
     """
     v, w = motion
     a, b = half
@@ -103,10 +103,8 @@ def _angle_to_contact(
 ) -> float:  # pragma: no cover  (compiled)
     """Computes the angle by which a point turns about (0, 0) until it meets the body.
 
-    The point starts at (x, y) and moves on the circle of radius ``far``. The body is a
-    rectangle with the center (0, -turn). The function intersects the circle with all
-    four sides of the rectangle, and takes the first crossing. If ``sign`` is positive,
-    the point turns counterclockwise, otherwise clockwise.
+    The point starts at (x, y) and keeps the distance ``far`` from (0, 0). The center of
+    the body is at (0, -turn). The point turns counterclockwise if ``sign`` is positive.
     """
     a, b = half
     begin, best = math.atan2(y, x), np.inf
@@ -156,16 +154,20 @@ def choose_in_window(
     bearing: float,
     numbers: WindowNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Chooses the admissible motion with the largest objective (Fox 1997, eq. 13-15).
+    """Chooses speed and yaw rate by the dynamic window approach (Fox, eq. 13-15).
 
-    The window contains the speeds and yaw rates that the robot can reach in one period.
-    The function tries a grid of motions in the window. A motion is admissible if the
-    robot can brake to rest before it covers an occupied cell. The objective is a
-    weighted sum of three terms: heading, distance, and speed.
+    The window contains all speeds and yaw rates that the robot can reach in one period.
+    The function tries a grid of these motions. It rejects a motion if the robot could
+    not brake to rest before it covers an occupied cell. From the remaining motions, it
+    chooses the motion with the largest weighted sum of three terms. The terms reward:
+
+    - heading: a small angle between the heading after the motion and the target
+    - distance: a long way to the first contact
+    - speed: a speed near the wanted speed
 
     Args:
-        places: (n, 3) cells that the body must not cover: x and y in the world frame W,
-            m, and the certainty, 0 to 1.
+        places: (n, 3) occupied cells: x and y in the world frame W, m, and the
+            certainty, 0 to 1 (not used).
         pose: Pose (x, y, theta) of the axle in W, m and rad.
         now: Present speed, m/s, and present yaw rate, rad/s.
         wanted: Wanted speed toward the target, m/s.
@@ -173,8 +175,8 @@ def choose_in_window(
         numbers: Weights and limits.
 
     Returns:
-        Speed, m/s, and yaw rate, rad/s. If no motion is admissible, the function
-        returns the lowest speed of the window and the yaw rate nearest to zero.
+        Speed, m/s, and yaw rate, rad/s. If the function rejects all motions, it returns
+        the lowest speed of the window and the yaw rate nearest to zero.
     """
     # The window.
     heading_gain, distance_gain, speed_gain = numbers.gains
@@ -221,9 +223,9 @@ def choose_in_window(
 def dynamic_window_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DynamicWindowNumbers
 ) -> None:
-    """Computes the twist (speed and yaw rate) of the robot in one control period.
+    """Computes speed and yaw rate of the robot for one control period.
 
-    The state is the last choice of speed, m/s, and yaw rate, rad/s.
+    The state contains the previous choice of both: speed, m/s, and yaw rate, rad/s.
     """
     pose = inputs[3]
     if tick % numbers.period_ticks == 0:
@@ -240,22 +242,22 @@ class DynamicWindowController(MapController):
     """Chooses a motion that the robot can reach and from which it can stop in time.
 
     Ten times per second, the block considers the speeds and yaw rates that the robot
-    can reach with its accelerations. The block keeps a motion if the robot can then
-    brake before its rectangle covers an occupied cell. Among these motions, the block
-    chooses the motion with the largest weighted sum of heading, distance, and speed.
+    can reach with its accelerations. It keeps those from which the robot can brake
+    before its body covers an occupied cell. It then chooses the motion with the largest
+    weighted sum of heading, distance, and speed (see ``choose_in_window``).
 
     The block differs from the paper in two points:
 
     - The speed term rewards speeds near the wanted speed, because a follower must not
       arrive at full speed.
-    - The obstacles are cells instead of lines. A cell is occupied if echoes came from
-      there and no sensor has seen the cell free since.
+    - The obstacles are cells of a map instead of lines. A cell is occupied if an echo
+      came from it and no sensor has seen it free since.
 
-    The discrete state has the last motion. There is no latency.
+    The discrete state is the previous motion. There is no latency.
 
     Args:
         robot: Size of the body, and position of the control point P ahead of the axle.
-        attraction: ``AttractionParameters``. Only the follow distance is used.
+        attraction: ``AttractionParameters``. The block uses only the follow distance.
         gains: ``DynamicWindowParameters``.
         tick_s: Control period, s.
 

@@ -72,9 +72,10 @@ class RollNumbers(NamedTuple):
     obstacle_gain: float
     inflation_m: float
     discs: tuple[float, float]
-    """Two numbers about the discs that cover the body, m. The first is the distance of
-    the outer discs from the middle of the axle. The second is the radius of all discs,
-    including the clearance."""
+    """Position and radius of the discs that cover the body. The first number is the
+    distance of the outer discs from the middle of the axle, m. The second is the radius
+    of every disc, including the clearance, m.
+    """
     control_point_m: float
 
 
@@ -103,23 +104,24 @@ class PathIntegralState(NamedTuple):
 def distance_field(
     places: Any, x: float, y: float, half: float, cell: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the distance of each cell in a window from the nearest occupied cell.
+    """Computes the distance from each cell of a window to the nearest occupied cell.
 
-    The function sweeps over the window twice, forward and backward. Each sweep passes
-    the distance on to the four neighbors that come later in the order of the sweep.
+    The window is a square. The function sweeps over the window twice, once forward and
+    once backward (a chamfer distance transform). The distance of a cell is the least
+    sum of the distance of a visited neighbor and the step from this neighbor. The step
+    is one cell side, or sqrt(2) cell sides from a diagonal neighbor.
 
     Args:
         places: (n, 3) occupied cells: x and y of the middle in the world frame W, m,
-            and the certainty, 0 to 1.
+            and the certainty, 0 to 1 (not used).
         x: Center of the window, x in W, m.
         y: Center of the window, y in W, m.
         half: Half of the side of the window, m.
         cell: Side of a cell, m.
 
     Returns:
-        (m, m) distances, m, measured along steps between neighboring cells. These
-        distances are at most 8 % longer than straight lines. If there are no occupied
-        cells, all distances are 1e6.
+        (m, m) distances, m. They are at most 8 % longer than straight lines. If there
+        are no occupied cells, all distances are 1e6.
     """
     size = 2 * math.ceil(half / cell) + 1
     field = np.full((size, size), 1e6)
@@ -155,20 +157,22 @@ def roll_out(
     cell: float,
     numbers: RollNumbers,
 ) -> None:  # pragma: no cover  (compiled)
-    """Replaces a sequence of motions by a weighted mean of noisy sequences.
+    """Replaces a sequence of motions by the weighted mean of noisy copies (MPPI).
 
-    The weight of a noisy sequence is exp(-cost/temperature).
+    MPPI is model predictive path integral control. The function adds noise to the
+    sequence, computes the cost of each noisy copy, and weights the copy with
+    exp(-cost/temperature).
 
     Args:
         controls: (steps, 2) speed, m/s, and yaw rate, rad/s. The function changes the
             array in place.
         noise: (samples, steps, 2) normal random numbers of standard deviation 1.
         pose: Pose (x, y, theta) of the axle in the world frame W, m and rad.
-        goal: Position (x, y), m, and velocity (vx, vy), m/s, of a moving goal in W. The
-            control point P should reach the goal.
+        goal: Position (x, y), m, and velocity (vx, vy), m/s, in W of the moving goal of
+            the control point P.
         field: (m, m) result of ``distance_field`` around the axle, m.
         cell: Side of a cell of the field, m.
-        numbers: Spreads, limits, and costs.
+        numbers: Constants of the sequences and costs.
     """
     samples, steps = len(noise), len(controls)
     costs, tried = np.empty(samples), np.empty((samples, steps, 2))
@@ -198,19 +202,11 @@ def _cost(
     cell: float,
     numbers: RollNumbers,
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes one noisy sequence of motions and returns the cost of the sequence.
+    """Computes the cost of one noisy sequence of motions.
 
-    The function writes the noisy sequence to ``tried``. In each step, the function adds
-    noise to the planned motion, limits the sum, and integrates the pose. A step costs
-    more in each of these cases:
-
-    - The robot drives backward.
-    - A disc of the body is near an occupied cell.
-    - The control point P is far from the moving goal.
-    - The robot does not point to the goal.
-
-    The total also contains the cost of the deviation from the plan. The positions x and
-    y are relative to the initial position of the axle, in the axes of W.
+    The function writes the noisy sequence to ``tried`` and integrates the pose. The
+    cost of a step grows with backward speed, nearness to occupied cells, distance from
+    the goal, and the angle to the goal. The deviation from the plan also has a cost.
     """
     least, most, turn = SPEED_LIMITS
     spread, turn_spread = _SPEED_SPREAD_M_S, numbers.turn_spread_rad_s
@@ -264,9 +260,10 @@ def path_integral_step(
     outputs: Any,
     numbers: PathIntegralNumbers,
 ) -> None:
-    """Computes the twist of one control period, and sometimes a new plan.
+    """Computes speed and yaw rate for one control period.
 
-    A new plan is due every ``period_ticks`` control periods.
+    Every ``period_ticks`` control periods, the step first makes a new plan. The output
+    is always the first motion of the plan.
     """
     target, velocity, pose = inputs[0], inputs[1], inputs[3]
     plan, space, twist = state.plan, inputs[4], outputs[0]
@@ -292,12 +289,10 @@ def path_integral_step(
 
 @register_jitable
 def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-untyped-def]
-    """Computes the goal that the control point P should reach.
+    """Computes the moving goal that the control point P should reach.
 
-    The function plans a route to the target. If the route is a detour, the goal lies in
-    the direction of a point of the route. Otherwise the goal lies in the direction of
-    the target. The function chooses the distance and the velocity of the goal so that P
-    approaches with the wanted speed.
+    The goal lies in the direction of the target, or toward a point of the route if the
+    route is a detour. Its distance and velocity make P approach with the wanted speed.
 
     Returns:
         Position (x, y), m, and velocity (vx, vy), m/s, of the goal in the world frame
@@ -328,32 +323,31 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
 
 
 class PathIntegralController(MapController):
-    """Tries many sequences of motions and drives the mean of these sequences.
+    """Tries many random sequences of motions and drives their weighted mean (MPPI).
 
     Ten times per second, the block makes a new plan in three stages:
 
-    1. The block plans a route to the target on the map with ``find_way``, like the
-       guarded law. In the direction of the route, the block places a goal that moves
-       with the target.
-    2. The block draws 500 random sequences of 2.5 s around the last plan. The cost of a
-       sequence depends on the distance and angle to the goal, on driving backward, and
-       on occupied cells near the body. Three discs cover the body.
-    3. The new plan is the weighted mean of the sequences. The weights are
-       exp(-cost/temperature).
+    1. It plans a route to the target on the map. In the direction of the route, it
+       places a goal that moves with at most 80 % of the speed of the target.
+    2. It draws 500 random sequences of 2.5 s around the previous plan, and computes the
+       cost of each. The cost depends on the distance and direction of the goal, on
+       driving backward, and on occupied cells near the body.
+    3. The new plan is the mean of the sequences, weighted with exp(-cost/temperature).
 
-    The state has the plan and the memory for the route. There is no latency.
+    The state contains the plan and the memory of the route planner. There is no
+    latency.
 
     Args:
         robot: Size of the body, and position of the control point P ahead of the axle.
-        attraction: ``AttractionParameters``. Only the follow distance is used.
+        attraction: ``AttractionParameters``. The block uses only the follow distance.
         gains: ``PathIntegralParameters``.
         guard: Parameters of the map.
         seed: Seed of the random sequences.
         tick_s: Control period, s.
 
     Reference: Williams et al., Information theoretic model predictive control, IEEE
-    Trans. on Robotics 34 (6), 2018. The cost terms are those of Nav2's MPPI controller,
-    where they are called critics.
+    Trans. on Robotics 34 (6), 2018. The cost terms are those of the MPPI controller in
+    Nav2, which calls them critics.
     """
 
     def __init__(

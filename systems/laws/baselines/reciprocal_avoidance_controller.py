@@ -37,7 +37,8 @@ class AvoidanceNumbers(NamedTuple):
     follow: FollowNumbers
     radius_m: float
     """Radius of the disc around the point ``offset_m`` ahead of the axle, m. The disc
-    contains the body and the clearance."""
+    covers the body and the clearance.
+    """
     tick_s: float
 
 
@@ -53,17 +54,17 @@ def _beyond(
 def avoid_body(
     relative: Any, half: Any, radius: float, velocity: Any, horizon: float
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Computes the half plane of velocities that ORCA permits (van den Berg, eq. 3).
+    """Computes the half plane of velocities that ORCA permits near one body.
 
-    The robot is a disc, and the other body is a rectangle. The velocity obstacle is the
-    set of relative velocities with which the disc touches the rectangle within the
-    horizon. This set is a cone with two legs and without a tip. Instead of a tip, the
-    cone has a rounded end, called the cut-off. The cut-off is the rectangle, enlarged
-    and rounded by the radius of the disc, and divided by the horizon.
+    ORCA is optimal reciprocal collision avoidance (van den Berg, eq. 3). The robot is a
+    disc, and the other body is a rectangle. Some relative velocities make the disc
+    touch the rectangle within the horizon. These velocities form the velocity obstacle:
+    a cone with two straight legs and a rounded end instead of a tip. The rounded end,
+    called the cut-off, is the rectangle, enlarged by the radius of the disc and divided
+    by the horizon.
 
     The function finds the point on the border of the velocity obstacle that is nearest
-    to the present relative velocity. The tangent at this point is the border of the
-    half plane.
+    to the present relative velocity. The tangent at this point bounds the half plane.
 
     Args:
         relative: Position (x, y) of the body relative to the center of the disc, m, and
@@ -71,11 +72,11 @@ def avoid_body(
         half: Half of the body's length and half of its width, m.
         radius: Radius of the disc, m.
         velocity: Velocity of the disc relative to the body, m/s.
-        horizon: Time for which contacts are avoided, s.
+        horizon: Time in which no contact may occur, s.
 
     Returns:
-        Three numbers: x and y of the unit normal n, and an offset, m/s. A relative
-        velocity v is permitted if n . v >= offset.
+        Unit normal n (x and y) and an offset, m/s. A relative velocity v is permitted
+        if n . v >= offset.
     """
     # In the axes of the rectangle. Its center is at (px, py), the disc at (0, 0).
     c, s = math.cos(relative[2]), math.sin(relative[2])
@@ -118,16 +119,14 @@ def _legs(
     horizon: float,
     front: tuple[float, float, float],
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Finds the nearest part of the border of a velocity obstacle to a velocity.
+    """Finds the part of a velocity obstacle's border that is nearest to a velocity.
 
-    A velocity obstacle is the set of relative velocities that lead to a contact. The
-    border has three parts: the cut-off (``front``), which is the rounded end of the
-    cone, and both legs of the cone. A leg counts only for velocities beyond the point
-    where the leg touches the cut-off.
+    The border consists of the rounded end (``front``) and two legs, which start where
+    they touch the rounded end (see ``avoid_body``).
 
     Returns:
-        Three numbers: the signed distance of the velocity from the border, m/s, and x
-        and y of the unit normal. The distance is negative inside the velocity obstacle.
+        Signed distance of the velocity from the border, m/s, negative inside the
+        velocity obstacle, and x and y of the unit normal.
     """
     (px, py), (vx, vy) = place, velocity
     middle = math.atan2(py, px)
@@ -166,18 +165,17 @@ def _legs(
 def reciprocal_avoidance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: AvoidanceNumbers
 ) -> None:
-    """Computes the twist (speed and yaw rate) of the robot in one control period.
+    """Computes speed and yaw rate of the robot for one control period.
 
-    The state has two parts. The first part is the velocity of the point ``offset_m``
-    ahead of the axle, in the world frame W, m/s. The second part is the pose of each
-    body one period ago.
-
-    The step works in four stages:
+    The state contains the velocity of the point ``offset_m`` ahead of the axle, in the
+    world frame W, m/s. It also contains the pose of each body one period ago. The step
+    has four stages:
 
     1. Estimate the velocity of each body from its last two poses.
-    2. Make one half plane of permitted velocities for each near body.
-    3. Choose the velocity in all half planes that is nearest to the preferred velocity.
-    4. Convert this velocity of the point to a twist.
+    2. Compute one half plane of permitted velocities for each near body.
+    3. Among the velocities that all half planes permit, choose the velocity nearest to
+       the preferred velocity.
+    4. Convert this velocity of the point to speed and yaw rate.
     """
     own, pose, poses, sizes = numbers.own, inputs[4], inputs[5], inputs[6]
     twist, count = outputs[0], len(inputs[6]) // 2
@@ -226,25 +224,25 @@ def reciprocal_avoidance_step(
 
 
 class ReciprocalAvoidanceController(BaselineController):
-    """Changes the wanted velocity as little as possible to avoid contacts for a time.
+    """Changes the wanted velocity as little as needed to avoid contacts (ORCA).
 
-    The block knows the positions, sizes, and velocities of all bodies, except the body
-    of the target. The block therefore shows how well a robot drives with perfect
-    knowledge of the bodies but without a planned route.
+    ORCA is optimal reciprocal collision avoidance. The block knows the exact positions,
+    sizes, and velocities of all bodies except the body of the target. It therefore
+    shows how well a robot can drive with perfect sensing but without a planned route.
 
-    Bodies are rectangles. The bodies do not avoid the robot, so the robot makes the
-    whole change of velocity. The paper calls such bodies non-cooperative agents.
+    The other bodies are rectangles that do not avoid the robot (the paper calls them
+    non-cooperative agents). Therefore the robot makes the whole change of velocity.
 
     The block controls the velocity of a point ahead of the axle. A disc around this
-    point contains the body of the robot. If no velocity obeys all constraints, the
+    point covers the body of the robot. If no velocity satisfies all constraints, the
     block takes the velocity with the least violation.
 
-    The discrete state has the velocity of the point, and the poses of the bodies one
-    control period ago. There is no latency.
+    The discrete state contains the velocity of the point and the previous poses of the
+    bodies. There is no latency.
 
     Args:
         robot: Size of the body, and position of the control point P ahead of the axle.
-        attraction: ``AttractionParameters``. Only the follow distance is used.
+        attraction: ``AttractionParameters``. The block uses only the follow distance.
         gains: ``ReciprocalAvoidanceParameters``.
         bodies: Number of bodies.
         tick_s: Control period, s.

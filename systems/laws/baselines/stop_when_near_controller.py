@@ -41,13 +41,13 @@ def stop_when_near_step(
 class StopWhenNearController(BaselineController):
     """Drives to the target, but does not drive forward while an echo is near.
 
-    This law is the simplest law. The block has no state and no latency.
+    This is the simplest law. The block has no state and no latency.
 
     Args:
         robot: Parameters of the robot, for the position of the control point P.
-        attraction: ``AttractionParameters``. Only the follow distance is used.
+        attraction: ``AttractionParameters``. The block uses only the follow distance.
         gains: ``StopWhenNearParameters``.
-        sensors: Range sensors. Only the number of sensors is used.
+        sensors: Range sensors. The block uses only their number.
         tick_s: Control period, s.
 
     Reference: our own work; docs/results_laws.md.

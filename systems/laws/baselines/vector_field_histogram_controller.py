@@ -64,9 +64,9 @@ def polar_histogram(
     """Computes the density of obstacles in each direction (VFH+, eq. 1-6).
 
     The paper calls this density the primary polar histogram. The function enlarges each
-    occupied cell by the radius of the robot. The enlarged cell adds its magnitude to
-    all sectors that it covers. The magnitude of a cell is larger if the cell is nearer,
-    or if the cell is more certainly occupied.
+    occupied cell to a disc with the radius of the robot. It adds the magnitude of the
+    cell to all sectors that the disc covers. The magnitude grows with the certainty of
+    the cell and falls with its distance.
 
     Args:
         places: (n, 3) occupied cells: x and y in the world frame W, m, and the
@@ -76,7 +76,7 @@ def polar_histogram(
         numbers: Window and radius.
 
     Returns:
-        (72,) density of each sector of 5 deg, counterclockwise from the x axis of W.
+        (72,) density in each sector of 5 deg, counterclockwise from the x axis of W.
     """
     density = np.zeros(_SECTORS)
     width = math.tau / _SECTORS
@@ -103,11 +103,12 @@ def polar_histogram(
 def _mask(
     blocked: Any, places: Any, pose: Any, circle: float, numbers: HistogramNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Blocks the directions to which the robot cannot turn while it moves (eq. 8-13).
+    """Blocks the directions to which the moving robot cannot turn freely (eq. 8-13).
 
-    At its present speed, the robot can turn left or right on a circle of radius
-    ``circle``. If an enlarged cell meets the left circle, the function blocks all
-    directions to the left of this cell. The same rule applies to the right side.
+    The robot can turn left or right on circles of radius ``circle``. The function
+    enlarges occupied cells by the radius of the robot. If a cell then meets the left
+    circle, all directions to the left of the cell are blocked. Cells on the right
+    circle block the right side.
     """
     x, y, theta = pose
     left = right = math.pi
@@ -139,25 +140,27 @@ def choose_direction(
     previous: float,
     previous_gain: float,
 ) -> float:  # pragma: no cover  (compiled)
-    """Chooses the candidate direction of least cost (VFH+, eq. 14-18).
+    """Chooses the candidate direction with the least cost (VFH+, eq. 14-18).
 
-    A valley is a run of free sectors. The candidates are:
+    A valley is a group of adjacent free sectors. The candidates are:
 
-    - in a narrow valley: the middle of the valley.
-    - in a wide valley: a direction near each edge. If the direction of the target lies
-      between these two, the direction of the target is a third candidate.
-    - without any blocked sectors: only the direction of the target.
+    - in a narrow valley: its middle
+    - in a wide valley: one direction near each edge, and also the direction of the
+      target if it lies between these two
+    - if no sector is blocked: only the direction of the target
+
+    Directions are angles counterclockwise from the x axis of the world frame, measured
+    in sectors of 5 deg.
 
     Args:
         blocked: (72,) whether each sector is blocked.
-        target: Direction of the target, sectors.
-        heading: Heading of the robot, sectors.
-        previous: Previously chosen direction, sectors. The value is negative if there
-            is none.
+        target: Direction of the target.
+        heading: Heading of the robot.
+        previous: Previously chosen direction, negative if there is none.
         previous_gain: Weight mu_3 of the angle to the previous direction.
 
     Returns:
-        Chosen direction, sectors. The value is negative if all sectors are blocked.
+        Chosen direction, or a negative number if all sectors are blocked.
     """
     anywhere = not blocked.any()
     begin = 0
@@ -210,13 +213,12 @@ def _steer(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Chooses a direction and updates the state.
 
-    The state has one number for each sector, 1 if the thresholds block the sector, and
-    the last direction.
+    The state contains one number per sector (1 if the thresholds block it), then the
+    previous direction.
 
     Returns:
-        Chosen direction in the world frame W, rad, and density of obstacles in this
-        direction. If all sectors are blocked, the direction is NaN and the density is
-        0.
+        Chosen direction in the world frame W, rad, and density of obstacles there; NaN
+        and 0 if all sectors are blocked.
     """
     density = polar_histogram(places, pose[0], pose[1], numbers)
     blocked = np.empty(_SECTORS, dtype=np.bool_)
@@ -245,10 +247,10 @@ def vector_field_histogram_step(
     outputs: Any,
     numbers: VectorFieldHistogramNumbers,
 ) -> None:
-    """Computes the twist (speed and yaw rate) of the robot in one control period.
+    """Computes speed and yaw rate of the robot for one control period.
 
-    The state has one number for each sector (1 if the sector is blocked, otherwise 0),
-    the last direction in sectors, and the last speed in m/s.
+    The state contains one number per sector (1 if the sector is blocked, otherwise 0),
+    the previous direction in sectors, and the previous speed in m/s.
     """
     pose, own, twist = inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
@@ -272,30 +274,31 @@ def vector_field_histogram_step(
 
 
 class VectorFieldHistogramController(MapController):
-    """Steers into the best valley of a polar histogram of obstacles.
+    """Steers into the best gap between obstacles (VFH+).
 
-    The histogram has the density of obstacles in each direction, and a valley is a run
-    of free directions. The obstacles are occupied cells of the map. A cell is occupied
-    if echoes came from there and no sensor has seen the cell free since. In every
+    VFH+ is the vector field histogram of Ulrich and Borenstein. It divides all
+    directions into 72 sectors. The obstacles are occupied cells of the map. A cell is
+    occupied if an echo came from it and no sensor has seen it free since. In every
     control period, the block follows the stages of the paper:
 
-    1. The primary histogram has the density of obstacles in each direction. The block
-       enlarges each cell by the radius of the robot.
-    2. The binary histogram marks blocked directions by two thresholds of the density.
+    1. The primary histogram contains the density of obstacles in each sector. The block
+       first enlarges each cell by the radius of the robot.
+    2. The binary histogram marks a sector as blocked or free, by two thresholds of the
+       density.
     3. The masked histogram also blocks directions to which the robot cannot turn at its
        present speed.
-    4. The block chooses the candidate direction of least cost.
+    4. The block chooses the candidate direction with the least cost.
 
-    A higher density in the chosen direction reduces the speed, as in an earlier paper
+    The speed falls with the density in the chosen direction, as in an earlier paper
     (Borenstein and Koren 1991). If all directions are blocked, the robot does not drive
-    forward, and turns to the target.
+    forward, but turns to the target.
 
-    The discrete state has the blocked sectors, the last direction, and the last speed.
-    There is no latency.
+    The discrete state contains the blocked sectors, the previous direction, and the
+    previous speed. There is no latency.
 
     Args:
         robot: Size of the body, and position of the control point P ahead of the axle.
-        attraction: ``AttractionParameters``. Only the follow distance is used.
+        attraction: ``AttractionParameters``. The block uses only the follow distance.
         gains: ``VectorFieldHistogramParameters``.
         tick_s: Control period, s.
 

@@ -71,14 +71,13 @@ def adaptation_step(
     """Adapts the gains K, D, and K_e by one control period.
 
     K is the stiffness to the target, D is the damping, and K_e is the stiffness of
-    contacts. The state begins with K, D, and K_e. For each of these gains q, four
-    sensitivities follow: x and y of dp/dq, then x and y of dv/dq. p and v are the
-    position and velocity of the control point P.
+    contacts. For each gain, the step computes a rate of change by the selected rule,
+    ``lyapunov`` or ``sensitivity``. It then changes the gain at this rate for one
+    period, and limits the gain. The output contains the gains from before this change.
 
-    For each gain, the step computes the gradient of the error. The gradient follows
-    from the Lyapunov rule or from the sensitivities. Then the step moves the gain
-    against the gradient and limits the gain. The output has the gains from before this
-    change.
+    The state starts with K, D, and K_e. Four sensitivities follow for each gain q: x
+    and y of dp/dq, then x and y of dv/dq. p and v are the position and velocity of the
+    control point P.
     """
     target, reference, pose, v_WP, objects = inputs
     for k in range(3):
@@ -113,23 +112,23 @@ class ImpedanceAdaptation(Block):
     """Adapts the stiffness and damping of a robot on a route.
 
     K is the stiffness to the target, D is the damping, and K_e is the stiffness of
-    contacts. p and v are the position and velocity of the control point P. p_d and v_d
-    belong to the target. p_ref and v_ref belong to a reference model. gamma is the rate
-    of the adaptation, and M is the virtual mass.
+    contacts. p and v are the position and velocity of the control point P. The
+    subscript d marks the target, and the subscript ref marks a reference model. gamma
+    is the rate of the adaptation, and M is the virtual mass.
 
-    The block has two rules:
+    The block has two rules, in which K', D' and q' are time derivatives:
 
-    - The rule ``lyapunov`` is K' = (gamma/M) e_v . (p - p_d) and D' = (gamma/M) e_v .
-      (v - v_d), with e_v = v - v_ref. The printed eq. 40 to 42 are equivalent to this
-      rule. Without contacts, a Lyapunov function falls under this rule.
-    - The rule ``sensitivity`` is q' = -gamma dJ/dq for each gain q. J is the cost of
-      eq. 27 with two changes: the weight tau_v multiplies velocities, and a hinge
-      function replaces the penalty. The sensitivities solve eq. 34, in which the left
-      side is read as a time derivative.
+    - ``lyapunov``: K' = (gamma/M) e_v . (p - p_d) and D' = (gamma/M) e_v . (v - v_d),
+      with e_v = v - v_ref. This rule is equivalent to eq. 40 to 42 as printed. Without
+      contacts, it makes a Lyapunov function decrease.
+    - ``sensitivity``: q' = -gamma dJ/dq for each gain q. J is the cost of eq. 27 with
+      two changes: a time tau_v multiplies the velocities, and the penalty of
+      ``penalty_gradient`` replaces the safety term. The sensitivities solve eq. 34,
+      whose left side we read as a time derivative.
 
-    The discrete state has K, D, K_e, and four sensitivities of each gain. The state is
-    updated every control period. The output ``impedance`` is part of the state. A
-    change of the gains therefore appears at the output one period later.
+    The discrete state contains K, D, K_e, and four sensitivities to each gain. The
+    output ``impedance`` is part of the state. Therefore a change of the gains appears
+    at the output one control period later.
 
     Args:
         parameters: ``AdaptiveTrajectoryParameters``.
@@ -179,13 +178,9 @@ def adaptation_numbers(
 ) -> AdaptationNumbers:
     """Computes the constants that ``adaptation_step`` uses.
 
-    Args:
-        own: Rule, rates, initial gains, and contacts.
-        robot: Virtual mass, and position of the control point P.
-        tick_s: Control period, s.
-
-    Returns:
-        Constants of the step.
+    ``own`` has the rule, the rates, the initial gains, and the contacts. ``robot`` has
+    the virtual mass and the position of the control point P. ``tick_s`` is the control
+    period, s.
     """
     boxes = STIFFNESS_BOX_N_M, DAMPING_BOX_N_S_M, _CONTACT_BOX_N_M
     low, high = zip(*(box if own.projected else _WIDE for box in boxes), strict=True)

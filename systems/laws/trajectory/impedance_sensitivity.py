@@ -27,9 +27,15 @@ def sensitivity_sources(
     """Computes the source terms of the sensitivities to the gains K, D, and K_e.
 
     K is the stiffness to the target, D is the damping, and K_e is the stiffness of
-    contacts. For a gain q, the source term is dA/dq X + dB/dq u in eq. 34 of
-    Engelbrecht 2021. X is the state, u is the input, and A and B are the matrices of
-    the model X' = A X + B u. Eq. 35 to 41 are these terms for the three gains.
+    contacts. The model of the motion is X' = A X + B u with the state X and the input
+    u. For a gain q, the source term is dA/dq X + dB/dq u (Engelbrecht 2021, eq. 34).
+    Eq. 35 to 41 give it for the three gains:
+
+    - K: -(p - p_d)/M
+    - D: -(v - v_d)/M
+    - K_e: sum of (S - d) n/M over all contacts
+
+    S - d is the overlap of a contact. n is the unit vector from the object to P.
 
     Args:
         p_WP: Position p (x, y) of the control point P in the world frame W, m.
@@ -40,10 +46,7 @@ def sensitivity_sources(
         mass: Virtual mass M, kg.
 
     Returns:
-        ``Sensitivities`` with three terms. The term for K is -(p - p_d)/M. The term for
-        D is -(v - v_d)/M. The term for K_e is the sum of (S - d) n/M over all contacts.
-        S - d is the overlap of a contact, and n is the unit vector from the object to
-        P.
+        ``Sensitivities`` with the three terms.
     """
     ex = ey = 0.0
     for contact in contacts:
@@ -60,27 +63,30 @@ def sensitivity_sources(
 def advance_sensitivity(
     state: Any, begin: Any, source: Any, contacts: Any, gains: Any, numbers: Any
 ) -> None:
-    """Integrates the sensitivities X_q over one control period.
+    """Integrates the sensitivity X_q to one gain q over one control period.
 
-    q is one gain of the law. X_q consists of dp/dq and dv/dq, where p and v are the
-    position and velocity of the control point P. The equation is d/dt X_q = A X_q +
-    source. It is eq. 34 of Engelbrecht 2021 with two corrections: the left side is a
-    time derivative, and the right side contains the term A X_q.
+    X_q consists of dp/dq and dv/dq, where p and v are the position and velocity of the
+    control point P. The equation is d/dt X_q = A X_q + source. It is eq. 34 of
+    Engelbrecht 2021 with two corrections: the left side is a time derivative, and the
+    right side contains A X_q.
 
-    A is the exact linearization of the loop. S is the distance at which a contact
-    begins, and d is the present distance. A contact has the stiffness K_e along the
-    unit vector n from the object to P. Across n, the contact has the stiffness -K_e (S
-    - d)/d. The damping D_e of a contact fades with d. Therefore the function adds the
-    matrix -(D_e/S) (v - v_j) n^T to the stiffness, where v_j is the velocity of the
-    object.
+    A is the exact linearization of the motion. Besides the gains K and D, it contains
+    these terms for each contact:
 
-    The function updates the velocity first, and then the position with the new
-    velocity. The virtual mass moves in the same order.
+    - the stiffness K_e along n, the unit vector from the object to P
+    - the stiffness -K_e (S - d)/d across n, where d is the distance of the object, and
+      contacts begin at the distance S
+    - the damping D_e, which fades with d
+    - the matrix -(D_e/S) (v - v_j) n^T, because the damping fades; v and v_j are the
+      velocities of P and of the object
+
+    The function first updates dv/dq. It then updates dp/dq with the new dv/dq, because
+    the model of the virtual mass updates v and p in the same order.
 
     Args:
         state: State of the block. The function changes four numbers: dp/dq (x and y)
             and dv/dq (x and y).
-        begin: Index in the state of the first of these four numbers.
+        begin: Index of the first of these four numbers.
         source: Source term (x, y) from ``sensitivity_sources``.
         contacts: Result of ``contacts_of_objects`` for damping that fades.
         gains: Stiffness K, N/m, damping D, N s/m, and contact stiffness K_e, N/m.
@@ -116,15 +122,14 @@ def advance_sensitivity(
 def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
     """Computes the gradient of the penalty for small distances from objects.
 
-    The penalty is lambda/2 h(d)^2 with the hinge h = max(0, d_sec - d) for the distance
-    d. The gradient is the sum of -lambda h(d) n over all contacts, where n is the unit
-    vector from the object to the control point P. The penalty replaces the safety term
-    lambda/2 (d_sec^2 - d^2) in eq. 27 of Engelbrecht 2021.
+    For an object at the distance d, the penalty is lambda/2 h^2. h is the larger of 0
+    and d_sec - d. The gradient is the sum of -lambda h n over all objects. n is the
+    unit vector from the object to the control point P. The penalty replaces the safety
+    term lambda/2 (d_sec^2 - d^2) of Engelbrecht 2021, eq. 27.
 
     Args:
         contacts: Result of ``contacts_of_objects``.
-        security_m: Distance d_sec, m. The adaptation uses the distance S at which
-            contacts begin.
+        security_m: Distance d_sec below which the penalty acts, m.
         penalty: Weight lambda.
 
     Returns:

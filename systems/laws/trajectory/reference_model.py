@@ -27,10 +27,10 @@ class ReferenceNumbers(NamedTuple):
 
 @lru_cache(maxsize=64)
 def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNumbers:
-    """Computes the exact discrete-time model of a second-order system for one axis.
+    """Computes the discrete-time model of a second-order system for one axis.
 
-    The continuous model is that of eq. 20 to 26 of Engelbrecht 2021. The target is
-    constant during each control period.
+    The continuous model is that of eq. 20 to 26 of Engelbrecht 2021. The discrete model
+    is exact if the target is constant during each control period.
 
     Args:
         frequency: Natural frequency w_n, rad/s.
@@ -38,8 +38,8 @@ def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNum
         tick_s: Control period, s.
 
     Returns:
-        Matrices A and B of x+ = A x + B u. The state x has the position and velocity of
-        the model. The input u has the position and velocity of the target.
+        Matrices A and B of x+ = A x + B u. x is the position and velocity of the model.
+        u is the position and velocity of the target.
     """
     stiff, damp = frequency**2, 2.0 * ratio * frequency
     whole = np.zeros((4, 4))
@@ -53,7 +53,7 @@ def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNum
 def nominal_poles(mass: float, stiffness: float, damping: float) -> tuple[float, float]:
     """Computes the natural frequency and damping ratio of a mass, spring, and damper.
 
-    Engelbrecht 2021 prints neither of these numbers.
+    Engelbrecht 2021 prints neither number.
 
     Args:
         mass: Virtual mass M, kg.
@@ -87,21 +87,20 @@ def reference_step(
 class ReferenceModel(Block):
     """Computes the motion with which the control point P should follow the target.
 
-    The model is a second-order system. In the first control period, the model starts at
-    the target. The model has no contacts with obstacles. Therefore a motion of P away
-    from an obstacle counts as an error.
+    The model is a second-order system that starts at the target. It has no contacts
+    with obstacles. Therefore a motion of P away from an obstacle counts as an error.
 
-    The discrete state has position and velocity. The state is updated every control
-    period. The update is exact if the target is constant during the period. A new
-    target changes the output one period later.
+    The discrete state is the position and velocity of the model. The update is exact if
+    the target is constant during the control period. A new target changes the output
+    one period later.
 
     Args:
         parameters: Stiffness K and damping D, ``TrajectoryImpedanceParameters``.
         robot: Virtual mass M. M, K, and D determine the poles of the model.
         tick_s: Control period, s.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 19 to 26. The dots of eq. 19,
-    which mark derivatives, are moved to their correct places.
+    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 19 to 26. In eq. 19, the dots
+    that mark derivatives are misplaced; the block uses the corrected equation.
     """
 
     part = "reference_model"

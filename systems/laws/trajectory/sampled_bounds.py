@@ -43,25 +43,25 @@ def sampled_matrix(
 ) -> NDArray[np.float64]:
     """Computes the matrix A that advances one axis of the robot by one control period.
 
-    A spring with the stiffness K to a fixed point and a damper D act on the virtual
-    mass M. The velocity v of the virtual mass is the command of the wheels. The wheel
-    speed w follows v with the time constant lag. p is the position of the control point
-    P, which moves at the speed w. T is the control period::
+    The virtual mass M has a spring of stiffness K to a fixed point, and a damper D. The
+    velocity v of the virtual mass is the command of the wheels. The wheel speed w
+    follows v with the time constant lag. The control point P is at p and moves at the
+    speed w. T is the control period::
 
         v+ = v - T/M (K p + D v),  w+ = a w + (1 - a) v+,  a = exp(-T/lag)
         p+ = p + lag (1 - a) w + (T - lag (1 - a)) v+
 
-    The damper acts without delay. If ``late_ticks`` is above 0, the spring uses an
-    earlier position instead of p.
+    If ``late_ticks`` is above 0, the spring uses the position p of ``late_ticks``
+    periods ago. The damper acts without delay.
 
     Args:
         stiffness: Sum of the stiffnesses of all springs, N/m.
         damping: Sum of all dampers, N s/m.
-        of: Mass, lag, and control period.
+        of: Mass, lag, control period, and ``late_ticks``.
 
     Returns:
-        (3 + late_ticks, 3 + late_ticks) matrix A of x+ = A x. The state x has p, w, v,
-        then earlier values of p.
+        (3 + late_ticks, 3 + late_ticks) matrix A of x+ = A x. The state x contains p,
+        w, v, then the earlier values of p.
     """
     size, tick_s = 3 + of.late_ticks, of.tick_s
     kept = math.exp(-tick_s / of.motor_lag_s)
@@ -92,8 +92,7 @@ def stiffness_bound(damping: float, of: SampledMass) -> float:
         of: Mass, lag, and control period.
 
     Returns:
-        Stiffness, N/m. The result is 0 if every stiffness is unstable with this
-        damping.
+        Stiffness, N/m; 0 if every stiffness is unstable with this damping.
     """
 
     def rests(stiffness: float) -> bool:
@@ -112,30 +111,20 @@ def stiffness_bound(damping: float, of: SampledMass) -> float:
 
 
 def damping_bound(of: SampledMass) -> float:
-    """Computes the largest stable damping of a virtual mass, 2 M/T.
+    """Computes the largest stable damping 2 M/T, N s/m.
 
-    M is the virtual mass, and T is the control period.
-
-    With more damping, the velocity changes sign in every control period and grows.
-
-    Args:
-        of: Mass and control period.
-
-    Returns:
-        Largest stable damping, N s/m.
+    M is the virtual mass, and T is the control period. With more damping, the velocity
+    changes sign in every control period and grows.
     """
     return 2.0 * of.mass_kg / of.tick_s
 
 
 def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
-    """Computes the lag at which the target pulls the control point P through a contact.
+    """Computes the lead at which the target pulls P through a contact.
 
-    Args:
-        own: Parameters of the law: stiffness K to the target, stiffness K_e of
-            contacts, and distance S at which contacts begin.
-
-    Returns:
-        Lag K_e S/K of P behind the target, m. If K_e is 0, the result is 1 m.
+    P is the control point of the robot. The lead is K_e S/K, m. K is the stiffness to
+    the target, K_e is the stiffness of contacts, and S is the distance at which
+    contacts begin. If K_e is 0, the result is 1 m.
     """
     lag = own.contact_stiffness_n_m * own.security_zone_m / own.stiffness_n_m
     return lag or 1.0
@@ -144,15 +133,16 @@ def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
 def rate_bound(rule: str, amplitude_m: float, of: SampledMass) -> float:
     """Computes the adaptation rate gamma above which the gains K and D may run away.
 
-    K is the stiffness to the target, and D is the damping. The bound applies to an
-    adaptation without limits of the gains.
+    K is the stiffness to the target, and D is the damping. The bound assumes that the
+    gains have no limits.
 
     Args:
         rule: ``lyapunov`` or ``sensitivity``.
-        amplitude_m: Amplitude a of the target, or its lead over the control point P, m.
+        amplitude_m: Amplitude of the target's motion, or distance by which the target
+            leads the control point P, m.
         of: Mass and control period.
 
     Returns:
-        Rate, (N/m)^2/(m^2 s). The rate is proportional to 1/a^2.
+        Rate, (N/m)^2/(m^2 s), proportional to 1/amplitude_m^2.
     """
     return RATE_BOUNDS[rule] * (of.mass_kg / (amplitude_m * of.tick_s)) ** 2

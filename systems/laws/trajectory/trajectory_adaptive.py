@@ -18,13 +18,13 @@ class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
     rule: Literal["lyapunov", "sensitivity"] = "lyapunov"
     """Rule that adapts the gains.
 
-    ``lyapunov`` uses eq. 40 to 42 of Engelbrecht 2021 as printed, which are a Lyapunov
-    rule. ``sensitivity`` uses the gradient of eq. 27 with the sensitivities that eq. 34
+    ``lyapunov`` is a Lyapunov rule: eq. 40 to 42 of Engelbrecht 2021 as printed.
+    ``sensitivity`` uses the gradient of eq. 27 with the sensitivities that eq. 34
     intends.
 
     With ``sensitivity``, the damping of a contact is 0 at the edge of the zone and
-    grows toward the object. The reason is that sensitivities need a force without
-    jumps."""
+    grows toward the object, because sensitivities need a force without jumps.
+    """
     rate: NonNegative = 10.0
     """Rate gamma = eta/T of K and D, (N/m)^2/(m^2 s)."""
     contact_rate: NonNegative = 0.0
@@ -32,16 +32,18 @@ class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
     penalty: NonNegative = 0.0
     """Weight lambda of the safety term, without unit. With 0 the term is off.
 
-    Eq. 27 of Engelbrecht 2021 prints the term lambda/2 (d_sec^2 - d^2) for each object.
-    Here the term is lambda/2 max(0, S - d)^2. d is the distance of the object, and S is
-    ``security_zone_m``. The gradient of the term is -lambda (S - d) n, where n is the
-    unit vector from the object to P.
+    For each object at the distance d, the term is lambda/2 max(0, S - d)^2, where S is
+    ``security_zone_m``. It replaces the term lambda/2 (d_sec^2 - d^2) of eq. 27 of
+    Engelbrecht 2021. Its gradient is -lambda (S - d) n, where n is the unit vector from
+    the object to P.
 
     The term has an effect only with ``rule: sensitivity``. Without the term, a robot
-    with adaptive gains collides more often than a robot with fixed gains."""
+    with adaptive gains collides more often than a robot with fixed gains.
+    """
     projected: bool = False
     """Whether the gains have limits: K from 0.5 to 6 N/m, D from 3 to 8 N s/m, and K_e
-    from 0.5 to 24 N/m."""
+    from 0.5 to 24 N/m.
+    """
     safety_filter: bool = False
     """Whether ``SafetyFilter`` keeps P away from objects, whatever the gains."""
 

@@ -14,11 +14,12 @@ from systems.laws.law import Equation, Law
 
 
 class TrajectoryImpedanceParameters(Parameters):
-    """Springs and dampers that act from the target and from contacts.
+    """Springs and dampers from the robot to the target and to contacts.
 
-    K, D, and S have the values of tables 1 and 2 of Engelbrecht, Steyn and Djouani
-    (2021). The paper prints only one stiffness K and one damping D. Contacts have the
-    same values by default: K_e = K and D_e = D.
+    K and D are the stiffness and damping to the target, and K_e and D_e are those to
+    contacts. Contacts begin at the distance S. K, D, and S have the values of tables 1
+    and 2 of Engelbrecht, Steyn and Djouani (2021). The paper prints only one stiffness
+    and one damping. Therefore K_e = K and D_e = D by default.
     """
 
     stiffness_n_m: Stiffness = 3.0
@@ -34,18 +35,19 @@ class TrajectoryImpedanceParameters(Parameters):
     block_distance_m: Length | None = None
     """Distance L_block of eq. 6 of Engelbrecht 2021, m. With null, eq. 6 is off.
 
-    The control point P stops if two conditions hold. The next step of P would end
-    within this distance of an object. The step would not lead away from the object.
+    With eq. 6, the control point P stops if its next step would end within this
+    distance of an object and would not lead away from the object.
 
     The paper prints no value. A distance of 0.2 m is enough for ``turtlebot3_burger``,
-    whose rear corners are 0.174 m from P."""
+    whose rear corners are 0.174 m from P.
+    """
 
     @property
     def damping_fades(self) -> bool:
-        """Whether the damping of a contact is 0 at the edge of the zone.
+        """Whether the damping of a contact is 0 at the edge of the security zone.
 
         If true, the damping grows from the edge toward the object. If false, the full
-        damping acts in the whole zone, as printed.
+        damping acts in the whole zone, as the paper prints it.
         """
         return False
 
@@ -59,15 +61,9 @@ def trajectory_law(
 ) -> Law:
     """Makes the record of a law whose block is ``TrajectoryImpedanceController``.
 
-    Args:
-        name: Name of the law in scenarios.
-        title: Heading in reports.
-        label: Label in the legends of pictures.
-        gains: Model of the gains.
-        *more: Equations that follow the equation of motion.
-
-    Returns:
-        Record of the law.
+    ``name`` is the name in scenarios, ``title`` the heading in reports, and ``label``
+    the label in legends. ``gains`` is the parameter class of the gains. The record
+    lists the equation of motion, then the equations ``more``.
     """
     motion = Equation(
         "Impedance to the target and to contacts",

@@ -17,9 +17,9 @@ from systems.world.geometry import safe_norm
 class ContactNumbers(NamedTuple):
     """Constants of the contact force.
 
-    The laws of the package set both distances to S, the width of the security zone.
-    Distances other than S correspond to other readings of the paper, which
-    docs/errata.md lists.
+    The laws in this package set ``begins_m`` and ``rest_m`` to S, the width of the
+    security zone. docs/errata.md lists other readings of the paper, in which these two
+    distances differ.
     """
 
     begins_m: float
@@ -28,7 +28,8 @@ class ContactNumbers(NamedTuple):
     """Distance at which the spring of a contact has no force, m."""
     fades: bool
     """Whether the damping is 0 at the distance ``begins_m`` and grows toward the
-    object."""
+    object.
+    """
 
 
 class Contact(NamedTuple):
@@ -50,14 +51,7 @@ class Contact(NamedTuple):
 
 
 def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
-    """Computes the constants of the contact force from the parameters of a law.
-
-    Args:
-        own: Parameters of the law.
-
-    Returns:
-        Constants of the contact force.
-    """
+    """Computes the constants of the contact force from the parameters of a law."""
     zone_m = own.security_zone_m
     return ContactNumbers(zone_m, zone_m, own.damping_fades)
 
@@ -66,9 +60,9 @@ def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
 def target_force(
     p_WP: Any, v_WP: Any, target: Any, stiffness: Any, damping: Any
 ) -> Any:
-    """Computes the force toward the target, U = -K (p - p_d) - D (v - v_d).
+    """Computes the force toward the target, -K (p - p_d) - D (v - v_d).
 
-    The force is eq. 2 of Engelbrecht 2021.
+    This force is eq. 2 of Engelbrecht 2021.
 
     Args:
         p_WP: Position p (x, y) of the control point P in the world frame W, m; floats
@@ -90,7 +84,7 @@ def target_force(
 
 @register_jitable
 def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
-    """Lists the contacts: the objects that are nearer to P than the limit ``begins_m``.
+    """Lists the objects within the distance ``numbers.begins_m`` of P.
 
     P is the control point of the robot.
 
@@ -125,11 +119,13 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
 def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
     """Computes the force of all contacts (Engelbrecht 2021, eq. 4 and 5).
 
-    The signs of the printed equations are corrected. Each contact has a spring and a
-    damper. The force V is the sum of K_e (S - d) n - D_e (v - v_j) over all contacts. S
-    - d is the compression of the spring. n is the unit vector from the object to the
+    Each contact has a spring and a damper. The force is the sum over all contacts of::
+
+        K_e (S - d) n - D_e (v - v_j)
+
+    S - d is the compression of the spring. n is the unit vector from the object to the
     control point P. v - v_j is the velocity of P relative to the object. If the damping
-    fades, a share of D_e acts.
+    fades, only a part of D_e acts. The paper prints other signs (docs/errata.md).
 
     Args:
         contacts: Result of ``contacts_of_objects``.
@@ -152,13 +148,11 @@ def contact_force(contacts: Any, stiffness: Any, damping: Any) -> Any:
 def step_is_blocked(objects: Any, step: Any, block_m: Any) -> Any:
     """Checks whether eq. 6 of Engelbrecht 2021 forbids a step of the control point P.
 
-    Eq. 6 allows a new position if its distance from every object is greater than
-    L_block. Otherwise the robot stays at its position.
-
-    This function also allows a step that ends within L_block but leads away from the
-    object. Without this exception, a robot within L_block could never leave. A robot
-    can come to rest within L_block, because it needs a distance to stop. At the speed
-    v, this distance is up to v (T + motor lag), where T is the control period.
+    Eq. 6 forbids a step that ends within the distance L_block of an object. This
+    function makes one exception: it allows a step that leads away from the object.
+    Otherwise a robot within L_block could never leave. A robot can get there, because
+    it needs a distance of up to v (T + motor lag) to stop from the speed v. T is the
+    control period.
 
     Args:
         objects: Vector of the port ``objects_W``, with the present positions.

@@ -60,13 +60,8 @@ def trajectory_numbers(
 ) -> TrajectoryNumbers:
     """Computes the constants of the step from the parameters.
 
-    Args:
-        own: Parameters of the law.
-        robot: Virtual mass, top speed, and position of the control point P.
-        tick_s: Control period, s.
-
-    Returns:
-        Constants of the step.
+    ``own`` has the parameters of the law. ``robot`` has the virtual mass, the top
+    speed, and the position of the control point P. ``tick_s`` is the control period, s.
     """
     return TrajectoryNumbers(
         (own.stiffness_n_m, own.damping_n_s_m, own.contact_stiffness_n_m),
@@ -127,22 +122,30 @@ def TrajectoryImpedanceController_(T):
     class Impl(Block_[T]):
         """Pulls P to a moving target and pushes it away from robots and obstacles.
 
-        P is the control point of the robot. The law is M p'' = -K (p - p_d) - D (v -
-        v_d) + V. p and v are the position and velocity of P. p_d and v_d are the
-        position and velocity of the target. V is the force of all contacts.
+        P is the control point of the robot. The law is::
 
-        A contact is an object j whose distance d from P is below S. The force V is the
-        sum of K_e (S - d) n - D_e (v - v_j) over all contacts. n is the unit vector
-        from object j to P, and v_j is the velocity of the object.
+            M p'' = -K (p - p_d) - D (v - v_d) + V
 
-        If ``adapts`` is true, there is an input port ``impedance``. The values K, D,
-        and K_e of this port replace the values of the parameters. The outputs are
-        functions of the present input. There is no state and no latency.
+        p and v are the position and velocity of P. p_d and v_d are those of the target.
+        M is the virtual mass. K and D are the stiffness and damping toward the target.
+        V is the force of all contacts.
 
-        ``block_distance_m`` switches eq. 6 on. Eq. 6 applies if two conditions hold.
-        The next step would end within this distance of an object. The step would not
-        lead away from the object. In this case the acceleration is -v/T, which stops
-        the virtual mass within one control period T.
+        A contact is an object j whose distance d from P is below S, the width of the
+        security zone. The force V is the sum over all contacts of::
+
+            K_e (S - d) n - D_e (v - v_j)
+
+        K_e and D_e are the stiffness and damping of contacts. n is the unit vector from
+        object j to P, and v_j is the velocity of the object.
+
+        If ``block_distance_m`` is set, the block also obeys eq. 6: a step must not end
+        within this distance of an object, except if it leads away from the object.
+        Before such a step, the acceleration is -v/T, which stops the virtual mass
+        within one control period T.
+
+        If ``adapts`` is true, the block reads K, D, and K_e from the input port
+        ``impedance`` instead of the parameters. The outputs depend only on the present
+        input. There is no state and no latency.
 
         At most eight objects count. The sampled loop is unstable if the sum of D_e over
         all contacts exceeds 2M/T (80 N s/m for 1 kg). Therefore another block first

@@ -1,19 +1,20 @@
-"""docs/your_law.md is true: a sensor and a block are a file each."""
+"""docs/extending.md is true: a sensor and a block are a file each."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
+from typing import Literal
 
+import numpy as np
 import pytest
 
 from diagrams import RunResult, build_sound_follower, load_scenario, simulate
 from diagrams.scenario.own_code import own_files
+from docs.building.page_code import page_file
 from systems.framework.input_error import InputError
 
 pytestmark = pytest.mark.drake
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "your_law.md"
 #: A source that is nearer than the follow distance, and a box behind the robot.
 PUSHED_BACK = [
     "hearing=ideal",
@@ -35,21 +36,15 @@ class Mine(Block):
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The page's files, in the working directory."""
-    codes = re.findall(r"(?ms)^```python\n(.*?)^```$", PAGE.read_text("utf-8"))
-    for name, content in (
-        ("rear_sonar.py", "class RearSonar"),
-        ("careful_command.py", "class CarefulCommand"),
-    ):
-        (code,) = (code for code in codes if content in code)
-        (tmp_path / name).write_text(code)
+    for name in ("rear_sonar.py", "careful_command.py"):
+        (tmp_path / name).write_text(page_file("extending.md", name), "utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def run(*blocks: str) -> RunResult:
-    return simulate(
-        load_scenario("default", [*PUSHED_BACK, f"blocks=[{', '.join(blocks)}]"])
-    )
+def run(*blocks: str, engine: Literal["drake", "compiled"] = "drake") -> RunResult:
+    settings = [*PUSHED_BACK, f"blocks=[{', '.join(blocks)}]"]
+    return simulate(load_scenario("default", settings), engine=engine)
 
 
 def test_the_pages_sensor_is_logged_and_changes_nothing(folder):
@@ -70,6 +65,26 @@ def test_the_pages_block_stands_in_the_place_of_ours(folder):
     follower = build_sound_follower(result.full_scenario)
     assert follower.blocks["command"].get_name() == "careful_command"
     assert not follower.robots["robot"].diagram.HasSubsystemNamed("wheel_command")
+
+
+def test_the_pages_sensor_measures_every_second_tick(folder):
+    """The robot moves back, so each measured range is new."""
+    assert folder
+    ranges = run("rear_sonar.py:RearSonar").columns["rear_range"][20:60]
+    assert (ranges[1::2] == ranges[::2]).all()
+    assert (ranges[2::2] != ranges[:-2:2]).all()
+
+
+@pytest.mark.slow
+def test_the_pages_blocks_run_in_both_engines(folder):
+    assert folder
+    blocks = "rear_sonar.py:RearSonar", "careful_command.py:CarefulCommand"
+    drake, compiled = run(*blocks), run(*blocks, engine="compiled")
+    assert compiled.engine == "compiled"
+    for column in ("rear_range", "wheel_speed_left", "p_WB_x"):
+        np.testing.assert_allclose(
+            compiled.columns[column], drake.columns[column], atol=1e-9
+        )
 
 
 def test_a_sweep_knows_the_files_of_blocks(folder):

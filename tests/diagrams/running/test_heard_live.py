@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import LeafSystem
 
-from analysis.arrays.voting.source_listener_block import SourceListener
 from analysis.listening.live_hearing import HeardStep, LiveHearing, listen
 from analysis.listening.sound_pipe import open_pipe
 from analysis.recordings.array_geometry import load_geometry
@@ -21,6 +20,7 @@ from diagrams import (
     make_simulator,
     simulate,
 )
+from docs.building.page_code import page_file
 
 SECONDS = 1.5
 # The robot is all but at rest, and has the source to its left.
@@ -28,26 +28,21 @@ OVERRIDES = (
     f"duration_s={SECONDS}",
     "start.heading_deg=-25",
     "robot.top_speed_m_s=0.02",
-    f"blocks=[{__name__}:Listener]",
 )
 
 
-class Listener(SourceListener):
-    """As docs/your_law.md has it."""
-
-    def __init__(self, scenario):
-        super().__init__(
-            robot=scenario.only.robot,
-            sound_speed_m_s=scenario.sound_speed_m_s,
-            microphones=scenario.follower.microphones,
-        )
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    """The robot has the listener of docs/recordings.md."""
+    file = tmp_path_factory.mktemp("block") / "talkers.py"
+    file.write_text(page_file("recordings.md", "talkers.py"), "utf-8")
+    return load_scenario("obstacle_free", [*OVERRIDES, f"blocks=[{file}:Talkers]"])
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def run(scenario, tmp_path_factory):
     """The files' directory, and the run's trajectory."""
     folder = tmp_path_factory.mktemp("run") / "ears"
-    scenario = load_scenario("obstacle_free", OVERRIDES)
     with RunAudio(scenario, folder) as audio:
         result = simulate(scenario, audio=audio)
     return folder, result.trajectory
@@ -84,9 +79,9 @@ def test_the_file_has_the_source_where_it_is(run):
     assert math.degrees(track.bearing) == pytest.approx(true, abs=1.5)
 
 
-def test_the_block_in_the_diagram_tells_what_listen_tells_of_the_file(run):
+def test_the_block_in_the_diagram_tells_what_listen_tells_of_the_file(run, scenario):
     folder, _ = run
-    follower = build_sound_follower(load_scenario("obstacle_free", OVERRIDES))
+    follower = build_sound_follower(scenario)
     simulator = make_simulator(follower)
     block: LeafSystem = follower.blocks["listener"]
     context = block.GetMyContextFromRoot(simulator.get_context())

@@ -280,7 +280,7 @@ def test_echoes_are_remembered_until_the_noise_is_louder():
     frame = np.random.default_rng(0).standard_normal((3, N)).astype(np.float32)
     memory = HearingMemory(3.0 * N, 0.15 * N)
     least = localiser._sizes.least(localiser._noise_density(memory))
-    echoes = np.full(localiser.echo_shape, 1e3 * least, dtype=np.float32)
+    echoes = np.full(localiser.full().echoes.shape, 1e3 * least, dtype=np.float32)
     memory, frames = memory._replace(echoes=echoes), 0
     while memory.echoes is not None:
         _, memory = localiser.localise(np.float32(0.9) * frame, memory)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -15,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from docs.building.page_code import page_file
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -75,14 +76,6 @@ print(json.dumps({
 """
 
 
-def page_code() -> str:
-    """The file that the page shows."""
-    page = (ROOT / "docs/your_law.md").read_text("utf-8")
-    codes = re.findall(r"(?ms)^```python\n(.*?)^```$", page)
-    (code,) = (code for code in codes if "GAUSSIAN" in code)
-    return code
-
-
 def add_law(tree: Path) -> None:
     """Ours by links, but for the room of the laws: that is a copy with one more."""
     tree.mkdir()
@@ -98,7 +91,8 @@ def add_law(tree: Path) -> None:
     shutil.copytree(
         ROOT / "systems/laws", laws, ignore=shutil.ignore_patterns("__pycache__")
     )
-    (laws / "gaussian.py").write_text(page_code(), "utf-8")
+    code = page_file("your_law.md", "gaussian.py")
+    (laws / "gaussian.py").write_text(code, "utf-8")
     listed = (laws / "catalogue.py").read_text("utf-8")
     for before, added in (
         (
