@@ -20,7 +20,7 @@ from analysis.certificates.energy_certificate import EnergyCertificate
 from analysis.models.diagram_state import set_discrete_state
 from analysis.models.ideal_scenarios import frozen_scenario, require_rolling
 from analysis.reporting.intervals import Estimate, estimate_rate
-from analysis.views.scene import touching_point
+from analysis.runs.contact import touching_point
 from diagrams import (
     Scenario,
     SoundFollower,
