@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.design.requirements import REQUIRED
 from analysis.linear.linear_plots import plot_equilibria, plot_step
 from analysis.linear.step_response import Oscillation, StepCheck, check_step
 from analysis.models.equilibria import EquilibriumSearch, find_equilibria
@@ -337,7 +338,7 @@ OPERATING_POINTS = Part[OperatingPoints](
             lambda data: data.at.eigenvalues.real.max(),
         ),
         Criterion(
-            "damping ratio at rest", "", "at least", 0.4,
+            "damping ratio at rest", "", "at least", REQUIRED.damping_ratio,
             "overshoots are small",
             "it overshoots and swings for several cycles",
             "usual: 0.4 to 0.8 (Astrom and Murray)",
@@ -351,7 +352,8 @@ OPERATING_POINTS = Part[OperatingPoints](
             lambda data: data.jams,
         ),
         Criterion(
-            "offset from the follow point at rest", "m", "at most", 0.1,
+            "offset from the follow point at rest", "m", "at most",
+            REQUIRED.rest_offset_m,
             "it rests at the follow distance",
             "obstacles, or the source's own body, push it off that distance",
             "set by this project",

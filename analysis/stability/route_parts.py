@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from analysis.design.requirements import REQUIRED
 from analysis.linear.loop_margins import LoopMargins
 from analysis.reporting.criterion import Criterion, Reading
 from analysis.reporting.plain_values import pick
@@ -143,21 +144,21 @@ FROZEN_GAINS = Part[Sequence[FrozenPoint]](
             lambda data: min(point.model.damping_ratio for point in data),
         ),
         Criterion(
-            "least phase margin", "deg", "at least", 45.0,
+            "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
             "the loop tolerates the usual extra phase lag or lead",
             "a small extra phase makes the loop oscillate",
             "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
             _worst(min, lambda margins: margins.phase_margin_deg),
         ),
         Criterion(
-            "least gain margin", "dB", "at least", 6.0,
+            "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
             "gains may double, or fall to half",
             "a gain that is off by less than a factor of two makes it unstable",
             "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
             _worst(min, lambda margins: margins.gain_margin_db),
         ),
         Criterion(
-            "largest sensitivity peak", "", "at most", 2.0,
+            "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
             "disturbances are hardly amplified",
             "disturbances near the crossover are amplified more than twice",
             "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",

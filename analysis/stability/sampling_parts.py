@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.design.requirements import REQUIRED
 from analysis.laws.radial_law import radial_law
 from analysis.linear.burst_cycle import (
     HOLDS,
@@ -177,7 +178,7 @@ DELAY_MARGINS = Part[SampledLoop](
     _show_sampled,
     criteria=(
         Criterion(
-            "least delay margin", "s", "at least", 0.1,
+            "least delay margin", "s", "at least", REQUIRED.delay_margin_s,
             "it tolerates more added delay than the threshold",
             "less added delay than the threshold makes it oscillate",
             "set by this project; exact margin of the sampled loop",
