@@ -49,7 +49,7 @@ def _gradient(
 def _changed(block: str, **fields: Any) -> dict[str, Any]:
     """The conventional law, whose block ``printed_impedance`` replaces."""
     blocks = [f"studies.support.printed_impedance:{block}"]
-    return {**_gains(_CONVENTIONAL, **fields), "blocks": blocks}
+    return {"law": _CONVENTIONAL, "impedance": fields, "blocks": blocks}
 
 
 #: Settings by what the tables call them. Each that adapts names lambda, the weight of
@@ -294,7 +294,11 @@ def blind_table(runs: int) -> Table:
 def block_settings(law: str, name: str) -> dict[str, Any]:
     """Fields of a law with eq. 6 as one of ``BLOCKS`` sets it."""
     block_m, replans = BLOCKS[name]
-    return {**_gains(law, block_distance_m=block_m), "route.replan": replans}
+    return {
+        "law": law,
+        "impedance": {"block_distance_m": block_m},
+        "route.replan": replans,
+    }
 
 
 def block_table(runs: int, scenarios: Sequence[str] = SCENARIOS[:2]) -> Table:

@@ -406,7 +406,7 @@ def _sounding(result: RunResult) -> NDArray[np.bool_]:
     if scenario.follower.hearing == "audio":
         # The distance is that at the end of the frame, which is half a frame too late.
         travel = result.columns["source_range_true"] / scenario.sound_speed_m_s
-    elif not scenario.follower.ideal_hearing.burst_gaps:
+    elif scenario.follower.hearing == "ideal_always":
         return np.ones(len(time), dtype=bool)
     middle = 0.5 * scenario.follower.microphones.frame_s
     sounds: NDArray[np.bool_] = scenario.source.sound.sounds(time - middle - travel)

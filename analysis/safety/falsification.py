@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from analysis.safety.driver_trials import (
-    BUBBLE_M,
     USUAL,
     Trial,
     draw_trial,
@@ -27,6 +26,7 @@ from analysis.safety.driver_trials import (
     run_trial,
 )
 from analysis.safety.job_pool import run_jobs
+from systems.safety.parameters import START_BUBBLE_M
 
 # Number of trials per job. A multiple of this has the same setting of the robot.
 _CHUNK = 50
@@ -106,7 +106,7 @@ def by_search(runs: int, seed: int) -> list[Found]:
         One result per run.
     """
     bounds = [(-math.pi, math.pi)]
-    bounds += [(-math.pi, math.pi), (BUBBLE_M + 0.012, 2.5)] * _POSTS
+    bounds += [(-math.pi, math.pi), (START_BUBBLE_M + 0.012, 2.5)] * _POSTS
     bounds += [(0.5, 5.0), (-0.72, 0.72), (-3.0, 3.0)] * _COMMANDS
     found: list[Found] = []
 

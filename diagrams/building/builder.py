@@ -142,10 +142,10 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
 
 
 def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
-    """Returns the sounds of a scenario if a robot hears them as waves.
+    """Returns the sounds of a scenario, provided that a robot hears sound as waves.
 
     The result has the sound of each source and loudspeaker, by name of the source or
-    robot. It is empty if all robots have ideal hearing.
+    robot. It is empty if no robot hears sound as waves.
     """
     listens = any(robot.listens for robot in scenario.robots.values())
     return scenario.sounds() if listens else {}

@@ -44,8 +44,9 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
       port in the diagram. It has exactly one of the output ports that ``make_command``
       accepts. Its constructor can take any of the arguments ``robot``, ``attraction``,
       ``laws``, ``gains``, ``velocity_term``, ``sensors``, ``tick_s``, ``guard``,
-      ``bodies`` and ``seed``. If the class derives from the block of a law of the
-      package, ``gains`` are the gains of that law.
+      ``bodies`` and ``seed``. Only a robot that follows a sound has ``attraction``,
+      ``velocity_term`` and ``guard``. If the class derives from the block of a law of
+      the package, ``gains`` are the gains of that law.
 
     Args:
         scenario: Scenario with the law and the parameters of its block.
@@ -91,7 +92,9 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         return _radial(LAWS[name], parts)
     law = import_own(name, "law")
     if inspect.isclass(law):
-        gains = _gains_of_base(law, robot.laws)
+        gains = robot.gains
+        if isinstance(robot, Follower):
+            gains = _gains_of_base(law, robot.laws)
         return _own_block(name, law, {**parts, "laws": robot.laws, "gains": gains})
     function = checked_law(name, law)
     reach, top_speed = robot.ultrasonic.maximum_range_m, robot.robot.top_speed_m_s
@@ -161,7 +164,8 @@ def commanded(controller: Any, name: str = "") -> str:
     """Returns the name of the output port that carries the commands of a controller.
 
     ``make_command`` lists the possible ports. If the controller has none or several of
-    them, the function raises an ``InputError`` that states the law ``name``.
+    them, the function raises an ``InputError``, whose message contains the law's name
+    ``name``.
     """
     name = name or controller.get_name()
     sizes = _output_sizes(controller)

@@ -23,7 +23,8 @@ def with_own_blocks(
         blocks: Blocks of the package, by part.
         names: Names of the user's blocks, as ``package.module:Name`` or
             ``path/to/file.py:Name``.
-        parts: Values for the arguments of the user's blocks, by name of the argument.
+        parts: Values of the arguments that the constructor of a user's block can take,
+            by name of the argument.
 
     Returns:
         A new mapping of blocks by part.

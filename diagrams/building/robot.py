@@ -116,8 +116,8 @@ def block_seed(seed: int, name: str) -> int:
 def seed_of(scenario: Scenario, block: str, owner: str) -> int:
     """Returns the random seed of a block that belongs to a robot or source.
 
-    The seed depends on the names of the block and of its owner. The default names
-    ``robot`` and ``source`` of owners do not affect the seed.
+    The seed depends on the names of the block and of its owner. An owner with the
+    default name ``robot`` or ``source`` does not affect the seed.
 
     Args:
         scenario: Scenario with the seed of the run.
@@ -186,7 +186,6 @@ def robot_blocks(
         ),
         WheelOdometry(
             robot=robot.robot,
-            odometry=robot.odometry,
             faults=robot.faults,
             plant=robot.plant,
             initial_pose=robot.start.pose,
@@ -222,11 +221,12 @@ def make_robot(
     """Builds the diagram of a robot.
 
     The fields ``hearing`` and ``obstacle_sensing`` select simulated or ideal sensors.
-    Both kinds of blocks have the same ports. If both fields are ``ideal`` and
-    ``odometry.rounding`` is off, Drake can convert the diagram to AutoDiffXd. Each
-    input of a block connects to the only output with the same name (see docs/model.md).
+    Both kinds of blocks have the same ports. If both are ideal and
+    ``plant.pulses_per_revolution`` is null, Drake can convert the diagram to
+    AutoDiffXd. Each input of a block connects to the only output with the same name
+    (see docs/model.md).
 
-    The diagram has those of the following inputs that the blocks need:
+    The diagram has each of the following inputs only if one of its blocks needs it:
 
     - ``pose_WS`` and ``emission`` of the target
     - ``poses_WO`` and ``sizes`` of the other bodies
@@ -450,8 +450,9 @@ def connect_by_name(
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:
     """Returns the names of the columns of a block's output ports, by port.
 
-    A user's block without the attribute ``columns`` has the columns ``LAW_COLUMNS``,
-    for ports with the right number of elements.
+    A user's block without the attribute ``columns`` has the columns ``LAW_COLUMNS``.
+    The result omits ports whose number of elements differs from the number of their
+    columns.
     """
     columns = getattr(block, "columns", None) or LAW_COLUMNS
     ports = {

@@ -128,9 +128,10 @@ class Referee:
     def collision(self, name: str) -> Collision | None:
         """Returns the collision of a robot and who is at fault, or None.
 
-        The method compares two motions since the last tick (control period): that of
-        the robot alone, and that of the body alone. The robot is at fault if its motion
-        brings the two at least as near to each other as the body's motion does.
+        The method considers two motions since the last tick (control period): that of
+        the robot while the body that it hit stays in place, and that of this body while
+        the robot stays in place. The robot is at fault if its motion brings the two at
+        least as near to each other as the body's motion does.
         """
         state, tick_s = self.steps[name].state, self.scenario.tick_s
         body, part, tick = state.contact.tolist()
@@ -183,11 +184,12 @@ def _numbers_of(scenario: Scenario, name: str) -> RefereeNumbers:
 def _table_of(
     bodies: Mapping[str, Body], own: Scenario, robots: list[str], *, touchable: int
 ) -> BodyTable:
-    """Tabulates the poses and sizes of bodies that a robot could touch.
+    """Tabulates the poses and sizes of the bodies around a robot.
 
-    Only the first ``touchable`` bodies can be touched. Each tick (control period) is
-    divided into equal parts, and contacts are checked at the end of each part. For a
-    fast body there are more parts, so that it moves at most ``_PART_M`` per part.
+    The robot can touch only the first ``touchable`` of the bodies; a goal may follow.
+    Each tick (control period) is divided into equal parts. The table has the pose of
+    each body on a known path at the end of each part. The number of parts is so large
+    that no such body moves more than ``_PART_M`` per part.
     """
     ticks = int(own.duration_s / own.tick_s + 1e-9)
     times: NDArray[np.float64] = own.tick_s * np.arange(ticks + 1.0)
@@ -230,7 +232,7 @@ def _table_of(
 
 
 def _instants(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
-    """Returns the instants at which contacts are checked, including the ticks.
+    """Returns the instants at which poses are tabulated, including the ticks.
 
     Args:
         times: (n + 1,) times of the ticks (control periods), s.

@@ -147,7 +147,7 @@ def judge_tick(
 
     ``state`` contains the start time of each condition that must last for some time. It
     also contains two counts: the ticks since the first detection of the target, and the
-    ticks among them in which the control point P follows the target.
+    number of these ticks in which the control point P follows the target.
     ``Referee.cause_of`` uses both counts if the run reaches its time limit.
 
     Args:
@@ -256,7 +256,7 @@ class BodyTable(NamedTuple):
     robots: NDArray[np.int64]
     """(n,) number of the robot if the body is a robot; otherwise -1."""
     parts: int
-    """Number of equal parts of a tick. Contacts are checked at the end of each part."""
+    """Number of equal parts of a tick. Poses are known at the end of each part."""
     rows: NDArray[np.int64]
     """(n, 2) two numbers for each body: the row in ``poses`` of the first tick, and the
     number of rows per tick (0 for a body at rest).
@@ -373,8 +373,9 @@ def _first_touched(
     """Returns the first body that a robot has touched in the last control period.
 
     The function skips bodies that are too far away. For the other bodies,
-    ``first_overlap`` checks several instants within the period. The poses of robots at
-    these instants are interpolated. The poses of all other bodies are known in advance.
+    ``first_overlap`` gets the poses at several instants within the period, and also
+    finds contacts between these instants. The poses of other robots are interpolated.
+    The poses of all other bodies are known in advance.
 
     Returns:
         Number of the body (-1 for none), and elapsed part of the period (0 to 1).
@@ -413,8 +414,8 @@ def run_is_over(found: Any) -> bool:
 
     The cause of a robot is the reason why its run ends. The run of all robots ends when
     every robot has a cause, or when one robot collides or diverges. A robot with any
-    other cause keeps moving until then. ``found`` is (robots,) index of the cause of
-    each robot in ``FOUND``, 0 without a cause.
+    other cause keeps moving until then. ``found`` has, for each robot, the index of its
+    cause in ``FOUND``, or 0 if the robot has no cause.
     """
     everyone = True
     for k in range(len(found)):

@@ -169,10 +169,10 @@ def loaded_digests(scenario: Scenario) -> dict[str, str]:
 
 @contextmanager
 def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[None]:
-    """Makes a scenario run with the user's code from the start of a sweep.
+    """Ensures that a scenario runs with the user's code from the start of a sweep.
 
-    A sweep is a series of runs. Within this context, Python does not load changed files
-    again if all loaded code is the code from the start of the sweep.
+    A sweep is a series of runs. Within the context, a changed file is not loaded again
+    if all loaded code is from the start of the sweep.
 
     Args:
         scenario: The scenario to run.

@@ -1,7 +1,8 @@
 """Defines the scenario: all that a run depends on, in one tree of fields.
 
-The tree consists of the parameter models of the blocks. Each quantity therefore has one
-name, one default and one permitted range. ``load_scenario`` reads a scenario from YAML.
+The tree consists of the parameter classes of the blocks. Each quantity therefore has
+one name, one default and one permitted range. ``load_scenario`` reads a scenario from
+YAML.
 """
 
 from __future__ import annotations
@@ -302,8 +303,8 @@ class Scenario(RunParameters):
                 at its start.
 
         Returns:
-            The bodies by name, and the target. If the target has a body, it is the last
-            one.
+            The bodies by name, and the target. If the target has a body, this body is
+            the last one.
         """
         robot = robot or next(iter(self.robots))
         target, paths = self.target(robot), paths or {}

@@ -87,8 +87,9 @@ def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
     """Sets fields in a tree of plain values.
 
     Some groups have a field ``preset``, which selects defaults for the group. The
-    function sets presets first, so that all other fields override them. A new preset
-    clears the group if the group already has one. The function creates missing groups.
+    function sets presets first, so that all other fields override them. If a group
+    already has a preset, a new preset first clears this group. The function creates
+    missing groups.
 
     Args:
         data: Fields of a scenario, changed in place.

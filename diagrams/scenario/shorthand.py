@@ -32,8 +32,8 @@ def begins_anew(changes: Mapping[str, Any]) -> bool:
     """Returns whether changes to a group of fields select a preset for this group.
 
     A preset selects defaults for a group, and clears its other fields. The result is
-    true if the value of ``preset`` is a text. If it is a mapping, ``preset`` is the
-    name of a robot or source.
+    true if the value of ``preset`` is a text. If the value is a mapping, then
+    ``preset`` is only the name of a robot or source.
     """
     return isinstance(changes.get("preset"), str)
 
@@ -121,8 +121,8 @@ def _robots(
 ) -> dict[str, Any]:
     """Applies fields at the top level of a file to the robots that have these fields.
 
-    A field that no robot has goes to all robots, so that the validation reports an
-    error.
+    If none of the robots has a field, the function adds it to all robots, so that the
+    validation reports an error.
     """
     kinds = {
         name: own.kind if isinstance(own, Robot) else kind_of({**shared, **_group(own)})
@@ -323,8 +323,8 @@ def _hoisted(
 def _common(trees: Sequence[Mapping[str, Any]], depth: int = 0) -> dict[str, Any]:
     """Returns the values that are equal in all trees of fields.
 
-    At the top level, a tree without a field does not count, because robots of other
-    kinds lack this field. Groups with different presets have nothing in common.
+    At the top level, a value may be missing in some of the trees, because robots of
+    other kinds lack this field. Groups with different presets have nothing in common.
     """
     found: dict[str, Any] = {}
     for key in dict.fromkeys(key for tree in trees for key in tree):

@@ -260,8 +260,8 @@ def advance(
         h: Length of the step, s.
         commanded: (2,) commanded left and right wheel speed, rad/s.
         derivatives: Function ``derivatives(state, commanded, *of_plant)``.
-        of_plant: The constants ``PlantNumbers``. With friction, ``GripNumbers``
-            follows.
+        of_plant: Last arguments of ``derivatives``: the fields of ``PlantNumbers`` and,
+            with friction, ``GripNumbers``.
     """
     size = len(state)
     slopes, reached = np.empty((6, size)), np.copy(state)

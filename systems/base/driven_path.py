@@ -31,9 +31,9 @@ class DrivenPath:
     pose is a cubic Hermite polynomial. This polynomial differs from the exact motion by
     at most 1 um and 10 urad.
 
-    In the scenarios of the library, the robot stays within 2 mm of its plan. At 0.7
-    m/s, it stays within 4 cm of the arcs of corners. It stops within 5 mm of the last
-    waypoint.
+    In the scenarios of the library, the robot stays within 2 mm of its plan. If it
+    turns corners at 0.7 m/s, it stays within 2 cm of its plan. It stops within 5 mm of
+    the last waypoint.
 
     Args:
         plan: Planned path.

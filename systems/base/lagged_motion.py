@@ -50,8 +50,9 @@ class LaggedMotion(NamedTuple):
 def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
     """Computes the constants of ``LaggedMotion`` for a duration and a motor lag in s.
 
-    The quadrature divides the period into panels that are no longer than the motor lag.
-    This keeps its error below 1e-10 of the path length.
+    The constants include the nodes of the quadrature in ``advance_pose``. The
+    quadrature divides the period into panels that are no longer than the motor lag. Its
+    error is therefore below 1e-10 of the path length.
     """
     panels = math.ceil(max(duration_s / lag_s, duration_s / _LONGEST_PANEL_S) - 1e-9)
     at, weight = np.polynomial.legendre.leggauss(_NODES)

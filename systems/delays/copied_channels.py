@@ -82,7 +82,7 @@ def frame_repeats(
     sound.
 
     Args:
-        frame: (n, samples) channels; integers are counts.
+        frame: (n, samples) channels. Integers are counts of the converter.
         pairs: (p, 2) channels to compare.
         later: (n - 1,) delays of the channels 1 ... n - 1 relative to channel 0,
             samples.
@@ -90,8 +90,8 @@ def frame_repeats(
             must be False if the two microphones may record the same signal at the same
             time.
         noisy: Whether the frames contain noise. Without noise, a sound that arrives
-            later by whole samples looks like a copy. Pairs are then compared only at
-            lag 0.
+            later by whole samples looks like a copy, so the function compares pairs
+            only at lag 0.
 
     Returns:
         True if at least one pair contains a copy.
@@ -222,8 +222,8 @@ def _difference(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Computes how much the second channel differs from the first channel.
 
-    The function returns the variances of the difference that remains after the best
-    gain, of the second channel, and of the first channel.
+    The function returns three variances: that of the difference that remains after the
+    best gain, that of the second channel, and that of the first channel.
     """
     begin, end = max(0, lag), min(second.size, second.size + lag)
     count = end - begin

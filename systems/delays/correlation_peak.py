@@ -35,8 +35,9 @@ def _turned(
     """Multiplies a cross-spectrum (n,) by exp(j w t), where w is the angular frequency.
 
     The function writes the real part and the imaginary part of the product to ``real``
-    and ``imaginary``. It evaluates sines and cosines only for bins whose number is a
-    power of two. For the other bins, it computes them by the addition theorems.
+    and ``imaginary``. It evaluates sines and cosines only for the first bin, and for
+    steps of 1, 2, 4, 8 ... bins. The addition theorems give the values of the other
+    bins.
     """
     bins = cross.size
     cosine, sine = np.empty(bins), np.empty(bins)
@@ -171,8 +172,8 @@ def _arrival_variances(
            sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2.
 
        The sums are over the bins, with the angular frequency w, the weight W, and s =
-       sqrt(s_i s_j). For equal weights and much signal, this variance is the bound of
-       Knapp and Carter (1976).
+       sqrt(s_i s_j). For equal weights and a high signal-to-noise ratio, this variance
+       is the bound of Knapp and Carter (1976).
     3. Each channel gets the part of this variance that its noise causes.
     """
     channels = energy.size
@@ -234,7 +235,7 @@ def measure_peaks(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], float, float, float, float, float
 ]:  # pragma: no cover  (compiled)
-    """Computes the fields of ``Peaks``. If a pair has no peak, the correlation is 0.
+    """Computes the fields of ``Peaks``. If a pair has no peak, ``correlation`` is 0.
 
     Args:
         cross: (p, bins) cross-spectra of the pairs, units of the audio frame squared.
@@ -242,8 +243,9 @@ def measure_peaks(
         energy: (n,) energies of the channels, units of the audio frame squared.
         arrivals: (n,) times of arrival to start from, relative to channel 0, samples.
         tables: Pairs of channels and their matrices, see ``PairTables``.
-        sizes: Three numbers: first bin; length of the transform, samples; and length of
-            the cut channels without the loss at their soft edges, samples.
+        sizes: Three numbers: first bin; length of the transform, samples; and effective
+            length of the cut channels, samples. Their soft edges reduce the effective
+            length.
         newton: Whether to refine the delays between samples by Newton's method.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Detects a sound in a frame of audio, and finds first values of its delays.
+"""Detects a sound in a frame of audio, and makes initial estimates of its delays.
 
 The noises of different channels are independent, whatever their spectra. The
 correlation of two noise channels at a lag therefore has a Gaussian distribution, whose
@@ -205,7 +205,7 @@ def _judge(
 
     For each edge (pair of channels), the highest peak of the correlation gives the lag.
     The edges form a tree, and the sums of the lags along the tree give the arrivals.
-    The heights of the peaks relative to the noise give the chance.
+    The heights of the peaks relative to the noise give ``chance`` and ``weakest``.
 
     Args:
         cross: (e, grid // 2 + 1) cross-spectra of the edges.
@@ -325,8 +325,8 @@ def search_delays(
             correlation.
 
     Returns:
-        First values of the times of arrival, and measures of their reliability. None if
-        a channel is silent.
+        Initial estimates of the times of arrival, and measures of their reliability.
+        None if a channel is silent.
     """
     size = plan.grid // 2 + 1
     cross, moments, energy = _cross_spectra(spectra, plan.edges, band.start, size)

@@ -131,8 +131,8 @@ def keep_first_wave_front(
         frame: (n, samples) channels, any unit.
         memory: (n, bins) memory of past power after the last frame; None after silence.
         sizes: Sizes of window and memory.
-        noise_density: Mean square per sample of white noise that is as loud as the
-            noise of the frame, units of the frame squared; 0 if it is unknown.
+        noise_density: Mean square of the samples of white noise that is as loud as the
+            noise in the frame, units of the frame squared; 0 if it is unknown.
 
     Returns:
         Three values: the (n, samples) weighted and whitened channels; the new memory;

@@ -19,9 +19,10 @@ from systems.framework.compiling import njit
 def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
     """Returns the number of rows to transform for a number of channels.
 
-    The library rocket_fft transforms rows of single precision four at a time. It
-    transforms three remaining rows one by one. In this case, a fourth row of zeros
-    saves a third of the time, so the result is the number of channels plus 1.
+    The library rocket_fft transforms rows of single precision four at a time. If three
+    rows remain, it transforms them one by one. A fourth row of zeros then saves a third
+    of the time, so the result is the number of channels plus 1. In all other cases, the
+    result is the number of channels.
     """
     return channels + (1 if channels % 4 == 3 else 0)
 

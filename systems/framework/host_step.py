@@ -39,8 +39,9 @@ class HostCall:
 
     Args:
         function: The function, see ``HostFunction``.
-        inputs: Number of elements of all input ports. The function receives one array,
-            which contains the inputs and then the outputs.
+        inputs: Number of elements of all input ports. Compiled code passes one array.
+            Its first ``inputs`` elements are the inputs, and all others are the
+            outputs.
     """
 
     def __init__(self, function: HostFunction, inputs: int) -> None:
@@ -126,8 +127,8 @@ def host_step(
         function: The function, see ``HostFunction``.
         inputs: Number of elements of all input ports.
         outputs: Number of elements of all output ports. They change at the tick
-            (control period) after a call. With 0 outputs, the compiled simulation loop
-            calls the function before any step publishes its outputs.
+            (control period) after a call. Without outputs, the compiled simulation loop
+            calls the function early in a tick, before any block publishes new outputs.
         period_ticks: Time from call to call, ticks.
 
     Returns:

@@ -12,9 +12,9 @@ Newton's method maximizes this expression. Each step has two parts:
 2. The position that fits these delays (``systems.hearing.multilateration``) is the next
    position.
 
-If there are only as many delays as unknowns, the result is the maximum over all delays.
-With more microphones, the result is the maximum over the delays that belong to a
-position.
+If there are only as many delays as unknowns, the result maximizes the likelihood over
+all sets of delays. With more delays, it maximizes the likelihood over those sets that
+belong to a position.
 
 The gains are estimated as the principal component of the cross-spectra of the channels.
 If the microphones are alike, the gains are proportional to 1/R_m, where R_m is the

@@ -241,7 +241,7 @@ class _Memory(NamedTuple):
 
 
 class CrossPowerEstimator(FrameBlock):
-    """Estimates where the source is while the robot searches, rests and listens.
+    """Estimates where the source is whenever the searching robot rests and listens.
 
     The search block sets the input ``listening``, which requests noise, sound or
     nothing. While it requests noise or sound, the block sums cross-power spectra of

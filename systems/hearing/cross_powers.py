@@ -81,7 +81,7 @@ def gather_frame(
     before: NDArray[np.float64],
     now: NDArray[np.float64],
 ) -> CrossPowers:
-    """Adds the joined spectra of two successive frames to the sums.
+    """Joins two successive frames, and adds their powers and cross powers to the sums.
 
     ``before`` and ``now`` are the previous and the present frame, (channels, samples).
     """
@@ -105,8 +105,8 @@ def signal_powers(
     """Computes the cross powers of the sound alone, and which bins the sound occupies.
 
     The sound occupies a bin of a pair of channels if the cross power exceeds three
-    limits. The limits are shares of the power of both channels, of the power of the
-    noise, and of the cross power of the strongest bin.
+    limits. Each limit is a fixed share of one of these values: the power of the sound
+    in both channels, the power of the noise, or the cross power of the strongest bin.
 
     Args:
         facts: Sizes of audio frames and spectra.

@@ -10,8 +10,9 @@ This function is smooth even at infinite range (w = 0) and for w below 0. The de
 tau_m relative to microphone 0 satisfy c tau_m = g_m - g_0, where c is the speed of
 sound. The fit has two stages:
 
-1. A linear problem gives start values. The squared ranges are linear in the direction
-   and the inverse range from microphone 0 (Smith and Abel, 1987).
+1. Linear equations give start positions. Let the equations of the squared ranges be
+   divided by the range from microphone 0. They are then linear in the direction and the
+   inverse range from microphone 0 (Smith and Abel, 1987).
 2. Gauss-Newton steps in (u, w) on the whitened delays give the result. The coordinates
    of u depend on the array. For a row, and for a plane array in space, they are the
    components of u within the span of the array. For other arrays, they are rotations of
@@ -277,11 +278,11 @@ def _within(
 def _descend(
     problem: DelayProblem, u: NDArray[np.float64], w: float, bound: Any, far: Any
 ) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
-    """Minimizes the squared residuals by Gauss-Newton steps with Marquardt damping.
+    """Minimizes the sum of squared residuals by damped Gauss-Newton steps (Marquardt).
 
-    If a step does not increase the cost, the function accepts the step and decreases
-    the damping. Otherwise it discards the step and increases the damping. The steps end
-    when the largest change is below ``_SETTLED``.
+    If a step does not increase the sum, the function accepts the step and decreases the
+    damping. Otherwise it discards the step and increases the damping. The steps end
+    when no coordinate changes by more than ``_SETTLED``.
 
     Args:
         problem: Delays and array.
@@ -372,20 +373,21 @@ def _starts(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], int
 ]:  # pragma: no cover  (compiled)
-    """Computes positions to start from, by linear equations relative to microphone 0.
+    """Computes the start positions of the fit by linear equations.
 
-    Let v be the components of the direction within the span of the array, and w the
-    inverse range. For each other microphone b, let q = p_b - p_0 be its relative
-    position, and d its range difference. Its equation is
+    Let v be the components of the direction from microphone 0 within the span of the
+    array, and w the inverse range from there. Each other microphone b is at q = p_b -
+    p_0, seen from microphone 0, and has the range difference d. It gives the equation
 
         q . v - w (q^2 - d^2) / 2 = -d.
 
-    The first start is a plane wave (w = 0). If v must have unit length, v is a linear
-    function of w, and |v| = 1 gives up to two further starts. Otherwise, if there are
-    enough delays, least squares for v and w give one further start.
+    The first start position is a plane wave (w = 0). If v must have unit length, v is a
+    linear function of w, and |v| = 1 gives up to two more start positions. Otherwise,
+    if there are enough delays, least squares for v and w give one more.
 
     Returns:
-        (3, r) components v, (3,) inverse ranges, and the number of starts.
+        (3, r) components v, (3,) inverse ranges w, 1/m, and the number of start
+        positions. Each start position has one row. Further rows have no meaning.
     """
     d, root, p, span = problem.d, problem.root, problem.p, problem.span
     m, rank = d.size, span.shape[0]
@@ -455,9 +457,10 @@ def _search(
 ]:  # pragma: no cover  (compiled)
     """Finds the two positions that fit the delays best.
 
-    The function refines each start by ``_descend_within``. The plane wave comes last,
-    and is omitted if another start already fits. The results are (2, d) directions,
-    (2,) inverse ranges and (2,) chi-squares. The best position is first.
+    The function refines the start positions by ``_descend_within``. It refines the
+    plane wave last, and omits it if another position already fits. It returns (2, d)
+    directions, (2,) inverse ranges, 1/m, and (2,) chi-squares. The position that fits
+    best is first.
     """
     n, dim = problem.p.shape
     unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
@@ -493,8 +496,8 @@ def _covariance(
         problem: Delays and array.
         u: (d,) direction of the source.
         w: Inverse range of the source, 1/m.
-        prior: Inverse of the variance of w that is known without the delays, m^2; 0 if
-            nothing is known.
+        prior: Inverse of the variance of w that is assumed before the delays are known,
+            m^2; 0 for no assumption.
 
     Returns:
         Three values:
@@ -567,8 +570,8 @@ def fit_delays(
 
     Args:
         problem: Delays, and the array that measured them.
-        prior_w: Standard deviation of the inverse range if the delays give no range,
-            1/m.
+        prior_w: Assumed standard deviation of the inverse range if the delays give no
+            range, 1/m.
 
     Returns:
         Eight values, in this order:

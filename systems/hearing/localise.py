@@ -167,8 +167,8 @@ class Localiser:
         c: Speed of sound, m/s.
         sample_rate_hz: Sample rate of the frames, Hz.
         frame_samples: Samples per channel of a frame.
-        limited: Whether to reject estimates that are not reliable. Off: every estimate
-            counts, as in the papers.
+        limited: Whether to reject estimates that are not reliable. If not, every
+            estimate counts, as in the papers.
 
     Raises:
         InputError: The array cannot be used at this sample rate and band.
@@ -185,7 +185,8 @@ class Localiser:
         limited: bool = True,
     ) -> None:
         whole = parameters.method == "amdf" or frame_samples % 2 == 1
-        self._halved = not whole and parameters.high_hz <= PASSED * sample_rate_hz
+        low_hz, high_hz = parameters.limits_hz
+        self._halved = not whole and high_hz <= PASSED * sample_rate_hz
         self._sample_rate_hz = sample_rate_hz
         divisor = 2 if self._halved else 1
         plan = DelayPlan(
@@ -193,8 +194,8 @@ class Localiser:
             c=c,
             sample_rate_hz=sample_rate_hz / divisor,
             frame_samples=frame_samples // divisor,
-            low_hz=parameters.low_hz,
-            high_hz=parameters.high_hz,
+            low_hz=low_hz,
+            high_hz=high_hz,
         )
         self.plan = plan
         self.parameters = parameters
@@ -217,7 +218,7 @@ class Localiser:
         # For the setting "found", the band may be arbitrarily narrow, so the weakest
         # sound is unknown.
         self._weakest = 0.0
-        if parameters.band == "set":
+        if parameters.band_hz != "found":
             self._weakest = weakest_sound(plan, parameters.false_alarm_rate)
 
     def blank(self) -> HearingMemory:
@@ -325,7 +326,7 @@ class Localiser:
             heard,
             self.plan,
             self.parameters.method,
-            find_band=self.parameters.band == "found",
+            find_band=self.parameters.band_hz == "found",
         )
         if seen is None:
             return None, memory
@@ -430,9 +431,9 @@ class Localiser:
     ) -> bool:
         """Returns whether two channels of an audio frame repeat each other.
 
-        Without noise, microphones at equal distances from the source record equal
-        samples. If two microphones have equal distances from the centroid, the function
-        therefore does not compare their channels at lag 0 in frames without noise.
+        Two microphones at equal distances from the centroid have equal distances from a
+        source straight ahead. Without noise, they then record equal samples. In frames
+        without noise, the function therefore does not compare their channels at lag 0.
         """
         shape = self.plan.shape
         # A fix without range has the delays of a plane wave. They may differ from those
@@ -449,7 +450,7 @@ class Localiser:
             frame,
             self.plan,
             self.parameters.method,
-            find_band=self.parameters.band == "found",
+            find_band=self.parameters.band_hz == "found",
             seen=seen,
         )
 

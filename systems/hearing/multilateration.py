@@ -1,8 +1,8 @@
 """Locates a source from the delays at microphones in any arrangement.
 
-For three equally spaced microphones in a row, the module uses a closed form
-(``systems.hearing.near_field``). For all other arrays, it uses
-``systems.hearing.delay_fit``.
+For three equally spaced microphones in a level row, the module uses the closed-form
+solution of ``systems.hearing.near_field``. For all other arrays, it uses the iterative
+fit of ``systems.hearing.delay_fit``.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ def locate_source(
     If the range exceeds its standard deviation, the range is valid. Otherwise the
     direction is that of a source far away.
 
-    For arrays without a closed form, the error of this direction includes the effect of
-    the unknown range. The function then assumes a standard deviation of the inverse
-    range of 1 / (2 apertures).
+    If the iterative fit computes this direction, the error of the direction includes
+    the effect of the unknown range. The fit then assumes that the inverse range has the
+    standard deviation 1 / (2 a), where a is the aperture of the array.
 
     Args:
         tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s. t_k is the time of

@@ -10,7 +10,8 @@ is the speed of sound. The module uses these equations, which are exact at any d
 - R2 = R1 + a and R3 = R1 + b;
 - sin(bearing) = (R3^2 - R1^2) / (4 l R2).
 
-Han 2019 prints the first equation as eq. 9, which is not consistent with its eq. 7.
+Han 2019 prints another equation for the range (eq. 9). It does not follow from eq. 7
+and 8 of that paper (docs/errata.md), so this module does not use it.
 """
 
 from __future__ import annotations

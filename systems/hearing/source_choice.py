@@ -382,8 +382,8 @@ def _aged(other: _Other | None, seconds: float, *, doubted: bool) -> _Other | No
 def _remember(others: list[_Other | None], number: int | None, place: _Place) -> None:
     """Stores in ``others`` the position of another source that was heard.
 
-    ``number`` is the number of the known source, from 1. If it is None, the source is
-    new and replaces the source with the longest silence.
+    ``number`` is 1 plus the index of this source in ``others``. If it is None, the
+    source is new and replaces the source with the longest silence.
     """
     if number is None:
         silences = [math.inf if o is None else o.silence for o in others]

@@ -65,8 +65,8 @@ def range_status(
 class SourceFix:
     """Estimated source relative to the centroid of the microphones, with its errors.
 
-    The errors are those that errors of the delays cause, to first order. They include
-    no errors of the microphone positions or of the speed of sound.
+    The errors follow from the errors of the delays, to first order. They do not include
+    the effect of errors of the microphone positions or of the speed of sound.
     """
 
     bearing: float

@@ -85,7 +85,8 @@ def steer(
 
     Returns:
         The position with the strongest response, and the strongest other peak. A
-        parabola refines the strongest bearing between the bearings of the grid.
+        parabola through the responses at adjacent bearings of the grid refines the
+        bearing of the strongest position.
     """
     response = np.zeros(grid.delays.shape[1:])
     length = correlations.shape[1]

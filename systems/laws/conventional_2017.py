@@ -25,11 +25,11 @@ def conventional_2017_force(
 ) -> Any:
     """Computes the force K_0/c + D_0 s at any distance c (Kim 2017, eq. 20).
 
-    The term K_0/c is the push. As printed, it becomes infinite as c approaches 0. This
-    function keeps the push constant below the least range of the sensors, because
-    sensors cannot distinguish shorter distances.
+    As printed, the term K_0/c becomes infinite as c approaches 0. This function keeps
+    the term constant below the least range of the sensors, because sensors cannot
+    distinguish shorter distances.
 
-    The push has no limit of reach. At twice the distance, it is half as large.
+    The term acts at any distance. At twice the distance, it is half as large.
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.

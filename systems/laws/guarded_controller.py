@@ -55,8 +55,8 @@ class GuardedController(Block):
     - If the guard stops the robot, the robot looks past both sides of the cell that
       blocks it. If this cell is still not free, routes avoid it for a time.
     - If the robot still does not get away, it backs off.
-    - If every route crosses cells with echoes for 20 s, the robot stops. The port
-      ``gives_up`` is then 1 until there is a route.
+    - If every route of the last 20 s crossed cells with echoes, the robot stops. The
+      port ``gives_up`` is then 1 until there is a route without such cells.
 
     The block also tracks moving bodies (``systems.planning.hazards``). An echo from
     floor that was free before counts as a moving body. While such a body may come near,

@@ -1,4 +1,4 @@
-"""Controllers of all laws that compute a force, and the functions of these forces.
+"""Controllers of all laws that compute a force, and functions that compute forces.
 
 A virtual mass M is at the control point P, which is ahead of the axle. The mass moves
 according to::
@@ -9,8 +9,8 @@ p is the position of P, and F_m is the attraction to the target. C is the collis
 vector, which points from P to an obstacle. f is the push of the law. The sum has one
 term per obstacle.
 
-Eq. 17-18 of Han 2019 print the repulsion with the wrong sign, and with forces that grow
-with distance. Eq. 19 replaces eq. 17-18. See docs/errata.md.
+In eq. 17 and 18 of Han 2019, the signs of the repulsion contradict each other, and the
+repulsion grows with the distance. Eq. 19 replaces both equations (docs/errata.md).
 """
 
 from __future__ import annotations
@@ -147,20 +147,21 @@ class ImpedanceNumbers(NamedTuple):
 def impedance_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Computes the acceleration of the virtual mass, the forces, and the speeds s.
+    """Computes the acceleration of the virtual mass, and the forces that cause it.
 
-    The state stores the collision vectors of one sensor round, which is the time in
-    which every sensor fires once. A collision vector C points from the control point P
-    to an obstacle, in the world frame W, m. The state has one row per control period,
-    most recent first. A row has three numbers for each slot of the input port: the
-    feature, C_x, and C_y. The feature is a number that identifies the sensors or the
-    body from which C comes.
+    The step also computes the speed s of each obstacle. The state stores the collision
+    vectors of one sensor round, which is the time in which every sensor fires once. A
+    collision vector C points from the control point P to an obstacle, in the world
+    frame W, m. The state has one row per control period, most recent first. A row has
+    three numbers for each slot of the input port: the feature, C_x, and C_y. The
+    feature is a number that identifies the sensors or the body from which C comes.
 
     The step has three stages:
 
     1. Search the oldest row for the feature of each occupied slot. If it is there,
        compute s from the old and the present vector. Otherwise s is 0.
-    2. Add the attraction and the pushes of all occupied slots.
+    2. Add the attraction and the pushes of all occupied slots, and divide the sum by
+       the virtual mass.
     3. Shift the rows by one period, and write the present vectors to the first row.
     """
     p_WS, valid, C_B, features, pose, v_WP = inputs

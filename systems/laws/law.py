@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any, Literal
 
 from systems.framework.parameters import Parameters
+from systems.laws.parameters import ImpedanceParameters
 
 #: Columns of the port ``forces_W`` of a law's block.
 FORCE_COLUMNS = "attraction_x", "attraction_y", "repulsion_x", "repulsion_y"
@@ -87,7 +88,10 @@ class Law:
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
-    """Model of the gains. Every field has a default."""
+    """Model of the gains in ``laws.<name>``. Every field has a default."""
+    impedance: type[ImpedanceParameters] | None = None
+    """Model of all parameters of a law on planned routes: those in ``impedance`` and
+    those in ``laws.<name>``."""
     controller_name: str = ""
     """Name of the class of the law's block in ``systems``. If it is empty, the block
     ``RadialLawController`` computes the force.
@@ -132,10 +136,10 @@ class Law:
     def arguments(self, gains: Any, least_range_m: float) -> tuple[Any, ...]:
         """Returns the arguments that the function ``force`` takes after c and s.
 
-        The first argument is the gains: ``gains``, or the default gains of the law if
-        ``gains`` is None. For a law without gains, it is None. If the field
-        ``least_range`` is true, the second argument is the least range of the sensors,
-        m.
+        The first argument is ``gains``. If ``gains`` is None, the default gains of the
+        law replace it. For a law without gains, the first argument is None. If the
+        field ``least_range`` is true, the second argument is the least range of the
+        sensors, m.
         """
         if gains is None and self.gains is not None:
             gains = self.gains()

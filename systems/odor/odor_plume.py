@@ -133,8 +133,8 @@ def concentration(
     """Computes the concentration of odor at a point of the floor.
 
     The result is the sum over all puffs, plus the background. A puff is a Gaussian
-    distribution of odor around its center on the floor. The floor reflects the odor. A
-    steady plume has no puffs. Its concentration follows from a closed equation.
+    distribution of odor around its center on the floor. The floor reflects the odor.
+    For a steady plume, which has no puffs, ``steady_concentration`` replaces the sum.
 
     Args:
         plume: (PLUME_SIZE,) value of the port ``plume``.

@@ -161,8 +161,9 @@ def _risk_along(
 ) -> tuple[float, bool]:  # pragma: no cover  (compiled)
     """Predicts the risk of a motion, and whether the guard would hold the robot.
 
-    If ``held_rad_s`` is infinite, the robot moves as if it had no guard. Otherwise the
-    robot stands where the guard would hold it, and turns at most at this rate.
+    If ``held_rad_s`` is infinite, the robot moves as if it had no guard. Otherwise,
+    where the guard would hold the robot, the robot only turns, at most at the yaw rate
+    ``held_rad_s``.
 
     Each particle (possible position of a body) counts with its nearest approach to the
     robot's rectangle. A later approach counts less.
@@ -238,7 +239,8 @@ def find_threats(
         wanted: Wanted speed, m/s, and wanted heading, rad.
 
     Returns:
-        Direction and weight of each particle.
+        Direction of each particle, and number of bodies that the robot has to watch
+        there.
     """
     speed, heading = max(wanted[0], 0.0), wanted[1]
     vx, vy = speed * math.cos(heading), speed * math.sin(heading)
@@ -263,9 +265,9 @@ def find_threats(
 def watch_of(threats: Threats, heading: float) -> float:  # pragma: no cover  (compiled)
     """Computes how much of the threats is out of view at a heading.
 
-    For each threat, the function multiplies the number of bodies by the angle between
-    the threat and the field of view, rad. The angle counts up to 1 rad. The result is
-    the sum over all threats.
+    For each threat, the function multiplies the number of bodies to be watched there by
+    the angle between the threat and the field of view, rad. The angle counts up to 1
+    rad. The result is the sum over all threats.
 
     Args:
         threats: Threats from ``find_threats``.

@@ -4,9 +4,9 @@ The robot is in one of five modes:
 
 - waiting, if there is no target
 - driving along the route that ``systems.planning.way`` finds
-- looking around, before the first motion or at a place that blocks the robot
+- looking around, before the first motion or at a cell that blocks the robot
 - backing off, after the robot has stayed in one place for too long
-- giving up for a time, if all routes lead through occupied cells
+- giving up, after all routes have led through occupied cells for too long
 
 In every mode, ``systems.planning.evasion`` may replace the motion to avoid moving
 bodies.
@@ -210,8 +210,8 @@ def drive_guarded(
 
     1. Update the tracks of moving bodies with the new echoes.
     2. Plan a route every 0.5 s. Compute the wanted speed and the heading error.
-    3. Update three timers: time in one place, time of a block by the guard, and time
-       without a route through free cells.
+    3. Update three timers: how long the robot has stayed in one place, how long the
+       guard has blocked it, and how long all routes have led through occupied cells.
     4. If a timer has expired, change the mode. Compute the motion of the mode.
     5. If moving bodies are near, replace the motion (``_evade``).
 
@@ -300,8 +300,9 @@ def _remember_held(
 def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untyped-def]
     """Replaces the wanted speed and yaw rate if a moving body may come near.
 
-    If the robot has to evade during a look at a blocked place, the look ends. The first
-    look goes on. The present yaw rate gives the weaving heading for ``choose_motion``.
+    If the robot evades during a look at a blocking cell, the look ends. A look before
+    the first motion continues. The function computes the weaving heading for
+    ``choose_motion`` from the wanted yaw rate.
     """
     m = state.memory
     bodies = pick_hazards(state.hazards, time, pose, _NEAR_M)
@@ -342,8 +343,9 @@ def _find_heading(  # type: ignore[no-untyped-def]
        at little extra cost. The heading error is the angle from the robot's heading to
        the carrot.
     3. Compute the remaining distance, which is normally the length of the route. If the
-       route is almost straight and avoids nothing, the straight distance counts
-       instead, and a robot close to the target drives directly toward it.
+       route is almost straight and crosses no cells that may be occupied, the straight
+       distance counts instead, and a robot close to the target drives directly toward
+       it.
     4. Compute the wanted speed from the remaining distance, the follow distance, and
        the speed at which the target moves away.
 
@@ -387,8 +389,9 @@ def _find_heading(  # type: ignore[no-untyped-def]
 def _begin_look(time, pose, ahead, m, space, numbers):  # type: ignore[no-untyped-def]
     """Begins a look before the robot first moves, or when the guard blocks the robot.
 
-    During a look, the robot turns to both sides of a direction, first to the nearer
-    side. The direction of the first look is that of the route (``ahead``).
+    During a look, the robot turns to both sides of a direction, first to the side
+    nearer to its heading. The direction of the first look is that of the route
+    (``ahead``).
 
     A later look begins after the guard has blocked the robot for ``_PATIENCE_S``. The
     guard does not report which cell blocks the robot. Therefore the function assumes
@@ -458,13 +461,13 @@ def _blocking(
 def _drive(  # type: ignore[no-untyped-def]
     time, velocity, wanted, error, there, state, numbers
 ):
-    """Drives toward the carrot, the point of the route for which the robot heads.
+    """Drives toward the carrot, which is a point of the route (``_find_heading``).
 
     The heading weaves around the direction of the carrot, so that the range sensors
     sweep the floor beside the route. The robot weaves more widely after the detection
-    of a moving body, and also while the target moves and the route is not narrow. If
-    the robot lags far behind the target, it weaves less. If the heading error is large,
-    it only turns.
+    of a moving body, and also while the target moves and the route is not narrow. This
+    wider weaving is reduced if the robot lags far behind the target. If the heading
+    error is large, the robot turns without driving.
     """
     m = state.memory
     if there:

@@ -1,6 +1,7 @@
 """Search for the permitted velocity that is nearest to a wanted velocity.
 
-Half planes and a top speed limit the permitted velocities.
+A velocity is permitted if it lies in all given half planes and does not exceed the top
+speed.
 """
 
 from __future__ import annotations
@@ -49,9 +50,9 @@ def _nearest(
 
     The slack is the distance by which all soft half planes move outward, m/s. The
     solution is the wanted velocity, its projection on a border, or the intersection of
-    two borders. The function tries all these candidates. In its loops, the index -1
-    means no border. The indices 0 to ``count - 1`` are the half planes. The index
-    ``count`` is the circle of the top speed.
+    two borders. The function tries all these candidates. In its loops, the indices 0 to
+    ``count - 1`` stand for the borders of the half planes, ``count`` stands for the
+    circle of the top speed, and -1 stands for no border.
 
     Returns:
         Velocity x, m/s; velocity y, m/s; and whether there is a permitted velocity.
@@ -111,11 +112,12 @@ def _nearest(
 def nearest_velocity(
     planes: Any, wanted: Any, top: float, hard: int
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
-    """Finds the velocity in all half planes that is nearest to a wanted velocity.
+    """Finds the permitted velocity that is nearest to a wanted velocity.
 
-    If no velocity lies in all half planes, the function moves all soft half planes
-    outward by the same distance, called the slack. Bisection finds the least slack that
-    permits a velocity. The hard half planes never move.
+    A velocity is permitted if it lies in all half planes and does not exceed ``top``.
+    If no velocity is permitted, the function moves all soft half planes outward by the
+    same distance, called the slack. Bisection finds the least slack that permits a
+    velocity. The hard half planes never move.
 
     Args:
         planes: (k, 3) half planes n . v >= offset: x and y of the unit normal n, and

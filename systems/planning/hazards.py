@@ -90,7 +90,7 @@ class Particles(NamedTuple):
     """Possible positions and velocities of moving bodies.
 
     In ``Hazards``, each array has the shape (tracks, particles). A function that works
-    on one track gets its row, with the shape (particles,).
+    on one track gets one row of each array, with the shape (particles,).
     """
 
     x: NDArray[np.float64]

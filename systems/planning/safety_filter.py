@@ -74,8 +74,8 @@ class SafetyFilter(Block):
 
     From all velocities that the wheels can produce and that lead into no object, the
     filter chooses the velocity nearest to the commanded velocity. If there is no such
-    velocity, it violates the constraints of moving objects as little as possible. It
-    never violates the limits on the approach to objects at rest.
+    velocity, the filter violates the constraints of moving objects as little as
+    possible. It never violates the limits on the approach to objects at rest.
 
     The block replaces ``WheelCommand``. The virtual mass moves with the velocity that
     the filter returns, which prevents windup.

@@ -263,8 +263,8 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
     All costs are whole numbers. Therefore a ring of buckets replaces the priority queue
     (Dial's algorithm). Bucket ``cost % _BUCKETS`` is a linked list of the waiting cells
     with this cost. Because every step costs less than the number of buckets, all cells
-    in a bucket have the same cost. A cell whose cost falls enters the queue again. The
-    search skips its older entry.
+    in a bucket have the same cost. If the search finds a lower cost for a waiting cell,
+    the cell enters the queue again, and the search later skips the older entry.
     """
     size = way.price.shape[0]
     way.cost[:, :] = _FAR

@@ -89,8 +89,8 @@ def write_frame(
 def read_frame(data: Any, first: int) -> tuple[int, int, float]:
     """Decodes a radio frame of nine bytes.
 
-    Angles are 0 to 359.9 deg, but the direction of the sound (function 13) is above
-    -180 and up to 180 deg. All other values have the range that ``write_frame`` states.
+    The direction of the sound (function 13) is in (-180, 180] deg. All other values,
+    including other angles, are in the range that ``write_frame`` states.
 
     Args:
         data: Sequence that contains the bytes.

@@ -61,15 +61,16 @@ def _is_open(
 ) -> bool:  # pragma: no cover  (compiled)
     """Returns whether a surface may continue beyond its outer hit.
 
-    The beam ``other`` beside the beam ``own`` of the outer hit decides. ``apart`` is
-    the angle between the two beams, rad, or 0 if there is no beam beside the outer hit.
+    The outer hit is the hit of the beam ``own``. The next beam outward is ``other``.
+    ``apart`` is the angle between the two beams, rad, or 0 if there is no next beam.
+    There are four cases:
 
-    - If there is no such beam, the surface may continue.
-    - If this beam has a nearer hit, a nearer object may hide the surface, so the
+    - If there is no next beam, the surface may continue.
+    - If the next beam has a nearer hit, a nearer object may hide the surface, so the
       surface may continue.
-    - If this beam has a farther hit, the surface ends.
-    - If this beam has no echo, the surface may continue only if the beam could not
-      reach it.
+    - If the next beam has a farther hit, the surface ends.
+    - If the next beam has no echo, the surface may continue only if it would be out of
+      the range of this beam.
     """
     if apart == 0.0:
         return True
@@ -86,8 +87,8 @@ def _describe(
     """Fills the row of one group of hits.
 
     The nearest point of the group is on a line segment between two adjacent hits.
-    ``ends`` has the indices of the first and the last beam of the group. Indices of n
-    or more wrap around.
+    ``ends`` has the indices of the first and the last beam of the group. Indices wrap
+    around at the number of beams.
     """
     count = len(ranges)
     first, last = ends[0] % count, ends[1] % count

@@ -155,8 +155,10 @@ def _vectors(points, heard, neighbours, joined, every):
     """Computes the results of ``collision_vectors``, in a form that compiles.
 
     ``heard`` has one flag per sensor, true if the sensor has an echo. The position of a
-    sensor without an echo is arbitrary. ``joined`` joins the nearest echo with its
-    nearer neighbor. ``every`` returns one vector per pair and per single echo.
+    sensor without an echo is arbitrary. If ``every`` is true, the function returns one
+    vector per pair of echoes and per single echo. Otherwise, it returns one vector to
+    the nearest echo. If ``joined`` is true, it first joins this echo with the nearer of
+    its neighbors.
     """
     # Find the nearest echo.
     nearest = -1

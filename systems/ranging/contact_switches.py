@@ -47,8 +47,8 @@ def _feel(
     """Returns whether a body closes the left switch, and whether it closes the right.
 
     ``body`` has the pose (x, y, theta) of the body in W, m and rad, and its length and
-    width, m. ``points`` are the test points of the front edge in B, m. A touch within
-    the distance ``middle`` of the robot's x axis closes both switches, m.
+    width, m. ``points`` are the test points of the front edge in B, m. A touch closes
+    both switches if its distance from the robot's x axis is at most ``middle``, m.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     # Skip a body whose circumscribed circle no switch can reach. The first test point,
@@ -74,7 +74,8 @@ def contact_switches_step(
 ) -> None:
     """Determines which switches are closed and which body the robot touches.
 
-    If the robot touches several bodies, the step reports the last of them.
+    If the robot touches several bodies, the step reports the one with the highest
+    number.
     """
     pose, poses, sizes, followed = inputs
     bodies = len(poses) // 3

@@ -128,8 +128,8 @@ class ObjectDetector(Block):
       with 72 beams, and 7 % with 360 beams.
     - While the robot turns, bodies at rest seem to move. Their apparent speed is up to
       0.3 m/s with 36 beams, 0.12 m/s with 72 beams, and 0 m/s with 360 beams.
-    - Where the spacing of the beams exceeds 0.25 m, no velocity is known. With the 7
-      beams, this is the case at distances above 0.48 m.
+    - Where the spacing of the beams exceeds 0.25 m, no velocity is known. With 7 beams,
+      this is the case at distances above 0.48 m.
 
     The discrete state has the hits and the tracks. The block updates it every control
     period. The output is a function of the state and the inputs. There is no latency,

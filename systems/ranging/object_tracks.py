@@ -126,11 +126,12 @@ def _correct(
 def _turn_surface(
     track: Any, p_WP: Any, along: Any, own: TrackNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the tracked position of a surface to the direction of its nearest point.
+    """Rotates the tracked position of a surface about P to its nearest point.
 
-    The noise of the ranges moves the nearest point along the surface by more than the
-    spacing of the beams. Therefore only the distance from the control point P shows a
-    motion. The function keeps this distance and rotates its variance to the new
+    P is the control point. ``along`` is the unit vector from P to the nearest point of
+    the present hits. The noise of the ranges moves this point along the surface by more
+    than the spacing of the beams. Therefore only the distance of the surface from P
+    shows a motion. The function keeps the tracked distance and its variance, but in the
     direction ``along``. The position along the surface becomes unknown. The sensors do
     not measure the velocity along the surface, so this velocity decays to zero.
     """
@@ -176,7 +177,7 @@ def _hides_motion(
 def _take_in(
     track: Any, group: Any, p_WP: Any, own: TrackNumbers
 ) -> None:  # pragma: no cover  (compiled)
-    """Corrects a track by its group of hits, or starts the track.
+    """Corrects a track with its group of hits, or starts the track.
 
     The measured position depends on the group:
 
@@ -185,8 +186,8 @@ def _take_in(
     - Otherwise, the position is in the direction of the middle of the group. Its
       distance from P is that of the nearest point plus the smoothed depth. The depth is
       the distance of the middle minus that of the nearest point. Both coordinates count
-      as measured. The noise perpendicular to the direction is larger by the spacing of
-      the beams.
+      as measured. Perpendicular to the direction, the standard deviation is larger by
+      the spacing of the beams.
     """
     wide = _hides_motion(group, own)
     sure = group[CHORD] < _COARSE_M and (not wide or group[EXTENT] > 0.0)

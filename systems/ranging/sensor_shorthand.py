@@ -139,7 +139,7 @@ def check_shared(data: Mapping[str, Any], model: type[Parameters]) -> None:
 
     Args:
         data: Input of the group ``ultrasonic``.
-        model: Model of a sensor.
+        model: Parameter class of one sensor.
 
     Raises:
         InputError: A value has the wrong type, or is out of range.
@@ -189,7 +189,7 @@ def mark_shared(schema: dict[str, Any]) -> None:
 def add_shorthand(schema: dict[str, Any], model: type[Parameters]) -> None:
     """Adds the short forms to the JSON Schema of ``UltrasonicParameters``, in place.
 
-    ``model`` is the model of a sensor.
+    ``model`` is the parameter class of one sensor.
     """
     properties, told = schema["properties"], meanings(model)
     own = model.model_json_schema()["properties"]

@@ -132,8 +132,8 @@ class GlobalPlanner(Block):
     robots at rest. If there is no such route, the block keeps the old route and tries
     again after 6 s.
 
-    The discrete state is ``PlannerState``. Other blocks read a new route one control
-    period after the inputs from which it follows. There is no feedthrough.
+    The discrete state is ``PlannerState``. A new route appears at the output one
+    control period after the inputs that cause it. There is no feedthrough.
 
     Args:
         parameters: Goal, clearance, and whether the block plans new routes.

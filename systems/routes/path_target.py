@@ -48,7 +48,7 @@ def route_fingerprint(
 ) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
     """Computes four numbers that identify a route.
 
-    The block notices a new route by these numbers: the count of the points, their
+    ``PathTarget`` notices a new route by these numbers: the count of the points, their
     spacing, a weighted sum of their x coordinates, and a weighted sum of their y
     coordinates.
     """
@@ -138,9 +138,11 @@ def point_on_route(
 def next_speed(
     speed: float, way: float, top: float, acceleration: float, tick_s: float
 ) -> float:
-    """Returns the largest next speed with which the target can still stop in time.
+    """Returns the largest speed from which the target can still stop in time.
 
-    The speed changes linearly during a tick (control period).
+    The result is the speed at the end of the present tick (control period). The speed
+    changes linearly during the tick. If no speed lets the target stop in time, the
+    target brakes at the largest deceleration.
 
     Args:
         speed: Present speed, m/s.

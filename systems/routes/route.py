@@ -291,8 +291,9 @@ def _way_out(
     """Returns the nearest free grid cell that a safe straight segment joins to ``end``.
 
     ``end`` is the start or the goal of a route. A safe segment keeps the clearance,
-    minus a small allowance. If ``end`` itself is nearer to an obstacle, the segment has
-    to keep only the distance that ``end`` has, minus the allowance.
+    minus a small allowance. If ``end`` itself is nearer to an obstacle than the
+    clearance, the segment has to keep only the distance of ``end`` from this obstacle,
+    minus the allowance.
 
     Returns:
         (i, j), indices of the cell along x and y. They are (-1, -1) if there is no such

@@ -98,7 +98,7 @@ def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, floa
     Args:
         speeds: Speeds of the left and right wheel at the start, rad/s.
         commanded: Commanded speeds of the left and right wheel, rad/s.
-        kept: Part of the difference between actual and commanded speed that remains at
+        kept: Share of the difference between actual and commanded speed that remains at
             the end, 0 to 1.
 
     Returns:
@@ -173,8 +173,9 @@ def _nearest_view(
 ) -> float:  # pragma: no cover  (compiled)
     """Computes the distance from a position to the nearest possible obstacle, m.
 
-    An obstacle may be at the end of any sensor view at the time of the reading. It then
-    approaches at ``speed`` until ``ahead_s`` from now.
+    The function assumes that an obstacle was at the end of each sensor's view when the
+    sensor took its last reading. From then until ``ahead_s`` from now, the obstacle
+    approaches the position at ``speed``.
     """
     nearest = np.inf
     for sensor in range(danger.arcs.shape[0]):
@@ -276,9 +277,9 @@ def _enters(
 ) -> bool:  # pragma: no cover  (compiled)
     """Checks whether a point of a non-free cell may have entered the robot's disc.
 
-    The disc at the start of the motion contains no obstacle, whatever the map states.
-    All points of the present disc that are nearer to the start than to the present
-    center were already in the disc at the start. The function ignores cells that
+    The robot's disc at the start of the motion contains no obstacle, whatever the map
+    states. A point of the present disc was already in that disc if it is nearer to the
+    center at the start than to the present center. The function ignores cells that
     contain only such points.
     """
     x, y, cell = pose[0], pose[1], danger.cell_m
@@ -306,11 +307,12 @@ def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (c
 def _keeps_off_moving(
     place: Any, ahead_s: float, moved: float, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether the robot keeps away from moving obstacles.
+    """Returns whether the robot keeps away from obstacles that it cannot see.
 
-    The result is true if no obstacle in view can be within ``keep_m`` of ``place`` at
-    the time ``ahead_s`` from now. It is also true if the robot moves away from the end
-    of the sensors' view.
+    Such an obstacle may be just behind the end of a sensor's view, and may come toward
+    the robot. The result is true if no such obstacle can be within ``keep_m`` of
+    ``place`` at the time ``ahead_s`` from now. The result is also true if the robot
+    moves away from the nearest end of a view.
     """
     x, y = place
     speed = numbers.obstacle_speed_m_s
@@ -330,9 +332,9 @@ def danger_of(
         space: Map of free space.
         time: Current time, s.
         pose: Present pose (x, y, theta), m and rad.
-        reach: Two distances, m. The function collects cells within the first distance
-            of the axle. Free cells must still count as free after the wheels have
-            rolled the second distance.
+        reach: Two distances, m. The function collects non-free cells within the first
+            distance of the axle. A cell is free only if it will still count as free
+            after the wheels have rolled the second distance.
         numbers: Model of the robot.
 
     Returns:

@@ -358,8 +358,8 @@ def _of_sectors(
 
     Returns:
         (sectors, 3) three distances per sector, m: the distance seen free; the distance
-        of the nearest echo, infinite without an echo; and the largest finite of these
-        two.
+        of the nearest echo, infinite without an echo; and the larger of both, or the
+        distance seen free if there is no echo.
     """
     seen = np.empty((len(sectors.right), 3))
     for k in range(len(seen)):
@@ -379,8 +379,9 @@ def _in_direction(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Returns how far a group of sensors has seen toward a cell.
 
-    ``bearing`` is the direction of the cell from the right edge of the group's view,
-    rad. The circle around the cell covers this direction plus and minus ``hides``, rad.
+    ``bearing`` is the angle from the right edge of the group's view to the middle of
+    the cell, rad. The circle around the cell covers ``bearing`` plus and minus
+    ``hides``, rad.
     The distance seen free is the least distance of all sectors that overlap the circle.
     It is 0 if a part of the circle is out of view. The echo is that of the sector that
     contains the middle of the cell.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import GuardParameters
@@ -29,7 +29,7 @@ _PART_S = 0.025
 
 
 class Sectors(NamedTuple):
-    """Sectors into which the apertures of range sensors are cut where they overlap.
+    """Sectors into which the edges of the apertures divide the view of range sensors.
 
     All sensors at the same position form a group. The sectors of a group are adjacent
     and in counterclockwise order. In a gap between two apertures, there is a sector
@@ -71,16 +71,16 @@ class PlaceError(NamedTuple):
         cls,
         guard: GuardParameters,
         robot: RobotParameters,
-        odometry: OdometryParameters,
+        plant: PlantParameters,
     ) -> PlaceError:
         """Collects the quantities from the parameters.
 
         ``guard`` has the wheel error and the allowed position error. ``robot`` has the
-        dimensions of the wheels. ``odometry`` has the pulses of the encoders.
+        dimensions of the wheels. ``plant`` has the pulses of the encoders.
         """
         pulse_m = 0.0
-        if odometry.rounding:
-            pulse = math.tau / odometry.pulses_per_revolution
+        if plant.pulses_per_revolution is not None:
+            pulse = math.tau / plant.pulses_per_revolution
             pulse_m = robot.wheel_radius_m * pulse
         return cls(
             guard.wheel_error, pulse_m, robot.wheel_separation_m, guard.place_error_m
@@ -220,14 +220,16 @@ def tick_parts(tick_s: float) -> int:
 def unseen_approach(
     robot: RobotParameters, plant: PlantParameters, tick_s: float
 ) -> float:
-    """Computes how much nearer to a cell the axle may come than the guard detects.
+    """Computes how much nearer the axle may come to a cell than the guard detects.
 
-    The guard checks the position of the axle at the end of each part of a control
-    period. The checks end when the rims will move by less than ``REST_M``. Between and
-    after these checks, four effects may bring the axle nearer to a cell:
+    Cells are those of the map of free space. The guard checks the position of the axle
+    at the end of each part of a control period. It makes no further check when the
+    wheel rims will move by less than ``REST_M``. Between two checks and after the last
+    check, four effects may bring the axle nearer to a non-free cell:
 
-    - The axle passes a corner of a cell on a straight path. At both checks, the corner
-      is just outside the body, but halfway between them it is inside.
+    - The axle passes a corner of a cell on a straight path. At two successive checks,
+      the corner is just outside the disc that contains the body. Halfway between these
+      checks, the corner is inside the disc.
     - The path is curved. Between two checks, it deviates from a straight line by up to
       a quarter of the line's length times the turn in rad.
     - The wheels reverse between two checks: the axle goes on and comes back.

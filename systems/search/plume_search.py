@@ -252,8 +252,8 @@ def plume_search_step(
     """Computes one tick (control period) of the search by smell.
 
     Each step of the search has three activities: wait, sense and move. ``AT.left``
-    counts the remaining ticks of the present activity. If the robot touches an object,
-    the search ends in any activity.
+    counts the remaining ticks of the present activity. If the robot touches an object
+    during any activity, the search ends.
     """
     gas, airflow, headings, contact = inputs
     heading = headings[0]

@@ -98,8 +98,8 @@ def add_frame(
 ) -> None:
     """Adds a radio frame to the frames that the robot sends in this tick.
 
-    A tick is a control period. If it already has ``MOST_FRAMES`` frames, the function
-    does nothing.
+    A tick is a control period. If the robot already sends ``MOST_FRAMES`` frames in
+    this tick, the function does nothing.
 
     Args:
         state: State of the search.

@@ -178,15 +178,19 @@ def _missed(state: Any, ended: int, numbers: SoundSearchNumbers) -> None:
 def _decide(
     state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
 ) -> None:
-    """Decides at the end of a step whether the robot moves, listens again or stops.
+    """Decides after the computing whether the robot moves, listens again or stops.
 
     The radio level gives the distance from the caller. The microphones give a bearing,
-    and sometimes a range. The rules are:
+    and sometimes a range. The first of these rules that applies decides:
 
-    - The robot has arrived if the distance or the range is below its threshold. The
-      range counts only if the distance is small.
-    - If the bearing is missing or not unique, the robot listens again.
-    - Otherwise, the robot moves. Near the caller, the move is shorter than ``MOVE_S``.
+    1. If the distance is below its threshold, the robot has arrived.
+    2. If the bearing is missing or not unique, the robot listens again. After too many
+       such steps in a row, the search ends.
+    3. If the distance is small and the range is below its threshold, the robot has
+       arrived. This rule applies only if the field ``stop`` is ``range``.
+    4. If the robot has made all permitted steps, the search ends.
+    5. Otherwise, the robot moves. With ``stop: range``, a move near the caller may be
+       shorter than ``MOVE_S``.
     """
     bearing, distance, detected, ranged, ambiguous, lost = heard
     own = numbers.own

@@ -80,8 +80,8 @@ def upwind_gradient_turn(gas: Any, airflow: Any, memory: Any) -> tuple[float, in
     - In the plume, the robot goes upwind, and turns a little toward the side with more
       gas.
     - After the robot has lost the plume, it crosses the wind to find the plume again.
-      The first step is to the side of its last turn toward the gas. Then follow two
-      steps to the other side, three steps back, and so on.
+      It makes one step to the side of its last turn toward the gas, then two steps to
+      the other side, then three steps to the first side, and so on.
     - Without wind, the robot turns by 180 deg. The search ends after ``_CALM_STOPS``
       consecutive stops without wind.
 

@@ -39,8 +39,8 @@ class EqualRow(NamedTuple):
 class ArrayShape:
     """Positions of microphones relative to their centroid, in the frame A of the array.
 
-    The frame A has its origin at the centroid, and the axes in which the positions were
-    given. To make a shape, call ``ArrayShape.of``.
+    The frame A has the axes in which the positions were given. Its origin is the
+    centroid. To make a shape, call ``ArrayShape.of``.
     """
 
     p_AM: NDArray[np.float64]
@@ -69,16 +69,16 @@ class ArrayShape:
 
         Args:
             positions: (n, 2) or (n, 3) positions in any frame, m; n is at least 3.
-            flat_m: Largest distance of a microphone from a line or plane to which it
-                still belongs, m. None: 1 % of the aperture.
+            flat_m: The microphones form a row or plane if none of them is farther than
+                this distance from a line or plane, m. None: 1 % of the aperture.
 
         Returns:
             The microphones relative to their centroid, and the line, plane, or space
             that they span.
 
         Raises:
-            InputError: There are fewer than 3 positions, two positions coincide, or a
-                position is not finite.
+            InputError: There are fewer than 3 positions, two positions nearly coincide,
+                a position is not finite, or the shape of the positions is wrong.
         """
         p = np.array(positions, dtype=np.float64)
         if p.ndim != 2 or p.shape[1] not in (2, 3):

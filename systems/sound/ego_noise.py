@@ -25,10 +25,10 @@ class EgoNoise:
     The level of the noise is constant. The recording of the noise is resampled to the
     sample rate, limited to the band of the microphones, and repeated without a seam.
 
-    If the recording has one channel per microphone, it is played as it is, so that the
-    channels stay coherent. If the recording has a single channel, all microphones play
-    it. Each microphone then starts at its own random position in the recording, so that
-    the channels are incoherent.
+    If the recording has one channel per microphone, all channels start at the same
+    random position in the recording, so that they stay coherent. If the recording has a
+    single channel, each microphone starts at its own random position in this channel,
+    so that the microphones hear incoherent noise.
 
     Args:
         parameters: File and level of the noise.

@@ -38,9 +38,9 @@ _BETA = 10.0
 def _interpolation_kernel() -> NDArray[np.float32]:
     """Fits polynomials to the weights of a windowed sinc function (error 1e-6).
 
-    The interpolation between samples uses 12 taps. Let u be the fraction of a sample
-    minus 1/2. The taps n and 11 - n have the weights E + O and E - O, with E = sum_k
-    e_k u^2k and O = u sum_k o_k u^2k.
+    The interpolation between samples uses 12 taps. Let u be the fractional part of the
+    position among the samples, minus 1/2. For n = 0 to 5, the taps n and 11 - n have
+    the weights E + O and E - O, with E = sum_k e_k u^2k and O = u sum_k o_k u^2k.
 
     Returns:
         (6, 2, 4) coefficients: for each n, the four e_k and the four o_k.
@@ -215,9 +215,9 @@ def _sample_delays(
     ``samples`` has the time of the first emitted sample, s, and the sample rate, Hz.
 
     Returns:
-        Four values: the (m,) first time of each channel, as a position among the
-        emitted samples; (m, k) delays, samples; (m, k) rates of change of the delays;
-        and the position of the earliest sample that is heard.
+        Four values: (m,) time from the first emitted sample to the first knot of each
+        channel, samples; (m, k) delays, samples; (m, k) rates of change of the delays;
+        and the position of the earliest heard sound among the emitted samples.
     """
     delays, rates = retarded_delays(times, p_WM, v_WM, knot_times, p_WS, v_WS, c)
     first, earliest = np.empty(len(times)), np.inf
@@ -266,15 +266,15 @@ def _interpolate(
 
     All times are in units of emitted samples. Between two knots, the delay d is a cubic
     polynomial of time. For each output sample, the function computes the position among
-    the emitted samples and the amplitude 1 / (c d). It then interpolates runs of output
-    samples at once. Within a run, the whole part of the position increases by one from
-    each output sample to the next.
+    the emitted samples and the amplitude 1 / (c d). It then interpolates one run of
+    output samples at a time. A run is a sequence in which the integer part of the
+    position increases by one from each output sample to the next.
 
     Args:
         samples: Emitted samples.
         kernel: ``INTERPOLATION_KERNEL``.
-        first: (m,) time of the first output sample of each channel, as a position among
-            the emitted samples.
+        first: (m,) time from the first emitted sample to the first output sample of
+            each channel.
         delays: (m, k) delays at evenly spaced knots.
         rates: (m, k) rates of change of the delays.
         units: Three numbers: time from one output sample to the next; speed of sound, m
@@ -395,9 +395,9 @@ def propagate(
 
     The microphones and the emission may have different sample rates. The travel time of
     the sound is exact at certain times (knots), and a cubic polynomial between them.
-    With knots every 2.5 ms and the bodies of this model, the errors of the travel times
-    are at most 1e-3 sample from 0.1 to 18 kHz. The errors of amplitudes are at most
-    1e-4.
+    With knots every 2.5 ms and the speeds and yaw rates of this model, the errors of
+    the travel times are at most 1e-3 sample from 0.1 to 18 kHz. The errors of
+    amplitudes are at most 1e-4.
 
     Args:
         emission: Stored sound and motion of the source.

@@ -11,9 +11,9 @@ from scipy import fft
 
 from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ, Emission
-from systems.sound.array_tolerances import RealArray
 from systems.sound.parameters import MicArrayParameters, RoomParameters
 from systems.sound.propagation import KERNEL_REACH, sampled_at
+from systems.sound.real_array import RealArray
 from systems.sound.room import room_images, room_impulse_responses
 from systems.world.geometry import rotate
 
@@ -76,8 +76,8 @@ class Reverberation:
         """Computes the sound pressure of the reflections over one audio frame.
 
         Args:
-            emissions: Sounds of the k sources. Each must reach back by the length of
-                the response.
+            emissions: Sounds of the k sources. Each must begin earlier than the frame
+                by at least the length of the response.
             time: End of the frame, s.
             old: (3 + 2 k,) x, y, theta of the robot and x, y of each source at the
                 beginning of the frame, in the world frame W, m and rad.

@@ -109,8 +109,8 @@ def _add_arrivals(
         images: Signs, offsets and gains of ``RoomImages``.
         p_S: (3,) position of the source from the corner of the room, m.
         p_M: (m, 3) positions of the microphones from the corner of the room, m.
-        early: (m,) number of samples by which the impulses appear earlier in each
-            channel.
+        early: (m,) number of samples by which each channel is sampled late. Its
+            impulses appear earlier by this number of samples.
         per_m: Number of samples in which sound travels one meter.
         nearest: Distance below which the amplitude no longer grows, m.
         kernel: ``INTERPOLATION_KERNEL``.
@@ -155,8 +155,9 @@ def room_impulse_responses(
 ) -> NDArray[np.float32]:
     """Computes impulse responses from a source at rest to microphones at rest.
 
-    Delays are exact below 18 kHz, as in ``systems.sound.propagation``. The amplitude of
-    each arrival is the gain of its reflections divided by the distance.
+    Delays are interpolated as in ``systems.sound.propagation``, which is accurate up to
+    18 kHz. The amplitude of each arrival is the gain of its reflections divided by the
+    distance.
 
     Args:
         room: Size and walls of the room.

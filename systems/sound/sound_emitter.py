@@ -145,7 +145,7 @@ def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParam
 def history_ticks(
     maximum_range_m: float, c: float, frame_s: float = TICK_S, tick_s: float = TICK_S
 ) -> int:
-    """Returns for how many control periods (ticks) to store the motion of the source.
+    """Returns the number of control periods (ticks) in the stored motion of the source.
 
     Sound needs time to travel. The stored motion must therefore begin before the
     emission of the earliest sound in the present audio frame.

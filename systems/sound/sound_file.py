@@ -141,10 +141,10 @@ def read_noise(
 
 
 class _Stream(soundfile.SoundFile):
-    """A sound file that claims not to be seekable, so that its end is no error.
+    """A sound file that claims not to be seekable, so that reading to its end works.
 
-    After each block of a seekable file, the library soundfile queries the position. At
-    the end of a FLAC file of unknown length, this query fails.
+    In a seekable file, the library soundfile queries the position after it has read a
+    block. At the end of a FLAC file of unknown length, this query fails.
     """
 
     def seekable(self) -> bool:
@@ -214,7 +214,8 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
 
     The library libsndfile reads a truncated WAV file without an error message, so this
     function refuses such a file. If a recorder left 0 as the length of the samples,
-    libsndfile reads nothing. The copy then has the mark of an unknown length instead.
+    libsndfile would read nothing. In this case, the function returns a copy whose
+    header marks the length as unknown.
     """
     file_size = path.stat().st_size
     with path.open("rb") as file:
@@ -239,10 +240,10 @@ def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
 
 
 def _data_size(file: BinaryIO) -> int | None:
-    """Reads from a WAV file how many bytes its samples have according to the header.
+    """Returns the size of the samples of a WAV file that its header states, in bytes.
 
-    The result is None if no samples follow. Afterwards, the position in the file is the
-    beginning of the samples.
+    The result is None if the file has no chunk of samples. Afterwards, the position in
+    the file is the beginning of the samples.
     """
     while len(chunk := file.read(8)) == 8:
         name, size = struct.unpack("<4sI", chunk)

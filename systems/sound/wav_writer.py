@@ -34,10 +34,10 @@ def pcm_of_counts(counts: NDArray[np.int16], full_scale: int) -> NDArray[np.int1
 
 
 def loudest_pa(level_pa: float) -> float:
-    """Returns the sound pressure at full scale in a file of a loudspeaker's sound, Pa.
+    """Returns the sound pressure that is full scale in a loudspeaker's sound file, Pa.
 
-    It is the smallest power of two that the peaks of the loudspeaker do not exceed. The
-    argument is the RMS pressure at 1 m while the source sounds, Pa.
+    The result is the smallest power of two that the peaks of the sound do not exceed.
+    ``level_pa`` is the RMS pressure at 1 m during a burst of the sound, Pa.
     """
     return 2.0 ** math.ceil(math.log2(LARGEST_CREST * level_pa))
 

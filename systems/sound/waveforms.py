@@ -37,8 +37,8 @@ def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
         with soft edges.
 
     Raises:
-        InputError: The file cannot be played. The message names the file and the
-            remedy.
+        InputError: The file cannot be played, or the sound is outside the band of the
+            microphones. The message states the remedy.
     """
     burst = round(sound.on_s * SAMPLE_RATE_HZ)
     raw = _SYNTHESES[sound.kind](sound, seed)

@@ -295,8 +295,9 @@ def contact_time(
 
     The function projects both rectangles onto the normal of each side. On each normal,
     the two projections overlap during one interval of time. The rectangles are in
-    contact at a time that lies in all intervals. The first contact is therefore at the
-    latest start of an interval, unless another interval has ended by then.
+    contact at a time that lies in all intervals. The contact therefore begins when the
+    last of these intervals begins. If one of the intervals has ended by then, the
+    rectangles never touch.
 
     Args:
         a: (5,) first rectangle (x, y, theta, length, width), m and rad.

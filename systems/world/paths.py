@@ -1,7 +1,8 @@
 """Describes the path of a body that moves through waypoints.
 
 Circular arcs replace the corners between the waypoints. The speed rises and falls with
-a limited acceleration. Position and velocity are continuous and have closed forms.
+a limited acceleration. Position and velocity are continuous, and explicit formulas give
+them at any time.
 
 The yaw rate jumps at the ends of an arc. The yaw rate of a robot with wheels cannot
 jump, so ``systems/base/carrier.py`` computes the motion of such a robot.
@@ -241,10 +242,11 @@ def _pieces(
     """Returns the pieces of the fastest motion along segments, and its duration in s.
 
     The motion starts and ends at rest. The function works with squared speeds, which
-    are linear in the distance. A forward pass over the joints of the segments limits
-    the squared speeds by the acceleration. A backward pass limits them by the braking.
-    Then the function splits each segment into up to three pieces: speeding up, constant
-    speed, and braking. ``limits`` has the top speed on each segment, m/s.
+    are linear in the distance. A forward pass over the ends of the segments limits each
+    squared speed to what the acceleration can reach. A backward pass limits it to a
+    value from which the body can brake in time. Then the function splits each segment
+    into up to three pieces: speeding up, constant speed, and braking. ``limits`` has
+    the top speed on each segment, m/s.
     """
     tops = [limit * limit for limit in limits]
     joints = [0.0, *(min(pair) for pair in pairwise(tops)), 0.0]

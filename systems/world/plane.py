@@ -54,7 +54,7 @@ def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
 
 
 def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
-    """Computes the vector to a point from the nearest point of a filled rectangle.
+    """Computes the vector from the nearest point of a filled rectangle to a point.
 
     Args:
         point: (x, y), m; floats, AutoDiffXd, or arrays.

@@ -37,10 +37,9 @@ def run_at_wall(law: str, share: float):
         Scenario.model_validate(
             {
                 "law": law,
-                "hearing": "ideal",
-                "ideal_hearing": {"burst_gaps": False},
+                "hearing": "ideal_always",
                 "obstacle_sensing": "ideal",
-                "odometry": {"rounding": False},
+                "plant": {"pulses_per_revolution": None},
                 "duration_s": 15.0,
                 "source": {"waypoints_m": [[source, 0.0]]},
                 "obstacles": [

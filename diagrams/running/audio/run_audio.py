@@ -188,7 +188,8 @@ class RunAudio:
         For each robot that listens, the method appends the audio frame that ends at the
         tick, if there is one. For each loudspeaker, it appends the sound since the last
         tick. Both engines call this method before any block changes its state at the
-        tick. The method does not save the sound at tick 0, which precedes the run.
+        tick. At tick 0, the method saves nothing, because the sound up to this tick
+        precedes the run.
 
         Args:
             tick: Number of the present tick.
@@ -219,7 +220,7 @@ class RunAudio:
             self.play(name, tick, read(name, "emission"))
 
     def hear(self, robot: str, tick: int, frame: AudioFrame | None) -> None:
-        """Appends the audio frame of a robot that ends at a tick (control period).
+        """Appends a robot's audio frame, which ends at a tick (control period).
 
         Args:
             robot: Name of the robot.

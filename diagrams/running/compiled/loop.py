@@ -4,8 +4,8 @@ Drake's diagram remains the model: the loop calls the same step functions of the
 as Drake does, in an order that follows from the connections in the diagram. The
 integrator, the random numbers and the logged columns are also the same.
 
-Some outputs are parts of a block's state (state outputs). As in Drake, each tick has
-this order:
+Some outputs depend only on the state of their block (state outputs). As in Drake, each
+tick has this order:
 
 1. The state outputs are already published.
 2. The blocks with other outputs compute their steps. Each block comes after the blocks

@@ -98,16 +98,16 @@ class LoopBlocks:
     ) -> tuple[dict[str, Step], dict[PortKey, Callable[[int], Any]]]:
         """Returns the steps of the blocks in a run, and the objects on their ports.
 
-        Most ports carry numbers, but some ports carry objects such as sound. Ports from
-        outside of the diagram count, too.
+        Most ports carry numbers, but some ports carry objects such as sound.
 
         Args:
             run: Facts about the run, such as seed and initial pose.
 
         Returns:
             Two mappings. The first has the step of each block, by part (role of the
-            block). The second has one function for each port that carries an object.
-            The function returns the object at a tick (control period).
+            block). The second has one function for each port or input of the diagram
+            that carries an object. The function returns the object at a tick (control
+            period).
 
         Raises:
             InputError: A user's own block has no step.
@@ -135,7 +135,7 @@ class LoopBlocks:
         Returns:
             Two lists of parts. The first has the blocks whose outputs depend on present
             inputs, each after the blocks whose outputs it reads. The second has the
-            blocks whose outputs are parts of their state.
+            blocks whose outputs depend only on their state.
         """
         late = [part for part, step in steps.items() if step.publish is not None]
         early = [part for part in self.blocks if part not in late]
@@ -206,9 +206,9 @@ def _step_for(block: Any, run: RunFacts) -> Step:
 def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
     """Returns the blocks of all robots for a compiled loop.
 
-    The function reuses the blocks of an earlier scenario where possible. Both scenarios
-    may differ in fields that do not affect the blocks, such as start pose and seed.
-    Reuse matters because Drake never frees blocks written in Python.
+    The function reuses the blocks of an earlier scenario where possible. The earlier
+    scenario may differ in fields that do not affect the blocks, such as start pose and
+    seed. Reuse matters because Drake never frees blocks written in Python.
 
     Args:
         scenario: The scenario to run.

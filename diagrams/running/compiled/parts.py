@@ -1,13 +1,13 @@
 """Defines the compiled functions that a compiled loop calls by their addresses.
 
-A part of the loop is a compiled function, for example the step of one block. To compile
-the loop together with its parts would take a long time for each set of blocks. Because
-the loop calls its parts by address, numba compiles each part separately, and the loop
-``run_parts`` only once.
+A part of the loop is a compiled function, for example the step of one block. If numba
+compiled the loop together with its parts, it would need a long time for each set of
+blocks. Because the loop calls its parts by address, numba compiles each part
+separately, and the loop ``run_parts`` only once.
 
 Each part has two arguments: the number of the tick (control period), and the address of
-an array of words. A word is a whole number or the address of another array. These
-arrays must not move in memory.
+an array of integers, the words of the part. A word is a number or the address of
+another array. None of these arrays may move in memory.
 
 This file imports little, so that a change of another file rarely makes the compiled
 code of the parts invalid.
@@ -156,9 +156,9 @@ def run_parts(
 ) -> tuple[int, bool]:  # pragma: no cover  (compiled)
     """Runs ticks (control periods) of a compiled loop.
 
-    A part is a compiled function, for example the step of one block. At the start of
-    the run, ``run_parts`` publishes the outputs that are parts of a block's state. In
-    each tick, it calls these parts:
+    A part is a compiled function, for example the step of one block. Some blocks have
+    outputs that depend only on their state. At the start of the run, ``run_parts``
+    calls the parts that publish these outputs. In each tick, it calls these parts:
 
     1. the first parts, which compute steps
     2. the judge, which decides whether the run is over
@@ -171,13 +171,14 @@ def run_parts(
         end: One after the last tick.
         log: (ticks, columns) rows to fill.
         logged: (n, 2) address and number of elements of each logged array.
-        parts: (m, 2) address of each part, and address of the words of this part.
+        parts: (m, 2) two addresses for each part: that of the compiled function, and
+            that of its array of words (see the module).
         plan: Tuple (begins, first, judge, before, after) with indices of parts.
             ``begins`` lists the parts that publish at the start of the run. ``first``
             lists the first parts of a tick. ``judge`` is one index. ``before`` and
             ``after`` are tables of the parts before and after the log. In each row of a
             table, the first number is the index of a part. The second number is 1 if
-            the part publishes its outputs, and 0 if it computes its step.
+            the call publishes outputs, and 0 if it computes a step.
 
     Returns:
         The tick after the last logged tick, and whether the run is over.

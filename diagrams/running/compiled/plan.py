@@ -93,8 +93,9 @@ class LoopPlan:
     def call(self, function: HostFunction) -> None:
         """Adds a Python function that the loop calls at every tick (control period).
 
-        The loop calls the function directly before the stop rules judge the robots. The
-        arguments of the function are the tick and two arrays, which it ignores.
+        The loop calls the function before the stop rules judge the robots. The
+        arguments of the function are the tick and two arrays. The function ignores the
+        arrays.
         """
         nothing = (np.zeros(1),)  # compiled code has no empty state
         self._early.append(self._step(host_step(function, 1, 0, 1), nothing, ()))
@@ -104,10 +105,11 @@ class LoopPlan:
     ) -> int:
         """Adds the step of a block as a part with generated source code.
 
-        If the outputs of the block are parts of its state, the loop calls the part
-        twice per tick. With ``PUBLISH`` as the tick, the part publishes the outputs.
-        With the number of the tick, it computes the step. Otherwise, the part sets the
-        outputs to zero, and then the step fills them.
+        If the outputs of the block depend only on its state, the loop calls the part
+        twice per tick. With the number of the tick, the part computes the step. With
+        ``PUBLISH`` as the tick, it publishes the outputs. For any other block, the loop
+        calls the part once per tick. The part sets the outputs to zero, and then the
+        step fills them.
 
         Returns:
             Number of the part.

@@ -44,10 +44,12 @@ _COUNT = count()
 
 
 class LoopPart:
-    """Builds the source code of one part of a compiled loop, and collects its values.
+    """Builds the source code of one part of a compiled loop.
 
-    A part is a function of the tick (control period). ``expression`` adds a value to
-    the source. ``name`` adds a function to the source.
+    A part is a generated function with the number of the tick (control period) as its
+    argument. The object also stores the values and functions to which the source code
+    refers. ``expression`` returns the source code for a value, and ``name`` returns the
+    name of a function in the source code.
     """
 
     def __init__(self) -> None:
@@ -80,7 +82,8 @@ class LoopPart:
         """Returns source code that evaluates to a value.
 
         Parameters become a named tuple of their fields and cached properties. A list
-        becomes an array, and an empty list becomes an array of pairs. None becomes 0.
+        becomes an array, and an empty list becomes an array of shape (0, 2). None
+        becomes 0.
 
         Args:
             value: A number, text, array, function, list, tuple of values, parameters,
@@ -131,8 +134,8 @@ class LoopPart:
         """Returns source code that evaluates to an array.
 
         The code reads the address and the shape of the array from the words of the
-        part. Because it contains no values of the array, the same source serves all
-        layouts.
+        part. Because the code contains neither the values nor the sizes of the array,
+        the same source serves arrays of other values and sizes.
         """
         if id(value) not in self._arrays:
             # An empty list becomes an array of pairs. A scalar becomes an array with
@@ -174,10 +177,10 @@ def _tuple_type(model: type[Parameters]) -> Any:
 def _compilable(function: FunctionType) -> Any:
     """Makes a function callable from compiled code, without the checks that wrap it.
 
-    The result is a plain function, because numba identifies such a function by its type
-    alone. A compiled function in a named tuple would be a pointer, and numba does not
-    cache code with pointers. The function may also call plain functions in a user's own
-    modules.
+    The result is a plain function, because numba identifies a plain function by its
+    type alone. A compiled function in a named tuple would be a pointer, and numba does
+    not cache code with pointers. ``function`` may also call plain functions in a user's
+    own modules.
     """
     plain = inspect.unwrap(function)
     for called in _users_helpers(plain, set()):
@@ -243,7 +246,8 @@ def _file(source: str, names: Mapping[str, Any]) -> Path | None:
     """Writes generated source code to a file in the cache folder.
 
     The name of the file is a hash of all that the code depends on. The result is None
-    if the file cannot be written, or if the names do not determine what the code does.
+    if the file cannot be written, or if the code calls a function whose source files do
+    not determine what it does, such as a closure.
     """
     origins = (
         [*map(str, _origins(names))] if all(map(_is_known, names.values())) else []

@@ -54,7 +54,7 @@ def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
 def fields_of_law(fields: Iterable[Field], law: str, kind: str) -> list[Field]:
     """Returns the fields of a robot that runs a certain control law.
 
-    The result omits gains of other laws and fields of the run.
+    The result omits the gains of other laws and the fields of the run.
 
     Args:
         fields: The fields to select from.
@@ -170,6 +170,8 @@ def _meaning(schema: Mapping[str, Any], node: Mapping[str, Any]) -> str:
 
 
 def _kind(node: Mapping[str, Any]) -> str:
+    if "const" in node:
+        return str(node["const"])
     if "enum" in node:
         return " or ".join(node["enum"])
     if "prefixItems" in node:

@@ -30,7 +30,7 @@ def options(schema: Schema, node: Schema) -> list[Schema]:
 
 
 def at_place(schema: Schema, place: Sequence[str]) -> Schema:
-    """Returns the fields of a group, as given by the path of the group.
+    """Returns the schemas of the fields of the group at a given path.
 
     Args:
         schema: The whole JSON Schema.

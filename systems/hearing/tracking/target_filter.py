@@ -196,7 +196,8 @@ def _innovation(
     Args:
         track: Track at the moment of the sighting.
         sighting: The sighting.
-        floor: Standard deviation added to that of the sighting, m.
+        floor: Standard deviation of errors that are not in the covariance of the
+            sighting, m.
         scale: Factor of the covariance of the sighting.
         extra: Variance added to that of the innovation, m^2.
 
@@ -235,10 +236,10 @@ def _robust_innovation(
 ) -> tuple[bool, Any, tuple[Any, ...]]:
     """Computes the innovation that the filter uses, and limits the effect of outliers.
 
-    A squared normalized innovation above ``GATE`` does not agree with the model. If the
-    innovation remains above ``GATE`` even with the additional standard deviation
-    ``GATE_FLOOR_M``, the filter rejects the sighting. Otherwise the sighting gets a
-    larger covariance, so that its effect stays bounded (Huber's weight).
+    A squared normalized innovation above ``GATE`` does not agree with the model. If it
+    remains above ``GATE`` even with the additional standard deviation ``GATE_FLOOR_M``,
+    the filter rejects the sighting. Otherwise the sighting gets a larger covariance, so
+    that its effect stays bounded (Huber's weight).
 
     Returns:
         Three values: whether the sighting is accepted; the squared normalized
@@ -262,8 +263,9 @@ def _learn_scatter(track: NDArray[Any], squared: Any, dimensions: Any) -> None:
 
     The scatter is the ratio of the actual variance of estimates to their stated
     covariance. Reflections scatter estimates far more than noise does. The scatter
-    rises if an innovation is above ``SCATTER_MARGIN`` times its covariance, and falls
-    otherwise. It adapts within about ``1 / SCATTER_RATE`` sightings (estimates).
+    rises if the squared normalized innovation is above ``SCATTER_MARGIN`` times its
+    expected value. Otherwise it falls, but not below 1. It adapts within about
+    ``1 / SCATTER_RATE`` sightings (estimates).
     """
     excess = min(squared, GATE) / (dimensions * SCATTER_MARGIN)
     track[15] = max(1.0, track[15] * (1.0 + SCATTER_RATE * (excess - 1.0)))
@@ -419,9 +421,11 @@ def _choose(
 ) -> None:
     """Updates the costs of both hypotheses, and chooses between them.
 
-    The hypotheses are that the source is ahead (0) or behind (1). The choice changes if
-    the chosen hypothesis costs more than the other by ``SWITCH_MARGIN``. It also
-    changes if only the mirror image of the sighting continues the track of the target.
+    The hypotheses are that the source is ahead (0) or behind (1). Each hypothesis has
+    one candidate for the position of the source: the sighting for hypothesis 0, and its
+    mirror image for hypothesis 1. The choice changes if the chosen hypothesis costs
+    more than the other by ``SWITCH_MARGIN``. It also changes if only the candidate of
+    the other hypothesis continues the track of the chosen hypothesis.
 
     Args:
         memory: Memory of the filter, which the function changes.

@@ -88,8 +88,8 @@ def tracker_numbers(
         frame_s: Period of the estimates, s, a multiple of ``tick_s``.
         tick_s: Control period of the robot, s.
         resolve_front_back: Whether the tracker uses the motion of the robot to
-            distinguish the source from its mirror image behind a row of microphones.
-            Off: every source is in front.
+            distinguish the source from its mirror image behind a row of microphones. If
+            not, every source is in front.
         floor_m: Standard deviation of errors that are not in the covariance of an
             estimate, m.
 
@@ -167,7 +167,7 @@ def _for_scalars(function: Any) -> Any:
 
 @register_jitable
 def past_pose(pose: Any, past: Any, ticks: float) -> tuple[Any, Any, Any]:
-    """Returns the odometry pose at a past time, given in control periods (ticks) ago.
+    """Returns the odometry pose that the robot had some control periods (ticks) ago.
 
     Between two ticks, the function interpolates linearly.
 

@@ -107,9 +107,9 @@ def distance_field(
     """Computes the distance from each cell of a window to the nearest occupied cell.
 
     The window is a square. The function sweeps over the window twice, once forward and
-    once backward (a chamfer distance transform). Each cell takes the least distance of
-    a visited neighbor, plus one cell side, or sqrt(2) cell sides for a diagonal
-    neighbor.
+    once backward (a chamfer distance transform). The distance of a cell is the least
+    sum of the distance of a visited neighbor and the step from this neighbor. The step
+    is one cell side, or sqrt(2) cell sides from a diagonal neighbor.
 
     Args:
         places: (n, 3) occupied cells: x and y of the middle in the world frame W, m,
@@ -172,7 +172,7 @@ def roll_out(
             the control point P.
         field: (m, m) result of ``distance_field`` around the axle, m.
         cell: Side of a cell of the field, m.
-        numbers: Spreads, limits, and costs.
+        numbers: Constants of the sequences and costs.
     """
     samples, steps = len(noise), len(controls)
     costs, tried = np.empty(samples), np.empty((samples, steps, 2))
@@ -328,7 +328,7 @@ class PathIntegralController(MapController):
     Ten times per second, the block makes a new plan in three stages:
 
     1. It plans a route to the target on the map. In the direction of the route, it
-       places a goal that moves as fast as the target.
+       places a goal that moves with at most 80 % of the speed of the target.
     2. It draws 500 random sequences of 2.5 s around the previous plan, and computes the
        cost of each. The cost depends on the distance and direction of the goal, on
        driving backward, and on occupied cells near the body.

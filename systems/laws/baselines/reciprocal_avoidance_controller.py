@@ -173,7 +173,8 @@ def reciprocal_avoidance_step(
 
     1. Estimate the velocity of each body from its last two poses.
     2. Compute one half plane of permitted velocities for each near body.
-    3. In all half planes, choose the velocity nearest to the preferred velocity.
+    3. Among the velocities that all half planes permit, choose the velocity nearest to
+       the preferred velocity.
     4. Convert this velocity of the point to speed and yaw rate.
     """
     own, pose, poses, sizes = numbers.own, inputs[4], inputs[5], inputs[6]

@@ -149,8 +149,8 @@ def choose_direction(
       target if it lies between these two
     - if no sector is blocked: only the direction of the target
 
-    Directions are numbers of sectors, counterclockwise from the x axis of the world
-    frame.
+    Directions are angles counterclockwise from the x axis of the world frame, measured
+    in sectors of 5 deg.
 
     Args:
         blocked: (72,) whether each sector is blocked.

@@ -71,9 +71,9 @@ def adaptation_step(
     """Adapts the gains K, D, and K_e by one control period.
 
     K is the stiffness to the target, D is the damping, and K_e is the stiffness of
-    contacts. For each gain, the step computes the gradient of the error, either by the
-    Lyapunov rule or from the sensitivities. It then moves the gain against the gradient
-    and limits it. The output contains the gains from before this change.
+    contacts. For each gain, the step computes a rate of change by the selected rule,
+    ``lyapunov`` or ``sensitivity``. It then changes the gain at this rate for one
+    period, and limits the gain. The output contains the gains from before this change.
 
     The state starts with K, D, and K_e. Four sensitivities follow for each gain q: x
     and y of dp/dq, then x and y of dv/dq. p and v are the position and velocity of the
@@ -122,11 +122,11 @@ class ImpedanceAdaptation(Block):
       with e_v = v - v_ref. This rule is equivalent to eq. 40 to 42 as printed. Without
       contacts, it makes a Lyapunov function decrease.
     - ``sensitivity``: q' = -gamma dJ/dq for each gain q. J is the cost of eq. 27 with
-      two changes: a weight tau_v multiplies the velocities, and a hinge function
-      replaces the penalty. The sensitivities solve eq. 34, whose left side we read as a
-      time derivative.
+      two changes: a time tau_v multiplies the velocities, and the penalty of
+      ``penalty_gradient`` replaces the safety term. The sensitivities solve eq. 34,
+      whose left side we read as a time derivative.
 
-    The discrete state contains K, D, K_e, and four sensitivities of each gain. The
+    The discrete state contains K, D, K_e, and four sensitivities to each gain. The
     output ``impedance`` is part of the state. Therefore a change of the gains appears
     at the output one control period later.
 

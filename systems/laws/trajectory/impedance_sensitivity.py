@@ -80,8 +80,8 @@ def advance_sensitivity(
     - the matrix -(D_e/S) (v - v_j) n^T, because the damping fades; v and v_j are the
       velocities of P and of the object
 
-    The function updates the velocity first, and then the position with the new
-    velocity. The virtual mass moves in the same order.
+    The function first updates dv/dq. It then updates dp/dq with the new dv/dq, because
+    the model of the virtual mass updates v and p in the same order.
 
     Args:
         state: State of the block. The function changes four numbers: dp/dq (x and y)

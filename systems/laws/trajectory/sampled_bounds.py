@@ -122,9 +122,9 @@ def damping_bound(of: SampledMass) -> float:
 def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
     """Computes the lead at which the target pulls P through a contact.
 
-    P is the control point of the robot. The target leads P by K_e S/K, m. K is the
-    stiffness to the target, K_e is the stiffness of contacts, and S is the distance at
-    which contacts begin. If K_e is 0, the result is 1 m.
+    P is the control point of the robot. The lead is K_e S/K, m. K is the stiffness to
+    the target, K_e is the stiffness of contacts, and S is the distance at which
+    contacts begin. If K_e is 0, the result is 1 m.
     """
     lag = own.contact_stiffness_n_m * own.security_zone_m / own.stiffness_n_m
     return lag or 1.0

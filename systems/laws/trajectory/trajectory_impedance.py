@@ -17,8 +17,9 @@ from systems.world.geometry import safe_norm
 class ContactNumbers(NamedTuple):
     """Constants of the contact force.
 
-    The laws in this package set both distances to S, the width of the security zone.
-    docs/errata.md lists other readings of the paper, which use other distances.
+    The laws in this package set ``begins_m`` and ``rest_m`` to S, the width of the
+    security zone. docs/errata.md lists other readings of the paper, in which these two
+    distances differ.
     """
 
     begins_m: float

@@ -305,8 +305,7 @@ def test_frames_with_sound_of_other_gates():
     assert len(burst_frames(1.0, sound=sound)) == 20 * 4
     endless = {"on_s": 2.0}
     assert len(burst_frames(1.0, sound=endless)) == 1640
-    always = {"burst_gaps": False}
-    assert len(burst_frames(1.0, hearing="ideal", ideal_hearing=always)) == 1640
+    assert len(burst_frames(1.0, hearing="ideal_always")) == 1640
 
 
 @pytest.mark.parametrize("hearing", ["audio", "ideal"])

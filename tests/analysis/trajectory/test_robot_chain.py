@@ -93,7 +93,7 @@ def test_the_matrix_of_a_chain_is_that_of_its_response(late):
 
 
 def test_robots_that_come_to_no_rest_are_no_chain():
-    field = "laws.trajectory_filtered.damping_n_s_m=90"
+    field = "impedance.damping_n_s_m=90"
     chain = robot_chain(load_scenario("unknown_block", [field]))
     for peak in chain.peaks.values():
         assert peak.grows

@@ -10,10 +10,9 @@ from analysis.runs.metrics import run_metrics
 from diagrams import Scenario, simulate
 
 EXACT = {
-    "hearing": "ideal",
+    "hearing": "ideal_always",
     "obstacle_sensing": "ideal",
-    "ideal_hearing": {"burst_gaps": False},
-    "odometry": {"rounding": False},
+    "plant": {"pulses_per_revolution": None},
     "law": "none",
     "obstacles": [],
 }

@@ -1,4 +1,4 @@
-"""Draws errors of a real microphone array: positions, delays and gains."""
+"""The true properties of a microphone array, which may differ from the stated ones."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.random import Generator
 from numpy.typing import NDArray
 
-from systems.sound.parameters import MicArrayParameters, channel_skew
+from systems.sound.parameters import MicArrayParameters
 
 # Largest spacing of the knots of a delay polynomial, s. Between two knots, the delay
 # deviates from a cubic polynomial by less than 1e-4 sample. This bound holds even if
@@ -19,7 +18,7 @@ _SPACING_S = 0.0025
 
 
 @dataclass(frozen=True)
-class Tolerances:
+class ChannelErrors:
     """Errors of the n channels of an array."""
 
     position_errors: NDArray[np.float64]
@@ -31,27 +30,9 @@ class Tolerances:
     """(n,) true gain divided by stated gain of each channel; 1 means no error."""
 
 
-def draw_tolerances(
-    parameters: MicArrayParameters, count: int, generator: Generator
-) -> Tolerances:
-    """Draws the errors of one array, uniformly distributed within its tolerances.
-
-    Args:
-        parameters: The tolerances.
-        count: Number of microphones n.
-        generator: Source of the random numbers.
-
-    Returns:
-        Errors of n positions, n delays, and n gains.
-    """
-    places = generator.uniform(-1.0, 1.0, (count, 2))
-    delays = generator.uniform(-1.0, 1.0, count)
-    gains_db = generator.uniform(-1.0, 1.0, count) * parameters.gain_tolerance_db
-    return Tolerances(
-        position_errors=places * parameters.position_tolerance_m,
-        channel_delays=delays * parameters.delay_tolerance_s,
-        gains=10.0 ** (gains_db / 20.0),
-    )
+def no_errors(count: int) -> ChannelErrors:
+    """Returns the errors of a perfect array with a number of channels."""
+    return ChannelErrors(np.zeros((count, 2)), np.zeros(count), np.ones(count))
 
 
 class RealArray(NamedTuple):
@@ -72,28 +53,23 @@ class RealArray(NamedTuple):
 def real_array(
     p_BM: NDArray[np.float64],
     parameters: MicArrayParameters,
-    tolerances: Tolerances,
+    errors: ChannelErrors,
     c: float,
 ) -> RealArray:
     """Computes the true properties of an array from its stated properties and errors.
 
     Args:
         p_BM: (n, 2) stated positions of the microphones in the body frame B, m.
-        parameters: Stated sampling delays (skew) of the channels, and length of an
-            audio frame.
-        tolerances: Errors of positions, delays and gains.
+        parameters: Length of an audio frame.
+        errors: Errors of positions, delays and gains.
         c: Speed of sound, m/s.
 
     Returns:
         The true array.
-
-    Raises:
-        ValueError: The number of stated delays differs from the number of microphones.
     """
-    late = channel_skew(parameters, len(p_BM)) + tolerances.channel_delays
     spans = math.ceil(parameters.frame_s / _SPACING_S - 1e-9)
     while parameters.frame_samples % spans:
         spans += 1
     knots = np.linspace(0.0, parameters.frame_s, spans + 1)
-    instants = knots + late[:, None]
-    return RealArray(p_BM + tolerances.position_errors, instants, tolerances.gains, c)
+    instants = knots + errors.channel_delays[:, None]
+    return RealArray(p_BM + errors.position_errors, instants, errors.gains, c)

@@ -8,20 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from systems.sound.array_tolerances import draw_tolerances
-from systems.sound.parameters import MicArrayParameters
-
-
-def parameters(position=0.0, delay=0.0, gain_db=0.0):
-    return MicArrayParameters(
-        position_tolerance_m=position,
-        delay_tolerance_s=delay,
-        gain_tolerance_db=gain_db,
-    )
+from analysis.hearing.array_tolerances import ArrayTolerances, draw_errors
 
 
 def test_perfect_array_has_no_errors():
-    drawn = draw_tolerances(parameters(), 4, np.random.default_rng(0))
+    drawn, speed = draw_errors(ArrayTolerances(), 4, np.random.default_rng(0))
+    assert speed == 1.0
     np.testing.assert_array_equal(drawn.position_errors, np.zeros((4, 2)))
     np.testing.assert_array_equal(drawn.channel_delays, np.zeros(4))
     np.testing.assert_array_equal(drawn.gains, np.ones(4))
@@ -31,8 +23,9 @@ def test_perfect_array_has_no_errors():
     st.floats(0.0, 0.1), st.floats(0.0, 1e-4), st.floats(0.0, 40.0), st.integers(0, 99)
 )
 def test_errors_stay_within_their_tolerances(position, delay, gain_db, seed):
-    wanted = parameters(position, delay, gain_db)
-    drawn = draw_tolerances(wanted, 3, np.random.default_rng(seed))
+    wanted = ArrayTolerances(position, delay, gain_db, 0.01)
+    drawn, speed = draw_errors(wanted, 3, np.random.default_rng(seed))
+    assert 0.99 <= speed <= 1.01
     assert np.abs(drawn.position_errors).max() <= position
     assert np.abs(drawn.channel_delays).max() <= delay
     assert np.abs(20.0 * np.log10(drawn.gains)).max() <= gain_db + 1e-12
@@ -40,8 +33,8 @@ def test_errors_stay_within_their_tolerances(position, delay, gain_db, seed):
 
 def test_errors_are_uniform():
     """Standard deviation a / sqrt(3), kurtosis 9 / 5."""
-    wanted = parameters(2e-4, 2e-7, 1.0)
-    drawn = draw_tolerances(wanted, 20_000, np.random.default_rng(1))
+    wanted = ArrayTolerances(2e-4, 2e-7, 1.0)
+    drawn, _ = draw_errors(wanted, 20_000, np.random.default_rng(1))
     gains_db = 20.0 * np.log10(drawn.gains)
     for errors, bound in (
         (drawn.position_errors[:, 0], 2e-4),
