@@ -41,11 +41,8 @@ class BodyLabel(Annotation):
     def __init__(self, text: str, rectangle: ArrayLike, colour: str) -> None:
         """Places the label at the right side of the body.
 
-        Args:
-            text: One line of text.
-            rectangle: (5,) body as (x, y, theta, length, width) in the world frame W, m
-                and rad.
-            colour: Color of the body. The text gets the same color, darkened if needed.
+        The body is (x, y, theta, length, width) in the world frame W, m and rad. The
+        text gets the color of the body, darkened if needed.
         """
         x, y, theta, length, width = map(float, np.asarray(rectangle))
         unit = math.sin(theta), -math.cos(theta)
@@ -74,11 +71,9 @@ class BodyLabel(Annotation):
 def spread_labels(axes: Axes) -> None:
     """Moves all labels to places where they cover as little of the picture as possible.
 
-    A label covers another label only if there is no other place. If a label is 8 points
-    or more away from its body, a thin line connects the two.
-
-    Args:
-        axes: Axes with the complete drawing. Their limits must be final.
+    The drawing must be complete, and the limits of the axes final. A label covers
+    another label only if there is no other place. If a label is 8 points or more away
+    from its body, a thin line connects the two.
     """
     figure = axes.get_figure(root=True)
     assert figure is not None

@@ -64,16 +64,10 @@ def html(content: Content, name: str = "", level: int = 2) -> Markup:
 
 
 def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) -> str:
-    """Returns a whole HTML document.
+    """Returns a whole HTML document with an embedded style sheet.
 
-    Args:
-        title: Title of the browser window, and heading of the page.
-        contents: Pairs of anchor and title, one pair for each section.
-        parts: Sections of the page in HTML.
-
-    Returns:
-        HTML with an embedded style sheet. The page loads no other files, apart from its
-        pictures.
+    The contents are pairs of anchor and title, one pair for each of the sections, which
+    ``parts`` contains as HTML. The page loads no other files, apart from its pictures.
     """
     return f"{_template().page(title, list(contents), list(map(Markup, parts)))}\n"
 

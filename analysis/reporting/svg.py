@@ -14,16 +14,11 @@ from matplotlib.mathtext import math_to_image
 
 
 def figure_svg(figure: Figure, name: str, label: str) -> Markup:
-    """Returns a matplotlib figure as an SVG element.
+    """Returns a figure as an SVG element; the same figure always gives the same HTML.
 
-    Args:
-        figure: The figure.
-        name: Beginning of all identifiers in the SVG: letters, digits, hyphens and
-            underscores. Each drawing of a page needs a different name.
-        label: Text for screen readers.
-
-    Returns:
-        HTML. The same figure always gives the same HTML.
+    All identifiers in the SVG begin with the name, so each drawing of a page needs a
+    different one: letters, digits, hyphens and underscores. The label is for screen
+    readers.
     """
     stream = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):

@@ -15,14 +15,11 @@ SAME_M = 0.03
 
 
 def echo_times(result: RunResult) -> tuple[float | None, float | None]:
-    """Computes when the range sensors saw the body that the robot touched.
+    """Computes how long before its contact the robot had echoes of the touched body.
 
-    Args:
-        result: Result of a run, for one robot with range sensors.
-
-    Returns:
-        Two times, s: from the first and from the last echo of the body to the contact.
-        Both are None if the run had no collision, or the body never caused an echo.
+    Returns the times from the first and from the last echo to the contact, s. Both are
+    None if the run had no collision, or if the body never caused an echo. The result
+    must be that of one robot with range sensors.
     """
     hit = result.collision
     if hit is None:

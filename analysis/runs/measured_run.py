@@ -283,14 +283,9 @@ class MeasuredRun(Proximity):
 
 
 def near_and_after(clearance: ArrayLike, period_s: float) -> Flags:
-    """Returns when an obstacle is nearer than 1 m, or was nearer within the last 5 s.
+    """(n,) whether an obstacle is nearer than 1 m, or was nearer within the last 5 s.
 
-    Args:
-        clearance: (n,) clearance from the nearest obstacle at constant intervals, m.
-        period_s: Interval, s.
-
-    Returns:
-        (n,) whether one of these conditions holds, for each sample.
+    The (n,) clearances from the nearest obstacle are in m.
     """
     near = np.asarray(clearance, dtype=float) < MET_M
     ticks = np.arange(len(near))
@@ -299,15 +294,10 @@ def near_and_after(clearance: ArrayLike, period_s: float) -> Flags:
 
 
 def yaw_ripple(rate: ArrayLike, where: Flags, period_s: float) -> float | None:
-    """Computes the RMS value of a yaw rate minus its moving mean over 1 s.
+    """Computes the RMS value of a yaw rate (n,) minus its moving mean over 1 s.
 
-    Args:
-        rate: (n,) yaw rates at constant intervals, rad/s.
-        where: (n,) whether each sample counts.
-        period_s: Interval, s.
-
-    Returns:
-        RMS value, rad/s. The value is None if no sample counts.
+    The flags ``where`` (n,) select the samples that count. The value has the unit of
+    the rate. It is None if no sample counts.
     """
     if not np.any(where):
         return None

@@ -104,16 +104,10 @@ class Group(NamedTuple):
 
 
 def run_metrics(result: RunResult) -> dict[str, float | None]:
-    """Computes all metrics of a run, in the units of ``METRICS``.
+    """Computes all metrics of a run by name, in the units of ``METRICS``.
 
     If a metric does not apply to the run, its value is None. If the run has several
     robots, each name begins with the name of the robot and a dot.
-
-    Args:
-        result: Result of a run, for one robot or several robots.
-
-    Returns:
-        Value of each metric, by name.
     """
     if result.several:
         return {
@@ -272,27 +266,19 @@ def _first_reaction(
     push: NDArray[np.float64],
     echoes: NDArray[np.float64],
 ) -> float:  # pragma: no cover  (compiled)
-    """Returns how near an obstacle is when the control law first reacts to it.
+    """Returns how near an obstacle is when the control law first reacts to it, m.
 
-    The law reacts at a tick (control period) if three conditions hold:
+    The law reacts at a tick (control period) if three conditions hold. If it never
+    reacts, the distance is infinite.
 
-    - The repulsive force is at least ``REACTION_N``.
-    - The nearest obstacle is nearer to the control point P than the target is.
+    - The repulsive force ``push`` (2, n) is at least ``REACTION_N``.
+    - The nearest obstacle is nearer to the control point P than the target is. The
+      target is the last of the m ``bodies`` (m, n, 5).
     - A collision vector agrees with this obstacle: its length differs from the distance
-      of the obstacle by at most ``ECHO_M``. A collision vector points from P to an
-      echo.
+      of the obstacle by at most ``ECHO_M``.
 
-    Args:
-        bodies: (m, n, 5) rectangles of the m bodies at n ticks. The last body is the
-            target of the robot.
-        p_WP: (2, n) positions of P in the world frame W, m.
-        push: (2, n) repulsive force of the law in W, N.
-        echoes: (k, 3, n) k collision vectors. Each has three entries: a number above 0
-            if there is a vector, and its x and y in the robot frame B, m.
-
-    Returns:
-        Distance from P to the nearest obstacle, m. It is infinite if the law never
-        reacted.
+    The ``echoes`` (k, 3, n) hold k collision vectors, which point from P to an echo: a
+    number above 0 if there is a vector, and its x and y in the robot frame B, m.
     """
     for i in range(push.shape[1]):
         if math.hypot(push[0, i], push[1, i]) < REACTION_N:

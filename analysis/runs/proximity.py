@@ -113,17 +113,13 @@ def least_clearances(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     """Computes the least clearances between a moving rectangle and other rectangles.
 
+    The robot (n, 5) and the m bodies (m, n, 5) are rectangles (x, y, theta, length,
+    width) at n times, m and rad. The function returns the (n,) clearance from the
+    nearest body at each time and the (m,) least clearance from each body over all
+    times, m. If rectangles overlap, the clearance is negative.
+
     To save time, the function skips a body at times at which the enclosing circles of
     both rectangles are far apart.
-
-    Args:
-        robot: (n, 5) rectangle (x, y, theta, length, width) at n times, m and rad.
-        bodies: (m, n, 5) rectangles of the m other bodies at these times, m and rad.
-
-    Returns:
-        Two arrays. The first array has the (n,) clearance from the nearest body at each
-        time, m. The second array has the (m,) least clearance from each body over all
-        times, m. If rectangles overlap, the clearance is negative.
     """
     count, ticks = bodies.shape[:2]
     nearest, least = np.full(ticks, np.inf), np.full(count, np.inf)
@@ -152,18 +148,10 @@ def _least_contact_time(
     velocity: NDArray[np.float64],
     bodies: NDArray[np.float64],
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the least predicted time to a contact, over all ticks and bodies.
+    """Computes the least predicted time to a contact, over all ticks and bodies, s.
 
-    A tick is a control period.
-
-    Args:
-        time: (n,) times of the ticks, s.
-        robot: (n, 5) rectangles (x, y, theta, length, width) of the robot, m and rad.
-        velocity: (2, n) velocity of the robot, m/s.
-        bodies: (m, n, 5) rectangles of the bodies, m and rad.
-
-    Returns:
-        Least time to a contact, s. It is infinite if no contact is predicted.
+    The time is infinite if no contact is predicted. The velocity (2, n) is in m/s; for
+    the rectangles, see ``least_clearances``.
     """
     least, reaches = np.inf, _reaches(robot, bodies)
     for k in range(len(bodies)):

@@ -16,16 +16,7 @@ from systems.search.search_ending import fault_names
 
 
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
-    """Returns the summary of a run as a JSON document.
-
-    Args:
-        result: Result of the run.
-        out: Directory of the run, which the summary names. With None, the summary names
-            no directory.
-
-    Returns:
-        Dictionary of plain values, which can be written as JSON.
-    """
+    """Returns the summary of a run in the directory ``out`` as a JSON document."""
     document = {
         "schema_version": SCHEMA_VERSION,
         "scenario": result.full_scenario.name,
@@ -68,15 +59,7 @@ def _outcome(result: RunResult) -> dict[str, Any]:
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
-    """Returns the summary of a run as text that fits on one screen.
-
-    Args:
-        result: Result of the run.
-        summary: Summary of the run, from ``run_summary``.
-
-    Returns:
-        Lines of text. The last line has no line end.
-    """
+    """Returns the summary of a run as text that fits on one screen."""
     return "\n".join(
         f"{name.split('.')[-1]:<21} {value}"
         for name, value in summary_rows(result, summary).items()
@@ -84,15 +67,9 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
 
 
 def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
-    """Returns the rows of a run's summary for the terminal.
+    """Returns the rows of a run's summary for the terminal, by name of the row.
 
-    Args:
-        result: Result of the run.
-        summary: Summary of the run, from ``run_summary``.
-
-    Returns:
-        Text of each row, by name of the row. With several robots, the names of a
-        robot's rows begin with the name of the robot and a dot.
+    With several robots, the names of a robot's rows begin with its name and a dot.
     """
     timing = summary["timing"]
     scenario = result.full_scenario

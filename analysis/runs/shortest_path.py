@@ -27,25 +27,15 @@ def shortest_path_length(
 ) -> float:
     """Computes the length of the shortest path of a disc to a circle around the goal.
 
-    The function grows the boxes by the radius of the disc. Then it runs A* on their
-    visibility graph, whose edges connect points on the outlines of the grown boxes. The
-    last leg of a path runs straight toward the goal. Polygons just outside the arcs
-    replace the rounded corners.
+    Lengths are in m. The boxes (n, 5) are rectangles (x, y, theta, length, width) at
+    rest, m and rad. The function grows them by the radius of the disc. Then it runs A*
+    on their visibility graph, whose edges connect points on the outlines of the grown
+    boxes. The last leg of a path runs straight toward the goal. Polygons just outside
+    the arcs replace the rounded corners.
 
     If the disc overlaps a box at the start, this box grows only up to the center of the
-    disc.
-
-    Args:
-        start: (2,) initial position of the disc's center, m.
-        goal: (2,) position of the goal, m.
-        goal_radius: Radius of the circle around the goal, m. The path ends at this
-            circle.
-        boxes: (n, 5) rectangles (x, y, theta, length, width) at rest, m and rad.
-        radius: Radius of the disc, m.
-
-    Returns:
-        Length of the path, m. It is 0 if the start is inside the circle, and infinite
-        if there is no path.
+    disc. The length is 0 if the start is inside the circle, and infinite if there is no
+    path.
     """
     ends = np.asarray([start, goal], dtype=float)
     rectangles = np.asarray(boxes, dtype=float).reshape(-1, 5)

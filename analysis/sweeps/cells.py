@@ -79,14 +79,10 @@ class Quantity:
         return estimate_median(values)
 
     def text(self, estimate: Estimate, sign: str = "") -> str:
-        """Writes an estimate with its interval; rates are in percent.
+        """Writes an estimate in the form '82 (68, 91)', with rates in percent.
 
-        Args:
-            estimate: The estimate.
-            sign: ``+`` to write the sign of positive numbers, too.
-
-        Returns:
-            Text in the form '82 (68, 91)'; a dash without runs.
+        With the sign ``+``, positive numbers have a sign, too. Without runs, the text
+        is a dash.
         """
         if self.rate:
             return estimate.text(f"{sign}.0f", factor=100.0)
@@ -99,15 +95,8 @@ def quantities(
 ) -> list[Quantity]:
     """Returns the rates and metrics that pages show, without those that no run has.
 
-    Args:
-        rows: Results of the sweep.
-        pictures: Whether to return only the metrics that pictures show.
-        robot: Name of a robot, for its own metrics without rates. The default are the
-            rates and the metrics of all robots together.
-        seed: Seed of the sweep.
-
-    Returns:
-        The rates, then the metrics in the order of ``METRICS``.
+    With the name of a robot, the result contains the metrics of this robot and no
+    rates. Otherwise, it contains the rates and the metrics of all robots together.
     """
     prefix = f"{robot}." if robot else ""
     names = [
@@ -161,17 +150,7 @@ class Cell:
 def make_cell(
     scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int = 0
 ) -> Cell:
-    """Summarizes one cell of a sweep.
-
-    Args:
-        scenario: Name of the scenario.
-        fields: Values of the grid's fields, by dotted path.
-        rows: Results of the cell's runs, with the control period ``tick_s``, s.
-        seed: Seed of the sweep.
-
-    Returns:
-        Rates, averages, causes of the endings, and example runs.
-    """
+    """Summarizes the runs of a cell. Their rows need the control period ``tick_s``."""
     metrics = {
         name: estimate
         for name in rows.columns
@@ -245,17 +224,8 @@ def marginal(
 
     The runs are sorted into bins by the value of the field. If the field is a number,
     the bins have about the same number of runs. Otherwise, each possible value has a
-    bin.
-
-    Args:
-        plan: Plan of the parameter sweep.
-        key: Key of ``plan.draw``. If the key lists several paths, the first path
-            represents all of them.
-        runs: Results of the sweep.
-        quantity: Quantity to estimate.
-
-    Returns:
-        One estimate for each bin.
+    bin. If the key in ``plan.draw`` lists several paths, the first path represents all
+    of them.
     """
     path = key.partition(",")[0].strip()
     values = runs[path]
@@ -284,28 +254,13 @@ def by_cell(plan: SweepPlan, results: pd.DataFrame) -> list[pd.DataFrame]:
 
 
 def cell_label(fields: dict[str, Any]) -> str:
-    """Describes a cell of a grid, which is one combination of values, in a short text.
-
-    Args:
-        fields: Values of the grid's fields in this cell, by dotted path.
-
-    Returns:
-        Last part of each path with its value, or ``all runs`` if there are no fields.
-    """
+    """Describes a cell by the last part of each path and its value."""
     pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
     return ", ".join(pairs) or "all runs"
 
 
 def short(value: Any, most: int = 24) -> str:
-    """Writes a value as short text.
-
-    Args:
-        value: Plain value. Values other than texts are written as JSON.
-        most: Greatest length of the result, at least 4 characters.
-
-    Returns:
-        The text. If the text is too long, three dots replace its end.
-    """
+    """Writes a plain value in at most ``most`` characters; dots replace the end."""
     text = value if isinstance(value, str) else json.dumps(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 

@@ -34,15 +34,7 @@ class Conditions(Parameters):
     origin of B."""
 
     def check(self, scenario: Scenario) -> None:
-        """Checks whether a layout fulfills the conditions.
-
-        Args:
-            scenario: Scenario with the layout.
-
-        Raises:
-            InputError: The layout violates a condition. The message names the
-                condition.
-        """
+        """Raises InputError, with the condition's name, if a layout violates it."""
         if self == Conditions():
             return
         self._check_source(scenario)

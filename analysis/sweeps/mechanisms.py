@@ -17,7 +17,10 @@ LATE_S = 1.0
 
 
 def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
-    """Determines why each failed run failed, as the name of a mechanism.
+    """Names the mechanism by which each failed run failed; none for a success.
+
+    The rows are results of runs with range sensors, with the control period ``tick_s``
+    as an additional column.
 
     The mechanism of a collision depends on the echoes of the body that the robot hit
     (docs/results_laws.md):
@@ -40,14 +43,6 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     - ``diverged``: The robot drove too far from the source.
     - ``no way found``: The control law reported that there is no path.
     - ``failed``: The run raised an error.
-
-    Args:
-        rows: Results of runs with sensor cones, from
-            ``analysis.sweeps.store.load_results``, with an additional column ``tick_s``
-            (control period, s).
-
-    Returns:
-        Name of the mechanism for each row. The name is missing if the run succeeded.
     """
     cause = rows["cause"].astype("object")
     names = cause.where(~cause.isin(SUCCESSFUL))

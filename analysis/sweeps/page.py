@@ -55,12 +55,7 @@ MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
 
 
 def write_batch(batch: Batch, document: dict[str, Any]) -> None:
-    """Writes the JSON document, the page and the examples into the batch's directory.
-
-    Args:
-        batch: Results of the batch.
-        document: JSON document from ``batch_document``.
-    """
+    """Writes the JSON document, the page and the examples to the batch's directory."""
     write_json(document, batch.out / SUMMARY)
     write_examples(batch)
     (batch.out / REPORT).write_text(batch_page(batch, document), "utf-8")
@@ -72,13 +67,6 @@ def batch_page(batch: Batch, document: dict[str, Any]) -> str:
     The page of a single sweep has a section for each kind of result. The page of a
     comparison has a section for each scenario. The page shows the pictures and replays
     that exist in the directory of the batch.
-
-    Args:
-        batch: Results of the batch.
-        document: JSON document from ``batch_document``.
-
-    Returns:
-        HTML.
     """
     parts = {"Summary": _about(batch, document)}
     for k, (name, each) in enumerate(batch.summaries.items()):

@@ -80,13 +80,7 @@ class Pair:
 def pairs_of(plan: SweepPlan, rows: pd.DataFrame, scenario: str) -> list[Pair]:
     """Compares each two cells of a paired sweep that differ in exactly one field.
 
-    Args:
-        plan: Plan of the sweep.
-        rows: Results of the sweep, sorted by layout in each cell.
-        scenario: Name of the scenario.
-
-    Returns:
-        One comparison for each pair of cells.
+    The rows of each cell must be sorted by layout.
     """
     return [_pair(scenario, each) for each in _neighbours(plan, rows)]
 
@@ -172,18 +166,10 @@ def paired_rate(
 ) -> PairedRate:
     """Compares how often two methods have an outcome, for example a collision.
 
-    Both methods run on the same n layouts. The confidence interval is the adjusted Wald
-    interval of Bonett and Price (2012). This interval keeps its coverage even for rare
-    outcomes and small samples.
-
-    Args:
-        first: (n,) whether the first method had the outcome on each layout, n >= 1.
-        second: (n,) whether the second method had the outcome on each layout.
-        level: Confidence level of the interval.
-
-    Returns:
-        Difference of the two rates, from -1 to 1, with its confidence interval. The
-        result also contains the p-value of the exact McNemar test.
+    The flags (n,) of each method tell whether it had the outcome on each of the same n
+    layouts, n >= 1. The confidence interval is the adjusted Wald interval of Bonett and
+    Price (2012). This interval keeps its coverage even for rare outcomes and small
+    samples. The p-value is that of the exact McNemar test.
     """
     from scipy.stats import binomtest, norm
 
@@ -208,19 +194,10 @@ def paired_rate(
 def paired_median(
     first: ArrayLike, second: ArrayLike, *, level: float = LEVEL
 ) -> PairedMedian | None:
-    """Compares the values of a metric between two methods.
+    """Compares the values (n,) of a metric between two methods on the same n layouts.
 
-    Both methods run on the same n layouts.
-
-    Args:
-        first: (n,) values of the first method. NaN if a run has no value.
-        second: (n,) values of the second method. NaN if a run has no value.
-        level: Confidence level of the interval.
-
-    Returns:
-        Medians, and the interval of the median difference, in the unit of the metric.
-        The result also contains the p-value of the Wilcoxon signed-rank test. The
-        result is None if no layout has values of both methods.
+    A run without a value has NaN. The p-value is that of the Wilcoxon signed-rank test.
+    The result is None if no layout has values of both methods.
     """
     from scipy.stats import wilcoxon
 

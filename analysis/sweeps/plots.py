@@ -40,18 +40,10 @@ def grid_axes(plan: SweepPlan) -> list[str]:
 def plot_heat_maps(
     plan: SweepPlan, results: pd.DataFrame, x: str, y: str, rest: dict[str, Any]
 ) -> Figure:
-    """Draws a heat map of each quantity over two fields of the grid.
+    """Draws a heat map of each quantity over two fields of the grid, x and y.
 
-    Args:
-        plan: Plan of the parameter sweep.
-        results: Results of the sweep, from ``load_results``.
-        x: Dotted path of the field along the horizontal axis.
-        y: Dotted path of the field along the vertical axis.
-        rest: Values of the grid's other fields, by dotted path.
-
-    Returns:
-        Picture with one panel for each quantity. Lighter cells have larger values.
-        Cells without an estimate are hatched.
+    The other fields of the grid have the values ``rest``. Lighter cells have larger
+    values. Cells without an estimate are hatched.
     """
     runs, cells = by_cell(plan, results), plan.cells()
     chosen = [
@@ -148,15 +140,7 @@ def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
 
 
 def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
-    """Draws each quantity of each cell, with 95 % intervals.
-
-    Args:
-        plan: Plan of the parameter sweep.
-        results: Results of the sweep, from ``load_results``.
-
-    Returns:
-        Picture with one panel for each quantity, and one row for each cell.
-    """
+    """Draws each quantity of each cell in a row of its own, with 95 % intervals."""
     labels = [cell_label(fields) for fields in plan.cells()]
     places = np.arange(len(labels), dtype=float)
     figure, panels = _panels(results, 0.9 + 0.32 * len(labels))
@@ -176,16 +160,7 @@ def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
 
 
 def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
-    """Draws each quantity over the only field of the grid, with 95 % intervals.
-
-    Args:
-        plan: Plan of the parameter sweep, whose grid has one field.
-        results: Results of the sweep, from ``load_results``.
-        x: Dotted path of this field.
-
-    Returns:
-        Picture with one panel for each quantity, for example the success rate.
-    """
+    """Draws each quantity over the only field of the grid, with 95 % intervals."""
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
         estimates = [quantity.estimate(runs) for runs in by_cell(plan, results)]
@@ -197,19 +172,11 @@ def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
 
 
 def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
-    """Draws each quantity as a function of one randomly drawn field.
+    """Draws each quantity as a function of one drawn field, a key of ``plan.draw``.
 
     If a field of the grid has few enough values, the picture has one curve for each of
     these values. If several fields have, the first field is used. Each curve combines
     the runs over all other fields.
-
-    Args:
-        plan: Plan of the parameter sweep.
-        results: Results of the sweep, from ``load_results``.
-        key: Key of the drawn field in ``plan.draw``.
-
-    Returns:
-        Picture with one panel for each quantity.
     """
     runs = results
     split = next(
