@@ -95,14 +95,9 @@ def spread_labels(axes: Axes) -> None:
             step = (turn + 1) // 2 * (1 if turn % 2 else -1)
             angle = theta - math.pi / 2.0 + 2.0 * math.pi * step / _DIRECTIONS
             unit = np.array([math.cos(angle), math.sin(angle)])
-            body = (
-                0.5
-                * along
-                * (
-                    length * abs(math.cos(angle - theta))
-                    + width * abs(math.sin(angle - theta))
-                )
-            )
+            sides = length * abs(math.cos(angle - theta))
+            sides += width * abs(math.sin(angle - theta))
+            body = 0.5 * along * sides
             reach = body + float(half @ np.abs(unit))
             for gap in _GAPS_PT:
                 place = middle + (reach + gap) * unit

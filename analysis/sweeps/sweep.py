@@ -124,25 +124,6 @@ def prepare_sweep(
     return PreparedSweep(plan, points, store, runner, compiled)
 
 
-def run_sweep(
-    plan: SweepPlan,
-    out: str | Path,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    resume: bool = False,
-    progress: Callable[[int], None] | None = None,
-) -> pd.DataFrame:
-    """Prepares a parameter sweep and does all its runs.
-
-    See ``prepare_sweep`` and ``PreparedSweep.run``.
-    """
-    prepared = prepare_sweep(
-        plan, out, workers=workers, scheduler=scheduler, resume=resume
-    )
-    return prepared.run(progress)
-
-
 def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
     """Returns the shell command that repeats one run of the sweep in a directory.
 
