@@ -111,8 +111,7 @@ _OBSTACLES = [
         collision_K_B_y="leftward part of collision vector k",
     ),
     *_of(
-        "number",
-        feature_K="code of the sensors that vector k comes from; 0: no vector",
+        "number", feature_K="code of the sensors that vector k comes from; 0: no vector"
     ),
     *_of(
         "m/s",

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.reporting.units import without_unit
 from analysis.runs.measured_run import (
     MOVING_M_S,
+    Flags,
+    Floats,
     MeasuredRun,
     lengths,
     quantile,
@@ -147,7 +148,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _first_time(run: MeasuredRun, flags: NDArray[np.bool_]) -> float | None:
+def _first_time(run: MeasuredRun, flags: Flags) -> float | None:
     found = np.flatnonzero(flags)
     return float(run.time[found[0]]) if len(found) else None
 
@@ -255,20 +256,14 @@ def _reaction_distance(run: MeasuredRun) -> float | None:
         [columns[f"feature_{k}"], *result.vector(f"collision_{k}_B")] for k in (1, 2, 3)
     ]
     distance = _first_reaction(
-        run.bodies,
-        result.vector("p_WP"),
-        result.vector("repulsion"),
-        np.array(echoes),
+        run.bodies, result.vector("p_WP"), result.vector("repulsion"), np.array(echoes)
     )
     return distance if math.isfinite(distance) else None
 
 
 @njit(cache=True)
 def _first_reaction(
-    bodies: NDArray[np.float64],
-    p_WP: NDArray[np.float64],
-    push: NDArray[np.float64],
-    echoes: NDArray[np.float64],
+    bodies: Floats, p_WP: Floats, push: Floats, echoes: Floats
 ) -> float:  # pragma: no cover  (compiled)
     """Returns how near an obstacle is when the control law first reacts to it, m.
 
@@ -524,7 +519,7 @@ def _gains(name: str, unit: str, symbol: str) -> tuple[Metric, ...]:
     def of(
         which: str,
         robots: Literal["mean", "least", "greatest"],
-        read: Callable[[NDArray[np.float64]], float],
+        read: Callable[[Floats], float],
     ) -> Metric:
         return Metric(
             f"{which}_{name}_{unit}",

@@ -11,6 +11,8 @@ from scipy.fft import rfft
 
 from systems.framework.compiling import njit
 
+Floats = NDArray[np.float64]
+
 #: Half of the time over which ``jerk`` fits a cubic, s. At 25 ms, this is 5 samples.
 JERK_HALF_WINDOW_S = 0.125
 #: Highest frequency of ``spectral_arc_length``, Hz.
@@ -22,7 +24,7 @@ THRESHOLD = 0.05
 PADDING = 4
 
 
-def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
+def jerk(velocity: ArrayLike, period: float) -> Floats:
     """Computes the jerk of a velocity (n,) or (n, k) as its second derivative.
 
     The function fits a cubic polynomial to the velocity over 0.25 s by least squares (a
@@ -44,7 +46,7 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
 
 
 @cache
-def _second_derivative(half: int) -> NDArray[np.float64]:
+def _second_derivative(half: int) -> Floats:
     """Returns the weights of samples for the second derivative of a fitted cubic.
 
     The weights apply to 2 half + 1 samples at an interval of 1.
@@ -52,11 +54,11 @@ def _second_derivative(half: int) -> NDArray[np.float64]:
     square = np.arange(-half, half + 1.0) ** 2
     # The cubic's odd terms are orthogonal to the square less its mean.
     square -= np.mean(square)
-    weights: NDArray[np.float64] = 2.0 * square / np.sum(square**2)
+    weights: Floats = 2.0 * square / np.sum(square**2)
     return weights
 
 
-def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
+def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> Floats:
     """Computes the spectral arc lengths (SPARC) of speeds (..., n), dimensionless.
 
     The function computes the magnitude spectrum of the speed, and normalizes frequency
@@ -76,7 +78,7 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
 @njit(cache=True)
 def _arc_lengths(
     spectra: NDArray[np.complex128], highest: int
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+) -> Floats:  # pragma: no cover  (compiled)
     """(n,) spectral arc lengths of (n, lines) spectra, up to the line ``highest``."""
     lengths = np.zeros(len(spectra))
     for k in range(len(spectra)):
@@ -91,7 +93,7 @@ def _arc_lengths(
     return lengths
 
 
-def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
+def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> Floats:
     """Computes the log dimensionless jerk (LDLJ) of speeds (..., n), a smoothness.
 
     The value is -ln(T^3 / v_peak^2 * J). T is the duration, v_peak is the largest
@@ -108,7 +110,7 @@ def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float
     return -np.log(duration**3 / np.max(np.abs(speed), axis=-1) ** 2 * integral)
 
 
-def windows(values: ArrayLike, length: int) -> NDArray[np.float64]:
+def windows(values: ArrayLike, length: int) -> Floats:
     """Divides values into windows (n, length), and omits an incomplete last window."""
     values = np.asarray(values, dtype=float)
     count = len(values) // length

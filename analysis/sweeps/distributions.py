@@ -9,13 +9,7 @@ import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from systems.framework.input_error import InputError
-from systems.framework.parameters import (
-    Angle,
-    Coordinate,
-    Length,
-    Parameters,
-    Point,
-)
+from systems.framework.parameters import Angle, Coordinate, Length, Parameters, Point
 
 #: Limits of the numbers. The difference of two floats within the limits is finite.
 #: Integers within the limits are exact as floats.
