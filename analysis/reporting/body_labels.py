@@ -38,7 +38,7 @@ _Box = tuple[float, float, float, float]
 class BodyLabel(Annotation):
     """Text label of a rectangular body; ``spread_labels`` finds its final position."""
 
-    def __init__(self, text: str, rectangle: ArrayLike, colour: str) -> None:
+    def __init__(self, text: str, rectangle: ArrayLike, color: str) -> None:
         """Places the label at the right side of the body.
 
         The body is (x, y, theta, length, width) in the world frame W, m and rad. The
@@ -52,7 +52,7 @@ class BodyLabel(Annotation):
             (x + 0.5 * width * unit[0], y + 0.5 * width * unit[1]),
             xytext=(9.0 * unit[0], 7.0 * unit[1]),
             textcoords="offset points",
-            color=text_colour(colour),
+            color=text_colour(color),
             fontsize=8,
             ha="center",
             va="center",
@@ -122,8 +122,8 @@ def spread_labels(axes: Axes) -> None:
         if gap >= _LEAD_FROM_PT:
             ends = np.array([middle + body * unit, place - _to_edge(half, unit)])
             where = axes.transData.inverted().transform(ends / scale)
-            colour = label.get_color()
-            line = Line2D(*where.T, color=colour, lw=0.6, zorder=6.9, gid="leader")
+            color = label.get_color()
+            line = Line2D(*where.T, color=color, lw=0.6, zorder=6.9, gid="leader")
             axes.add_line(line)
 
 

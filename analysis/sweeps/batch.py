@@ -51,7 +51,7 @@ def compares_laws(plan: SweepPlan) -> bool:
     return plan.pair and "law" in plan.grid and plan.cell_count <= MOST_CELLS
 
 
-def summarise(plan: SweepPlan, table: pd.DataFrame, name: str) -> Summary:
+def summarize(plan: SweepPlan, table: pd.DataFrame, name: str) -> Summary:
     """Summarizes the results of a sweep, as ``load_results`` returns them."""
     scenario = scenario_from_mapping(plan.base)
     if "tick_s" not in table:  # else it is swept or drawn
@@ -118,7 +118,7 @@ class PreparedBatch:
 
         for name, sweep in self.sweeps.items():
             table = sweep.run(partial(report, before))
-            summaries[name] = summarise(sweep.plan, table, name)
+            summaries[name] = summarize(sweep.plan, table, name)
             before += len(sweep.points)
         pooled = pooled_pairs(
             [(each.plan, each.rows) for each in summaries.values() if each.pairs]

@@ -82,21 +82,21 @@ def pairs_of(plan: SweepPlan, rows: pd.DataFrame, scenario: str) -> list[Pair]:
 
     The rows of each cell must be sorted by layout.
     """
-    return [_pair(scenario, each) for each in _neighbours(plan, rows)]
+    return [_pair(scenario, each) for each in _neighbors(plan, rows)]
 
 
 def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]:
     """Compares each pair of values of a field over several scenarios together."""
-    groups: dict[tuple[str, str, str], list[_Neighbours]] = {}
+    groups: dict[tuple[str, str, str], list[_Neighbors]] = {}
     for plan, rows in sweeps:
-        for one in _neighbours(plan, rows):
+        for one in _neighbors(plan, rows):
             key = (one.field, str(one.first), str(one.second))
             groups.setdefault(key, []).append(one)
     return [_pair("all", _joined(group)) for group in groups.values()]
 
 
 @dataclass(frozen=True)
-class _Neighbours:
+class _Neighbors:
     """Runs of two cells that differ in one field, in the same order of layouts."""
 
     field: str
@@ -107,17 +107,17 @@ class _Neighbours:
     second_rows: pd.DataFrame
 
 
-def _neighbours(plan: SweepPlan, rows: pd.DataFrame) -> Iterator[_Neighbours]:
+def _neighbors(plan: SweepPlan, rows: pd.DataFrame) -> Iterator[_Neighbors]:
     cells = list(zip(plan.cells(), by_cell(plan, rows), strict=True))
     for (one, ones), (other, others) in combinations(cells, 2):
         apart = [key for key in one if one[key] != other[key]]
         if len(apart) == 1:
             field = apart[0]
             common = {key: value for key, value in one.items() if key != field}
-            yield _Neighbours(field, one[field], other[field], common, ones, others)
+            yield _Neighbors(field, one[field], other[field], common, ones, others)
 
 
-def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
+def _joined(group: Sequence[_Neighbors]) -> _Neighbors:
     return replace(
         group[0],
         fields={},
@@ -126,7 +126,7 @@ def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
     )
 
 
-def _pair(scenario: str, runs: _Neighbours) -> Pair:
+def _pair(scenario: str, runs: _Neighbors) -> Pair:
     first, second = runs.first_rows, runs.second_rows
     both = successes(first) & successes(second)
     met = both & _pushed(first) & _pushed(second)
@@ -178,13 +178,13 @@ def paired_rate(
     apart, pairs = only_first + only_second, len(a)
     p_value = binomtest(only_first, apart).pvalue if apart else 1.0
     up, down = (only_first + 1) / (pairs + 2), (only_second + 1) / (pairs + 2)
-    centre = up - down
-    spread = math.sqrt((up + down - centre**2) / (pairs + 2))
+    center = up - down
+    spread = math.sqrt((up + down - center**2) / (pairs + 2))
     half = float(norm.ppf(0.5 + level / 2.0)) * spread
     difference = Estimate(
         (only_first - only_second) / pairs,
-        max(centre - half, -1.0),
-        min(centre + half, 1.0),
+        max(center - half, -1.0),
+        min(center + half, 1.0),
         pairs,
         level,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.sweeps.batch import summarise
+from analysis.sweeps.batch import summarize
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.report import robot_rows
 from analysis.sweeps.sweep import prepare_sweep
@@ -36,7 +36,7 @@ def test_rows_and_pages_have_each_robots_own(tmp_path):
         "far",
         "near",
     )
-    head, near, far = robot_rows(summarise(plan, table, "two_followers"))
+    head, near, far = robot_rows(summarize(plan, table, "two_followers"))
     assert (near[1], far[1]) == ("near", "far")
     assert head[2:4] == ["least clearance (m)", "least clearance from obstacles (m)"]
     assert near[2] == far[2], "each touches the other"
