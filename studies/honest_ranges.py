@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from analysis.recordings.locate import hear
 from analysis.recordings.locate_result import LocateResult
+from analysis.recordings.prepared_recording import RecordedSamples
 from analysis.reporting.intervals import wilson_interval
 from studies.support.drawn_recordings import (
     RATE,
@@ -95,7 +96,7 @@ def try_array(cell: Cell, drawn: DrawnArray, rng: np.random.Generator) -> Trial:
     """Records and locates."""
     samples = record(drawn, cell, rng)
     try:
-        heard = hear(samples, RATE, drawn.geometry, "recording")
+        heard = hear(RecordedSamples(samples, RATE, "recording"), drawn.geometry)
     except InputError as error:
         return Trial(cell, drawn, str(error), (), (), *(math.nan,) * 4, ())
     known = drawn.geometry.known

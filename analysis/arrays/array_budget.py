@@ -34,17 +34,7 @@ class ArrayBudget:
         speed_std: float = 0.0,
         delay_std: float = 0.0,
     ) -> ArrayBudget:
-        """Makes an error budget with equal position errors for all coordinates.
-
-        Args:
-            shape: The microphones.
-            position_std: Standard deviation of each coordinate of each microphone, m.
-            speed_std: Standard deviation of the speed of sound, m/s.
-            delay_std: Standard deviation of the sampling times of each channel, s.
-
-        Returns:
-            The standard deviations of all errors.
-        """
+        """Makes an error budget with equal position errors for all coordinates."""
         of_places = position_std**2 * np.eye(shape.p_AM.size)
         return cls(of_places, speed_std, delay_std)
 
@@ -56,19 +46,12 @@ class ArrayBudget:
     def delay_covariance(
         self, u: NDArray[np.float64], w: float, shape: ArrayShape, c: float
     ) -> NDArray[np.float64]:
-        """Computes the covariance of the delays t_k - t_0 from the errors of the array.
+        """Computes the (n - 1, n - 1) covariance of the delays t_k - t_0, s^2.
 
-        The computation is to first order. If a microphone is nearer to the source by a
-        length, the sound arrives earlier by this length divided by c.
-
-        Args:
-            u: (d,) unit vector from the centroid of the microphones to the source.
-            w: Inverse range of the source, 1/m; 0 for a distant source.
-            shape: The n microphones.
-            c: Speed of sound, m/s.
-
-        Returns:
-            (n - 1, n - 1) covariance of the delays, s^2.
+        The unit vector u points from the centroid of the microphones to the source. The
+        inverse range w is 0 for a distant source, 1/m. The computation is to first
+        order: if a microphone is nearer to the source by a length, the sound arrives
+        earlier by this length divided by c.
         """
         count, dimension = shape.p_AM.shape
         to_source = u - w * shape.p_AM
@@ -89,11 +72,7 @@ class ArrayBudget:
 def _arrivals(
     u: NDArray[np.float64], w: float, shape: ArrayShape
 ) -> NDArray[np.float64]:
-    """Computes how much farther from the source each microphone is than the centroid.
-
-    Returns:
-        (n,) differences of distance, m.
-    """
+    """Returns the (n,) distances of the microphones minus that of the centroid, m."""
     along = shape.p_AM @ u
     square = np.sum(shape.p_AM**2, axis=1)
     ratio = np.sqrt(np.maximum(1.0 - 2.0 * w * along + w * w * square, 0.0))

@@ -70,15 +70,9 @@ def correlate_pairs(
 ) -> PairCorrelations | None:
     """Computes the peaks of the correlations of all pairs in the loudest frames.
 
-    Args:
-        samples: (n, samples) channels without NaN.
-        max_delay_s: Longest delay that sound can have, s. The search covers delays
-            three times as long, so that it also finds impossible delays.
-        sample_rate_hz: Sample rate, Hz.
-        band_hz: Lowest and highest frequency to use, Hz.
-
-    Returns:
-        The peaks of the correlations. None if the recording is too short or silent.
+    The (n, samples) channels have no NaN. The search covers three times the delay
+    ``max_delay_s``, so that it also finds impossible delays. The result is None if the
+    recording is too short or silent.
     """
     count, total = samples.shape
     crossing = max_delay_s * sample_rate_hz

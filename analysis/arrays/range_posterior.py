@@ -139,12 +139,10 @@ def _delays(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Computes the delays of a source at the distance r in the direction u.
+    """Computes the (n - 1,) delays of a source at the distance r in the direction u, s.
 
-    Returns:
-        tau: (n - 1,) delays, s.
-        slopes: (n - 1, d) derivatives of the delays with respect to the position, s/m.
-        whole: (n - 1, n - 1) covariance of all delay errors, s^2.
+    The other results are the (n - 1, d) derivatives of the delays with respect to the
+    position, and the (n - 1, n - 1) covariance of all delay errors.
     """
     n, d = kernel.p.shape
     rays = np.empty((n, d))
@@ -236,11 +234,9 @@ def _log_likelihood(
 def _place(
     kernel: _Kernel, a: NDArray[np.float64], r: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Finds the best direction at a range, and the error of the source position.
+    """Returns the best direction at a range along the axes ``kernel.frame``.
 
-    Returns:
-        a: (q,) unit vector to the source, along the axes ``kernel.frame``.
-        covariance: (d, d) covariance of the position, m^2.
+    The other result is the (d, d) covariance of the source position, m^2.
     """
     a, _ = _turned(kernel, a, r)
     _, slopes, whole = _delays(kernel, kernel.frame @ a, r)

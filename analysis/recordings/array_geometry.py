@@ -26,7 +26,15 @@ _LARGEST_M = 30.0
 # Largest number of microphones. The computing time grows with the number of pairs.
 _MOST_MICROPHONES = 64
 
-_LEAST_BAND_HZ = 500.0
+LEAST_BAND_HZ = 500.0
+
+#: Default lowest frequency of a recording and of a live stream, Hz.
+LOWEST_HZ, LOWEST_LIVE_HZ = 300.0, 200.0
+#: Default highest frequency, Hz. Lower frequencies suffice to find faults.
+HIGHEST_HZ, HIGHEST_FAULTS_HZ = 15_000.0, 8_000.0
+# Upper limit of a default band, as a share of the sample rate. Near half the sample
+# rate, the filters of recorders attenuate the sound.
+_TOP_OF_RATE = 0.45
 
 # _PLACES_SHARE: default standard deviation of positions as a share of the aperture. It
 #   corresponds to a tape measure for a large array, and to a circuit board for a small
@@ -155,11 +163,11 @@ class ArrayGeometry(Parameters):
     def _check_band(self) -> None:
         if self.band is not None and self.band[0] >= self.band[1]:
             raise InputError("band", "must rise, for example [300, 8000]")
-        if self.band is not None and self.band[1] - self.band[0] < _LEAST_BAND_HZ:
+        if self.band is not None and self.band[1] - self.band[0] < LEAST_BAND_HZ:
             raise InputError(
                 "band",
                 f"{list(self.band)} is too narrow to measure delays; give at least "
-                f"{_LEAST_BAND_HZ:g} Hz",
+                f"{LEAST_BAND_HZ:g} Hz",
             )
 
     def _check_budget(self, shape: ArrayShape) -> None:
@@ -258,21 +266,22 @@ def _check_covariance(given: tuple[tuple[float, ...], ...], shape: ArrayShape) -
         )
 
 
+def usable_band(
+    band_hz: tuple[float, float] | None,
+    sample_rate_hz: float,
+    lowest_hz: float = LOWEST_HZ,
+    highest_hz: float = HIGHEST_HZ,
+) -> tuple[float, float]:
+    """Returns the stated band, or the default band at a sample rate."""
+    return band_hz or (lowest_hz, min(highest_hz, _TOP_OF_RATE * sample_rate_hz))
+
+
 def make_geometry(
     geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None,
 ) -> ArrayGeometry:
-    """Makes a geometry from any supported description of the microphones.
+    """Makes a geometry from a geometry, a path, a list of positions in m, or None.
 
-    Args:
-        geometry: A geometry, the path of a geometry file, or a list of positions (x, y)
-            or (x, y, z) in m. None: the robot's own array.
-
-    Returns:
-        The geometry of the array.
-
-    Raises:
-        InputError: The description is invalid. The message states the cause and the
-            remedy.
+    None stands for the robot's own array.
     """
     if geometry is None:
         return ROBOT_ARRAY
@@ -293,19 +302,7 @@ def make_geometry(
 
 
 def load_geometry(path: str | Path) -> ArrayGeometry:
-    """Reads a geometry file.
-
-    Args:
-        path: YAML file with ``microphones`` and optionally the other fields of
-            ``ArrayGeometry``.
-
-    Returns:
-        The geometry in the file.
-
-    Raises:
-        InputError: The file is missing, is not YAML, or has an invalid value. The
-            message names the field and the remedy.
-    """
+    """Reads a YAML file with ``microphones`` and optionally the other fields."""
     path = require_file(path, "geometry", "YAML")
     try:
         content = parse_yaml(path.read_text(encoding="utf-8"), "geometry")

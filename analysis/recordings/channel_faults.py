@@ -7,10 +7,8 @@ There are these checks:
   (``systems.delays.copied_channels``).
 - Each channel compared with the others: its level, and the height and the sign of its
   correlation with them.
-- The delays of all channels: whether they match the size of the array
-  (``analysis.recordings.delay_scale``).
-- The delays of all channels: whether they fit a position of a source
-  (``analysis.recordings.channel_order``).
+- The delays of all channels: whether they match the size of the array, and whether
+  they fit a position of a source (``analysis.recordings.frame_delays``).
 """
 
 from __future__ import annotations
@@ -22,9 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.pair_correlations import PairCorrelations, correlate_pairs
-from analysis.recordings.array_geometry import KnownArray
-from analysis.recordings.channel_order import FrameDelays, exchanged_channels, misfit
-from analysis.recordings.delay_scale import REACHES_M, DelayScale, delay_scale
+from analysis.recordings.array_geometry import (
+    HIGHEST_FAULTS_HZ,
+    KnownArray,
+    usable_band,
+)
+from analysis.recordings.frame_delays import (
+    REACHES_M,
+    DelayScale,
+    FrameDelays,
+    delay_scale,
+    exchanged_channels,
+    misfit,
+)
 from systems.delays.copied_channels import copied_pairs
 from systems.sound.array_shape import ArrayShape
 
@@ -88,18 +96,11 @@ def find_channel_faults(
     sample_rate_hz: float,
     band_hz: tuple[float, float] | None = None,
 ) -> list[ChannelFault]:
-    """Finds the faults of the channels of a recording.
+    """Finds the faults of the (n, samples) channels of a recording.
 
-    Args:
-        samples: (n, samples) recorded samples, one row per microphone.
-        array: The n microphones and the errors of their description.
-        sample_rate_hz: Sample rate, Hz.
-        band_hz: Lowest and highest frequency of the sound, Hz. None: 300 Hz up to
-            8000 Hz or 0.45 times the sample rate, whichever is lower.
-
-    Returns:
-        The faults that were found. An empty list does not prove that all channels are
-        good, because a silent recording shows few faults.
+    An empty list does not prove that all channels are good, because a silent recording
+    shows few faults. If ``band_hz`` is None, the band is 300 Hz up to 8000 Hz or 0.45
+    times the sample rate, whichever is lower.
     """
     shape, c = array.shape, array.c
     faults = [_unreadable(k, channel) for k, channel in enumerate(samples)]
@@ -110,7 +111,7 @@ def find_channel_faults(
         return found
     readable = samples if use.size == len(samples) else samples[use]
     found += _copied(readable, use, sample_rate_hz)
-    band_hz = band_hz or (300.0, min(8000.0, 0.45 * sample_rate_hz))
+    band_hz = usable_band(band_hz, sample_rate_hz, highest_hz=HIGHEST_FAULTS_HZ)
     measured = correlate_pairs(readable, shape.max_delay(c), sample_rate_hz, band_hz)
     if measured is None:
         return found
@@ -181,10 +182,7 @@ def _copied(
 
 
 def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
-    """Returns a fault if many samples of a channel have its lowest or highest value.
-
-    The value must occur far more often than each of the next three values.
-    """
+    """Reports a channel with far more samples at its extremes than just inside them."""
     _, counts = np.unique(channel, return_counts=True)
     most = 0
     for ends in (counts, counts[::-1]):
@@ -233,10 +231,7 @@ def _levels(
 def _strangers(
     measured: PairCorrelations, use: NDArray[np.int64]
 ) -> list[ChannelFault]:
-    """Finds channels that have no sound in common with the others.
-
-    The others must share a sound with each other.
-    """
+    """Finds channels that have no sound in common with the others."""
     table = np.zeros((use.size, use.size))
     table[tuple(measured.pairs.T)] = measured.shared
     best = (table + table.T).max(axis=0)
@@ -291,16 +286,11 @@ def _lags(
 
 
 def _fits(delays: FrameDelays) -> bool:
-    """Returns whether all pairs agree on delays in enough frames.
-
-    Enough means at least half of the frames, and at least 16.
-    """
     agreed, _ = delays.agreeing()
     return len(agreed) >= max(_LEAST_FRAMES, len(delays.lags) / 2)
 
 
 def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
-    """Describes the fault of delays that do not match the size of the array."""
     size = f"an array of {shape.aperture_m:.3g} m"
     if scale.kind == "beyond":
         remedy = "check the positions (in m) and the order of the channels"

@@ -10,19 +10,20 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from analysis.arrays.steered_response import (
-    LAG_DENSITY,
     SearchGrid,
     centroid_delays,
     steered_response,
 )
 from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
 from analysis.recordings.recording_spectra import RecordingSpectra
-from systems.delays.correlations import correlations_at_lags
 from systems.delays.delay_sets import consistent_lags
 from systems.sound.array_shape import ArrayShape
+
+#: Ratio of the standard deviation to the median absolute deviation of normally
+#: distributed values.
+MAD_TO_STD = 1.4826
 
 # Least mean weight of a stretch with a source. Other stretches are silence or echoes.
 _LEAST_WEIGHT = 0.02
@@ -99,47 +100,16 @@ class RecordingSearch:
     @cached_property
     def grid(self) -> SearchGrid:
         """Positions to search."""
-        return SearchGrid.of(
-            self.shape, self.c, self.recording.high_hz, self._length / self._window_s
-        )
-
-    @property
-    def _window_s(self) -> float:
-        return self.recording.window.size / self.recording.sample_rate_hz
-
-    @cached_property
-    def _length(self) -> int:
-        """Number of samples of a correlation that covers a whole window."""
-        least = LAG_DENSITY * self.recording.high_hz * self._window_s
-        return int(fft.next_fast_len(math.ceil(least), real=True))
+        rate = self.recording.sample_rate_hz
+        window_s = self.recording.window.size / rate
+        return SearchGrid.of(self.shape, self.c, self.recording.high_hz, window_s)
 
     def _correlations(
         self, cross: NDArray[np.complex64], slack: int = 0
     ) -> NDArray[np.float32]:
-        """Computes the correlations of p pairs of microphones.
-
-        Args:
-            cross: (p, f) cross-spectra of the pairs. For each pair, the magnitudes add
-                up to at most 1.
-            slack: Number of lags to add on either side.
-
-        Returns:
-            (p, 2 m + 1) correlations. Lag 0 is in the middle.
-        """
-        m = self.grid.max_lag + slack
-        values = correlations_at_lags(cross, self.recording.bins, self._length, m)
-        return values * np.float32(0.5 * self._length)
+        return self.grid.correlations(cross, self.recording.bins, slack)
 
     def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
-        """Computes the steered response of each grid position.
-
-        Args:
-            cross: (p, f) cross-spectra of the pairs. For each pair, the magnitudes add
-                up to at most 1.
-
-        Returns:
-            (g,) responses of the g grid positions.
-        """
         return steered_response(self._correlations(cross), self.grid)
 
     @cached_property
@@ -152,12 +122,9 @@ class RecordingSearch:
         return self._responses(cross.astype(np.complex64))
 
     def mean_response(self) -> float:
-        """Averages the greatest response of each stretch.
+        """Computes the weighted mean of the greatest responses of all stretches.
 
         The mean measures how well all pairs of channels agree on a source position.
-
-        Returns:
-            Mean over the stretches, weighted by the weights of the stretches.
         """
         weights = [float(self.recording.weights[s].mean()) for s in self.stretches]
         best = [
@@ -167,11 +134,7 @@ class RecordingSearch:
         return float(np.average(best, weights=np.array(weights) + 1e-30))
 
     def sightings(self) -> Iterator[Sighting]:
-        """Finds the stretches that have a source.
-
-        Yields:
-            The stretches with a source, in the order of time.
-        """
+        """Finds the stretches that have a source, in the order of time."""
         held: deque[tuple[slice, float, NDArray[np.float32]]] = deque()
         near = np.zeros(len(self.grid.lags))
         weight = 0.0
@@ -252,7 +215,7 @@ class RecordingSearch:
           position may lie on a side lobe instead of the peak.
         """
         weight = float(self.recording.weights[stretch].sum())
-        rate = self._length / self._window_s
+        rate = self.grid.lag_rate_hz
         slack = math.ceil(self.slack_s * rate)
         reach = np.ceil(self.shape.distances_m / self.c * rate).astype(np.int64)
         sets = consistent_lags(
@@ -286,7 +249,6 @@ class RecordingSearch:
         return diffuse + max(_DEVIATIONS * deviation, least)
 
     def _delays(self, place: int, stretch: slice) -> AlignedDelays | None:
-        """Estimates delays after aligning the channels for a grid position."""
         grid = self.grid
         chosen = slice(place, place + 1)
         later = centroid_delays(

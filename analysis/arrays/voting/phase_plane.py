@@ -93,15 +93,7 @@ class PhasePlane:
 
     @classmethod
     def of(cls, shape: ArrayShape, c: float) -> PhasePlane:
-        """Makes the fit for an array from the shortest pairs that span the array.
-
-        Args:
-            shape: The microphones.
-            c: Speed of sound, m/s.
-
-        Returns:
-            The fit for the array.
-        """
+        """Makes the fit for an array from the shortest pairs that span the array."""
         i, j = shape.pairs.T
         paths = (shape.p_AM[j] - shape.p_AM[i]) @ shape.span.T
         for longest in np.sort(shape.distances_m):
@@ -130,15 +122,10 @@ class PhasePlane:
     def fit(
         self, pattern: NDArray[np.complex128], frequency_hz: NDArray[np.float64]
     ) -> PlaneFits:
-        """Fits a plane wave to each of k patterns of amplitudes at the microphones.
+        """Fits a plane wave to each of (k, n) complex amplitudes at the n microphones.
 
-        Args:
-            pattern: (k, n) complex amplitudes at n microphones. A common factor of all
-                amplitudes of a pattern has no effect.
-            frequency_hz: (k,) frequency of each pattern, up to ``highest_hz``, Hz.
-
-        Returns:
-            Directions of the patterns to which a plane wave fits.
+        A common factor of the n amplitudes has no effect. The (k,) frequencies are at
+        most ``highest_hz``.
         """
         i, j = self.shape.pairs.T
         phase = np.angle(pattern[:, j] * pattern[:, i].conj())
@@ -173,9 +160,8 @@ class PhasePlane:
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Finds the guessed direction that fits the phases of all pairs best.
 
-        Returns:
-            slowness: (k, r) best guess for each pattern.
-            clear: (k,) True if no clearly different guess fits nearly as well.
+        The results are the (k, r) best guesses, and whether no clearly different guess
+        fits nearly as well.
         """
         slowness = np.empty((len(phase), self.guesses.shape[1]))
         clear = np.empty(len(phase), dtype=bool)
@@ -196,15 +182,10 @@ class PhasePlane:
     def _directions(
         self, slowness: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Converts measured slownesses to directions.
+        """Converts measured slownesses to directions, and returns their lengths.
 
-        A slowness is the direction of a wave divided by its speed, relative to that of
-        sound.
-
-        Returns:
-            u: (k, d) directions. They are unit vectors if the component perpendicular
-                to the array can be computed.
-            length: (k,) lengths of the measured slownesses.
+        The directions are unit vectors if the component perpendicular to the array can
+        be computed.
         """
         length = np.linalg.norm(slowness, axis=1)
         u = slowness @ self.shape.span

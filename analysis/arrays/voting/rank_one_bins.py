@@ -34,15 +34,10 @@ def _running(values: NDArray[np.float32], size: int) -> NDArray[np.float32]:
 
 
 def group_powers(spectra: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Computes the power of each group of consecutive frames.
+    """Computes the (g, b) power of each group of frames, summed over the channels.
 
-    Args:
-        spectra: (f, n, b) spectra of f frames and n channels at b frequencies. There
-            are at least ``GROUP_FRAMES`` frames.
-
-    Returns:
-        (g, b) power of each group, summed over its frames and channels. Group k
-        consists of the frames k ... k + ``GROUP_FRAMES`` - 1.
+    Group k consists of the frames k ... k + ``GROUP_FRAMES`` - 1 of the (f, n, b)
+    spectra.
     """
     power = np.einsum("fnb->fb", spectra.real**2 + spectra.imag**2)
     return _running(power, GROUP_FRAMES)
@@ -53,20 +48,11 @@ def find_rank_one(
     candidates: NDArray[np.bool_],
     least_ratio: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.complex128]]:
-    """Finds the bins that contain only one wave.
+    """Finds the (g, b) candidates among the bins that contain only one wave.
 
-    A bin is one frequency in one group of frames.
-
-    Args:
-        spectra: (f, n, b) spectra of f frames and n channels at b frequencies.
-        candidates: (g, b) whether to examine each bin. The g groups are those of
-            ``group_powers``.
-        least_ratio: Least ratio of the two largest eigenvalues of the covariance.
-
-    Returns:
-        group: (k,) numbers of the groups of the k bins.
-        bins: (k,) numbers of the frequencies of the k bins.
-        pattern: (k, n) dominant eigenvector of each bin, with any length and phase.
+    A bin is one frequency in one group of frames. The results are the (k,) numbers of
+    the groups and of the frequencies of these bins, and their (k, n) dominant
+    eigenvectors, with any length and phase.
     """
     products = _products(spectra)
     power = _running(products[0].real, GROUP_FRAMES)

@@ -72,25 +72,13 @@ class ListenerMemory:
 
     @classmethod
     def blank(cls, plan: VotePlan) -> ListenerMemory:
-        """Makes the state before the first block.
-
-        Args:
-            plan: Settings with which the array votes for directions.
-
-        Returns:
-            The initial state.
-        """
+        """Makes the state before the first block."""
         return cls(plan.blank(), join_votes([]), TrackMemory(), 0, 0)
 
     def after_gap(self, plan: VotePlan, *, keeps_tracks: bool) -> ListenerMemory:
         """Returns the state after missing samples or a change of the channels.
 
-        Args:
-            plan: Settings with which the array votes for directions after the gap.
-            keeps_tracks: Whether the tracks from before the gap continue.
-
-        Returns:
-            The new state. Times continue, and no identity of a track is used again.
+        Times continue, and no identity of a track is used again.
         """
         # The first group of frames after the gap begins at most one hop from its exact
         # time.
@@ -105,24 +93,10 @@ def hear_sources(
     plan: VotePlan,
     parameters: ListenerParameters,
 ) -> tuple[list[TrackedSources], ListenerMemory]:
-    """Tracks sources in one more block of samples.
+    """Tracks sources in one more block of (n, k) samples, in any unit.
 
     The tracks are updated in steps of constant length, 0.1 s by default. A block may
     complete any number of steps.
-
-    Args:
-        block: (n, k) samples of n channels, in any unit, of any length k.
-        memory: State after the previous block.
-        plan: Settings with which the array votes for directions.
-        parameters: Parameters that determine how votes become tracks.
-
-    Returns:
-        found: Sources at the end of each completed step.
-        memory: State after this block.
-
-    Raises:
-        InputError: The block does not have one channel per microphone, or a sample is
-            not finite.
     """
     rate = plan.sample_rate_hz
     found, first = [], 0
@@ -149,16 +123,9 @@ def follow_sources(
     plan: VotePlan,
     parameters: ListenerParameters,
 ) -> list[TrackedSources]:
-    """Tracks sources in a whole recording, from its votes for directions.
+    """Tracks sources in a whole recording, from its votes in the order of time.
 
-    Args:
-        votes: Votes of the whole recording, in the order of time.
-        seconds: Length of the recording, s.
-        plan: Settings with which the array voted.
-        parameters: Parameters that determine how votes become tracks.
-
-    Returns:
-        Sources at the end of each step, as ``hear_sources`` returns them.
+    The result is that of ``hear_sources``.
     """
     memory, found = TrackMemory(), []
     # The time of a vote is the middle of its samples. In live sound, the vote exists

@@ -144,21 +144,10 @@ def step_tracks(
     memory: TrackMemory,
     parameters: TrackParameters,
 ) -> tuple[list[SourceTrack], TrackMemory]:
-    """Updates the tracks with the detections of one step.
+    """Updates the tracks with the detections of one step, and returns those to report.
 
-    Args:
-        detections: Detections of this step, in any order.
-        t_s: Time of this step, s. Steps may have different lengths.
-        memory: Tracks after the previous step; ``TrackMemory()`` before the first step.
-        parameters: Parameters of the motion and the detection of sources.
-
-    Returns:
-        told: The tracks to report. The oldest track is first. A track gets its identity
-            when it is first reported.
-        memory: All tracks after this step.
-
-    Raises:
-        ValueError: The time is before the time of the previous step.
+    Steps may have different lengths. The first memory is ``TrackMemory()``. A track
+    gets its identity when it is first reported. The oldest track is first.
     """
     elapsed = 0.0 if memory.t_s is None else t_s - memory.t_s
     if elapsed < 0.0:
@@ -195,7 +184,6 @@ def step_tracks(
 
 
 def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack:
-    """Predicts a track by the time dt."""
     forget = math.exp(-dt / p.rate_memory_s)
     F = np.array([[1.0, dt], [0.0, forget]])
     q = math.radians(p.acceleration_std_deg_s2) ** 2
@@ -250,11 +238,7 @@ def _hidden(
     chosen: list[int | None],
     p: TrackParameters,
 ) -> dict[int, int]:
-    """Finds tracks without a detection that another nearby track may hide.
-
-    Returns:
-        For the number of each hidden track, the number of the track that hides it.
-    """
+    """Returns the tracks that another nearby track may hide, and that other track."""
     resolution = math.radians(p.resolution_deg)
     hidden: dict[int, int] = {}
     for i, track in enumerate(tracks):
@@ -284,7 +268,6 @@ def _heard(
     t_s: float,
     p: TrackParameters,
 ) -> SourceTrack:
-    """Updates a track with its detection."""
     of_detection = _scatter(track, detection, p)
     C = track.covariance
     variance = float(C[0, 0]) + of_detection
@@ -371,5 +354,5 @@ def _single(tracks: list[SourceTrack], p: TrackParameters) -> list[SourceTrack]:
 
 
 def _wrapped(angle: float) -> float:
-    """Returns an angle wrapped to (-pi, pi], rad."""
+    """Wraps an angle to (-pi, pi], rad."""
     return math.pi - (math.pi - angle) % (2.0 * math.pi)

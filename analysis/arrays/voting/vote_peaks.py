@@ -78,19 +78,12 @@ class VotedSource(NamedTuple):
 def gather_sources(
     votes: DirectionVotes, *, least_votes: float = _LEAST_VOTES
 ) -> list[VotedSource]:
-    """Finds the sources in a span of time from its votes for directions.
+    """Finds the sources in a span of time. The source with the largest share is first.
 
     If enough single frequencies vote, they decide together with the steered response.
     Otherwise, the steered response decides alone. Two steady sounds at the same time
-    cannot be separated, because no time or frequency contains only one of them.
-
-    Args:
-        votes: Votes of the span of time.
-        least_votes: Least number of votes of single frequencies for a source. Use a
-            smaller number for less than one second of sound.
-
-    Returns:
-        The sources. The source with the largest share of the votes is first.
+    cannot be separated, because no time or frequency contains only one of them. For
+    less than one second of sound, ``least_votes`` must be smaller.
     """
     single = ~votes.steered
     enough = np.count_nonzero(single) >= least_votes
@@ -125,12 +118,7 @@ def gather_sources(
 def _density(
     azimuth: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Computes the smoothed density of the votes around the circle.
-
-    Returns:
-        density: (c,) density in each of c cells of the circle.
-        bearings: (c,) bearings of the middles of the cells, rad.
-    """
+    """Returns the smoothed density of the votes in cells of the circle, and their bearings."""
     cells = np.floor((azimuth + math.pi) / (2.0 * math.pi) * _CELLS).astype(int)
     histogram = np.bincount(cells % _CELLS, weight, _CELLS)
     centres = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
@@ -162,16 +150,8 @@ def _source(
 ) -> VotedSource | None:
     """Makes the source at a peak from the votes that are nearest to this peak.
 
-    Args:
-        azimuth: (k,) azimuths of the votes, rad.
-        elevation: (k,) elevations of the votes, rad.
-        weight: (k,) weights of the votes.
-        bearing: Bearing of the peak, rad.
-        nearest: (k,) whether this peak is the nearest one to each vote.
-
-    Returns:
-        The source. None if no vote is near the peak, for example if only the steered
-        response has a peak there.
+    The source is None if no vote is near the peak, for example if only the steered
+    response has a peak there.
     """
     near = np.abs(_wrapped(azimuth - bearing)) < _NEAR_RAD
     count = int(np.count_nonzero(near))
@@ -198,5 +178,5 @@ def _source(
 
 
 def _wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns angles wrapped to (-pi, pi], rad."""
+    """Wraps angles to (-pi, pi], rad."""
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
