@@ -118,7 +118,7 @@ def gather_sources(
 def _density(
     azimuth: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns the smoothed density of the votes in cells of the circle, and their bearings."""
+    """Returns the smoothed density of the votes in cells, and the bearings of these."""
     cells = np.floor((azimuth + math.pi) / (2.0 * math.pi) * _CELLS).astype(int)
     histogram = np.bincount(cells % _CELLS, weight, _CELLS)
     centres = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
