@@ -60,20 +60,13 @@ class ArrayBudget:
         slopes[np.arange(count), np.arange(count)] = -to_source / c
         slopes = slopes[1:] - slopes[0]
         flat = slopes.reshape(count - 1, -1)
-        later = _arrivals(u, w, shape) / c
+        along = shape.p_AM @ u
+        square = np.sum(shape.p_AM**2, axis=1)
+        ratio = np.sqrt(np.maximum(1.0 - 2.0 * w * along + w * w * square, 0.0))
+        later = (w * square - 2.0 * along) / (ratio + 1.0) / c
         delays = later[1:] - later[0]
         return (
             flat @ self.of_places @ flat.T
             + (self.speed_std / c) ** 2 * np.outer(delays, delays)
             + self.delay_std**2 * (np.eye(count - 1) + 1.0)
         )
-
-
-def _arrivals(
-    u: NDArray[np.float64], w: float, shape: ArrayShape
-) -> NDArray[np.float64]:
-    """Returns the (n,) distances of the microphones minus that of the centroid, m."""
-    along = shape.p_AM @ u
-    square = np.sum(shape.p_AM**2, axis=1)
-    ratio = np.sqrt(np.maximum(1.0 - 2.0 * w * along + w * w * square, 0.0))
-    return (w * square - 2.0 * along) / (ratio + 1.0)

@@ -48,7 +48,14 @@ def locate_far_source(
     gain = np.linalg.pinv(root @ slopes @ basis) @ root
     of_u = basis @ gain @ covariance @ gain.T @ basis.T
     if inverse_range_std > 0.0:
-        bend = _bend(u, root, slopes @ basis, shape, c, inverse_range_std)
+        # Compared with a plane wave, a wave front from the distance 1/w reaches a
+        # microphone at p later by w |p - (p . u) u|^2 / 2c.
+        square = np.sum(shape.p_AM**2, axis=1) - (shape.p_AM @ u) ** 2
+        curved = root @ (square[1:] - square[0]) / (2.0 * c)
+        within = root @ (slopes @ basis)
+        turned = np.linalg.pinv(within) @ curved
+        seen = curved - within @ turned
+        bend = turned / math.sqrt(float(seen @ seen) + inverse_range_std**-2)
         of_u += basis @ np.outer(bend, bend) @ basis.T
     residual = root @ (tau - slopes @ u)
     bearing_std, elevation, elevation_std = angles_of(u, of_u, shape)
@@ -64,27 +71,6 @@ def locate_far_source(
         covariance=of_u,
         chi_square=float(residual @ residual),
     )
-
-
-def _bend(
-    u: NDArray[np.float64],
-    root: NDArray[np.float64],
-    slopes: NDArray[np.float64],
-    shape: ArrayShape,
-    c: float,
-    inverse_range_std: float,
-) -> NDArray[np.float64]:
-    """Computes the error of the direction from an unknown curvature of the wave front.
-
-    Compared with a plane wave, a wave front from the distance 1/w reaches a microphone
-    at p later by w |p - (p . u) u|^2 / 2c.
-    """
-    square = np.sum(shape.p_AM**2, axis=1) - (shape.p_AM @ u) ** 2
-    curved = root @ (square[1:] - square[0]) / (2.0 * c)
-    within = root @ slopes
-    turned = np.linalg.pinv(within) @ curved
-    seen = curved - within @ turned
-    return np.asarray(turned / math.sqrt(float(seen @ seen) + inverse_range_std**-2))
 
 
 def _on_sphere(

@@ -101,8 +101,6 @@ def correlate_pairs(
         return None
     pairs = np.stack(np.triu_indices(count, 1), axis=1)
     values = [_correlation(spectra[i], spectra[j], gate) for i, j in pairs]
-    extremes = [_extremes(v, gate) for v in values]
-    at_highest, at_lowest = np.stack(extremes, axis=2)
     one = math.sqrt(math.log(2.0 * gate + 1.0) / bins)
     shared = [
         max(
@@ -113,8 +111,8 @@ def correlate_pairs(
     ]
     return PairCorrelations(
         pairs=pairs,
-        lag_of_highest=at_highest,
-        lag_of_lowest=at_lowest,
+        lag_of_highest=np.stack([_vertex(v) for v in values], axis=1) - gate,
+        lag_of_lowest=np.stack([_vertex(-v) for v in values], axis=1) - gate,
         pooled_highest=np.array([v.mean(axis=0).max() for v in values]),
         pooled_lowest=np.array([v.mean(axis=0).min() for v in values]),
         shared=np.array(shared),
@@ -138,14 +136,9 @@ def _correlation(
     return correlations_at_lags(share, band, grid, _DENSITY * gate) * (grid / 2.0)
 
 
-def _extremes(values: NDArray[np.float64], gate: int) -> NDArray[np.float64]:
-    """Returns the (2, f) lags of the largest and the smallest value, samples."""
-    return np.stack((_vertex(values), _vertex(-values))) / _DENSITY - gate
-
-
 def _vertex(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the position of the largest value of each row, refined by a parabola."""
+    """Returns the position of the largest value of each row, samples."""
     rows = np.arange(len(values))
     best = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
     left, top, right = (values[rows, best + k] for k in (-1, 0, 1))
-    return best + parabola_vertex(left, top, right)
+    return (best + parabola_vertex(left, top, right)) / _DENSITY

@@ -113,8 +113,11 @@ def range_posterior(
     close = 1.0 / np.clip(w + w_std * _ABOUT, 1.0 / FARTHEST_M, 1.0 / nearest_m)
     ranges = np.unique(np.concatenate((ranges, close)))[::-1].copy()
     likelihood = _log_likelihood(kernel, frame.T @ u, ranges)
-    density = np.exp(likelihood - likelihood.max())
-    mean, std = _moments(ranges[::-1], density[::-1])
+    density, ranges = np.exp(likelihood - likelihood.max())[::-1], ranges[::-1]
+    whole = np.trapezoid(density, ranges)
+    mean = float(np.trapezoid(density * ranges, ranges) / whole)
+    variance = np.trapezoid(density * (ranges - mean) ** 2, ranges) / whole
+    std = float(np.sqrt(variance))
     a, of_p = _place(kernel, frame.T @ u, mean)
     direction = frame @ a
     along = float(direction @ of_p @ direction)
@@ -122,15 +125,6 @@ def range_posterior(
         direction, direction
     )
     return RangePosterior(mean, std, direction, stretch @ of_p @ stretch)
-
-
-def _moments(
-    ranges: NDArray[np.float64], density: NDArray[np.float64]
-) -> tuple[float, float]:
-    whole = np.trapezoid(density, ranges)
-    mean = float(np.trapezoid(density * ranges, ranges) / whole)
-    variance = np.trapezoid(density * (ranges - mean) ** 2, ranges) / whole
-    return mean, float(np.sqrt(variance))
 
 
 @njit(cache=True)

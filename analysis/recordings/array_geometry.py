@@ -50,6 +50,13 @@ _TEMPERATURE_C, _SPEED_SHARE = 2.0, 0.01
 # largest variance.
 _ROUNDING = 1e-6
 
+# Pairs of fields of which a geometry states at most one.
+_ALTERNATIVES = (
+    ("sound_speed", "temperature_c"),
+    ("position_std_m", "position_covariance_m2"),
+    ("sound_speed_std", "temperature_std_c"),
+)
+
 _Point3 = Annotated[tuple[float, float, float], Strict(False)]
 _Points = Annotated[tuple[Point, ...], Strict(False)]
 _Points3 = Annotated[tuple[_Point3, ...], Strict(False)]
@@ -143,10 +150,11 @@ class ArrayGeometry(Parameters):
                 )
             if len(set(self.channels)) != count:
                 raise InputError("channels", "one is named twice; name each once")
-        if self.sound_speed is not None and self.temperature_c is not None:
-            raise InputError(
-                "sound_speed", "is given together with temperature_c; keep one of them"
-            )
+        for one, other in _ALTERNATIVES:
+            if getattr(self, one) is not None and getattr(self, other) is not None:
+                raise InputError(
+                    one, f"is given together with {other}; keep one of them"
+                )
         self._check_band()
         shape = ArrayShape.of(self.microphones)
         if shape.aperture_m > _LARGEST_M:
@@ -172,11 +180,6 @@ class ArrayGeometry(Parameters):
 
     def _check_budget(self, shape: ArrayShape) -> None:
         std, covariance = self.position_std_m, self.position_covariance_m2
-        if std is not None and covariance is not None:
-            raise InputError(
-                "position_std_m",
-                "is given together with position_covariance_m2; keep one of them",
-            )
         if isinstance(std, tuple) and len(std) != shape.count:
             raise InputError(
                 "position_std_m",
@@ -185,11 +188,6 @@ class ArrayGeometry(Parameters):
             )
         if covariance is not None:
             _check_covariance(covariance, shape)
-        if self.sound_speed_std is not None and self.temperature_std_c is not None:
-            raise InputError(
-                "sound_speed_std",
-                "is given together with temperature_std_c; keep one of them",
-            )
 
     @property
     def columns(self) -> tuple[int, ...]:

@@ -74,14 +74,17 @@ _FARTHEST_M = 20.0
 _LEAD = 0.1
 
 
+_Kind = Literal[
+    "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
+    "units", "size", "late", "drift"
+]  # fmt: skip
+
+
 @dataclass(frozen=True)
 class ChannelFault:
     """A fault of one or more channels, or of the description of the array."""
 
-    kind: Literal[
-        "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
-        "units", "size", "late", "drift"
-    ]  # fmt: skip
+    kind: _Kind
     channels: tuple[int, ...]
     """Numbers of the faulty channels, from 0. Empty if the fault concerns all channels.
     """
@@ -148,20 +151,20 @@ def find_channel_faults(
     return found + (order if scale is None else [_scale_fault(scale, shape)])
 
 
+def _of_channel(kind: _Kind, k: int, text: str) -> ChannelFault:
+    return ChannelFault(kind, (k,), f"channel {k + 1}: {text}")
+
+
 def _dead(k: int, seen: str) -> ChannelFault:
     remedy = "check its microphone, or leave it out of the geometry"
-    return ChannelFault("dead", (k,), f"channel {k + 1}: dead, {seen}; {remedy}")
+    return _of_channel("dead", k, f"dead, {seen}; {remedy}")
 
 
 def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     wrong = np.flatnonzero(~np.isfinite(channel))
     if wrong.size:
-        return ChannelFault(
-            "nan",
-            (k,),
-            f"channel {k + 1}: sample {wrong[0]} is not a number ({wrong.size} "
-            "samples in all); repair the file",
-        )
+        text = f"sample {wrong[0]} is not a number ({wrong.size} samples in all)"
+        return _of_channel("nan", k, f"{text}; repair the file")
     if channel.size and np.ptp(channel) == 0.0:
         return _dead(k, f"all samples are {channel[0]:g}")
     return None
@@ -170,15 +173,15 @@ def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
 def _copied(
     samples: NDArray[np.float64], use: NDArray[np.int64], sample_rate_hz: float
 ) -> list[ChannelFault]:
-    return [
-        ChannelFault(
-            "copied",
-            (int(use[i]), int(use[j])),
-            f"channels {use[i] + 1} and {use[j] + 1}: their samples are equal apart "
-            "from gain and delay; record every microphone on its own channel",
+    faults = []
+    for pair in copied_pairs(samples, sample_rate_hz):
+        i, j = use[list(pair)].tolist()
+        text = (
+            f"channels {i + 1} and {j + 1}: their samples are equal apart from gain "
+            "and delay; record every microphone on its own channel"
         )
-        for i, j in copied_pairs(samples, sample_rate_hz)
-    ]
+        faults.append(ChannelFault("copied", (i, j), text))
+    return faults
 
 
 def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
@@ -191,12 +194,8 @@ def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     share = most / channel.size
     if share < _CLIPPED_SHARE:
         return None
-    return ChannelFault(
-        "clipped",
-        (k,),
-        f"channel {k + 1}: clipped, {100 * share:.2g} % of its samples are at an "
-        "extreme; record with less gain",
-    )
+    text = f"clipped, {100 * share:.2g} % of its samples are at an extreme"
+    return _of_channel("clipped", k, f"{text}; record with less gain")
 
 
 def _levels(
@@ -216,15 +215,12 @@ def _levels(
         # The source is near one microphone if the levels of all other channels are
         # similar.
         if over > near_db and np.ptp(others) < near_db:
-            faults.append(
-                ChannelFault(
-                    "near",
-                    (channel,),
-                    f"channel {channel + 1}: {over:.0f} dB above the others: the "
-                    "source is close to its microphone, or gains differ; move the "
-                    "source away from the array, or set equal gains",
-                )
+            text = (
+                f"{over:.0f} dB above the others: the source is close to its "
+                "microphone, or gains differ; move the source away from the array, or "
+                "set equal gains"
             )
+            faults.append(_of_channel("near", channel, text))
     return faults
 
 
@@ -262,18 +258,13 @@ def _inverted(
     agreement = signs * (table @ (signs * alive)) / max(alive.sum() - 1, 1)
     if np.any(agreement[alive] < _LEAD):
         return []
-    return [
-        ChannelFault(
-            "inverted",
-            (int(use[k]),),
-            f"channel {use[k] + 1}: inverted, because its correlation with the others "
-            "is negative; exchange the wires of its microphone, or the sign of its "
-            "samples",
-        )
-        # The sign of a channel without any sound in common with the others is
-        # arbitrary.
-        for k in np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
-    ]
+    text = (
+        "inverted, because its correlation with the others is negative; exchange the "
+        "wires of its microphone, or the sign of its samples"
+    )
+    # The sign of a channel without any sound in common with the others is arbitrary.
+    negative = np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
+    return [_of_channel("inverted", int(use[k]), text) for k in negative]
 
 
 def _lags(
@@ -296,27 +287,17 @@ def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
         remedy = "check the positions (in m) and the order of the channels"
         if scale.share > _OTHER_UNITS:
             remedy = "give positions in m (multiply them by 10, 100 or 1000?)"
-        return ChannelFault(
-            "units",
-            (),
-            f"microphones: {size} cannot have delays {scale.share:.1f} times as long "
-            f"as sound takes along it; {remedy}",
-        )
-    said = f"microphones: delays are below {100 * scale.share:.1g} % of what {size}"
+        times = f"{scale.share:.1f} times as long as sound takes along it"
+        text = f"microphones: {size} cannot have delays {times}; {remedy}"
+        return ChannelFault("units", (), text)
+    said = f"delays are below {100 * scale.share:.1g} % of what {size} can have"
     if shape.kind == "space" or scale.least_range_m > _FARTHEST_M:
-        return ChannelFault(
-            "units",
-            (),
-            f"{said} can have; give positions in m (divide those in cm by 100, in mm "
-            "by 1000)",
-        )
+        remedy = "give positions in m (divide those in cm by 100, in mm by 1000)"
+        return ChannelFault("units", (), f"microphones: {said}; {remedy}")
     where = "ahead of" if shape.kind == "row" else "above or below"
-    return ChannelFault(
-        "size",
-        (),
-        f"{said} can have: the source is straight {where} it, or the positions are "
-        "not in m; check the positions",
-    )
+    cause = f"the source is straight {where} it, or the positions are not in m"
+    text = f"microphones: {said}: {cause}; check the positions"
+    return ChannelFault("size", (), text)
 
 
 def _order(delays: FrameDelays) -> list[ChannelFault]:
@@ -324,23 +305,17 @@ def _order(delays: FrameDelays) -> list[ChannelFault]:
     exchanges = exchanged_channels(delays)
     if exchanges:
         names = " or ".join(f"{a + 1} and {b + 1}" for a, b in exchanges)
-        return [
-            ChannelFault(
-                "swapped",
-                tuple(sorted({k for pair in exchanges for k in pair})),
-                f"channels {names}: exchanged, because the delays fit the geometry "
-                "only in the other order; exchange them in 'channels'",
-            )
-        ]
+        text = (
+            f"channels {names}: exchanged, because the delays fit the geometry only in "
+            "the other order; exchange them in 'channels'"
+        )
+        channels = tuple(sorted({k for pair in exchanges for k in pair}))
+        return [ChannelFault("swapped", channels, text)]
     share = misfit(delays)
     if share is None:
         return []
-    return [
-        ChannelFault(
-            "geometry",
-            (),
-            f"channels: {100 * share:.0f} % of the delays fit no place outside the "
-            "array; check the microphones' positions (in m), their order and the "
-            "speed of sound",
-        )
-    ]
+    text = (
+        f"channels: {100 * share:.0f} % of the delays fit no place outside the array; "
+        "check the microphones' positions (in m), their order and the speed of sound"
+    )
+    return [ChannelFault("geometry", (), text)]

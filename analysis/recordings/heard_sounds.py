@@ -101,24 +101,20 @@ def heard_sound(
     4. The error from reflections is added, because it is the same in all stretches.
     """
     tau = np.array([sighting.tau for sighting in sightings])
-    near = _near_median(tau)
+    # Stretches far from the median contain a different sound.
+    off = np.linalg.norm(tau - np.median(tau, axis=0), axis=1)
+    usual = MAD_TO_STD * float(np.median(off))
+    near = off <= max(_FARTHEST * usual, float(off.min()))
     chosen = [s for s, is_near in zip(sightings, near, strict=True) if is_near]
     weights = [np.linalg.inv(s.covariance) for s in chosen]
     covariance = np.linalg.inv(np.sum(weights, axis=0))
     pulls = [w @ s.tau for w, s in zip(weights, chosen, strict=True)]
     mean = covariance @ np.sum(pulls, axis=0)
     if len(chosen) > 1:
-        off = [(s.tau - mean) for s in chosen]
-        scatter = sum(float(d @ w @ d) for d, w in zip(off, weights, strict=True))
+        errors = [s.tau - mean for s in chosen]
+        scatter = sum(float(d @ w @ d) for d, w in zip(errors, weights, strict=True))
         covariance *= 2.0 * max(1.0, scatter / (mean.size * (len(chosen) - 1)))
     coherence = float(np.mean([min(s.coherence, 1.0) for s in chosen]))
     alike = _SCATTER_SHARE * (1.0 - coherence) * shape.max_delay(c)
     covariance = covariance + alike**2 * (np.eye(mean.size) + 1.0)
     return HeardSound(mean, covariance, len(sightings), len(chosen))
-
-
-def _near_median(tau: NDArray[np.float64]) -> NDArray[np.bool_]:
-    off = np.linalg.norm(tau - np.median(tau, axis=0), axis=1)
-    usual = MAD_TO_STD * float(np.median(off))
-    near: NDArray[np.bool_] = off <= max(_FARTHEST * usual, float(off.min()))
-    return near

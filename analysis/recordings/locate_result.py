@@ -66,25 +66,27 @@ class SourceEstimate:
             The estimate, with angles in deg and the range in m.
         """
         fix, systematic = placed.fix, placed.systematic
-        bearing = math.isfinite(fix.bearing_std)
-        elevation = fix.elevation_std is not None and math.isfinite(fix.elevation_std)
+
+        def degrees(angle: float | None, std: float | None) -> float | None:
+            if angle is None or std is None or not math.isfinite(std):
+                return None
+            return math.degrees(angle)
+
+        bearing = degrees(fix.bearing, fix.bearing_std)
+        ranged = fix.range_valid
         return cls(
             t_s=t_s,
-            bearing_deg=wrapped_deg(math.degrees(fix.bearing)) if bearing else None,
-            bearing_std_deg=math.degrees(fix.bearing_std) if bearing else None,
-            bearing_systematic_deg=(
-                math.degrees(systematic.bearing_std) if bearing else None
+            bearing_deg=None if bearing is None else wrapped_deg(bearing),
+            bearing_std_deg=degrees(fix.bearing_std, fix.bearing_std),
+            bearing_systematic_deg=degrees(systematic.bearing_std, fix.bearing_std),
+            elevation_deg=degrees(fix.elevation, fix.elevation_std),
+            elevation_std_deg=degrees(fix.elevation_std, fix.elevation_std),
+            elevation_systematic_deg=degrees(
+                systematic.elevation_std, fix.elevation_std
             ),
-            elevation_deg=math.degrees(fix.elevation or 0.0) if elevation else None,
-            elevation_std_deg=(
-                math.degrees(fix.elevation_std or 0.0) if elevation else None
-            ),
-            elevation_systematic_deg=(
-                math.degrees(systematic.elevation_std or 0.0) if elevation else None
-            ),
-            range_m=fix.range if fix.range_valid else None,
-            range_std_m=fix.range_std if fix.range_valid else None,
-            range_systematic_m=systematic.range_std if fix.range_valid else None,
+            range_m=fix.range if ranged else None,
+            range_std_m=fix.range_std if ranged else None,
+            range_systematic_m=systematic.range_std if ranged else None,
         )
 
 
@@ -244,7 +246,7 @@ def _median(
 ) -> tuple[float | None, float | None]:
     """Returns the weighted median of values, and the error of a single value.
 
-    The input are pairs of a value and its standard deviation. The weight of a value is
+    Each estimate is a value and its standard deviation. The weight of a value is
     the inverse square of its error. A larger number of values does not reduce the error
     of the result, because the values may have a common error. The error is the scatter
     of the values around the median, or the median of their standard deviations,
@@ -255,22 +257,16 @@ def _median(
         return None, None
     values, errors = np.array(rows, dtype=np.float64).T
     weights = 1.0 / np.maximum(errors, _LEAST_ERROR * np.median(errors)) ** 2
-    centre = _weighted_median(values, weights)
-    scatter = MAD_TO_STD * float(np.median(np.abs(values - centre)))
-    return centre, max(scatter, float(np.median(errors)))
+    order = np.argsort(values)
+    below = np.cumsum(weights[order]) - 0.5 * weights[order]
+    center = float(np.interp(0.5 * weights.sum(), below, values[order]))
+    scatter = MAD_TO_STD * float(np.median(np.abs(values - center)))
+    return center, max(scatter, float(np.median(errors)))
 
 
 def _usual(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return float(np.median(known)) if known else None
-
-
-def _weighted_median(
-    values: NDArray[np.float64], weights: NDArray[np.float64]
-) -> float:
-    order = np.argsort(values)
-    below = np.cumsum(weights[order]) - 0.5 * weights[order]
-    return float(np.interp(0.5 * weights.sum(), below, values[order]))
 
 
 def _median_angle(
@@ -279,11 +275,11 @@ def _median_angle(
     """Computes ``_median`` of angles in deg, wrapped around their mean direction."""
     known = [row for row in estimates if row[0] is not None]
     mean = sum(cmath.exp(1j * math.radians(angle or 0.0)) for angle, _ in known)
-    centre = math.degrees(cmath.phase(mean))
+    center = math.degrees(cmath.phase(mean))
     offset, scatter = _median(
-        [(wrapped_deg((angle or 0.0) - centre), error) for angle, error in known]
+        [(wrapped_deg((angle or 0.0) - center), error) for angle, error in known]
     )
-    return None if offset is None else wrapped_deg(centre + offset), scatter
+    return None if offset is None else wrapped_deg(center + offset), scatter
 
 
 def wrapped_deg(angle: float) -> float:

@@ -242,22 +242,9 @@ def channels_without_faults(
     if inverted:
         samples = samples.copy()
         samples[inverted] *= -1.0
-    kept = []
+    as_given = agreement(samples) if any(f.kind == "swapped" for f in faults) else 0.0
     for fault in faults:
-        if fault.kind != "swapped":
-            kept.append(fault)
-        elif _fits_better_exchanged(samples, fault.channels, agreement):
+        pairs = combinations(fault.channels, 2) if fault.kind == "swapped" else ()
+        if any(agreement(exchanged(samples, *pair)) > as_given for pair in pairs):
             raise InputError("recording", f"{where}: {fault.message}")
-    return samples, kept
-
-
-def _fits_better_exchanged(
-    samples: NDArray[np.float64],
-    channels: tuple[int, ...],
-    agreement: Callable[[NDArray[np.float64]], float],
-) -> bool:
-    as_given = agreement(samples)
-    return any(
-        agreement(exchanged(samples, a, b)) > as_given
-        for a, b in combinations(channels, 2)
-    )
+    return samples, [fault for fault in faults if fault.kind != "swapped"]

@@ -34,9 +34,9 @@ _LEAST_WEIGHT = 0.02
 _DEVIATIONS = 5.0
 _LEAST_DIRECT = 0.1
 # The neighbors of a stretch help to choose among its peaks:
-# - _NEIGHBOURS: number of neighbors before and after the stretch.
+# - _NEIGHBORS: number of neighbors before and after the stretch.
 # - _HELP: weight of their mean response.
-_NEIGHBOURS, _HELP = 4, 0.5
+_NEIGHBORS, _HELP = 4, 0.5
 # Several sets of lags are compared for a single short sound, or if the microphone
 # positions are too uncertain.
 # - _CANDIDATES: largest number of sets.
@@ -140,7 +140,7 @@ class RecordingSearch:
         weight = 0.0
         queue = iter(self.stretches)
         middle = 0
-        for k in range(len(self.stretches) + _NEIGHBOURS):
+        for k in range(len(self.stretches) + _NEIGHBORS):
             new = next(queue, None)
             if new is not None:
                 value = float(self.recording.weights[new].mean())
@@ -148,14 +148,14 @@ class RecordingSearch:
                 held.append((new, value, response))
                 near += value * response
                 weight += value
-            if k < _NEIGHBOURS:
+            if k < _NEIGHBORS:
                 continue
             stretch, value, response = held[middle]
             found = self._sighting(stretch, value, response, near / max(weight, 1e-30))
             if found is not None:
                 yield found
             middle += 1
-            if middle > _NEIGHBOURS:
+            if middle > _NEIGHBORS:
                 _, value, response = held.popleft()
                 near -= value * response
                 weight -= value

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.ndimage import maximum_filter1d
-from scipy.signal import butter, sosfilt
 
 WINDOW_S = 0.032
 #: Least length of a window, as a multiple of the travel time of sound along the array.
@@ -199,6 +198,8 @@ class OnsetSpectra(RecordingSpectra):
     @cached_property
     def energy(self) -> NDArray[np.float64]:
         """(k,) mean power of all channels within the band, in steps of 1 ms."""
+        from scipy.signal import butter, sosfilt  # slow import, about 1 s
+
         step = round(_STEP_S * self.sample_rate_hz)
         # The filter is causal, so no part of a sound appears before its onset.
         high_hz = min(self.high_hz, _HIGHEST * self.sample_rate_hz)

@@ -95,7 +95,7 @@ def has_place(delays: AlignedDelays, array: KnownArray) -> bool:
 def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     tau, shape, c = delays.tau, array.shape, array.c
     own = delays.covariance + _reflections(delays, array)
-    bent = _inverse_range_std(shape)
+    bent = min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
     lying = shape.dimension == 2 and shape.kind == "plane"
     u = _direction(tau, own, array)
     far = locate_far_source(
@@ -248,10 +248,6 @@ def tolerance(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
     reflected = _reflections(delays, array)
     u = _direction(delays.tau, delays.covariance + reflected, array)
     return reflected + _budget(u, 0.0, array)
-
-
-def _inverse_range_std(shape: ArrayShape) -> float:
-    return min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
 
 
 def _limit(freedom: int) -> float:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.wave_fronts import wave_front
 from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.recording_search import MAD_TO_STD, Sighting
@@ -164,15 +165,15 @@ def _fit(
     range. The last residual is that of the prior of the range.
     """
     for k in range(_STEPS + 1):
-        delays, along_u, along_w = _wave_front(u, w, shape.p_AM, c)
+        front = wave_front(shape.p_AM, c, u, w)
         basis = np.linalg.svd(u[np.newaxis])[2][1:].T
         slopes = np.vstack(
             (
-                np.column_stack((root @ along_u @ basis, root @ along_w)),
+                np.column_stack((root @ front.by_h @ basis, root @ front.by_w)),
                 [0.0] * basis.shape[1] + [1.0 / _INVERSE_RANGE],
             )
         )
-        residual = np.append(root @ (tau - delays), -w / _INVERSE_RANGE)
+        residual = np.append(root @ (tau - front.delays), -w / _INVERSE_RANGE)
         if k == _STEPS:
             break
         step = np.linalg.lstsq(slopes, residual, rcond=1e-9)[0]
@@ -181,27 +182,3 @@ def _fit(
         u /= np.linalg.norm(u)
         w = min(max(w + float(step[-1]), 0.0), 1.0 / NEAREST_M)
     return residual, slopes
-
-
-def _wave_front(
-    u: NDArray[np.float64], w: float, p: NDArray[np.float64], c: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Computes the (n - 1,) delays of a wave front from the position u / w, s.
-
-    The other results are their derivatives with respect to u and w. A microphone at p
-    is nearer to the source than the origin by (2 p.u - w p^2) / (1 + s). Here s is the
-    distance of the microphone from the source times w.
-    """
-    square = np.sum(p**2, axis=1)
-    s = np.sqrt(np.maximum(1.0 - 2.0 * w * (p @ u) + w * w * square, 1e-12))
-    path = (w * square - 2.0 * (p @ u)) / (1.0 + s)
-    along_u = -p / s[:, np.newaxis]
-    if w < 1e-6:
-        along_w = 0.5 * (square - (p @ u) ** 2)
-    else:
-        along_w = ((w * square - p @ u) / s - path) / w
-    return (
-        (path[1:] - path[0]) / c,
-        (along_u[1:] - along_u[0]) / c,
-        (along_w[1:] - along_w[0]) / c,
-    )

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from analysis.arrays.voting.phase_plane import PhasePlane
-from analysis.arrays.voting.rank_one_bins import (
+from analysis.arrays.voting.single_waves import (
     GROUP_FRAMES,
+    PhasePlane,
     find_rank_one,
     group_powers,
 )

@@ -112,8 +112,13 @@ def hear_sources(
         )
         first = last
         if memory.samples == end:
-            sources, memory = _step(memory, rate, parameters)
+            t_s = end / rate
+            recent = _between(memory.recent, t_s - parameters.window_s, math.inf)
+            sources, tracks = _tracked(recent, t_s, memory.tracks, parameters)
             found.append(sources)
+            memory = replace(
+                memory, recent=recent, tracks=tracks, steps=memory.steps + 1
+            )
     return found, memory
 
 
@@ -134,38 +139,29 @@ def follow_sources(
     for k in range(1, math.floor(seconds / parameters.step_s + 1e-9) + 1):
         t_s = k * parameters.step_s
         recent = _between(votes, t_s - parameters.window_s, t_s - late)
-        told, memory = step_tracks(
-            _detections(recent, parameters), t_s, memory, parameters.tracks
-        )
-        found.append(TrackedSources(t_s, tuple(told)))
+        sources, memory = _tracked(recent, t_s, memory, parameters)
+        found.append(sources)
     return found
 
 
-def _step(
-    memory: ListenerMemory, rate: float, parameters: ListenerParameters
-) -> tuple[TrackedSources, ListenerMemory]:
-    t_s = memory.samples / rate
-    recent = _between(memory.recent, t_s - parameters.window_s, math.inf)
-    told, tracks = step_tracks(
-        _detections(recent, parameters), t_s, memory.tracks, parameters.tracks
-    )
-    after = replace(memory, recent=recent, tracks=tracks, steps=memory.steps + 1)
-    return TrackedSources(t_s, tuple(told)), after
-
-
-def _detections(
-    recent: DirectionVotes, parameters: ListenerParameters
-) -> list[Detection]:
+def _tracked(
+    votes: DirectionVotes,
+    t_s: float,
+    memory: TrackMemory,
+    parameters: ListenerParameters,
+) -> tuple[TrackedSources, TrackMemory]:
     least = max(_LEAST_VOTES, _VOTES_S * parameters.window_s)
-    return [
+    detections = [
         Detection(
             source.bearing,
             _OVERLAP * source.bearing_std,
             source.elevation,
             source.share,
         )
-        for source in gather_sources(recent, least_votes=least)
+        for source in gather_sources(votes, least_votes=least)
     ]
+    told, memory = step_tracks(detections, t_s, memory, parameters.tracks)
+    return TrackedSources(t_s, tuple(told)), memory
 
 
 def _between(votes: DirectionVotes, begin: float, end: float) -> DirectionVotes:

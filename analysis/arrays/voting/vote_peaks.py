@@ -92,7 +92,7 @@ def gather_sources(
     azimuth, weight = votes.azimuth[use], votes.weight[use]
     if azimuth.size < least:
         return []
-    density, centres = _density(azimuth, weight)
+    density, centers = _density(azimuth, weight)
     if enough and np.count_nonzero(votes.steered) >= _LEAST_STEERED:
         other, _ = _density(votes.azimuth[votes.steered], votes.weight[votes.steered])
         density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
@@ -101,10 +101,10 @@ def gather_sources(
     peaks = _peaks(density)
     if not peaks.size:
         return []
-    nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centres[peaks]), axis=1)]
+    nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centers[peaks]), axis=1)]
     for peak in peaks:
         source = _source(
-            azimuth, votes.elevation[use], weight, centres[peak], nearest == peak
+            azimuth, votes.elevation[use], weight, centers[peak], nearest == peak
         )
         if source is not None and source.votes >= least:
             height = float(density[peak] / density.max())
@@ -121,11 +121,11 @@ def _density(
     """Returns the smoothed density of the votes in cells, and the bearings of these."""
     cells = np.floor((azimuth + math.pi) / (2.0 * math.pi) * _CELLS).astype(int)
     histogram = np.bincount(cells % _CELLS, weight, _CELLS)
-    centres = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
-    kernel = np.exp((np.cos(centres - centres[0]) - 1.0) / _KERNEL_RAD**2)
+    centers = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
+    kernel = np.exp((np.cos(centers - centers[0]) - 1.0) / _KERNEL_RAD**2)
     smooth = np.fft.irfft(np.fft.rfft(histogram) * np.fft.rfft(kernel), _CELLS)
     density = np.maximum(smooth, 0.0) / smooth.sum()
-    return density + _ANYWHERE / _CELLS, centres
+    return density + _ANYWHERE / _CELLS, centers
 
 
 def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:
