@@ -26,18 +26,6 @@ class ArrayBudget:
     delay_std: float
     """Standard deviation of the sampling times of each channel, s."""
 
-    @classmethod
-    def of(
-        cls,
-        shape: ArrayShape,
-        position_std: float,
-        speed_std: float = 0.0,
-        delay_std: float = 0.0,
-    ) -> ArrayBudget:
-        """Makes an error budget with equal position errors for all coordinates."""
-        of_places = position_std**2 * np.eye(shape.p_AM.size)
-        return cls(of_places, speed_std, delay_std)
-
     @property
     def position_std(self) -> float:
         """Root mean square of the coordinates' standard deviations, m."""

@@ -23,6 +23,7 @@ from analysis.arrays.voting.direction_votes import (
     join_votes,
 )
 from analysis.arrays.voting.source_listener import ListenerParameters, follow_sources
+from analysis.arrays.voting.source_tracks import SourceTrack
 from analysis.arrays.voting.vote_peaks import VotedSource, gather_sources
 from systems.sound.array_shape import ArrayShape
 
@@ -179,8 +180,7 @@ def steered_only(votes: DirectionVotes) -> DirectionVotes:
     between the sources. The steered response measures how well all frequencies together
     agree on a direction.
     """
-    kept = votes.steered
-    return DirectionVotes._make([*(each[kept] for each in votes[:5]), *votes[5:]])
+    return votes.part(votes.steered, slice(None))
 
 
 def _sounds(levels_db: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -241,21 +241,21 @@ def _doubted(told: _Told) -> _Told:
 def _tracks(
     votes: DirectionVotes, seconds: float, plan: VotePlan
 ) -> list[FollowedSource]:
-    tracks: dict[int, FollowedSource] = {}
+    heard: dict[int, list[tuple[float, SourceTrack]]] = {}
     parameters = ListenerParameters()
     # The time of a step is the end of its window. The bearing belongs to the middle.
     late = 0.5 * parameters.window_s
     for step in follow_sources(votes, seconds, plan, parameters):
         for track in step.tracks:
-            if step.t_s - track.t_heard > _PAUSE_S:
-                continue
-            known = tracks.setdefault(
-                track.identity, FollowedSource(track.identity, [], [], 0.0)
-            )
-            known.t_s.append(round(step.t_s - late, 6))
-            known.bearing_deg.append(math.degrees(track.bearing))
-            sure = max(known.confidence, track.confidence)
-            tracks[track.identity] = FollowedSource(
-                track.identity, known.t_s, known.bearing_deg, sure
-            )
-    return list(tracks.values())
+            if step.t_s - track.t_heard <= _PAUSE_S:
+                at = round(step.t_s - late, 6), track
+                heard.setdefault(track.identity, []).append(at)
+    return [
+        FollowedSource(
+            identity,
+            [t_s for t_s, _ in steps],
+            [math.degrees(track.bearing) for _, track in steps],
+            max(track.confidence for _, track in steps),
+        )
+        for identity, steps in heard.items()
+    ]

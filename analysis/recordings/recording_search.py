@@ -104,13 +104,9 @@ class RecordingSearch:
         window_s = self.recording.window.size / rate
         return SearchGrid.of(self.shape, self.c, self.recording.high_hz, window_s)
 
-    def _correlations(
-        self, cross: NDArray[np.complex64], slack: int = 0
-    ) -> NDArray[np.float32]:
-        return self.grid.correlations(cross, self.recording.bins, slack)
-
     def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
-        return steered_response(self._correlations(cross), self.grid)
+        correlations = self.grid.correlations(cross, self.recording.bins)
+        return steered_response(correlations, self.grid)
 
     @cached_property
     def diffuse_response(self) -> NDArray[np.float32]:
@@ -218,8 +214,9 @@ class RecordingSearch:
         rate = self.grid.lag_rate_hz
         slack = math.ceil(self.slack_s * rate)
         reach = np.ceil(self.shape.distances_m / self.c * rate).astype(np.int64)
+        cross = self._cross(stretch) / weight
         sets = consistent_lags(
-            self._correlations(self._cross(stretch) / weight, slack),
+            self.grid.correlations(cross, self.recording.bins, slack),
             self.shape.pairs,
             reach + slack,
             _CANDIDATES,

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,11 @@ class DirectionVotes(NamedTuple):
     group_levels_db: NDArray[np.float64]
     """(g, 24) power of all channels at 24 frequencies of the band, dB relative to the
     unit of the samples."""
+
+    def part(self, votes: Any, groups: slice) -> DirectionVotes:
+        """Returns the votes with some indices, and the levels of some groups."""
+        kept = [each[votes] for each in self[:5]] + [each[groups] for each in self[5:]]
+        return self._make(kept)
 
 
 class VoteMemory(NamedTuple):
@@ -234,7 +239,7 @@ def join_votes(parts: list[DirectionVotes]) -> DirectionVotes:
         np.concatenate(each) for each in zip(*parts, strict=True)
     )
     order = np.argsort(joined.t_s, kind="stable")
-    return DirectionVotes._make([*(each[order] for each in joined[:5]), *joined[5:]])
+    return joined.part(order, slice(None))
 
 
 def _check(

@@ -16,7 +16,6 @@ from analysis.arrays.voting.direction_votes import (
     join_votes,
 )
 from analysis.arrays.voting.source_tracks import (
-    Detection,
     SourceTrack,
     TrackMemory,
     TrackParameters,
@@ -152,12 +151,7 @@ def _tracked(
 ) -> tuple[TrackedSources, TrackMemory]:
     least = max(_LEAST_VOTES, _VOTES_S * parameters.window_s)
     detections = [
-        Detection(
-            source.bearing,
-            _OVERLAP * source.bearing_std,
-            source.elevation,
-            source.share,
-        )
+        source._replace(bearing_std=_OVERLAP * source.bearing_std)
         for source in gather_sources(votes, least_votes=least)
     ]
     told, memory = step_tracks(detections, t_s, memory, parameters.tracks)
@@ -167,6 +161,4 @@ def _tracked(
 def _between(votes: DirectionVotes, begin: float, end: float) -> DirectionVotes:
     inside = slice(*np.searchsorted(votes.t_s, (begin, end)))
     groups = slice(*np.searchsorted(votes.group_t_s, (begin, end)))
-    return DirectionVotes._make(
-        [*(each[inside] for each in votes[:5]), *(each[groups] for each in votes[5:])]
-    )
+    return votes.part(inside, groups)

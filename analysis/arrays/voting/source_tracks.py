@@ -19,13 +19,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.optimize import linear_sum_assignment
 
+from analysis.arrays.voting.vote_peaks import VotedSource
 from systems.framework.parameters import Fraction, Parameters, Positive
 
 # Largest distance of a detection from its track, in standard deviations.
@@ -71,19 +71,6 @@ class TrackParameters(Parameters):
     hidden_s: Positive = 3.0
     """Time without a detection of its own after which a track ends, s. It limits how
     long a nearby track may hide a track."""
-
-
-class Detection(NamedTuple):
-    """A direction from which sound came in a step."""
-
-    bearing: float
-    """Bearing, rad."""
-    bearing_std: float
-    """Standard deviation of the bearing, rad."""
-    elevation: float | None
-    """Elevation, rad. None if the array cannot measure it."""
-    share: float = 1.0
-    """Share of all sound in the step, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +126,7 @@ class TrackMemory:
 
 
 def step_tracks(
-    detections: Sequence[Detection],
+    detections: Sequence[VotedSource],
     t_s: float,
     memory: TrackMemory,
     parameters: TrackParameters,
@@ -207,7 +194,7 @@ def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack
 
 def _assigned(
     tracks: Sequence[SourceTrack],
-    detections: Sequence[Detection],
+    detections: Sequence[VotedSource],
     p: TrackParameters,
 ) -> list[int | None]:
     """Returns the number of the detection of each track, or None."""
@@ -234,7 +221,7 @@ def _assigned(
 
 def _hidden(
     tracks: Sequence[SourceTrack],
-    detections: Sequence[Detection],
+    detections: Sequence[VotedSource],
     chosen: list[int | None],
     p: TrackParameters,
 ) -> dict[int, int]:
@@ -256,7 +243,7 @@ def _hidden(
     return hidden
 
 
-def _scatter(track: SourceTrack, detection: Detection, p: TrackParameters) -> float:
+def _scatter(track: SourceTrack, detection: VotedSource, p: TrackParameters) -> float:
     """Returns the variance of a detection relative to its track, rad^2."""
     rate_squared = track.rate**2 + float(track.covariance[1, 1])
     return detection.bearing_std**2 + p.smear_s**2 * rate_squared
@@ -264,7 +251,7 @@ def _scatter(track: SourceTrack, detection: Detection, p: TrackParameters) -> fl
 
 def _heard(
     track: SourceTrack,
-    detection: Detection,
+    detection: VotedSource,
     t_s: float,
     p: TrackParameters,
 ) -> SourceTrack:
@@ -304,7 +291,7 @@ def _missed(track: SourceTrack, p: TrackParameters) -> SourceTrack:
     return replace(track, sounding=sounding / whole, silent=track.silent / whole)
 
 
-def _born(detection: Detection, t_s: float) -> SourceTrack:
+def _born(detection: VotedSource, t_s: float) -> SourceTrack:
     return SourceTrack(
         identity=0,
         bearing=_wrapped(detection.bearing),
