@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from analysis.recordings.locate import hear
 from analysis.recordings.locate_result import LocateResult
 from analysis.recordings.prepared_recording import RecordedSamples
+from analysis.recordings.recording_search import MAD_TO_STD
 from analysis.reporting.intervals import wilson_interval
 from studies.support.drawn_recordings import (
     RATE,
@@ -154,7 +155,7 @@ def own_deviations(trials: Sequence[Trial]) -> Callable[[Trial], float]:
     for trial in trials:
         late[alike(trial)].extend(trial.late_s)
     found = {
-        key: 1.4826 * float(np.median(np.abs(of))) for key, of in late.items() if of
+        key: MAD_TO_STD * float(np.median(np.abs(of))) for key, of in late.items() if of
     }
     return lambda trial: found.get(alike(trial), 0.0)
 

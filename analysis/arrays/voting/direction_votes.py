@@ -46,6 +46,9 @@ _WEAKEST, _FOLLOW = 0.3, 0.1
 #   s.
 _RISE, _DECAY_DB_S = 1.6, 62.5
 
+# Least ratio of the two largest eigenvalues of the covariance in a bin with one wave.
+_LEAST_RATIO = 20.0
+
 # Number of frequencies whose levels are stored.
 _LEVELS = 24
 
@@ -125,9 +128,6 @@ class VotePlan:
     votes."""
     plane: PhasePlane
     steered: SteeredSearch
-    least_ratio: float
-    """Least ratio of the two largest eigenvalues of the covariance in a bin with one
-    wave."""
 
     @classmethod
     def of(
@@ -137,7 +137,6 @@ class VotePlan:
         sample_rate_hz: float,
         *,
         band_hz: tuple[float, float] = (200.0, 8_000.0),
-        least_ratio: float = 20.0,
     ) -> VotePlan:
         """Makes the settings with which an array votes for directions of sound.
 
@@ -152,7 +151,7 @@ class VotePlan:
                 "a row that is not level gives no bearings; give a row in the "
                 "plane z = const, or add microphones off the row",
             )
-        _check(c, sample_rate_hz, band_hz, least_ratio)
+        _check(c, sample_rate_hz, band_hz)
         frame_s = max(_FRAME_S, _CROSSINGS * shape.max_delay(c))
         hop = max(1, round(frame_s * sample_rate_hz / _HOPS))
         size = _HOPS * hop
@@ -174,7 +173,6 @@ class VotePlan:
             bins=bins,
             plane=plane,
             steered=SteeredSearch.of(shape, c, per_hz, (low, high)),
-            least_ratio=least_ratio,
         )
 
     def blank(self) -> VoteMemory:
@@ -242,9 +240,7 @@ def join_votes(parts: list[DirectionVotes]) -> DirectionVotes:
     return joined.part(order, slice(None))
 
 
-def _check(
-    c: float, sample_rate_hz: float, band_hz: tuple[float, float], least_ratio: float
-) -> None:
+def _check(c: float, sample_rate_hz: float, band_hz: tuple[float, float]) -> None:
     if not _SPEEDS_M_S[0] <= c <= _SPEEDS_M_S[1]:
         raise InputError(
             "c", f"{c:g} m/s is not a speed of sound; use about 343 m/s in air"
@@ -260,8 +256,6 @@ def _check(
             f"{low:g} to {high:g} Hz at {sample_rate_hz:g} samples/s; give a lowest "
             "frequency above 0 and below the highest and half the rate",
         )
-    if not 1.0 <= least_ratio < math.inf:
-        raise InputError("least_ratio", f"{least_ratio:g}; give at least 1")
 
 
 def _checked(
@@ -377,7 +371,7 @@ def _bin_votes(
     t_s: NDArray[np.float64],
 ) -> DirectionVotes:
     """Computes the votes of single bins that contain only one wave."""
-    group, bins, pattern = find_rank_one(spectra, loud, plan.least_ratio)
+    group, bins, pattern = find_rank_one(spectra, loud, _LEAST_RATIO)
     frequency = plan.frequencies_hz[bins]
     fits = plan.plane.fit(pattern, frequency)
     return _cast(

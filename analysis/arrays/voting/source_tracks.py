@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.optimize import linear_sum_assignment
 
-from analysis.arrays.voting.vote_peaks import VotedSource
+from analysis.arrays.voting.vote_peaks import VotedSource, wrapped
 from systems.framework.parameters import Fraction, Parameters, Positive
 
 # Largest distance of a detection from its track, in standard deviations.
@@ -184,7 +184,7 @@ def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack
     silent = track.silent * (1.0 - to_sounding) + track.sounding * to_silent
     return replace(
         track,
-        bearing=_wrapped(track.bearing + dt * track.rate),
+        bearing=wrapped(track.bearing + dt * track.rate),
         rate=forget * track.rate,
         covariance=F @ track.covariance @ F.T + Q,
         sounding=stays * sounding,
@@ -205,7 +205,7 @@ def _assigned(
     for i, track in enumerate(tracks):
         for k, d in enumerate(detections):
             variance = float(track.covariance[0, 0]) + _scatter(track, d, p)
-            off = _wrapped(d.bearing - track.bearing)
+            off = wrapped(d.bearing - track.bearing)
             # Reported tracks have priority, so that a new track does not take their
             # detections.
             late = 0.0 if track.identity else 4.0
@@ -235,8 +235,8 @@ def _hidden(
             k = chosen[j]
             if k is None or not other.identity:
                 continue
-            apart = abs(_wrapped(track.bearing - other.bearing))
-            off = abs(_wrapped(detections[k].bearing - track.bearing))
+            apart = abs(wrapped(track.bearing - other.bearing))
+            off = abs(wrapped(detections[k].bearing - track.bearing))
             if apart < resolution and off < resolution:
                 hidden[i] = j
                 break
@@ -258,7 +258,7 @@ def _heard(
     of_detection = _scatter(track, detection, p)
     C = track.covariance
     variance = float(C[0, 0]) + of_detection
-    off = _wrapped(detection.bearing - track.bearing)
+    off = wrapped(detection.bearing - track.bearing)
     gain = C[:, 0] / variance
     # Joseph's form of the covariance update keeps the covariance symmetric.
     A = np.eye(2) - np.outer(gain, [1.0, 0.0])
@@ -273,7 +273,7 @@ def _heard(
         elevation = 0.7 * track.elevation + 0.3 * elevation
     return replace(
         track,
-        bearing=_wrapped(track.bearing + float(gain[0]) * off),
+        bearing=wrapped(track.bearing + float(gain[0]) * off),
         rate=track.rate + float(gain[1]) * off,
         covariance=A @ C @ A.T + of_detection * np.outer(gain, gain),
         elevation=track.elevation if elevation is None else elevation,
@@ -294,7 +294,7 @@ def _missed(track: SourceTrack, p: TrackParameters) -> SourceTrack:
 def _born(detection: VotedSource, t_s: float) -> SourceTrack:
     return SourceTrack(
         identity=0,
-        bearing=_wrapped(detection.bearing),
+        bearing=wrapped(detection.bearing),
         rate=0.0,
         covariance=np.diag([detection.bearing_std**2, _RATE_STD**2]),
         elevation=detection.elevation,
@@ -333,13 +333,8 @@ def _single(tracks: list[SourceTrack], p: TrackParameters) -> list[SourceTrack]:
     near = math.radians(0.5 * p.resolution_deg)
     for track in sorted(tracks, key=lambda t: (t.identity == 0, t.t_born)):
         again = track.identity == 0 and any(
-            abs(_wrapped(track.bearing - other.bearing)) < near for other in kept
+            abs(wrapped(track.bearing - other.bearing)) < near for other in kept
         )
         if not again:
             kept.append(track)
     return kept
-
-
-def _wrapped(angle: float) -> float:
-    """Wraps an angle to (-pi, pi], rad."""
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)

@@ -11,7 +11,7 @@ densities, but at different directions.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,22 +153,22 @@ def _source(
     The source is None if no vote is near the peak, for example if only the steered
     response has a peak there.
     """
-    near = np.abs(_wrapped(azimuth - bearing)) < _NEAR_RAD
+    near = np.abs(wrapped(azimuth - bearing)) < _NEAR_RAD
     count = int(np.count_nonzero(near))
     mine = near & nearest
     if not mine.any():
         return None
     a, w = azimuth[mine], weight[mine]
     for _ in range(_STEPS):
-        off = _wrapped(a - bearing)
+        off = wrapped(a - bearing)
         pull = w * np.exp((np.cos(off) - 1.0) / _KERNEL_RAD**2)
         bearing += math.atan2(float(pull @ np.sin(off)), float(pull @ np.cos(off)))
-    off = _wrapped(a - bearing)
+    off = wrapped(a - bearing)
     spread = math.sqrt(float(w @ off**2) / float(w.sum()))
     std = spread / math.sqrt(min(float(a.size), _INDEPENDENT))
     heights = elevation[mine]
     return VotedSource(
-        bearing=float(_wrapped(np.array(bearing))),
+        bearing=float(wrapped(bearing)),
         bearing_std=math.hypot(std, _LEAST_STD_RAD),
         elevation=float(np.median(heights)) if np.isfinite(heights).all() else None,
         share=float(w.sum() / weight.sum()),
@@ -177,6 +177,6 @@ def _source(
     )
 
 
-def _wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Wraps angles to (-pi, pi], rad."""
+def wrapped(angle: Any) -> Any:
+    """Wraps an angle or an array of angles to (-pi, pi], rad."""
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
