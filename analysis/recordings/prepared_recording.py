@@ -170,9 +170,9 @@ def prepared_recording(
 ) -> tuple[RecordingSpectra, list[ChannelFault]]:
     """Returns the spectra of the array's channels, and the faults worth reporting.
 
-    Inverted channels are corrected. Frequencies above ``top_hz`` are not used. If the
-    positions of the microphones are uncertain, delays cannot reveal exchanged channels
-    or drifting clocks.
+    Inverted channels are corrected. Frequencies above ``top_hz`` are not used, but the
+    band is at least 500 Hz wide. If the positions of the microphones are uncertain,
+    delays cannot reveal exchanged channels or drifting clocks.
     """
     samples, rate, where = recorded
     known = geometry.known

@@ -158,7 +158,7 @@ def _fit(
     shape: ArrayShape,
     c: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fits a source position to delays that the matrix ``root`` whitens, from u / w.
+    """Fits a source position to delays that ``root`` whitens, beginning at u / w.
 
     The results are the (n,) whitened residuals, and the (n, 3) derivatives of the
     modeled values with respect to two coordinates of the direction and the inverse

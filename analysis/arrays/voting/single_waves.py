@@ -252,7 +252,7 @@ def find_rank_one(
     candidates: NDArray[np.bool_],
     least_ratio: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.complex128]]:
-    """Finds the (g, b) candidates among the bins that contain only one wave.
+    """Finds those of the (g, b) candidate bins that contain only one wave.
 
     A bin is one frequency in one group of frames. The results are the (k,) numbers of
     the groups and of the frequencies of these bins, and their (k, n) dominant
