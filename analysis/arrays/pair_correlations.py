@@ -9,11 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from systems.delays.correlations import (
-    correlations_at_lags,
-    parabola_vertex,
-    whitening,
-)
+from systems.delays.correlations import correlations_at_lags, parabola_vertex, whitening
 
 # Number of frames to use. They are the loudest frames anywhere in the recording.
 _FRAMES = 64

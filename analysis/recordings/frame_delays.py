@@ -181,9 +181,7 @@ def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
 
 
 def _fitting(
-    differences: NDArray[np.float64],
-    levels: NDArray[np.float64],
-    delays: FrameDelays,
+    differences: NDArray[np.float64], levels: NDArray[np.float64], delays: FrameDelays
 ) -> tuple[float, float]:
     """Returns the share of frames that fit a position outside the array, and the error.
 

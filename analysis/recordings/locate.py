@@ -9,11 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.recordings.array_geometry import (
-    ArrayGeometry,
-    KnownArray,
-    make_geometry,
-)
+from analysis.recordings.array_geometry import ArrayGeometry, KnownArray, make_geometry
 from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.heard_sources import heard_sources
 from analysis.recordings.locate_result import LocateResult, SourceEstimate

@@ -248,9 +248,7 @@ def group_powers(spectra: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 
 def find_rank_one(
-    spectra: NDArray[np.complex64],
-    candidates: NDArray[np.bool_],
-    least_ratio: float,
+    spectra: NDArray[np.complex64], candidates: NDArray[np.bool_], least_ratio: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.complex128]]:
     """Finds those of the (g, b) candidate bins that contain only one wave.
 

@@ -82,9 +82,7 @@ class SourceListener(Block):
         ticket = self.abstract_state_ticket(state)
         self.declare_output("sources", self._publish_sources, {ticket})
         self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=microphones.frame_s,
-            offset_sec=0.0,
-            update=self._hear,
+            period_sec=microphones.frame_s, offset_sec=0.0, update=self._hear
         )
 
     def _hear(self, context: Any, state: Any) -> None:

@@ -193,9 +193,7 @@ def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack
 
 
 def _assigned(
-    tracks: Sequence[SourceTrack],
-    detections: Sequence[VotedSource],
-    p: TrackParameters,
+    tracks: Sequence[SourceTrack], detections: Sequence[VotedSource], p: TrackParameters
 ) -> list[int | None]:
     """Returns the number of the detection of each track, or None."""
     chosen: list[int | None] = [None] * len(tracks)
@@ -250,10 +248,7 @@ def _scatter(track: SourceTrack, detection: VotedSource, p: TrackParameters) -> 
 
 
 def _heard(
-    track: SourceTrack,
-    detection: VotedSource,
-    t_s: float,
-    p: TrackParameters,
+    track: SourceTrack, detection: VotedSource, t_s: float, p: TrackParameters
 ) -> SourceTrack:
     of_detection = _scatter(track, detection, p)
     C = track.covariance
