@@ -92,7 +92,7 @@ class DirectionVotes(NamedTuple):
     def part(self, votes: Any, groups: slice) -> DirectionVotes:
         """Returns the votes with some indices, and the levels of some groups."""
         kept = [each[votes] for each in self[:5]] + [each[groups] for each in self[5:]]
-        return self._make(kept)
+        return DirectionVotes._make(kept)
 
 
 class VoteMemory(NamedTuple):
