@@ -77,20 +77,10 @@ def range_posterior(
 ) -> RangePosterior:
     """Estimates the range of a source, averaged over the unknown errors of the array.
 
-    Args:
-        tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
-        covariance: (n - 1, n - 1) covariance of the delays from noise and reflections,
-            s^2.
-        shape: The n microphones.
-        budget: Errors of the microphone positions, sampling times, and speed of sound.
-        c: Speed of sound, m/s.
-        start: First estimate of the source: a (d,) direction, its inverse range in 1/m,
-            and the standard deviation of the inverse range. More ranges are evaluated
-            around this estimate.
-        nearest_m: Least range, m.
-
-    Returns:
-        Mean and standard deviation of the range up to 30 m, and the direction.
+    The (n - 1,) delays t_k - t_0 have the covariance of noise and reflections, s^2. The
+    first estimate ``start`` is a (d,) direction, its inverse range, 1/m, and the
+    standard deviation of the inverse range. More ranges are evaluated around this
+    estimate. The ranges reach from ``nearest_m`` to 30 m.
     """
     u, w, w_std = start
     frame = (
