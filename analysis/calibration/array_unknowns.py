@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_budget import ArrayBudget
-from analysis.calibration.wave_fronts import WaveFront, wave_front
+from analysis.arrays.wave_fronts import WaveFront, wave_front
 from systems.framework.input_error import InputError
 
 # A direction whose variance is below this share of the largest is taken as exact.

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from analysis.arrays.array_budget import ArrayBudget
 from analysis.arrays.far_field import locate_far_source
+from analysis.arrays.wave_fronts import WaveFront
 from analysis.calibration.measured_sound import MeasuredSound
-from analysis.calibration.wave_fronts import WaveFront
 from systems.hearing.multilateration import locate_source
 from systems.sound.array_shape import ArrayShape
 

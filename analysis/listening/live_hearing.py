@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.voting.direction_votes import VotePlan
-from analysis.arrays.voting.listening_plan import vote_plan
 from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
@@ -21,13 +20,14 @@ from analysis.arrays.voting.source_listener import (
 )
 from analysis.listening.live_faults import LiveFaults
 from analysis.listening.sound_stream import SoundBlock, SoundStream, StreamBrokenError
-from analysis.recordings.array_geometry import ArrayGeometry
-from analysis.recordings.array_match import array_mismatch, chosen_microphones
+from analysis.recordings.array_geometry import (
+    LOWEST_LIVE_HZ,
+    ArrayGeometry,
+    usable_band,
+)
 from analysis.recordings.channel_faults import ChannelFault
+from analysis.recordings.prepared_recording import array_mismatch, chosen_microphones
 from systems.framework.input_error import InputError
-
-_BAND_HZ = (200.0, 15_000.0)
-_TOP_OF_RATE = 0.45
 
 # Kinds of faults that make bearings wrong. Only the user can correct them.
 _FATAL = ("copied", "swapped", "units", "drift")
@@ -110,8 +110,8 @@ class LiveHearing:
 
     def _voting(self, geometry: ArrayGeometry) -> VotePlan:
         rate, known = float(self._stream.sample_rate_hz), geometry.known
-        band = geometry.band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
-        return vote_plan(known.shape, known.c, rate, band)
+        band_hz = usable_band(geometry.band, rate, lowest_hz=LOWEST_LIVE_HZ)
+        return VotePlan.of(known.shape, known.c, rate, band_hz=band_hz)
 
     def steps(self) -> Iterator[HeardStep]:
         """Tracks the sources to the end of the stream.
