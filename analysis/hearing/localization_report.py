@@ -7,9 +7,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from analysis.hearing.free_field import frame_estimator
 from analysis.hearing.localization import LocalizationCell, LocalizationExperiment
 from analysis.hearing.sensitivity import sensitivity_table
+from analysis.hearing.single_frames import frame_estimator
 from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import write_scenario

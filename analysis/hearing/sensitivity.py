@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.hearing.cramer_rao import polar_gradients, polar_point
-from analysis.hearing.free_field import Estimator, Loudspeaker
 from analysis.hearing.paper_tables import PaperCell
+from analysis.hearing.single_frames import Estimator, Loudspeaker
 from systems.framework.signals import TICK_S
 from systems.sound.array_shape import ArrayShape
 

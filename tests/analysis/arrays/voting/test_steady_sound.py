@@ -12,7 +12,7 @@ from analysis.arrays.voting.steady_sound import (
     level_scatter_db,
     steered_only,
 )
-from analysis.hearing.synthetic_speech import speech_like
+from studies.support.synthetic_speech import speech_like
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 16_000, 343.0
