@@ -90,25 +90,13 @@ def open_pipe(
     sample_rate_hz: int | None = None,
     sample_format: SampleFormat = "s16le",
 ) -> SoundStream:
-    """Opens a stream from a pipe or a file.
+    """Opens a stream from a pipe or file, which is read to its end without seeking.
 
-    The pipe is read to its end, without seeking.
-
-    Args:
-        pipe: Pipe or file with a file descriptor, from which nothing was read before.
-            The stream owns it and closes it.
-        raw_channels: Number of channels of raw samples if ``channels`` is None.
-        channels: Stated number of channels. None: the number in the WAV header.
-        sample_rate_hz: Stated sample rate, Hz. None: the rate in the WAV header.
-        sample_format: Format of raw samples.
-
-    Returns:
-        The stream.
-
-    Raises:
-        InputError: There are three possible causes. The input is empty. Its header is
-            not WAV or contradicts the stated values. The input is raw and no sample
-            rate is stated.
+    The stream owns and closes the pipe, which must have a file descriptor. Without
+    ``channels``, the WAV header states the number of channels, and raw samples have
+    ``raw_channels``. Raises ``InputError`` if the input is empty, if its WAV header is
+    invalid or contradicts the stated values, or if the input is raw and no sample rate
+    is stated.
     """
     with ExitStack() as stack:
         stack.callback(pipe.close)
@@ -127,9 +115,8 @@ def open_pipe(
 def _begin(source: _Source, raw: _Format | None) -> tuple[_Format, int | None]:
     """Reads the beginning of the input up to the samples.
 
-    Returns:
-        form: Format of the samples; ``raw`` if there is no header.
-        length: Number of bytes of the samples. None if it is unknown.
+    Returns the format of the samples, which is ``raw`` if there is no header, and their
+    number of bytes, or None if it is unknown.
     """
     start = source.read(4)
     if not start:
@@ -163,12 +150,8 @@ class _Source:
     def some(self, size: int) -> bytes | None:
         """Reads up to ``size`` bytes.
 
-        Args:
-            size: Largest number of bytes.
-
-        Returns:
-            The bytes. Empty at the end of the input. None if nothing has arrived for
-            1 s.
+        Returns no bytes at the end of the input, and None if nothing has arrived for 1
+        s.
         """
         if self._unread:
             data, self._unread = self._unread[:size], self._unread[size:]
@@ -194,16 +177,8 @@ def open_flac(
 ) -> SoundStream:
     """Opens a stream from a FLAC file.
 
-    Args:
-        path: FLAC file.
-        channels: Stated number of channels. None: the number in the file.
-        sample_rate_hz: Stated sample rate, Hz. None: the rate in the file.
-
-    Returns:
-        The stream.
-
-    Raises:
-        InputError: The file cannot be decoded, or it contradicts the stated values.
+    Raises ``InputError`` if the file cannot be decoded or contradicts the stated
+    values.
     """
     try:
         sound = soundfile.SoundFile(path)
@@ -242,9 +217,8 @@ def _check_stated(
 def _wav_header(source: _Source) -> tuple[_Format, int | None]:
     """Reads a WAV header after the bytes RIFF, up to the samples.
 
-    Returns:
-        form: Format of the samples.
-        length: Number of bytes of the samples. None if the header does not state it.
+    Returns the format and the number of bytes of the samples, or None if the header
+    does not state the number.
     """
     _exactly(source, 4)
     if _exactly(source, 4) != b"WAVE":
@@ -292,13 +266,7 @@ def _exactly(source: _Source, size: int) -> bytes:
 def _blocks(source: _Source, form: _Format, length: int | None) -> Iterator[SoundBlock]:
     """Yields blocks of samples, including those of further WAV files in the stream.
 
-    Args:
-        source: Input after the header.
-        form: Format of the samples.
-        length: Number of bytes of the samples. None if it is unknown.
-
-    Yields:
-        Blocks of samples. A block without samples reports a pause or an incomplete end.
+    A block without samples reports a pause or an incomplete end.
     """
     pace, gap, cut = Pace(form.sample_rate_hz), False, 0
     for data in _chunks(source, form, length):
@@ -322,10 +290,9 @@ def _blocks(source: _Source, form: _Format, length: int | None) -> Iterator[Soun
 def _chunks(
     source: _Source, form: _Format, length: int | None
 ) -> Iterator[bytes | None]:
-    """Yields the bytes of whole samples. Only the last bytes may be incomplete.
+    """Yields the bytes of whole samples, or None if nothing has arrived for 1 s.
 
-    Yields:
-        Bytes, or None if nothing has arrived for 1 s.
+    Only the last bytes may be incomplete.
     """
     most = form.width * max(1, round(BLOCK_S * form.sample_rate_hz))
     while True:
@@ -360,11 +327,7 @@ def _chunks(
 
 
 def _reaches_another(source: _Source) -> bool:
-    """Skips the chunks after the samples of a WAV until another WAV begins.
-
-    Returns:
-        True if another WAV begins, False at the end of the input.
-    """
+    """Skips the chunks after a WAV's samples. Returns whether another WAV begins."""
     while (name := source.read(4)) != b"RIFF":
         size = source.read(4)
         if len(name + size) < 8:
@@ -375,11 +338,7 @@ def _reaches_another(source: _Source) -> bool:
 
 
 def _another(source: _Source, form: _Format) -> int | None:
-    """Reads the header of a further WAV after the bytes RIFF.
-
-    Returns:
-        Number of bytes of its samples. None if it is unknown.
-    """
+    """Reads the header of a further WAV. Returns the number of bytes of its samples."""
     other, length = _wav_header(source)
     if other != form:
         # Times and delays are counted in samples, so the rate must not change.
