@@ -63,17 +63,8 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
 
     A first pass uses only frequencies that the stated position errors allow. If the
     first pass improves the array and fits, a second pass uses higher frequencies.
-
-    Args:
-        sounds: Recordings, with source positions where these are known.
-        geometry: The array, with its stated uncertainties.
-
-    Returns:
-        The calibrated array.
-
-    Raises:
-        InputError: A recording cannot be used, a source position is not plausible, or
-            no recording contains a detectable sound.
+    Raises ``InputError`` if a recording cannot be used, if a source position is not
+    plausible, or if no recording contains a detectable sound.
     """
     places = np.array(geometry.microphones)
     for k, listed in enumerate(sounds.sounds):
@@ -85,33 +76,22 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
     top_hz = _top_hz(
         geometry, float(np.sqrt(np.mean(np.diag(geometry.known.budget.of_places))))
     )
-    first = calibration_run(*_listened(sounds, geometry, geometry, top_hz))
+    first = _pass(sounds, geometry, geometry, top_hz)
     if first.misfit is not None or first.gains_nothing or math.isinf(top_hz):
         return first
     # Better known microphone positions allow higher frequencies, which say more.
     known = ArrayGeometry.model_validate(calibrated_fields(first.calibration, geometry))
     top_hz = _top_hz(geometry, _shape_std(first))
-    return calibration_run(*_listened(sounds, geometry, known, top_hz))
+    return _pass(sounds, geometry, known, top_hz)
 
 
-def _listened(
+def _pass(
     sounds: CalibrationSounds,
     geometry: ArrayGeometry,
     known: ArrayGeometry,
     top_hz: float,
-) -> tuple[list[MeasuredSound], ArrayGeometry, list[HeardSound], list[str]]:
-    """Measures the delays in all recordings.
-
-    Args:
-        sounds: The recordings.
-        geometry: The array as stated.
-        known: The array as known so far, which is used to measure the delays.
-        top_hz: Highest frequency to use, Hz.
-
-    Returns:
-        Four values: the measured sounds; ``geometry``, unchanged; the results of the
-        recordings; messages about the recordings.
-    """
+) -> CalibrationRun:
+    """Calibrates the array from delays that are measured with the ``known`` array."""
     measured: list[MeasuredSound] = []
     heard: list[HeardSound] = []
     remarks: list[str] = []
@@ -145,16 +125,15 @@ def _listened(
             "no recording has a detectable sound; record single loud sounds in a "
             "quiet place, and check the positions of the microphones (in m)",
         )
-    return measured, geometry, heard, remarks
+    return calibration_run(measured, geometry, heard, remarks)
 
 
 def _sightings(
     sounds: CalibrationSounds, k: int, known: ArrayGeometry, top_hz: float
 ) -> tuple[list[Sighting], list[str]]:
-    """Finds the parts of one recording that contain sound.
+    """Finds the parts of one recording that contain sound below ``top_hz``.
 
-    The search uses frequencies below ``top_hz``. If the recording is silent there, the
-    search uses all frequencies.
+    If the recording is silent there, the search uses all frequencies.
     """
     listed = sounds.sounds[k]
     path, part = sounds.path_of(listed), (listed.from_s, listed.to_s)
@@ -188,19 +167,8 @@ def calibration_run(
 ) -> CalibrationRun:
     """Calibrates an array from measured delays between microphones.
 
-    Args:
-        sounds: The delays, with source positions where these are known.
-        geometry: The array, with its stated uncertainties.
-        heard: Results of the recordings, one per sound. None: the delays do not come
-            from recordings.
-        remarks: Messages about the recordings.
-
-    Returns:
-        The calibrated array.
-
-    Raises:
-        InputError: The sounds do not match the array, for example in their number of
-            delays.
+    Raises ``InputError`` if the sounds do not match the array, for example in their
+    number of delays.
     """
     calibration = calibrate_array(
         np.array(geometry.microphones),

@@ -40,16 +40,10 @@ def calibrated_fields(
 ) -> dict[str, Any]:
     """Computes the fields of a geometry file for a calibrated array.
 
-    If the array is too large for a covariance in the file, the file holds one standard
-    deviation per microphone. If the calibrated microphones no longer lie in a plane or
-    line, the field ``side`` is left out.
-
-    Args:
-        calibration: The calibration.
-        geometry: The array as stated. Fields that were not calibrated are copied.
-
-    Returns:
-        Plain values by field name.
+    Fields that were not calibrated are copied from the array as stated. If the array is
+    too large for a covariance in the file, the file holds one standard deviation per
+    microphone. If the calibrated microphones no longer lie in a plane or line, the
+    field ``side`` is left out.
     """
     fields = {
         "microphones": calibration.places.tolist(),
@@ -65,14 +59,7 @@ def calibrated_fields(
 
 
 def write_calibration(document: dict[str, Any], folder: Path) -> None:
-    """Writes a calibration as ``array.yaml`` and ``calibration.json``.
-
-    ``load_geometry`` reads ``array.yaml``.
-
-    Args:
-        document: The JSON document of a calibration, from ``calibration_document``.
-        folder: Existing folder for the two files.
-    """
+    """Writes ``calibration.json``, and ``array.yaml`` for ``load_geometry``."""
     write_json(document, folder / "calibration.json")
     text = dump_yaml(document["geometry"])
     (folder / "array.yaml").write_text(text, encoding="utf-8")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from analysis.calibration.calibration import Calibration, Fit, place_weight
-from analysis.calibration.wave_fronts import wave_front
+from analysis.calibration.unknowns import wave_front
 
 # The fit is rejected if chance exceeds its chi-square with less than this probability.
 _CHANCE = 1e-3
@@ -44,13 +44,8 @@ def calibration_misfit(calibration: Calibration) -> CalibrationMisfit | None:
 
     The function compares three kinds of candidates: one sound is left out, the position
     of one microphone is free, or the delay of one channel is free. The change of
-    chi-square is computed to first order about the solution.
-
-    Args:
-        calibration: The calibration.
-
-    Returns:
-        The candidate that fits best. None if everything fits without a change.
+    chi-square is computed to first order about the solution. Returns None if everything
+    fits without a change.
     """
     whole, freedom = calibration.chi_square, calibration.freedom
     if freedom < 1 or chi2.sf(whole, freedom) > _CHANCE:
@@ -120,13 +115,7 @@ def _drop_of(
 ) -> float:
     """Computes how much chi-square falls if f more parameters are free.
 
-    Args:
-        fits: Fits of the sounds.
-        columns: (n - 1, f) slopes of each sound's delays along the parameters.
-        covariance: (m, m) covariance of the unknowns.
-
-    Returns:
-        The decrease of chi-square.
+    ``columns`` has (n - 1, f) slopes of each sound's delays along the parameters.
     """
     free = columns[0].shape[1]
     pull, own = np.zeros(free), np.zeros((free, free))

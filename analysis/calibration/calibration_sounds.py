@@ -62,16 +62,8 @@ class CalibrationSounds(Parameters):
 def load_calibration_sounds(path: str | Path) -> CalibrationSounds:
     """Reads a list of sounds from a YAML file.
 
-    Args:
-        path: YAML file with a list ``sounds``, whose entries have the fields of
-            ``CalibrationSound``.
-
-    Returns:
-        The list. If the file names no ``folder``, ``folder`` is that of the file.
-
-    Raises:
-        InputError: The file is missing, is not YAML, or lists no sounds. The message
-            names the field and the remedy.
+    If the file names no ``folder``, ``folder`` is that of the file. Raises
+    ``InputError`` if the file is missing, is not YAML, or lists no sounds.
     """
     path = require_file(path, "sounds", "YAML")
     data = read_mapping(path)

@@ -35,16 +35,10 @@ class MeasuredSound:
 def check_sounds(
     places: NDArray[np.float64], sounds: Sequence[MeasuredSound], field: str = "sounds"
 ) -> None:
-    """Checks that measured sounds are suitable to calibrate an array.
+    """Checks that sounds are suitable to calibrate microphones at (n, d) places in m.
 
-    Args:
-        places: (n, d) microphone positions, m.
-        sounds: The sounds.
-        field: Field name that begins the message of an error.
-
-    Raises:
-        InputError: There are no sounds; a sound does not have n - 1 delays; or a source
-            position does not have d coordinates, or is too near or too far.
+    Raises ``InputError``, whose message begins with ``field``, if there are no sounds,
+    if a sound does not have n - 1 delays, or if a source position is not plausible.
     """
     if not sounds:
         raise InputError(
@@ -68,14 +62,9 @@ def check_position(
 ) -> None:
     """Checks that a stated position of a sound is plausible.
 
-    Args:
-        places: (n, d) microphone positions, m.
-        position: (d,) position of the source in the same frame, m.
-        field: Field name that begins the message of an error.
-
-    Raises:
-        InputError: The position does not have d coordinates, is less than 5 cm from a
-            microphone, or is more than 1 km from the nearest microphone.
+    Raises ``InputError`` for ``field`` if the (d,) position, in m, does not have as
+    many coordinates as the (n, d) microphone positions ``places``, if it is less than 5
+    cm from a microphone, or if it is more than 1 km from the nearest microphone.
     """
     dimension = places.shape[1]
     if position.shape != (dimension,):

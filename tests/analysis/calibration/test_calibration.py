@@ -18,7 +18,7 @@ from analysis.calibration.observability import (
     gain_ratios,
     gains_nothing,
 )
-from analysis.calibration.wave_fronts import wave_front
+from analysis.calibration.unknowns import wave_front
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 from tests.analysis.calibration.arrays import (
