@@ -1,17 +1,18 @@
-"""Formats a calibration as text for a terminal, and as a JSON document."""
+"""Formats a calibration as text and as a JSON document, and writes its files."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.calibration.calibrate import CalibrationRun
-from analysis.calibration.calibrated_geometry import calibrated_fields
+from analysis.calibration.calibrate import CalibrationRun, calibrated_fields
 from analysis.calibration.observability import CalibrationGain, gain_ratios
-from analysis.reporting.plain_values import plain
+from analysis.reporting.plain_values import plain, write_json
+from diagrams.scenario.yaml_text import dump_yaml
 
 # Most independent directions that a document lists.
 _MOST_DIRECTIONS = 32
@@ -84,6 +85,13 @@ def calibration_document(run: CalibrationRun) -> dict[str, Any]:
         "sounds": [_sound(run, j) for j in range(len(calibration.sounds))],
         "remarks": run.remarks,
     }
+
+
+def write_calibration(document: dict[str, Any], folder: Path) -> None:
+    """Writes ``calibration.json``, and ``array.yaml`` for ``load_geometry``."""
+    write_json(document, folder / "calibration.json")
+    text = dump_yaml(document["geometry"])
+    (folder / "array.yaml").write_text(text, encoding="utf-8")
 
 
 def _gain_text(run: CalibrationRun, gain: CalibrationGain) -> str:

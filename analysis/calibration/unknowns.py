@@ -139,7 +139,7 @@ class ArrayUnknowns:
     def values(
         self, z: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
-        """Converts z to (n, d) positions, the speed of sound, and (n,) channel delays."""
+        """Converts z to (n, d) positions, speed of sound and (n,) channel delays."""
         stated = (self.places.ravel(), [self.c], np.zeros(len(self.places)))
         whole = np.concatenate(stated) + self.scale @ z
         size = self.places.size

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.hearing.listening import Heard, Listener
+from analysis.hearing.listener import Heard, Listener
 from analysis.hearing.paper_tables import PAPER_CELLS, PaperCell
 from analysis.hearing.sensitivity import ArrayErrors, PolarStd, predicted_std
 from analysis.hearing.trial_counts import check_trials
@@ -165,16 +165,9 @@ class LocalizationExperiment:
         """Runs the experiment: all positions of the source, with every estimator.
 
         The errors of the array are redrawn within their tolerances for every
-        measurement. All estimators get the same errors, sound and noise.
-
-        Args:
-            progress: Called with the number of measurements so far.
-
-        Returns:
-            Results sorted by position, then by estimator.
-
-        Raises:
-            InputError: The sound cannot be played.
+        measurement. All estimators get the same errors, sound and noise. ``progress``
+        is called with the number of measurements so far. The results are sorted by
+        position, then by estimator.
         """
         listeners = [
             (name, Listener(_with_estimator(self.scenario, name)))
@@ -209,16 +202,8 @@ def prepare_localization(
 ) -> LocalizationExperiment:
     """Prepares the localization experiment in the default scenario.
 
-    Args:
-        overrides: Changes of the scenario, as for ``load_scenario``.
-        trials: Number of measurements per position of the source and estimator.
-        tolerances: Whether the array has errors within ``REALISTIC_TOLERANCES``.
-
-    Returns:
-        The experiment, ready to run.
-
-    Raises:
-        InputError: An override, or the number of trials, is wrong.
+    If ``tolerances`` is true, the array has errors within ``REALISTIC_TOLERANCES``.
+    Raises ``InputError`` if an override, or the number of trials, is wrong.
     """
     check_trials(trials)
     own = REALISTIC_TOLERANCES if tolerances else ()

@@ -96,9 +96,9 @@ def _to_scale(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
         )
         label = None
     for name, group in _by_estimator(cells).items():
-        colour, title = _STYLES[name]
+        color, title = _STYLES[name]
         found = np.concatenate([cell.heard.positions for cell in group])
-        axes.plot(*found.T, ".", markersize=3, color=colour, alpha=0.5, label=title)
+        axes.plot(*found.T, ".", markersize=3, color=color, alpha=0.5, label=title)
 
 
 def _exaggerated(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
@@ -118,21 +118,21 @@ def _exaggerated(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
         for cell in ring:
             _spread(axes, cell, factors)
     titles = [_STYLES[name] for name in _by_estimator(drawn)]
-    for colour, title in titles:
-        axes.plot([], [], color=colour, label=title)
+    for color, title in titles:
+        axes.plot([], [], color=color, label=title)
     axes.plot([], [], "--", color=COLOURS["source"], label="Cramer-Rao bound")
 
 
 def _spread(axes: Axes, cell: LocalizationCell, factors: NDArray[np.float64]) -> None:
     """Draws estimates about their mean, their ellipse, and the bound's ellipse."""
-    colour = _STYLES[cell.estimator][0]
+    color = _STYLES[cell.estimator][0]
     truth, turn = _truth(cell), _along_and_across(cell)
     stretch = turn.T @ np.diag(factors) @ turn
     positions = cell.heard.positions
     about_mean = truth + (positions - positions.mean(axis=0)) @ stretch.T
-    axes.plot(*about_mean.T, ".", markersize=1.5, color=colour, alpha=0.35)
+    axes.plot(*about_mean.T, ".", markersize=1.5, color=color, alpha=0.35)
     for covariance, line, edge in (
-        (np.cov(positions.T), "-", colour),
+        (np.cov(positions.T), "-", color),
         (cell.heard.bound.covariance, "--", COLOURS["source"]),
     ):
         ellipse = _ellipse(truth, stretch @ covariance @ stretch.T)
@@ -164,12 +164,12 @@ def _nice(value: float) -> float:
     return next(k * power for k in (5.0, 2.0, 1.0) if k * power <= value)
 
 
-def _ellipse(centre: NDArray[np.float64], covariance: NDArray[np.float64]) -> Ellipse:
+def _ellipse(center: NDArray[np.float64], covariance: NDArray[np.float64]) -> Ellipse:
     values, vectors = np.linalg.eigh(covariance)
     width, height = 2.0 * _SIGMAS * np.sqrt(np.maximum(values, 0.0))
     angle = math.degrees(math.atan2(vectors[1, 0], vectors[0, 0]))
     return Ellipse(
-        (float(centre[0]), float(centre[1])), width, height, angle=angle, fill=False
+        (float(center[0]), float(center[1])), width, height, angle=angle, fill=False
     )
 
 

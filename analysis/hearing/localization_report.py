@@ -29,13 +29,7 @@ def localization_summary(
 ) -> dict[str, Any]:
     """Builds the JSON document of the localization experiment.
 
-    Args:
-        experiment: The experiment.
-        cells: Results, one per position of the source and estimator.
-        out: Name of the result directory in the document. None: no directory.
-
-    Returns:
-        Plain values for JSON.
+    ``out`` is the result directory that the document names, or None without one.
     """
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.follower.microphones, scenario.sound_speed_m_s
@@ -72,14 +66,7 @@ def write_localization(
     summary: dict[str, Any],
     directory: Path,
 ) -> None:
-    """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``.
-
-    Args:
-        experiment: The localization experiment.
-        cells: Results, one per position of the source and estimator.
-        summary: The document from ``localization_summary``.
-        directory: Existing directory for the files.
-    """
+    """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``."""
     from analysis.hearing.localization_plots import plot_localization
 
     write_scenario(experiment.scenario, directory)

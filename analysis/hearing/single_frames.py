@@ -28,19 +28,11 @@ Estimator = Callable[[NDArray[np.float32]], SourceFix | None]
 def frame_estimator(
     parameters: TDOAParameters, shape: ArrayShape, c: float, *, limited: bool = True
 ) -> Estimator:
-    """Makes a function that locates the source in a single frame.
+    """Makes a function that locates the source in a single (n, samples) frame.
 
     The function does what ``TDOAEstimator`` does in the first frame that it receives.
-
-    Args:
-        parameters: Settings of the estimator.
-        shape: The array of n microphones.
-        c: Speed of sound, m/s.
-        limited: Whether to reject unreliable estimates, as in ``Localiser``.
-
-    Returns:
-        A function from an (n, samples) frame to a position estimate. The function
-        returns None if the frame has no detectable sound.
+    If the frame has no detectable sound, the function returns None. Unless ``limited``,
+    unreliable estimates are not rejected.
     """
     localiser = Localiser(parameters, shape, c, limited=limited)
     return lambda frame: localiser.localise(frame, localiser.blank())[0]
@@ -58,16 +50,7 @@ class Loudspeaker:
 
     @classmethod
     def of(cls, kind: str, seed: int, seconds: float = 2.0) -> Loudspeaker:
-        """Makes a chirp or a band noise of 0.5-8 kHz.
-
-        Args:
-            kind: ``chirp`` or ``band_noise``.
-            seed: Seed of the noise.
-            seconds: Length of the sound, s.
-
-        Returns:
-            The sound at 100 kHz, its slope energy and its level.
-        """
+        """Makes a ``chirp`` or ``band_noise`` of 0.5-8 kHz at 100 kHz."""
         sound = SoundParameters.model_validate(
             {"kind": kind, "on_s": seconds, "period_s": seconds}
         )
@@ -88,17 +71,11 @@ class Loudspeaker:
         p_AM: NDArray[np.float64],
         c: float,
     ) -> NDArray[np.float32]:
-        """Computes the sound pressure at microphones at rest for one frame.
+        """Computes the (n, samples) sound pressure of one frame at microphones, Pa.
 
-        Args:
-            begin: Time of the frame's first sample, s. Either (n,), or one time for all
-                channels.
-            p_AS: (2,) position of the source, m.
-            p_AM: (n, 2) positions of the microphones, m.
-            c: Speed of sound, m/s.
-
-        Returns:
-            (n, samples) sound pressure, Pa.
+        Source and microphones are at rest, at (2,) p_AS and (n, 2) p_AM, m. ``begin``
+        is the time of the frame's first sample in s, either (n,), or one time for all
+        channels.
         """
         emission = Emission(
             samples=self.samples,

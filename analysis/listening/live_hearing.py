@@ -32,7 +32,8 @@ _TOP_OF_RATE = 0.45
 # Kinds of faults that make bearings wrong. Only the user can correct them.
 _FATAL = ("copied", "swapped", "units", "drift")
 
-_QUIET_DB = -120.0
+# Least power that a level expresses, relative to full scale: -120 dB.
+_QUIET = 1e-12
 
 # Largest magnitude of a valid sample; full scale is 1.
 _WILD = 1e3
@@ -127,7 +128,8 @@ class LiveHearing:
                 )
                 for step in steps:
                     self.heard.identities |= {track.identity for track in step.tracks}
-                    yield HeardStep(step, _decibels(float(np.mean(powers))))
+                    power = max(float(np.mean(powers)), _QUIET)
+                    yield HeardStep(step, 10.0 * math.log10(power))
                     powers.clear()
             for fault in looks.finish():
                 self._mend(fault, looks)
@@ -197,10 +199,6 @@ class LiveHearing:
             self._named.add(about or fault)
             self.heard.faults.append(fault)
             self._name_fault(fault, self.heard.seconds)
-
-
-def _decibels(power: float) -> float:
-    return max(_QUIET_DB, 10.0 * math.log10(max(power, 1e-30)))
 
 
 def listen(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStream:

@@ -33,13 +33,14 @@ from systems.framework.input_error import InputError
 
 SampleFormat = Literal["s16le", "s24le", "s32le", "f32le"]
 
-#: Formats of raw samples, by the names that other programs use, and their bytes per
-#: sample.
-SAMPLE_FORMATS: dict[SampleFormat, int] = {
-    "s16le": 2,
-    "s24le": 3,
-    "s32le": 4,
-    "f32le": 4,
+# Formats of raw samples, by the names that other programs use. Each has a number of
+# bytes per sample, the type of the numbers, and their full scale. A sample of 24 bits
+# is converted to the high bytes of 32 bits.
+_FORMATS: dict[SampleFormat, tuple[int, str, float]] = {
+    "s16le": (2, "<i2", 2.0**15),
+    "s24le": (3, "<i4", 2.0**31),
+    "s32le": (4, "<i4", 2.0**31),
+    "f32le": (4, "<f4", 1.0),
 }
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
@@ -76,7 +77,7 @@ class _Format(NamedTuple):
     @property
     def width(self) -> int:
         """Bytes of one sample of all channels."""
-        return self.channels * SAMPLE_FORMATS[self.samples]
+        return self.channels * _FORMATS[self.samples][0]
 
     def __str__(self) -> str:
         return f"{self.channels} channels, {self.sample_rate_hz} Hz, {self.samples}"
@@ -351,16 +352,10 @@ def _another(source: _Source, form: _Format) -> int | None:
 
 def _samples(data: bytes, form: _Format) -> NDArray[np.float32]:
     """Converts bytes to (channels, k) samples; full scale is 1."""
-    return _numbers(data, form.samples).reshape(-1, form.channels).T
-
-
-def _numbers(data: bytes, sample_format: SampleFormat) -> NDArray[np.float32]:
-    if sample_format == "f32le":
-        return np.frombuffer(data, dtype="<f4").astype(np.float32)
-    if sample_format == "s16le":
-        return np.frombuffer(data, dtype="<i2").astype(np.float32) / np.float32(2**15)
-    if sample_format == "s32le":
-        return np.frombuffer(data, dtype="<i4").astype(np.float32) / np.float32(2**31)
-    wide = np.zeros((len(data) // 3, 4), dtype=np.uint8)
-    wide[:, 1:] = np.frombuffer(data, dtype=np.uint8).reshape(-1, 3)
-    return wide.view("<i4")[:, 0].astype(np.float32) / np.float32(2**31)
+    width, kind, full_scale = _FORMATS[form.samples]
+    if width == 3:
+        wide = np.zeros((len(data) // 3, 4), dtype=np.uint8)
+        wide[:, 1:] = np.frombuffer(data, dtype=np.uint8).reshape(-1, 3)
+        data = wide.tobytes()
+    numbers = np.frombuffer(data, kind).astype(np.float32) / np.float32(full_scale)
+    return numbers.reshape(-1, form.channels).T

@@ -79,16 +79,11 @@ _NEXT: list[NDArray[np.float64]] = [np.array(Row(0.0))]
 
 @register_jitable
 def wave(angle: float, edge: float, skew: float) -> float:
-    """Computes a periodic function between -1 and 1: a sine, square wave or sawtooth.
+    """Computes a periodic function between -1 and 1 of a phase angle in rad.
 
-    Args:
-        angle: Phase angle, rad.
-        edge: Gain before the value is limited to [-1, 1]. A gain of 1 keeps the sine,
-            and a large gain makes a square wave.
-        skew: 0 keeps the sine. Values near 1 or -1 make a sawtooth.
-
-    Returns:
-        The value at this angle.
+    With an ``edge`` of 1 and a ``skew`` of 0, the function is a sine. ``edge`` is the
+    gain before the value is limited to [-1, 1]. A large gain makes a square wave. A
+    ``skew`` near 1 or -1 makes a sawtooth.
     """
     value = edge * math.sin(angle + skew * math.sin(angle))
     return min(max(value, -1.0), 1.0)
@@ -327,11 +322,8 @@ _LAWS = ("active", "conventional")
 def outside(boxes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
     """Moves boxes outward until no box overlaps a circle of 1 m about the start.
 
-    Args:
-        boxes: (x, y, theta, length, width) of each box, m and rad.
-
-    Returns:
-        The moved boxes. Each box is outside the circle by 0.1 mm or more.
+    A box is (x, y, theta, length, width), m and rad. Each moved box is outside the
+    circle by 0.1 mm or more.
     """
     moved = []
     for x, y, *rest in boxes:
@@ -365,18 +357,9 @@ def make_trial(
 ) -> Trial:
     """Makes a trial from boxes and commands.
 
-    Args:
-        names: Names of layout, driver and setting.
-        boxes: (x, y, theta, length, width) of each box, m and rad.
-        rows: Rows of the driver's table, as fields of ``Row``. If empty, the driver is
-            a law.
-        heading: Heading of the robot at the start, rad.
-        source: Position of the source, m.
-        seed: Seed of the noise.
-        duration_s: Duration of the run, s.
-
-    Returns:
-        The trial.
+    ``names`` are those of layout, driver and setting. A box is (x, y, theta, length,
+    width), m and rad. ``rows`` have the fields of ``Row``. Without rows, the driver is
+    the law of this name. The robot starts with a heading in rad.
     """
     layout, driver, variant = names
     boxes = outside(boxes)
@@ -425,18 +408,10 @@ def draw_trial(
     setting: str | None = None,
     duration_s: float = DURATION_S,
 ) -> Trial:
-    """Draws a random trial.
+    """Draws a random trial. The same arguments give the same trial.
 
-    Args:
-        seed: Seed of all trials.
-        number: Number of the trial.
-        drivers: Names of ``DRIVERS``, or of laws, from which one is drawn.
-        setting: Name of the robot's setting in ``SETTINGS``. None: the number of the
-            trial selects one of ``VARIANTS``.
-        duration_s: Duration of the run, s.
-
-    Returns:
-        The trial. The same arguments give the same trial.
+    The driver is one of ``drivers``, which are names of ``DRIVERS`` or of laws. Without
+    a ``setting``, the number of the trial selects one of ``VARIANTS``.
     """
     draw = np.random.default_rng([seed, number])
     layout = str(draw.choice([*LAYOUTS]))
@@ -456,45 +431,24 @@ def draw_trial(
 
 
 def run_trial(trial: Trial, changes: dict[str, Any] | None = None) -> Outcome:
-    """Runs a trial, and returns its outcome.
-
-    Args:
-        trial: Trial to run.
-        changes: Fields of the scenario that replace those of the trial.
-
-    Returns:
-        Whether the robot collided, and the least clearances.
-    """
+    """Runs a trial, with changes as for ``run_result``, and returns its outcome."""
     result = run_result(trial, changes)
     return Outcome(result.collision is not None, *least_clearances(result))
 
 
 def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult:
-    """Runs a trial, and returns the complete run.
-
-    Args:
-        trial: Trial to run.
-        changes: Fields of the scenario that replace those of the trial.
-
-    Returns:
-        The run.
-    """
+    """Runs a trial after ``changes`` of the fields of its scenario."""
     _NEXT[0] = trial.table
     fields = _merged(trial.fields, changes or {})
     return simulate(Scenario.model_validate(fields), engine="compiled")
 
 
 def least_clearances(result: RunResult) -> tuple[float, float]:
-    """Computes the least distance of a robot from obstacles at rest.
+    """Computes the least distances of a robot's body and disc from obstacles, m.
 
+    The obstacles are at rest. The disc is centered on the axle and encloses the body.
     The true poses are evaluated at the control periods and halfway between them. A
     negative distance means an overlap.
-
-    Args:
-        result: A run.
-
-    Returns:
-        Distance of the body, and distance of the disc that encloses the body, m.
     """
     robot = result.scenario.only.robot
     others = result.surroundings.bodies.values()

@@ -51,14 +51,8 @@ class Listener:
 
     Drake never frees blocks that are written in Python. One diagram therefore serves
     all measurements. For each relative position, the robot is moved, and the source
-    stays.
-
-    Args:
-        scenario: Scenario with a continuously sounding source at rest, and a robot that
-            no force moves.
-
-    Raises:
-        ValueError: The sound cannot be played.
+    stays. The source of the scenario sounds continuously at rest, and no force moves
+    the robot.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -79,21 +73,12 @@ class Listener:
         *,
         session: int = 0,
     ) -> Heard:
-        """Takes measurements of the source at one relative position.
+        """Takes one measurement from each of ``trials`` frames (25 ms of audio).
 
-        Each frame (25 ms of audio) gives one measurement.
-
-        Args:
-            distance: Distance of the source from the microphones' centroid, m.
-            bearing: Bearing of the source, rad.
-            trials: Number of frames.
-            sound_speed_tolerance: Largest error of the speed of sound, as a share of
-                the speed.
-            session: Number of the session. Sessions run at different times. Each
-                session therefore has its own noise and errors.
-
-        Returns:
-            The estimates, with their bound.
+        The source is at a distance in m and a bearing in rad from the microphones'
+        centroid. ``sound_speed_tolerance`` is the largest error of the speed of sound,
+        as a share of the speed. Sessions run at different times. Each session therefore
+        has its own noise and errors.
         """
         p_AS = distance * np.array([math.cos(bearing), math.sin(bearing)])
         start = session * (trials + 4 * _LEAD)
