@@ -9,15 +9,17 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.calibration.calibration import Calibration, calibrate_array
 from analysis.calibration.calibration_misfit import (
     CalibrationMisfit,
     calibration_misfit,
 )
-from analysis.calibration.calibration_sounds import CalibrationSounds
-from analysis.calibration.measured_sound import MeasuredSound, check_position
+from analysis.calibration.calibration_sounds import (
+    CalibrationSounds,
+    MeasuredSound,
+    check_position,
+)
 from analysis.calibration.observability import (
     CalibrationGain,
     calibration_gains,
@@ -74,11 +76,6 @@ class CalibrationRun:
     remarks: list[str] = field(default_factory=list)
     """Messages about recordings, such as a recording without detectable sound."""
 
-    @property
-    def gains_nothing(self) -> bool:
-        """Whether the sounds made nothing about the array better known."""
-        return gains_nothing(self.calibration)
-
 
 def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> CalibrationRun:
     """Calibrates an array from recordings that the array made.
@@ -99,7 +96,8 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
         geometry, float(np.sqrt(np.mean(np.diag(geometry.known.budget.of_places))))
     )
     first = _pass(sounds, geometry, geometry, top_hz)
-    if first.misfit is not None or first.gains_nothing or math.isinf(top_hz):
+    fits = first.misfit is None
+    if not fits or gains_nothing(first.calibration) or math.isinf(top_hz):
         return first
     # Better known microphone positions allow higher frequencies, which say more.
     known = ArrayGeometry.model_validate(calibrated_fields(first.calibration, geometry))
@@ -242,13 +240,10 @@ def _has_side(calibration: Calibration, side: _Side) -> bool:
 
 def _uncertainty(calibration: Calibration) -> dict[str, Any]:
     covariance = calibration.of_places
+    symmetric = (covariance + covariance.T) / 2.0
     for digits in _DIGITS:
         if covariance.size * (digits + _AROUND) < LARGEST_BYTES:
-            return {"position_covariance_m2": _rounded(covariance, digits)}
+            rows = [[float(f"{x:.{digits}g}") for x in row] for row in symmetric]
+            return {"position_covariance_m2": rows}
     variances = np.diag(covariance).reshape(calibration.places.shape)
     return {"position_std_m": np.sqrt(variances.mean(axis=1)).tolist()}
-
-
-def _rounded(matrix: NDArray[np.float64], digits: int) -> list[list[float]]:
-    symmetric = (matrix + matrix.T) / 2.0
-    return [[float(f"{value:.{digits}g}") for value in row] for row in symmetric]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_budget import ArrayBudget
-from analysis.calibration.measured_sound import MeasuredSound, check_sounds
+from analysis.calibration.calibration_sounds import MeasuredSound, check_sounds
 from analysis.calibration.unknowns import ArrayUnknowns, SoundPlace
 from systems.hearing.multilateration import whitening_matrix
 from systems.sound.array_shape import ArrayShape
@@ -62,10 +62,8 @@ class Calibration:
     channel_delays: NDArray[np.float64]
     """(n,) delays of the channels minus their mean, s."""
     covariance: NDArray[np.float64]
-    """(n d + 1 + n, n d + 1 + n) joint covariance.
-
-    The order is microphone coordinates, speed of sound, channel delays.
-    """
+    """(n d + 1 + n, n d + 1 + n) joint covariance of microphone coordinates, speed of
+    sound and channel delays, in this order."""
     information: NDArray[np.float64]
     """(m, m) Fisher information of the sounds on the scaled unknowns z."""
     z: NDArray[np.float64]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from analysis.arrays.wave_fronts import wave_front
 from analysis.calibration.calibration import Calibration, Fit, place_weight
-from analysis.calibration.unknowns import wave_front
 
 # The fit is rejected if chance exceeds its chi-square with less than this probability.
 _CHANCE = 1e-3

@@ -10,7 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.calibration.calibrate import CalibrationRun, calibrated_fields
-from analysis.calibration.observability import CalibrationGain, gain_ratios
+from analysis.calibration.observability import (
+    CalibrationGain,
+    gain_ratios,
+    gains_nothing,
+)
 from analysis.reporting.plain_values import plain, write_json
 from diagrams.scenario.yaml_text import dump_yaml
 
@@ -42,16 +46,17 @@ def calibration_text(run: CalibrationRun) -> str:
     known = sum(sound.position is not None for sound in calibration.sounds)
     heard = f"{len(calibration.sounds)} sounds, {known} of them at stated positions"
     lines = [f"{heard}, and {count} microphones"]
-    if run.gains_nothing:
+    nothing = gains_nothing(calibration)
+    if nothing:
         text = _NOTHING_KNOWN if known else _NOTHING
         lines.append(text.format(delays=count - 1, unknowns=dimension))
     for verdict in ("observable", "in part", "not observable"):
         told = [gain for gain in run.gains if gain.verdict == verdict]
         lines += [f"{verdict}: {_gain_text(run, gain)}" for gain in told]
     lines.append(_fit_text(run))
-    if not calibration.settled and not run.gains_nothing:
+    if not calibration.settled and not nothing:
         lines.append("the search did not converge: do not rely on these numbers")
-    if not run.gains_nothing:
+    if not nothing:
         lines += ["", f"speed of sound {calibration.c:.2f} m/s", *_places(run)]
     return "\n".join([*lines, "", *_sounds(run)])
 
@@ -66,7 +71,7 @@ def calibration_document(run: CalibrationRun) -> dict[str, Any]:
         "schema_version": 1,
         "geometry": plain(calibrated_fields(calibration, run.geometry)),
         "stated": plain(run.geometry),
-        "gains_nothing": run.gains_nothing,
+        "gains_nothing": gains_nothing(calibration),
         "gains": [
             {**plain(gain), "ratio": gain.ratio, "verdict": gain.verdict}
             for gain in run.gains

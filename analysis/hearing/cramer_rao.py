@@ -139,23 +139,12 @@ def position_bound(
 ) -> LocalizationBound:
     """Computes the Cramer-Rao bound of a source's position from one frame.
 
-    Source and microphones are at rest. Bearing and range are seen from the origin,
-    which should be the microphones' centroid. If the frame does not determine the
-    position, the covariances and standard deviations are infinite.
-
-    Args:
-        energy: Slope energy of the sound.
-        begin: Time of the frame's first sample, s.
-        end: Time one sample after the frame's last sample, s.
-        p_AS: (d,) position of the source, m.
-        p_AM: (n, d) positions of the microphones, m.
-        noise_pa: RMS of the noise from 0 to half the sample rate, Pa. Either (n,), or
-            one value for all channels.
-        sample_rate_hz: Sample rate of the microphones, Hz.
-        c: Speed of sound, m/s.
-
-    Returns:
-        Least covariances and standard deviations.
+    Source and microphones are at rest, at (d,) p_AS and (n, d) p_AM, m. The frame lasts
+    from its first sample at ``begin`` to one sample after its last at ``end``, s.
+    ``noise_pa`` is the RMS of the noise from 0 to half the sample rate, either (n,), or
+    one value for all channels. Bearing and range are seen from the origin, which should
+    be the microphones' centroid. If the frame does not determine the position, the
+    covariances and standard deviations are infinite.
     """
     p_AS, p_AM = np.asarray(p_AS, dtype=float), np.asarray(p_AM, dtype=float)
     rays = p_AS - p_AM

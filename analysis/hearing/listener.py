@@ -37,11 +37,7 @@ class Heard:
     ranges: NDArray[np.float64]
     """(l,) ranges from the frames with a valid range, m."""
     positions: NDArray[np.float64]
-    """(l, 2) estimated positions from the frames with a valid range, m.
-
-    The origin is the microphones' centroid, and the axes are those of the robot frame
-    B.
-    """
+    """(l, 2) positions like p_AS, estimated from the frames with a valid range, m."""
     bound: LocalizationBound
     """Bound due to noise and rounding, averaged over all frames."""
 

@@ -32,17 +32,14 @@ _X_M, _Y_M = (-0.35, 5.05), (-0.95, 4.3)
 
 
 def plot_localization(cells: Sequence[LocalizationCell]) -> Figure:
-    """Plots two maps of the estimates, in axes of the robot frame B, m.
+    """Plots two maps of the estimates about the microphones' centroid, in B axes, m.
 
-    The origin of both maps is the microphones' centroid.
-
-    - The left map is to scale. It shows the estimates of Han 2019, as means with two
-      standard deviations of range and bearing. The left map also shows each estimator's
-      estimates.
+    - The left map is to scale. It shows each estimator's estimates, and those of Han
+      2019, as means with two standard deviations of range and bearing.
     - The right map shows ellipses of two standard deviations about each estimator's
       mean, and those of the Cramer-Rao bound. The ellipses are exaggerated along and
-      across the line of sight. The exaggeration factors are written at each distance.
-      The right map leaves out the papers' estimator, whose errors do not form ellipses.
+      across the line of sight, by factors that are written at each distance. The
+      papers' estimator is left out, because its errors do not form ellipses.
     """
     figure = Figure(figsize=(13.0, 7.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
@@ -148,10 +145,9 @@ def _along_and_across(cell: LocalizationCell) -> NDArray[np.float64]:
 
 
 def _factors(cells: Sequence[LocalizationCell]) -> NDArray[np.float64]:
-    """(2,) exaggeration factors of the ellipses, along and across the line of sight.
+    """(2,) exaggeration factors of ellipses, along and across the line of sight.
 
-    The factors are chosen such that the largest ellipse at one distance has the half
-    axes ``_ROOM_M``, or slightly shorter ones.
+    The largest ellipse at one distance gets half axes of ``_ROOM_M`` or slightly less.
     """
     stds = [(c.heard.positions @ _along_and_across(c).T).std(axis=0) for c in cells]
     wanted = np.array(_ROOM_M) / np.maximum(_SIGMAS * np.max(stds, axis=0), 1e-9)

@@ -82,10 +82,8 @@ def localization_text(summary: dict[str, Any]) -> str:
     lines = [
         f"{cells[0]['trials']} frames per cell, {summary['sound']}, "
         f"{summary['snr_db_at_1m']:g} dB over the noise at 1 m, "
-        + (_tolerances_text(tolerances) if drawn else "no errors of the array")
-    ]
-    lines += [
-        "Han 2019: on hardware; paper: its estimator here; (n): frames without result"
+        + (_tolerances_text(tolerances) if drawn else "no errors of the array"),
+        "Han 2019: on hardware; paper: its estimator here; (n): frames without result",
     ]
     for name, unit in (("range", "m"), ("bearing", "deg")):
         lines += ["", *_table(cells, name, unit)]

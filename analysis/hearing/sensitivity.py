@@ -42,12 +42,10 @@ class ArrayErrors:
 
 @dataclass(frozen=True)
 class PolarStd:
-    """Standard deviations of a source's bearing and range."""
+    """Standard deviations of a source's bearing, rad, and range, m."""
 
     bearing: float
-    """Standard deviation of the bearing, rad."""
     range: float
-    """Standard deviation of the range, m."""
 
 
 #: Errors in the sensitivity table: 1 mm, 1 us, 1 % and 1 dB.

@@ -60,10 +60,7 @@ class Row(NamedTuple):
     swing_omega: float = 0.0
     """Amplitude of the yaw rate, rad/s."""
     rate: float = 0.0
-    """Angular frequency of the swing, rad/s.
-
-    ``make_trial`` converts the frequency to rad per control period.
-    """
+    """Angular frequency, rad/s. ``make_trial`` converts it to rad per tick."""
     phase: float = 0.0
     """Phase by which the yaw rate leads the forward speed, rad."""
     edge: float = 1.0

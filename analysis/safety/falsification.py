@@ -211,17 +211,17 @@ def falsification_text(summary: dict[str, Any]) -> str:
 def _line(name: str, counts: dict[str, Any]) -> str:
     return (
         f"{name:<24} {counts['runs']:>7} runs, {counts['collisions']} collisions "
-        f"(below {100.0 * counts['largest_rate']:.2g} %), least clearance of the body "
-        f"{1e3 * counts['clearance_m']:.1f} mm, of the disc "
-        f"{1e3 * counts['disc_m']:.1f} mm"
+        f"(below {100.0 * counts['largest_rate']:.2g} %), least {_clearances(counts)}"
     )
 
 
 def _run_text(run: dict[str, Any]) -> str:
-    return (
-        f"run {run['number']} ({', '.join(run['kinds'])}), clearance of the body "
-        f"{1e3 * run['clearance_m']:.1f} mm, of the disc {1e3 * run['disc_m']:.1f} mm"
-    )
+    return f"run {run['number']} ({', '.join(run['kinds'])}), {_clearances(run)}"
+
+
+def _clearances(run: dict[str, Any]) -> str:
+    body_mm, disc_mm = 1e3 * run["clearance_m"], 1e3 * run["disc_m"]
+    return f"clearance of the body {body_mm:.1f} mm, of the disc {disc_mm:.1f} mm"
 
 
 def trial_summary(trial: Trial, outcome: Outcome, seed: int) -> dict[str, Any]:
@@ -252,8 +252,5 @@ def trial_text(summary: dict[str, Any]) -> str:
     ]
     kinds = ", ".join(summary[kind] for kind in _KINDS)
     hit = "collision" if summary["collided"] else "no collision"
-    end = (
-        f"{hit}, clearance of the body {1e3 * summary['clearance_m']:.1f} mm, of the "
-        f"disc {1e3 * summary['disc_m']:.1f} mm"
-    )
+    end = f"{hit}, {_clearances(summary)}"
     return "\n".join([kinds, f"fields {summary['fields']}", "commands:", *rows, end])

@@ -108,14 +108,16 @@ class Journal:
 
 def _keep(path: Path, seed: int, number: int, job: Job) -> list[LongRun]:
     runs = job()
-    kept = [
-        {**run._asdict(), "swing": run.swing and run.swing._asdict()} for run in runs
-    ]
+    kept = [_fields(run) for run in runs]
     # Several processes share the file. A single write in append mode is safe.
     line = json.dumps({"seed": seed, "job": number, "runs": kept})
     with path.open("a", encoding="utf-8") as file:
         file.write(f"{line}\n")
     return runs
+
+
+def _fields(run: LongRun) -> dict[str, Any]:
+    return {**run._asdict(), "swing": run.swing and run.swing._asdict()}
 
 
 def _run_of(kept: dict[str, Any]) -> LongRun:
@@ -241,10 +243,8 @@ def long_summary(found: Mapping[int, Sequence[LongRun]], seed: int) -> dict[str,
     """Builds the JSON document of long runs, given by number of their job."""
 
     def told(job: int, run: LongRun) -> dict[str, Any]:
-        swing = run.swing._asdict() if run.swing is not None else None
         contact_s = run.contact_s if math.isfinite(run.contact_s) else None
-        own = {**run._asdict(), "swing": swing, "contact_s": contact_s}
-        return {"job": job, **own}
+        return {"job": job, **_fields(run), "contact_s": contact_s}
 
     runs = [told(job, run) for job, own in found.items() for run in own]
     contacts = sum(run["contact_s"] is not None for run in runs)

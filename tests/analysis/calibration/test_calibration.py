@@ -10,15 +10,15 @@ import pytest
 from scipy.optimize import least_squares
 
 from analysis.arrays.array_budget import ArrayBudget
+from analysis.arrays.wave_fronts import wave_front
 from analysis.calibration.calibration import calibrate_array
 from analysis.calibration.calibration_misfit import calibration_misfit
-from analysis.calibration.measured_sound import MeasuredSound
+from analysis.calibration.calibration_sounds import MeasuredSound
 from analysis.calibration.observability import (
     calibration_gains,
     gain_ratios,
     gains_nothing,
 )
-from analysis.calibration.unknowns import wave_front
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 from tests.analysis.calibration.arrays import (
