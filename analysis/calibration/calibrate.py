@@ -128,17 +128,10 @@ def _pass(
                 f"{name}: of {sound.stretches} stretches {sound.used} agree; its "
                 "source moves, or there are other sources"
             )
-        place = listed.position_m
         heard.append(sound)
-        measured.append(
-            MeasuredSound(
-                sound.tau,
-                sound.covariance,
-                None if place is None else np.array(place),
-                listed.position_std_m,
-                name,
-            )
-        )
+        place, std = listed.position_m, listed.position_std_m
+        position = None if place is None else np.array(place)
+        measured.append(MeasuredSound(sound.tau, sound.covariance, position, std, name))
     if not measured:
         raise InputError(
             "sounds",
@@ -190,21 +183,10 @@ def calibration_run(
     Raises ``InputError`` if the sounds do not match the array, for example in their
     number of delays.
     """
-    calibration = calibrate_array(
-        np.array(geometry.microphones),
-        geometry.c,
-        geometry.known.budget,
-        sounds,
-        geometry.known.shape,
-    )
-    return CalibrationRun(
-        geometry,
-        calibration,
-        calibration_gains(calibration),
-        calibration_misfit(calibration),
-        heard or [],
-        remarks or [],
-    )
+    places, known = np.array(geometry.microphones), geometry.known
+    found = calibrate_array(places, geometry.c, known.budget, sounds, known.shape)
+    gains, misfit = calibration_gains(found), calibration_misfit(found)
+    return CalibrationRun(geometry, found, gains, misfit, heard or [], remarks or [])
 
 
 def calibrated_fields(

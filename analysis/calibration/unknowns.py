@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from analysis.arrays.array_budget import ArrayBudget
 from analysis.arrays.far_field import locate_far_source
@@ -64,22 +65,15 @@ class ArrayUnknowns:
         kept = variances > _EXACT * max(float(variances[-1]), 1e-30)
         of_places = axes[:, kept] * np.sqrt(variances[kept])
         apart = np.linalg.svd(np.ones((1, count)))[2][1:].T * self.budget.delay_std
-        blocks = (of_places, np.array([[self.budget.speed_std]]), apart)
-        rows = [len(block) for block in blocks]
-        columns = [int(np.any(block)) * block.shape[1] for block in blocks]
-        if not any(columns):
+        scale = block_diag(of_places, self.budget.speed_std, apart)
+        uncertain = np.any(scale != 0.0, axis=0)
+        if not uncertain.any():
             raise InputError(
                 "position_std_m",
                 "is 0, as are all other uncertainties; state how uncertain the "
                 "geometry is, for example 'position_std_m: 0.02'",
             )
-        scale = np.zeros((sum(rows), sum(columns)))
-        row = column = 0
-        for block, high, wide in zip(blocks, rows, columns, strict=True):
-            if wide:
-                scale[row : row + high, column : column + wide] = block
-            row, column = row + high, column + wide
-        return scale
+        return np.compress(uncertain, scale, axis=1)
 
     @cached_property
     def prior_covariance(self) -> NDArray[np.float64]:
@@ -111,7 +105,7 @@ class ArrayUnknowns:
             (front.by_places, front.by_speed[:, np.newaxis], own[1:] - own[0])
         )
         heard = front.delays + late[1:] - late[0]
-        return WaveFront(**{**vars(front), "delays": heard}), slopes @ self.scale
+        return replace(front, delays=heard), slopes @ self.scale
 
 
 @dataclass(frozen=True)
@@ -138,10 +132,7 @@ class SoundPlace:
 
     @classmethod
     def stated_at(cls, position: NDArray[np.float64], std: float) -> SoundPlace:
-        """Makes a ``SoundPlace`` from a (d,) stated position relative to the origin, m.
-
-        Each coordinate has the standard deviation ``std``, m.
-        """
+        """Makes a ``SoundPlace`` from a (d,) stated position from the origin, m."""
         return cls(
             h=position.copy(),
             w=1.0,

@@ -114,12 +114,11 @@ def _moments(
 ) -> dict[str, float | None]:
     """Computes mean, standard deviation and RMS error; None for too few values."""
     some, several = len(values) > 0, len(values) > 1
+    rmse = float(np.sqrt(np.mean((values - truth) ** 2))) if some else None
     return {
         f"{name}_mean_{unit}": float(values.mean()) if some else None,
         f"{name}_std_{unit}": float(values.std(ddof=1)) if several else None,
-        f"{name}_rmse_{unit}": float(np.sqrt(np.mean((values - truth) ** 2)))
-        if some
-        else None,
+        f"{name}_rmse_{unit}": rmse,
     }
 
 

@@ -133,16 +133,10 @@ def long_run(trial: Trial, swing: Swing | None = None) -> LongRun:
 def _judged(
     driver: str, setting: str, swing: Swing | None, result: RunResult
 ) -> LongRun:
-    contact_s = result.simulated_s if result.collision else np.inf
-    return LongRun(
-        driver,
-        setting,
-        result.simulated_s,
-        contact_s,
-        *least_clearances(result),
-        float(odometry_error(result).max()),
-        swing,
-    )
+    end_s, clearances = result.simulated_s, least_clearances(result)
+    contact_s = end_s if result.collision else np.inf
+    drift_m = float(odometry_error(result).max())
+    return LongRun(driver, setting, end_s, contact_s, *clearances, drift_m, swing)
 
 
 def jobs(seed: int) -> list[Job]:

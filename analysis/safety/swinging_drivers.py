@@ -42,6 +42,8 @@ SLOWEST_HZ, FASTEST_HZ = 0.1, 10.0
 #: Duration of a run in the search for drift, and in the search for a contact, s. The
 #: second is enough to visit four boxes, to swing, and to press against all four.
 _DRIFT_S, _CONTACT_S = 48.0, 450.0
+#: Position of the source, m. The drivers ignore it.
+_SOURCE = 80.0, 0.0
 #: Bearing of the body's front left corner from the axle, rad.
 _CORNER = math.atan2(0.5 * RobotParameters().width_m, 0.5 * RobotParameters().length_m)
 
@@ -114,7 +116,6 @@ def swing_at_boxes(
     swings: int = 4,
     swing_s: float = 10.0,
     presses: int = 1,
-    seed: int = 1,
 ) -> Trial:
     """Makes a driver that visits boxes, swings, and presses against the boxes again.
 
@@ -137,8 +138,7 @@ def swing_at_boxes(
             script.press(*faces[turn % len(faces)])
             script.home(heading, home_s)
             turn += 1
-    source = 80.0, 0.0
-    return make_trial(names, boxes, script.rows, heading, source, seed, duration_s)
+    return make_trial(names, boxes, script.rows, heading, _SOURCE, 1, duration_s)
 
 
 def _nearest_point(box: Sequence[float]) -> tuple[float, float]:
@@ -168,8 +168,7 @@ def swing_alone(swing: Swing, setting: str, duration_s: float) -> Trial:
     names, script = ("empty", "swing", setting), _Script()
     script.look_around()
     script.add(duration_s, swing.until(0.0))
-    source = 80.0, 0.0
-    return make_trial(names, [], script.rows, 0.0, source, 1, duration_s)
+    return make_trial(names, [], script.rows, 0.0, _SOURCE, 1, duration_s)
 
 
 #: Bounds of the parameters of a swing, in this order: forward speed, m/s; logarithm of
