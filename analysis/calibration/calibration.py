@@ -102,14 +102,14 @@ def calibrate_array(
     sounds: Sequence[MeasuredSound],
     shape: ArrayShape | None = None,
 ) -> Calibration:
-    """Estimates microphone positions, speed of sound c, m/s, and channel delays.
+    """Estimates microphone positions, speed of sound, and channel delays.
 
     If sounds have stated positions, these and the stated (n, d) microphone positions
-    ``places``, in m, together define the coordinate frame, weighted by their
-    uncertainties. Otherwise, the stated microphone positions define the frame.
-    ``shape`` faces the sources without stated positions. By default, it is built from
-    ``places``. Raises ``InputError`` if the sounds do not match the array, or if all
-    uncertainties are stated as 0.
+    ``places`` together define the coordinate frame, weighted by their uncertainties.
+    Otherwise, the stated microphone positions define the frame. ``shape`` has the same
+    positions and faces the sources without stated positions. By default, it is built
+    from ``places``. Raises ``InputError`` if the sounds do not match the array, or if
+    all uncertainties are stated as 0.
     """
     places = np.asarray(places, dtype=np.float64)
     check_sounds(places, sounds)

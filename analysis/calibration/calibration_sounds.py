@@ -108,10 +108,10 @@ class MeasuredSound:
 
 
 def check_sounds(places: NDArray[np.float64], sounds: Sequence[MeasuredSound]) -> None:
-    """Checks that sounds are suitable to calibrate microphones at (n, d) places in m.
+    """Checks that sounds are suitable to calibrate microphones at (n, d) ``places``.
 
-    Raises ``InputError`` if there are no sounds,
-    if a sound does not have n - 1 delays, or if a source position is not plausible.
+    Raises ``InputError`` if there are no sounds, if a sound does not have n - 1 delays,
+    or if a source position is not plausible.
     """
     if not sounds:
         raise InputError(
@@ -133,11 +133,11 @@ def check_sounds(places: NDArray[np.float64], sounds: Sequence[MeasuredSound]) -
 def check_position(
     places: NDArray[np.float64], position: NDArray[np.float64], field: str
 ) -> None:
-    """Checks that a stated position of a sound is plausible.
+    """Checks that a stated (d,) position of a sound is plausible.
 
-    Raises ``InputError`` for ``field`` if the (d,) position, in m, does not have as
-    many coordinates as the (n, d) microphone positions ``places``, if it is less than 5
-    cm from a microphone, or if it is more than 1 km from the nearest microphone.
+    Raises ``InputError`` for ``field`` if the position does not have as many
+    coordinates as the (n, d) microphone positions ``places``, if it is less than 5 cm
+    from a microphone, or if it is more than 1 km from the nearest microphone.
     """
     dimension = places.shape[1]
     if position.shape != (dimension,):

@@ -108,10 +108,10 @@ def arrival_information(
 ) -> NDArray[np.float64]:
     """Computes the Fisher information of a frame on the arrival times of its sound.
 
-    The frame lasts from ``begin`` to ``end``, s. ``travel`` has the (n,) travel times
-    to the microphones, s. ``weights`` has the (n,) products of the sample rate and g_m
-    from the module docstring, 1/(Pa^2 s). The result is (n, n), 1/s^2. A common shift
-    of all times has no information.
+    The frame lasts from its first sample at ``begin`` to one sample after its last at
+    ``end``. ``travel`` has the (n,) travel times to the microphones. ``weights`` has
+    the (n,) products of the sample rate and g_m from the module docstring, 1/(Pa^2 s).
+    The result is (n, n), 1/s^2. A common shift of all times has no information.
     """
     travel, weights = np.asarray(travel), np.asarray(weights)
     edges = np.sort(np.concatenate((begin - travel, end - travel)))

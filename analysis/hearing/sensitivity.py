@@ -62,9 +62,9 @@ def predicted_std(
 ) -> PolarStd:
     """Predicts the standard deviations due to errors, to first order.
 
-    Gain errors have no effect, because they do not change delays. The source is at
-    p_AS, (2,) m, from the centroid of the microphones, which lie in the plane. The
-    stated speed of sound is c, m/s.
+    Gain errors have no effect, because they do not change delays. The (2,) position
+    p_AS of the source begins at the centroid of the microphones, which lie in the
+    plane.
     """
     rays = p_AS - shape.p_AM
     ranges = np.linalg.norm(rays, axis=1)

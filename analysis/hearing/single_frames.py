@@ -31,8 +31,8 @@ def frame_estimator(
     """Makes a function that locates the source in a single (n, samples) frame.
 
     The function does what ``TDOAEstimator`` does in the first frame that it receives.
-    If the frame has no detectable sound, the function returns None. Unless ``limited``,
-    unreliable estimates are not rejected.
+    If the frame has no detectable sound, the function returns None. If ``limited`` is
+    false, the function also returns unreliable estimates.
     """
     localiser = Localiser(parameters, shape, c, limited=limited)
     return lambda frame: localiser.localise(frame, localiser.blank())[0]

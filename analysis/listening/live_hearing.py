@@ -128,7 +128,7 @@ class LiveHearing:
                 )
                 for step in steps:
                     self.heard.identities |= {track.identity for track in step.tracks}
-                    power = max(float(np.mean(powers)), _QUIET)
+                    power = max(_QUIET, float(np.mean(powers)))
                     yield HeardStep(step, 10.0 * math.log10(power))
                     powers.clear()
             for fault in looks.finish():

@@ -355,8 +355,8 @@ def make_trial(
     """Makes a trial from boxes and commands.
 
     ``names`` are those of layout, driver and setting. A box is (x, y, theta, length,
-    width), m and rad. ``rows`` have the fields of ``Row``. Without rows, the driver is
-    the law of this name. The robot starts with a heading in rad.
+    width), m and rad. ``rows`` have the fields of ``Row``. Without rows, the law with
+    the driver's name drives. The heading at the start is in rad.
     """
     layout, driver, variant = names
     boxes = outside(boxes)

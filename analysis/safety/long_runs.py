@@ -202,7 +202,7 @@ def _drawn_commands(setting: str, seed: int) -> list[LongRun]:
 
 
 def summary_table(runs: Sequence[LongRun], by: Sequence[str]) -> str:
-    """Summarizes runs in a Markdown table, grouped by the fields ``by``.
+    """Summarizes runs in a Markdown table, grouped by the fields ``by`` of ``LongRun``.
 
     The last row is for all runs.
     """

@@ -217,7 +217,8 @@ def odometry_error(result: RunResult) -> NDArray[np.float64]:
 def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
     """Searches by differential evolution for the swing with the largest odometry drift.
 
-    The search takes about ``runs`` runs of 48 s each. The drift is in m/s.
+    The search takes about ``runs`` runs of 48 s each. Returns the swing and its drift,
+    m/s.
     """
 
     def drift(x: NDArray[np.float64]) -> float:
@@ -248,8 +249,8 @@ def search_contact(
     """Searches by differential evolution for a run that ends in a contact.
 
     The search takes about ``runs`` runs of 450 s each. It varies the heading, the
-    distance of four boxes, and the swing, and minimizes the value that ``judge``
-    returns.
+    distance of four boxes, and the swing. It minimizes the value that ``judge`` returns
+    for the swing and the result of a run.
     """
     names = "four boxes", "swing, searched for contact", setting
 
