@@ -19,7 +19,7 @@ from benchmarks.speed import (
 from benchmarks.start import start_figures
 from studies.support.figures import Figure, print_figures, stay_on_one_core
 
-IDEAL = ("hearing=ideal", "obstacle_sensing=ideal", "odometry.rounding=false")
+IDEAL = ("hearing=ideal", "obstacle_sensing=ideal", "plant.pulses_per_revolution=null")
 
 
 def main() -> int:

@@ -28,7 +28,7 @@ from systems.base.wheel_speed_command import (
     integrate_velocity,
     limited_wheel_speeds,
 )
-from systems.framework.noise import BEFORE_THE_RUN, standard_normals, tick_generator
+from systems.framework.noise import standard_normals
 from systems.framework.signals import TICK_S
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.tdoa_estimator import port_values, robot_localiser
@@ -50,7 +50,7 @@ from systems.ranging.ultrasonic_array import (
     range_errors,
     world_rectangles,
 )
-from systems.sound.array_tolerances import draw_tolerances, real_array
+from systems.sound.real_array import no_errors, real_array
 from systems.sound.recorder import record_frame
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.sound.waveforms import make_waveform
@@ -73,11 +73,7 @@ class PlainLoop:
         self.ticks = history_ticks(MAXIMUM_RANGE_M, c)
         self.mic_seed = block_seed(scenario.seed, "mic_array")
         microphones = scenario.follower.microphones
-        errors = draw_tolerances(
-            microphones,
-            len(scenario.only.robot.microphones_m),
-            tick_generator(self.mic_seed, BEFORE_THE_RUN),
-        )
+        errors = no_errors(len(scenario.only.robot.microphones_m))
         p_BM = microphones_B(scenario.only.robot)
         self.array = real_array(p_BM, microphones, errors, c)
         self.tracker = tracker_numbers(
@@ -124,7 +120,8 @@ class PlainLoop:
         return np.array(states)
 
     def _odometry(self, pose: Any, angles: Any, true_angles: Any, wheels: Any) -> Any:
-        pulses = self.scenario.only.odometry.pulses_per_revolution
+        pulses = self.scenario.only.plant.pulses_per_revolution
+        assert pulses is not None
         now = [encoder_angle(angle, pulses) for angle in true_angles]
         steps = (now[0] - angles[0], now[1] - angles[1])
         robot = self.scenario.only.robot

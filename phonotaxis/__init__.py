@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from analysis.arrays.voting.source_listener_block import SourceListener
-    from analysis.exports.columns import columns
     from analysis.recordings.array_geometry import ArrayGeometry
     from analysis.recordings.locate import locate
     from analysis.recordings.locate_result import LocateResult, SourceEstimate
+    from analysis.runs.columns import columns
     from analysis.sweeps.plan import SweepPlan
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
@@ -72,7 +72,7 @@ _HOMES = {
     "StabilityResult": "phonotaxis.studies",
     "SweepPlan": "analysis.sweeps.plan",
     "SweepResult": "phonotaxis.studies",
-    "columns": "analysis.exports.columns",
+    "columns": "analysis.runs.columns",
     "compare": "phonotaxis.studies",
     "library_scenarios": "diagrams.scenario.loading",
     "load_scenario": "diagrams.scenario.loading",

@@ -59,7 +59,8 @@ class RunResult(diagrams.RunResult):
                 has several robots. Each robot then has time series of its own.
         """
         from analysis.runs.proximity import Proximity
-        from analysis.runs.run_plots import plot_time_series, plot_trajectory
+        from analysis.views.picture import plot_trajectory
+        from analysis.views.time_series import plot_time_series
 
         if what == "trajectory":
             return plot_trajectory(self)
@@ -85,7 +86,7 @@ class RunResult(diagrams.RunResult):
         Raises:
             OSError: The file cannot be written.
         """
-        from analysis.runs.replay import write_replay
+        from analysis.views.replay import write_replay
 
         write_replay(self, path)
         return Path(path)
@@ -103,8 +104,8 @@ class RunResult(diagrams.RunResult):
             InputError: The packages that write MCAP files are not installed.
             OSError: The file cannot be written.
         """
-        from analysis.exports.mcap_file import write_mcap
-        from analysis.exports.recorded_run import RecordedRun
+        from analysis.runs.recorded_run import RecordedRun
+        from analysis.views.mcap_file import write_mcap
 
         write_mcap(RecordedRun.of(self), Path(path))
         return Path(path)
@@ -156,7 +157,8 @@ class RunResult(diagrams.RunResult):
             InputError: The directory is in use, or cannot be created or written.
         """
         from analysis.reporting.result_directory import whole_directory
-        from analysis.runs.run_report import run_summary, write_run
+        from analysis.runs.run_report import run_summary
+        from analysis.views.run_directory import write_run
 
         with whole_directory(directory) as (shown, partial):
             write_run(self, run_summary(self, shown), partial)

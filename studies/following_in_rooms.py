@@ -20,7 +20,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from diagrams import RunResult, load_scenario, simulate
 from studies.support.figures import Figure, bounds_table
 from studies.tables import Table

@@ -9,7 +9,7 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from analysis.runs.run_plots import plot_trajectory
+from analysis.views.picture import plot_trajectory
 from diagrams import Scenario, library_scenarios, load_scenario, simulate
 from studies.tables import Table
 

@@ -23,7 +23,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
-from analysis.runs.metrics import following_error
+from analysis.runs.measured_run import MeasuredRun
 from diagrams import RunResult, load_scenario, simulate
 from studies.support.figures import Figure, bounds_table
 from studies.support.synthetic_speech import speech_like
@@ -202,7 +202,9 @@ def table_rows(
                 result = simulate(scenario, engine="compiled")
                 scores.append(score_of(result, layout.others))
                 causes.append(result.cause)
-                errors.append(float(np.median(np.abs(following_error(result)))))
+                errors.append(
+                    float(np.median(np.abs(MeasuredRun(result).following_error)))
+                )
             total = Score(*np.sum(scores, axis=0).tolist())
             share = causes.count("completed") / layouts
             found[name, count, level, choose] = total, share

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from analysis.runs.run_report import run_summary, summary_text
 from diagrams import RunResult, load_scenario, simulate
 from studies.tables import Table

@@ -15,9 +15,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
-from analysis.reporting.html_page import COLOURS_CSS
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
-from analysis.runs.replay import write_replay
+from analysis.reporting.render import COLOURS_CSS
+from analysis.views.replay import write_replay
 from diagrams import load_scenario, simulate
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

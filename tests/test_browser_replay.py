@@ -12,7 +12,7 @@ import pytest
 from matplotlib.image import imread
 
 from analysis.runs.proximity import Proximity
-from analysis.runs.replay import write_replay
+from analysis.views.replay import write_replay
 from diagrams import load_scenario, simulate
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

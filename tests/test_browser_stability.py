@@ -12,7 +12,7 @@ from matplotlib.image import imread
 
 from analysis.stability.law_analysis import analyse_law
 from analysis.stability.report_page import stability_page
-from analysis.stability.report_parts import parts
+from analysis.stability.report_parts import SOUND_PARTS
 from diagrams import load_scenario
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -24,7 +24,7 @@ PARTS = 4
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("stability") / "report.html"
-    analysis = analyse_law(load_scenario(), parts(full=False)[:PARTS])
+    analysis = analyse_law(load_scenario(), SOUND_PARTS[:PARTS])
     path.write_text(stability_page([analysis]))
     return path
 

@@ -50,7 +50,7 @@ def test_summary_names_files_that_locate_reads(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("--set", "hearing=ideal"), "no robot hears sound waves (hearing is 'ideal')"),
+        (("--set", "hearing=ideal"), "no robot hears sound waves (hearing is ideal)"),
         (("--save-audio", "full"), "full is not empty; name another directory"),
         (("--save-audio", "file"), "file is a file; name a directory"),
         (("--save-audio", "mine/../full"), "mine/../full is not empty; name another"),

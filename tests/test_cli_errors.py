@@ -65,7 +65,7 @@ def fail(*_args, **_options):
         (["accuracy"], "analysis.hearing.localization.prepare_localization"),
         (["locate", "heard.wav"], "analysis.recordings.locate.located"),
         (["scenarios"], "diagrams.library_scenarios"),
-        (["compare", "wall"], "analysis.comparison.compare.prepare_comparison"),
+        (["compare", "wall"], "analysis.sweeps.batch.prepare_comparison"),
     ],
 )
 def test_a_bug_is_no_bad_input(capsys, tmp_path, monkeypatch, words, place):
@@ -223,7 +223,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
 
 
 def test_json_has_no_infinity(capsys, tmp_path, monkeypatch):
-    from analysis.runs.metrics import run_metrics
+    from analysis.runs.metric_table import run_metrics
 
     def with_infinity(result):
         return run_metrics(result) | {"least_time_to_contact_s": float("inf")}
@@ -308,7 +308,7 @@ def test_a_locale_of_ascii(tmp_path):
     for words in (f"{QUICK} --json", "sweep sweep.yaml --workers 1 --json"):
         ended = shell(tmp_path, words, ASCII)
         assert (ended.returncode, ended.stderr) == (0, "")
-        assert json.loads(ended.stdout)["schema_version"] == 1
+        assert json.loads(ended.stdout)["schema_version"] == 2
     for words in ("simulate \u03bb.yaml", "simulate sound.yaml"):
         ended = shell(tmp_path, words, ASCII)
         assert (ended.returncode, ended.stdout) == (2, "")

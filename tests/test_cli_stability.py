@@ -7,41 +7,36 @@ import json
 import pytest
 
 import phonotaxis
-from analysis.reporting.html_page import paragraph
-from analysis.stability import report_parts as stability_parts
+from analysis.reporting.criterion import Criterion
+from analysis.reporting.section import Figure
+from analysis.stability import report_parts
 from analysis.stability.law_analysis import Part
-from analysis.stability.safety_parts import safety_parts
-from analysis.stability.verdicts import Criterion, judge
 from diagrams import load_scenario
 from systems.framework.input_error import InputError
 
-MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")
+
+def impossible(study):
+    raise InputError("law", "has no such thing; choose another one")
 
 
-def quick_parts(
-    *, full: bool, guarded: bool = False, routed: bool = False, searching: bool = False
-) -> tuple[Part, ...]:
-    """Stand-ins for analyses that take their time."""
-
-    def verdicts(study):
-        return (judge(MASS, study.scenario.only.robot.mass_kg),)
-
-    def impossible(study):
-        raise InputError("law", "has no such thing; choose another one")
-
-    def render(data, name):
-        return [paragraph(f"{len(data)} verdicts")]
-
-    quick = (
-        Part("verdicts", "Verdicts", verdicts, render),
-        Part("impossible", "Impossible", impossible, render),
-    )[: 2 if full else 1]
-    return (*quick, *(safety_parts() if guarded else ()))
+MASS = Part[float](
+    "mass",
+    "Mass",
+    lambda study: study.scenario.only.robot.mass_kg,
+    lambda data: [f"{data} kg"],
+    criteria=(
+        Criterion(
+            "mass", "kg", "at most", 4.0, "light", "heavy", "a test", lambda data: data
+        ),
+    ),
+)
+IMPOSSIBLE = Part("impossible", "Impossible", impossible, lambda data: [], slow=True)
 
 
 @pytest.fixture
 def quick(monkeypatch):
-    monkeypatch.setattr(stability_parts, "parts", quick_parts)
+    """Stand-ins for analyses that take their time."""
+    monkeypatch.setattr(report_parts, "SOUND_PARTS", (MASS, IMPOSSIBLE))
 
 
 def run(capsys, *words: str) -> tuple[int, str, str]:
@@ -56,18 +51,17 @@ def test_a_part_that_fails_is_no_success(capsys, tmp_path, monkeypatch):
     def broken(study):
         return study.found["nothing"]
 
-    def show_broken(data, name):
+    def draw():
         raise ZeroDivisionError("no figure")
 
     parts = (
-        *quick_parts(full=True),
-        Part("broken", "Broken", broken, lambda data, name: []),
-        Part("unshown", "Unshown", lambda study: [1], show_broken),
-        Part(
-            "after", "After", lambda study: [1, 2], lambda data, name: ["<p>last</p>"]
-        ),
+        MASS,
+        IMPOSSIBLE,
+        Part("broken", "Broken", broken, lambda data: []),
+        Part("unshown", "Unshown", lambda study: [1], lambda data: [Figure(draw, "")]),
+        Part("after", "After", lambda study: [1, 2], lambda data: ["last"]),
     )
-    monkeypatch.setattr(stability_parts, "parts", lambda **_: parts)
+    monkeypatch.setattr(report_parts, "parts_for", lambda _, full: parts)
     out = tmp_path / "out"
     status, printed, complaint = run(capsys, "--out", str(out))
     assert status == 1
@@ -176,11 +170,8 @@ def test_drake_ending_the_analysis_is_one_line(capsys, tmp_path, monkeypatch):
     def demand(study):
         raise SystemExit(1)
 
-    monkeypatch.setattr(
-        stability_parts,
-        "parts",
-        lambda **_: (Part("bad", "Bad", demand, lambda data, name: []),),
-    )
+    parts = (Part("bad", "Bad", demand, lambda data: []),)
+    monkeypatch.setattr(report_parts, "SOUND_PARTS", parts)
     status, printed, complaint = run(capsys, "--out", str(tmp_path / "out"))
     assert (status, printed) == (1, "")
     assert "the command was ended from within" in complaint

@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 
 import systems
 from analysis.arrays.voting.source_listener_block import SourceListener
-from systems.base.parameters import OdometryParameters
+from systems.base.parameters import PlantParameters
 
 pytestmark = pytest.mark.drake
 
@@ -28,7 +28,9 @@ BLOCKS: dict[str, Any] = {
 #: Those that convert to other scalars.
 TEMPLATED = {name for name in BLOCKS if hasattr(systems, f"{name}_")}
 # A rounded angle has no derivative, and the block says so.
-DIFFERENTIABLE = {"WheelOdometry": {"odometry": OdometryParameters(rounding=False)}}
+DIFFERENTIABLE = {
+    "WheelOdometry": {"plant": PlantParameters(pulses_per_revolution=None)}
+}
 UNITS = {
     "0 or 1", "1", "dBm", "deg", "m", "m/s", "m/s^2", "m^2", "N", "number", "rad",
     "rad/s", "s"

@@ -227,7 +227,7 @@ def test_a_comparison_counts_the_runs_with_warnings(tmp_path: Path):
     )
     counted = [{"field": FIELD, "runs": 2, "message": MESSAGE}]
     assert [cell["warnings"] for cell in found.summary["cells"]] == [[], counted]
-    line = f"Warning in 2 of 2 runs of guarded: {FIELD}: {MESSAGE}"
+    line = f"Warning in 2 of 4 runs: {FIELD}: {MESSAGE}"
     assert line in str(found).splitlines()
     assert line in shown(found.out / "report.html")
 
@@ -254,10 +254,10 @@ def test_a_comparison_gives_rates_and_pairs(tmp_path: Path):
         out=tmp_path / "laws",
         workers=1,
     )
-    (comparison,) = found.comparisons.values()
-    assert [cell.label for cell in comparison.cells] == ["none", "active"]
+    (comparison,) = found.scenarios.values()
+    assert [cell.label for cell in comparison.cells] == ["law none", "law active"]
     assert (comparison.pairs[0].first, comparison.pairs[0].second) == ("none", "active")
-    assert "success %" in str(found)
+    assert "success (%)" in str(found)
     assert (found.out / "summary.json").is_file()
     with pytest.raises(phonotaxis.InputError, match="is listed twice"):
         phonotaxis.compare("wall", "wall", out=tmp_path / "twice")
@@ -268,7 +268,7 @@ def test_stability_gives_findings_and_a_page(
 ):
     """The first parts alone: all of them take a minute."""
     monkeypatch.setattr(
-        report_parts, "parts_for", lambda _, full: report_parts.parts(full=full)[:2]
+        report_parts, "parts_for", lambda _, full: report_parts.SOUND_PARTS[:2]
     )
     told: list[str] = []
     for laws, names in (
@@ -282,7 +282,7 @@ def test_stability_gives_findings_and_a_page(
     found = phonotaxis.stability("obstacle_free", progress=told.append)
     assert repr(found) == "<StabilityResult obstacle_free: active>"
     assert len(told) == 2
-    assert len(found.analyses[0].findings) == 2
+    assert len(found.analyses[0].sections) == 2
     assert (found.save(tmp_path / "report") / "report.html").is_file()
 
 

@@ -31,7 +31,7 @@ class SavedMovie:
     def __init__(
         self, file: str, scenario: Scenario, place: Place, saved: SavedAudio | None
     ) -> None:
-        from analysis.movies.encoding import MovieFile
+        from analysis.views.movie_file import MovieFile
         from diagrams.scenario.audible import check_audible
         from systems.framework.input_error import InputError
 
@@ -79,7 +79,7 @@ class SavedMovie:
         Raises:
             RunError: The encoder failed, or the file could not be written to the disk.
         """
-        from analysis.movies.run_frames import RunFrames
+        from analysis.views.film import RunFrames
 
         sound = None
         if self._audible and self._saved is not None:

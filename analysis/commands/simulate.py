@@ -69,8 +69,9 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
         movie = SavedMovie(options.movie, scenario, place, saved)
     say(f"simulating {scenario.name}")
 
-    from analysis.exports.recorded_run import RecordedRun
-    from analysis.runs.run_report import run_summary, summary_text, write_run
+    from analysis.runs.recorded_run import RecordedRun
+    from analysis.runs.run_report import run_summary, summary_text
+    from analysis.views.run_directory import write_run
     from diagrams import build_sound_follower, prepared_loop, simulate
     from diagrams.scenario.warnings.warnings_of import warnings_of
 

@@ -75,7 +75,10 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     work = parts_for(scenarios, full=options.full)
 
     def run(progress: Progress) -> list[LawAnalysis]:
-        analyses = [analyse_law(each, work, step=progress.step) for each in scenarios]
+        analyses = [
+            analyse_law(each, work, full=options.full, step=progress.step)
+            for each in scenarios
+        ]
         progress.step("writing the report")
         return analyses
 
@@ -91,7 +94,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     return Job(
         run=run,
         summary=lambda analyses: stability_document(analyses, place.out),
-        text=lambda _, document: stability_text(document),
+        text=lambda analyses, _: stability_text(analyses),
         out=place.out,
         write=lambda analyses, document: write_stability(
             analyses, document, place.directory

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from analysis.design.design_study import DesignStudy
 from analysis.laws.law_curves_plots import LAW_STYLES
-from analysis.laws.push_and_pull import DESIGNED_LAWS, spring, stiffest
+from analysis.laws.push_and_pull import DESIGNED_LAWS, spring
+from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import largest_contact_stiffness
 
 #: Values of D_r on the axis of the right panel, N s/m.
@@ -70,7 +71,7 @@ def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
     scenario = study.today.scenario
     attraction, spare = (
         scenario.follower.attraction,
-        study.requirements.spare_latency_ticks,
+        study.gains.requirements.spare_latency_ticks,
     )
     lines = dict.fromkeys((0, spare), "-") | {spare: "--"}
     for ticks, line in lines.items():
@@ -84,7 +85,7 @@ def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
         axes.plot(_DAMPING_N_S_M, limits, f"k{line}", label=label)
     for law in DESIGNED_LAWS:
         colour, title = LAW_STYLES[law]
-        stiffness = stiffest(law, scenario)
+        stiffness = radial_law(scenario.with_robot(law=law)).stiffest_n_m
         if stiffness < _STIFFNESS_N_M:
             label = f"{title}: {stiffness:.1f} N/m"
             axes.axhline(stiffness, color=colour, label=label)

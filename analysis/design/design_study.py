@@ -7,17 +7,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from analysis.design.attraction_search import (
-    attraction_damping_ratio,
+    GainFigures,
+    RecommendedGains,
     braking_overshoot,
+    fitting_gains,
     follow_distance,
-    following_lag,
-    search_attraction,
+    gain_figures,
+    recommend_gains,
 )
 from analysis.design.gain_search import gain_for_barrier, search_gains
 from analysis.design.jam_runs import JAM_STARTS_M, JamRuns, jam_runs
 from analysis.design.requirements import (
-    DesignRequirements,
     LawDesign,
+    Requirements,
     allowed_stiffness,
     check_law,
     metres_to_go,
@@ -29,6 +31,7 @@ from analysis.laws.push_and_pull import (
 )
 from analysis.linear.contact_mode import largest_contact_stiffness
 from diagrams.scenario.scenario import Scenario
+from systems.framework.input_error import InputError
 
 #: Distances from the obstacle to the point of rest in the table of barriers, m.
 _TO_GO_M = (1.0, 1.5, 2.0, 3.0)
@@ -40,10 +43,8 @@ class Alternative:
 
     scenario: Scenario
     """Scenario with this attraction and these gains."""
-    damping_ratio: float
-    """Damping ratio of the loop to the follow point."""
-    following_lag_m: float
-    """Distance of the control point P behind the follow point of a moving source, m."""
+    figures: GainFigures
+    """Margins and other figures of K_r and D_r."""
     overshoot_m: float
     """Overshoot past the follow point after an approach at top speed, m."""
     follow_distance_m: float
@@ -79,7 +80,8 @@ class BarrierRow:
 class DesignStudy:
     """The result of ``phonotaxis design``."""
 
-    requirements: DesignRequirements
+    gains: RecommendedGains
+    """The recommendation, as in the stability report."""
     kinetic_energy_j: float
     """Kinetic energy of the virtual mass at top speed, J."""
     barriers: tuple[BarrierRow, ...]
@@ -87,9 +89,11 @@ class DesignStudy:
     """Largest stable stiffness of a push if echoes are 0, 1, 2, and 4 ticks late,
     N/m."""
     today: Alternative
-    """The attraction of the scenario."""
+    """The attraction of the scenario. The laws may push P at rest to the edge of the
+    goal."""
     recommended: Alternative
-    """The attraction that meets the requirements."""
+    """The attraction that meets the requirements with the scenario's law, and gains of
+    all laws for this attraction."""
 
 
 #: Latencies for ``DesignStudy.contact_limits_n_m``, in control periods.
@@ -100,14 +104,13 @@ STUDY_RUNS = 2 * len(DESIGNED_LAWS) * len(JAM_STARTS_M)
 
 def study_design(
     scenario: Scenario,
-    requirements: DesignRequirements | None = None,
+    requirements: Requirements | None = None,
     *,
     progress: Callable[[float], None] | None = None,
 ) -> DesignStudy:
     """Chooses gains of the laws for a scenario, and also recommends another attraction.
 
-    The attraction is the virtual spring and damper that pull the robot to the follow
-    point near the source.
+    The recommendation is that of the stability report.
 
     Args:
         scenario: The scenario with the attraction and the robot. Of the parameters of
@@ -126,10 +129,15 @@ def study_design(
             be met.
     """
     scenario.require_one_robot("a design of gains")
-    requirements = requirements or DesignRequirements()
-    laws = search_gains(scenario, requirements)
+    requirements = requirements or Requirements()
+    within_goal = requirements.within_goal(scenario)
+    laws = search_gains(scenario, within_goal)
     designed = scenario.with_robot(laws=laws)
-    better = search_attraction(scenario, requirements)
+    gains = recommend_gains(scenario, requirements)
+    if gains.chosen is None:
+        raise InputError("attraction", f"cannot be designed. {gains.advice}")
+    laws = fitting_gains(gains.chosen, requirements, *DESIGNED_LAWS)
+    better = gains.chosen.with_robot(laws=laws)
     K_r = scenario.follower.attraction.stiffness_n_m
 
     def later(done: float) -> None:
@@ -137,28 +145,27 @@ def study_design(
             progress(done + STUDY_RUNS // 2)
 
     return DesignStudy(
-        requirements=requirements,
+        gains=gains,
         kinetic_energy_j=kinetic_energy(scenario),
         barriers=tuple(_barrier_row(scenario, to_go) for to_go in _TO_GO_M),
         contact_limits_n_m=tuple(
             largest_contact_stiffness(scenario, latency_ticks=ticks) - K_r
             for ticks in _TICKS
         ),
-        today=_alternative(designed, requirements, progress),
+        today=_alternative(designed, within_goal, progress),
         recommended=_alternative(better, requirements, later),
     )
 
 
 def _alternative(
     scenario: Scenario,
-    requirements: DesignRequirements,
+    requirements: Requirements,
     progress: Callable[[float], None] | None,
 ) -> Alternative:
     overshoot = braking_overshoot(scenario)
     return Alternative(
         scenario=scenario,
-        damping_ratio=attraction_damping_ratio(scenario),
-        following_lag_m=following_lag(scenario),
+        figures=gain_figures(scenario, requirements),
         overshoot_m=overshoot,
         follow_distance_m=follow_distance(scenario, requirements, overshoot),
         metres_to_go=metres_to_go(scenario, requirements),
@@ -173,8 +180,6 @@ def _barrier_row(scenario: Scenario, to_go: float) -> BarrierRow:
         scenario.follower.attraction,
         scenario.follower.laws.conventional.reach_m,
     )
-    farther = DesignRequirements(
-        source_range_m=to_go + attraction.follow_distance_m + reach
-    )
+    farther = Requirements(source_range_m=to_go + attraction.follow_distance_m + reach)
     needed = gain_for_barrier(scenario, "conventional", "stiffness_n_m", farther)
     return BarrierRow(to_go, needed, barrier_from_reach_n_m(scenario, to_go))

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from analysis.design.attraction_search import GainChoice
 from analysis.design.design_study import Alternative, DesignStudy
 from analysis.design.requirements import Check
 from analysis.reporting.plain_values import plain, write_json
@@ -38,6 +39,9 @@ def design_text(study: DesignStudy) -> str:
     ]
     lines += ["", "Current attraction", *_alternative_lines(study.today)]
     lines += ["", "Recommended attraction", *_alternative_lines(study.recommended)]
+    lines += ["", "Least D_r that meets all requirements, for several K_r"]
+    lines += [_choice_text(choice) for choice in study.gains.choices]
+    lines += ["", study.gains.advice]
     return "\n".join(lines)
 
 
@@ -49,8 +53,9 @@ def _alternative_lines(alternative: Alternative) -> list[str]:
         f"(at least {alternative.follow_distance_m:g} m)"
     )
     figures = (
-        f"  damping ratio {alternative.damping_ratio:.2f}, lag "
-        f"{alternative.following_lag_m:.2f} m, overshoot "
+        f"  damping ratio {alternative.figures.damping_ratio:.2f}, phase margin "
+        f"{alternative.figures.phase_margin_deg:.0f} deg, lag "
+        f"{alternative.figures.following_lag_m:.2f} m, overshoot "
         f"{alternative.overshoot_m:.2f} m, target {alternative.metres_to_go:.1f} m "
         "behind the obstacle"
     )
@@ -61,6 +66,17 @@ def _alternative_lines(alternative: Alternative) -> list[str]:
         lines += [f"    {_check_text(check)}" for check in law.checks]
         lines += [f"    {'jams':<26}{runs.jams:8d} of {sum(runs.causes.values())} runs"]
     return lines
+
+
+def _choice_text(choice: GainChoice) -> str:
+    found = choice.figures
+    if found is None:
+        return f"  K_r {choice.stiffness_n_m:g} N/m: no D_r"
+    return (
+        f"  K_r {found.stiffness_n_m:g} N/m: D_r {found.damping_n_s_m:g} N s/m, "
+        f"damping ratio {found.damping_ratio:.2f}, lag {found.following_lag_m:.2f} m, "
+        f"delay margin {found.delay_margin_s:.2f} s"
+    )
 
 
 def _check_text(check: Check) -> str:
@@ -97,7 +113,7 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
 
     - ``summary.json`` is the JSON document.
     - ``scenario.yaml`` is the scenario with new gains of the laws.
-    - ``recommended.yaml`` is the scenario with the recommended attraction as well.
+    - ``recommended.yaml`` is the scenario with the recommended gains.
     - ``design.png`` is the figure of ``plot_design``.
     - ``law_curves.png`` shows the forces of the laws.
 

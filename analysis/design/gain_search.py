@@ -13,12 +13,12 @@ docs/avoidance.md explains these requirements.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from scipy.optimize import brentq
 
 from analysis.design.requirements import (
-    DesignRequirements,
+    Requirements,
     allowed_stiffness,
     metres_to_go,
     with_gains,
@@ -28,12 +28,11 @@ from analysis.laws.push_and_pull import (
     injected_share,
     kinetic_energy,
     largest_rise,
-    law_force,
     rest_offset,
     sampled_push,
     spring,
-    stiffest,
 )
+from analysis.laws.radial_law import radial_law
 from diagrams.scenario.participants import LawGains
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -48,13 +47,19 @@ _GAINS = (1e-3, 1e5)
 _ALPHAS_M = (0.05, 1.0)
 
 
-def search_gains(scenario: Scenario, requirements: DesignRequirements) -> LawGains:
-    """Finds the gains of each law that meet the requirements.
+def search_gains(
+    scenario: Scenario,
+    requirements: Requirements,
+    *,
+    laws: Iterable[str] = tuple(DESIGNED_LAWS),
+) -> LawGains:
+    """Finds gains of laws that meet the requirements.
 
     Args:
         scenario: The scenario with the attraction, the robot, and the sensors. The
             reaches, speed limits, and saturations of its laws are also used.
         requirements: Requirements that the gains must meet.
+        laws: Names of the laws, all of them in ``DESIGNED_LAWS``.
 
     Returns:
         The law parameters of the scenario, with the gains that were found.
@@ -62,8 +67,9 @@ def search_gains(scenario: Scenario, requirements: DesignRequirements) -> LawGai
     Raises:
         InputError: No gain meets a requirement that must be met.
     """
-    for law, tuning in DESIGNED_LAWS.items():
-        scenario = _RULES[tuning.rule](scenario, law, requirements)
+    for law in laws:
+        rule = _RULES[DESIGNED_LAWS[law].rule]
+        scenario = rule(scenario, law, requirements)
     return LawGains.model_validate(scenario.follower.laws.model_dump())
 
 
@@ -71,7 +77,7 @@ def gain_for_barrier(
     scenario: Scenario,
     law: str,
     field: str,
-    requirements: DesignRequirements,
+    requirements: Requirements,
     **also: float,
 ) -> float:
     """Returns the value of a gain with which a law just stops the robot at an obstacle.
@@ -106,7 +112,7 @@ def gain_for_barrier(
 
 
 def _barrier_gains(
-    scenario: Scenario, law: str, requirements: DesignRequirements
+    scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
     """Derives the two gains of a law by the rule ``barrier``.
 
@@ -125,7 +131,7 @@ def _barrier_gains(
 
 
 def _matched_gains(
-    scenario: Scenario, law: str, requirements: DesignRequirements
+    scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
     """Derives the gains of both terms of the active law of 2019."""
     # The push on a far echo includes the tail of the spring term. The second round
@@ -141,7 +147,7 @@ _RULES = {"barrier": _barrier_gains, "matched": _matched_gains}
 
 
 def _matched_damper(
-    scenario: Scenario, law: str, requirements: DesignRequirements
+    scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
     """Derives the two gains of the velocity term of the active law of 2019.
 
@@ -155,7 +161,8 @@ def _matched_damper(
     )
     unit = {"reference_damping_n_s_m": 1.0, "matched_damping_n_s_m": 2.0}
     with_unit = with_gains(scenario, law, **unit)
-    unit_term = law_force(law, with_unit)(far, 0.0) - spring(law, with_unit)(far)
+    force = radial_law(with_unit.with_robot(law=law)).function
+    unit_term = force(far, 0.0) - spring(law, with_unit)(far)
     d_ref = _rounded(at_rest / unit_term)
 
     def excess(D_0: float) -> float:
@@ -179,7 +186,7 @@ def _matched_damper(
 
 
 def _matched_spring(
-    scenario: Scenario, law: str, requirements: DesignRequirements
+    scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
     """Derives the two gains of the spring term of the active law of 2019.
 
@@ -212,10 +219,11 @@ def _matched_spring(
         )
 
     def too_far(alpha: float) -> float:
-        return rest_offset(law, with_alpha(alpha)) - scenario.stop.goal_margin_m
+        return rest_offset(law, with_alpha(alpha)) - requirements.rest_offset_m
 
     def too_stiff(alpha: float) -> float:
-        return stiffest(law, with_alpha(alpha)) - allowed
+        softer = with_alpha(alpha).with_robot(law=law)
+        return radial_law(softer).stiffest_n_m - allowed
 
     field = f"laws.{law}.reference_stiffness_n_m"
     alpha = _root(too_far, *_ALPHAS_M, field)

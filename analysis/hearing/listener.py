@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.hearing.array_tolerances import ArrayTolerances, draw_errors
 from analysis.hearing.cramer_rao import LocalizationBound, SlopeEnergy, position_bound
 from diagrams import Scenario, build_sound_follower, make_simulator
 from diagrams.building.robot import block_seed
@@ -17,7 +18,6 @@ from systems.base.robot import microphones_B
 from systems.framework.noise import tick_generator
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.array_shape import ArrayShape
-from systems.sound.array_tolerances import draw_tolerances
 from systems.sound.sound_emitter import emitted_samples
 from systems.sound.waveforms import make_waveform
 
@@ -65,16 +65,16 @@ class Listener:
         distance: float,
         bearing: float,
         trials: int,
-        sound_speed_tolerance: float = 0.0,
+        tolerances: ArrayTolerances = ArrayTolerances(),
         *,
         session: int = 0,
     ) -> Heard:
         """Takes one measurement from each of ``trials`` frames (25 ms of audio).
 
         The source is at a distance in m and a bearing in rad from the microphones'
-        centroid. ``sound_speed_tolerance`` is the largest error of the speed of sound,
-        as a share of the speed. Sessions run at different times. Each session therefore
-        has its own noise and errors.
+        centroid. The errors of the array and of the speed of sound are redrawn within
+        their tolerances for every frame. Sessions run at different times. Each session
+        therefore has its own noise and errors.
         """
         p_AS = distance * np.array([math.cos(bearing), math.sin(bearing)])
         start = session * (trials + 4 * _LEAD)
@@ -85,7 +85,7 @@ class Listener:
         simulator.Initialize()
         rows = []
         for frame in range(start, start + _LEAD + trials):
-            self._redraw_errors(root, frame, sound_speed_tolerance)
+            self._redraw_errors(root, frame, tolerances)
             # AdvanceTo ends with the update at this time, which processes the frame.
             simulator.AdvanceTo((frame + 1) * self._frame_s)
             rows.append(self._read(root))
@@ -110,11 +110,12 @@ class Listener:
         at_rest = np.zeros(plant.num_continuous_states() - len(p_WB))
         plant.SetContinuousState([*p_WB, *at_rest])
 
-    def _redraw_errors(self, root: Any, frame: int, speed_tolerance: float) -> None:
+    def _redraw_errors(
+        self, root: Any, frame: int, tolerances: ArrayTolerances
+    ) -> None:
         scenario = self._scenario
         rng = tick_generator(block_seed(scenario.seed, "array_errors"), frame)
-        errors = draw_tolerances(scenario.follower.microphones, self.shape.count, rng)
-        speed = 1.0 + speed_tolerance * rng.uniform(-1.0, 1.0)
+        errors, speed = draw_errors(tolerances, self.shape.count, rng)
         microphones = self._follower.blocks["microphones"]
         context = microphones.GetMyMutableContextFromRoot(root)
         for index, values in (

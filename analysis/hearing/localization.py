@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.hearing.array_tolerances import ArrayTolerances
 from analysis.hearing.listener import Heard, Listener
 from analysis.hearing.paper_tables import PAPER_CELLS, PaperCell
 from analysis.hearing.sensitivity import ArrayErrors, PolarStd, predicted_std
@@ -37,13 +38,10 @@ _SETTING = (
 )
 
 #: Tolerances of a carefully built array. The errors within them are redrawn for every
-#: measurement.
-REALISTIC_TOLERANCES = (
-    "microphones.position_tolerance_m=0.0002",
-    "microphones.delay_tolerance_s=2.0e-7",
+#: measurement. The tolerance of the speed of sound corresponds to 1 deg C.
+REALISTIC_TOLERANCES = ArrayTolerances(
+    position_m=0.0002, delay_s=2.0e-7, sound_speed_share=0.002
 )
-#: Tolerance of the speed of sound, as a share of the speed. Corresponds to 1 deg C.
-SOUND_SPEED_TOLERANCE = 0.002
 
 #: Values of the field ``tdoa.method`` by name of the estimator.
 ESTIMATORS = {"paper": "amdf", "fast": "gcc", "ml": "ml"}
@@ -130,8 +128,8 @@ class LocalizationExperiment:
     """Scenario with a continuously sounding source at rest, and a robot at rest."""
     trials: int
     """Number of measurements per position and estimator."""
-    sound_speed_tolerance: float
-    """Largest error of the speed of sound, as a share of the speed."""
+    tolerances: ArrayTolerances
+    """Largest errors of the array and of the speed of sound."""
     estimators: tuple[str, ...] = tuple(ESTIMATORS)
     """Names of the estimators: keys of ``ESTIMATORS``."""
     places: tuple[PaperCell, ...] = PAPER_CELLS
@@ -151,11 +149,10 @@ class LocalizationExperiment:
     def array_errors(self) -> ArrayErrors:
         """Standard deviations of errors that are uniform within the tolerances."""
         part = 1.0 / math.sqrt(3.0)
-        microphones = self.scenario.follower.microphones
         return ArrayErrors(
-            position_m=part * microphones.position_tolerance_m,
-            delay_s=part * microphones.delay_tolerance_s,
-            sound_speed_share=part * self.sound_speed_tolerance,
+            position_m=part * self.tolerances.position_m,
+            delay_s=part * self.tolerances.delay_s,
+            sound_speed_share=part * self.tolerances.sound_speed_share,
         )
 
     def run(
@@ -179,7 +176,7 @@ class LocalizationExperiment:
                     place.range_m,
                     math.radians(place.bearing_deg),
                     self.trials,
-                    self.sound_speed_tolerance,
+                    self.tolerances,
                     session=number,
                 )
                 tolerance = predicted_std(
@@ -205,11 +202,10 @@ def prepare_localization(
     Raises ``InputError`` if an override, or the number of trials, is wrong.
     """
     check_trials(trials)
-    own = REALISTIC_TOLERANCES if tolerances else ()
     return LocalizationExperiment(
-        scenario=load_scenario("default", [*_SETTING, *own, *overrides]),
+        scenario=load_scenario("default", [*_SETTING, *overrides]),
         trials=trials,
-        sound_speed_tolerance=SOUND_SPEED_TOLERANCE if tolerances else 0.0,
+        tolerances=REALISTIC_TOLERANCES if tolerances else ArrayTolerances(),
     )
 
 

@@ -40,12 +40,7 @@ def localization_summary(
         "seed": scenario.seed,
         "sound": scenario.source.sound.kind,
         "snr_db_at_1m": microphones.snr_db_at_1m,
-        "tolerances": {
-            "position_m": microphones.position_tolerance_m,
-            "delay_s": microphones.delay_tolerance_s,
-            "gain_db": microphones.gain_tolerance_db,
-            "sound_speed_share": experiment.sound_speed_tolerance,
-        },
+        "tolerances": experiment.tolerances._asdict(),
         "cells": [cell.to_dict() for cell in cells],
         "sensitivity": sensitivity_table(
             experiment.places,

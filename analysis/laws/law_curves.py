@@ -1,23 +1,19 @@
 """Curves of the force of each law over distance and over speed.
 
 Han 2019 describes such curves in words (figure 6), and so does Kim 2017. The figures
-themselves are missing. The forces in this module come from the blocks of the
-simulation.
+themselves are missing. The forces are those of the controllers of the simulation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from diagrams.building.laws import make_controller
+from analysis.laws.radial_law import radial_law
 from diagrams.scenario.scenario import Scenario
-from systems.framework.input_error import InputError
-from systems.ranging.collision_vector import SLOTS
 
 #: Distances of the curves, m.
 DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
@@ -60,65 +56,25 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
         One entry per law, with forces in N.
 
     Raises:
-        InputError: A law does not exist, or its block has no output for forces.
+        InputError: A law does not exist, or it is a block without a radial force.
     """
+    closing = scenario.follower.collision_vector.velocity_term == "closing"
+    # The law sees the speed of approach, or without ``closing`` its magnitude.
+    speeds = np.maximum(SPEEDS_M_S, 0.0) if closing else np.abs(SPEEDS_M_S)
     curves = []
     for law in laws:
-        controller = make_controller(scenario.with_robot(law=law))
-        if not controller.HasOutputPort("forces_W"):
-            raise InputError(
-                "law", f"{law!r} has no output port forces_W to draw; use another law"
-            )
+        force = radial_law(scenario.with_robot(law=law)).function
         curves.append(
             LawCurves(
                 law=law,
                 velocity_term=scenario.follower.collision_vector.velocity_term,
                 distance_m=DISTANCES_M,
-                push_n=radial_forces(controller, DISTANCES_M, 0.0),
+                push_n=np.array([float(force(c, 0.0)) for c in DISTANCES_M.tolist()]),
                 at_distance_m=AT_DISTANCE_M,
                 speed_m_s=SPEEDS_M_S,
-                force_n=radial_forces(controller, AT_DISTANCE_M, SPEEDS_M_S),
+                force_n=np.array(
+                    [float(force(AT_DISTANCE_M, s)) for s in speeds.tolist()]
+                ),
             )
         )
     return curves
-
-
-def radial_forces(
-    controller: Any, c: ArrayLike, approach: ArrayLike
-) -> NDArray[np.float64]:
-    """Returns the force away from an obstacle after one control period of approach.
-
-    Args:
-        controller: A block with the ports of ``RadialLawController``.
-        c: (...) distances at the end of the control period, m, above 0. The function
-            broadcasts ``c`` and ``approach`` to one shape.
-        approach: (...) speeds of approach during the control period, m/s. A negative
-            speed means that the obstacle recedes.
-
-    Returns:
-        (...) force in N, with the broadcast shape.
-    """
-    context = controller.CreateDefaultContext()
-    for name, size in (("p_WS_estimated", 2), ("pose_WB_estimated", 3), ("v_WP", 2)):
-        controller.GetInputPort(name).FixValue(context, np.zeros(size))
-    controller.GetInputPort("target_valid").FixValue(context, np.zeros(1))
-    features = np.eye(SLOTS)[0]
-    controller.GetInputPort("features").FixValue(context, features)
-    forces = controller.GetOutputPort("forces_W")
-    period_s = controller.GetUniquePeriodicDiscreteUpdateAttribute().period_sec()
-    distances, speeds = np.broadcast_arrays(c, approach)
-    found = []
-    for now, speed in zip(distances.ravel(), speeds.ravel(), strict=True):
-        _see(controller, context, now + speed * period_s)
-        update = controller.EvalUniquePeriodicDiscreteUpdate(context)
-        context.SetDiscreteState(update)
-        _see(controller, context, now)
-        found.append(-forces.Eval(context)[2])
-    return np.array(found).reshape(distances.shape)
-
-
-def _see(controller: Any, context: Any, distance: float) -> None:
-    """Sets the first input vector of a controller to an obstacle straight ahead."""
-    vectors = np.zeros(2 * SLOTS)
-    vectors[0] = distance
-    controller.GetInputPort("collision_vectors_B").FixValue(context, vectors)

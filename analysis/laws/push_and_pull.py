@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from analysis.laws.radial_law import law_function
+from analysis.laws.radial_law import radial_law
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
@@ -33,27 +33,6 @@ _STEP_M, _FARTHEST_M = 0.002, 3.0
 _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
 
-def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
-    """Returns the force function of a law with the gains of a scenario.
-
-    Args:
-        law: One of ``DESIGNED_LAWS``.
-        scenario: The scenario with the gains and the sensors.
-
-    Returns:
-        A function f(c, s) that returns the force away from an obstacle, N. The distance
-        of the obstacle is c, m. Its relative speed is s, m/s.
-
-    Raises:
-        InputError: The design does not choose gains for this law.
-    """
-    if law not in DESIGNED_LAWS:
-        raise InputError(
-            "law", f"{law!r} has no gains to choose; use {', '.join(DESIGNED_LAWS)}"
-        )
-    return law_function(scenario.with_robot(law=law))
-
-
 def spring(law: str, scenario: Scenario) -> Push:
     """Returns the spring term of a law as a function of distance.
 
@@ -68,7 +47,11 @@ def spring(law: str, scenario: Scenario) -> Push:
     Raises:
         InputError: The design does not choose gains for this law.
     """
-    force = law_force(law, scenario)
+    if law not in DESIGNED_LAWS:
+        raise InputError(
+            "law", f"{law!r} has no gains to choose; use {', '.join(DESIGNED_LAWS)}"
+        )
+    force = radial_law(scenario.with_robot(law=law)).function
     speed = DESIGNED_LAWS[law].spring_speed(getattr(scenario.follower.laws, law))
     return lambda c: force(c, speed)
 
@@ -160,22 +143,6 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
     return 2.0 * (kinetic_energy(scenario) + work) / reach**2
 
 
-def stiffest(law: str, scenario: Scenario) -> float:
-    """Returns the largest stiffness of a law for an obstacle at rest.
-
-    Args:
-        law: One of ``DESIGNED_LAWS``.
-        scenario: The scenario with the gains and the least range of the sensors.
-
-    Returns:
-        The largest slope -df/dc in N/m, where f is the force and c is the distance. The
-        distance is at least the least range of the sensors.
-    """
-    gains = getattr(scenario.follower.laws, law)
-    nearest = scenario.follower.ultrasonic.minimum_range_m
-    return DESIGNED_LAWS[law].stiffest(gains, nearest)
-
-
 def rest_offset(law: str, scenario: Scenario) -> float:
     """Returns how far the leader pushes the follower off the follow point at rest.
 
@@ -190,7 +157,7 @@ def rest_offset(law: str, scenario: Scenario) -> float:
     Returns:
         The offset in m, 0 or more.
     """
-    force = law_force(law, scenario)
+    force = radial_law(scenario.with_robot(law=law)).function
     K_r, follow = (
         scenario.follower.attraction.stiffness_n_m,
         scenario.follower.attraction.follow_distance_m,
@@ -217,7 +184,7 @@ def far_offset(law: str, scenario: Scenario) -> float:
     Returns:
         The offset in m. If the law has a shorter reach, the offset is 0.
     """
-    force = law_force(law, scenario)
+    force = radial_law(scenario.with_robot(law=law)).function
     farthest = scenario.follower.ultrasonic.maximum_range_m
     return force(farthest, 0.0) / scenario.follower.attraction.stiffness_n_m
 
@@ -239,7 +206,7 @@ def injected_share(law: str, scenario: Scenario) -> float:
         The ratio, 0 or more. The distance c is half the reach rho_0 of the conventional
         law.
     """
-    force = law_force(law, scenario)
+    force = radial_law(scenario.with_robot(law=law)).function
     within = 0.5 * scenario.follower.laws.conventional.reach_m
     speeds = scenario.only.robot.top_speed_m_s * _SPEEDS
     term = np.array([force(within, s) for s in speeds.tolist()]) - force(within, 0.0)

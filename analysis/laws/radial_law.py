@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -43,20 +43,74 @@ class RadialLaw:
     """The function f(c, s) of the controller, N, for floats and for AutoDiffXd."""
     range_m: float
     """Largest range of the sensors, m."""
-    forces_n: NDArray[np.float64]
-    """(n,) force f(c, 0), N. The distances c are 0, DISTANCE_STEP_M, and so on up to
-    ``range_m``."""
-    energies_j: NDArray[np.float64]
-    """(n,) work of the force f(c, 0) from the distance c to ``range_m``, J. The
-    distances are those of ``forces_n``."""
-    increments_n: NDArray[np.float64]
-    """(n, k) velocity term f(c, s) - f(c, 0), N. Row i has the distance i
-    INCREMENT_STEPS[0]. Column j has the speed j INCREMENT_STEPS[1]."""
+    top_speed_m_s: float
+    """Top speed of the robot, m/s. ``increments_n`` covers the speeds up to it."""
+
+    @cached_property
+    def distances_m(self) -> NDArray[np.float64]:
+        """(n,) distances 0, DISTANCE_STEP_M, and so on up to ``range_m``, m."""
+        count = round(self.range_m / DISTANCE_STEP_M) + 1
+        return DISTANCE_STEP_M * np.arange(count, dtype=float)
+
+    @cached_property
+    def forces_n(self) -> NDArray[np.float64]:
+        """(n,) force f(c, 0) at ``distances_m``, N. The first entry is the limit at 0.
+
+        Raises:
+            InputError: A force is not finite.
+        """
+        distances = np.maximum(self.distances_m, 1e-9).tolist()
+        forces = np.array([float(self.function(c, 0.0)) for c in distances])
+        if not np.all(np.isfinite(forces)):
+            raise InputError(
+                "law",
+                f"{self.name!r} gives a force that is not finite; bound the force",
+            )
+        return forces
+
+    @cached_property
+    def energies_j(self) -> NDArray[np.float64]:
+        """(n,) work of the force f(c, 0) from ``distances_m`` to ``range_m``, J."""
+        work = 0.5 * DISTANCE_STEP_M * (self.forces_n[1:] + self.forces_n[:-1])
+        return np.append(np.cumsum(work[::-1])[::-1], 0.0)
+
+    @cached_property
+    def increments_n(self) -> NDArray[np.float64]:
+        """(n, k) velocity term f(c, s) - f(c, 0), N.
+
+        Row i has the distance i INCREMENT_STEPS[0]. Column j has the speed j
+        INCREMENT_STEPS[1].
+        """
+        dc, ds = INCREMENT_STEPS
+        # The force of a law may jump, for example at rho_0. Therefore, users of the
+        # table take the row of the nearest distance and do not interpolate rows.
+        rows = np.maximum(dc * np.arange(round(self.range_m / dc) + 1), 1e-9).tolist()
+        speeds = (ds * np.arange(int(np.ceil(self.top_speed_m_s / ds)) + 2)).tolist()
+        table = np.array([[float(self.function(c, s)) for s in speeds] for c in rows])
+        return table - table[:, :1]
+
+    @cached_property
+    def stiffest(self) -> tuple[float, float]:
+        """Distance at which the law is stiffest, m, and its stiffness there, N/m.
+
+        The stiffness is the largest slope -df/dc for an obstacle at rest. It is at most
+        0 if the force never grows as the obstacle comes nearer.
+        """
+        slopes = -np.diff(self.forces_n) / DISTANCE_STEP_M
+        k = int(slopes.argmax())
+        best = float(self.distances_m[k]), float(slopes[k])
+        # The mean slope of a step is less than the slope at its steeper end.
+        inside = 1e-6 * DISTANCE_STEP_M
+        for c in (self.distances_m[k] + inside, self.distances_m[k + 1] - inside):
+            slope = -self.gradient(float(c), 0.0)[0]
+            if slope > best[1]:
+                best = float(c), slope
+        return best
 
     @property
-    def distances_m(self) -> NDArray[np.float64]:
-        """(n,) distances of ``forces_n`` and ``energies_j``, m."""
-        return DISTANCE_STEP_M * np.arange(len(self.forces_n), dtype=float)
+    def stiffest_n_m(self) -> float:
+        """Largest stiffness -df/dc for an obstacle at rest, N/m; see ``stiffest``."""
+        return self.stiffest[1]
 
     def force(self, c: float, s: float = 0.0) -> float:
         """Returns the force of the law away from an obstacle.
@@ -95,46 +149,21 @@ class RadialLaw:
         return (float(slopes[0]), float(slopes[1])) if len(slopes) else (0.0, 0.0)
 
 
-def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:
-    """Returns the radial force function of the controller of a scenario.
-
-    Args:
-        scenario: The scenario with the law.
-
-    Returns:
-        A function f(c, s) that returns the force away from an obstacle, N. The distance
-        of the obstacle is c, m. Its relative speed is s, m/s.
-
-    Raises:
-        InputError: The law does not exist.
-        InputError: The law is a block without a radial force.
-    """
-    controller = make_controller(scenario)
-    function = getattr(controller, "radial_force", None)
-    if function is None:
-        raise InputError(
-            "law",
-            f"{scenario.only.law!r} is a block without a force f(c, s), which energy "
-            "functions need; write it as a function law(c, s, laws)",
-        )
-    return function
-
-
 def radial_law(scenario: Scenario) -> RadialLaw:
-    """Tabulates the law of a scenario up to the sensor range and the top speed.
+    """Returns the force of the law of a scenario.
 
     Args:
         scenario: The scenario with the law, the sensors, and the top speed.
 
     Returns:
-        The tables of the law.
+        The force, with tables up to the sensor range and the top speed.
 
     Raises:
         InputError: The law does not exist.
-        InputError: The law has no radial force, or its force is not finite.
+        InputError: The law is a block without a radial force.
     """
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
-    return _tabulate(
+    return _radial_law(
         key.only.law,
         str(loaded_digests(key)),
         key.follower.laws.model_dump_json(),
@@ -165,7 +194,7 @@ class _Scenario:
 
 
 @lru_cache(maxsize=64)
-def _tabulate(
+def _radial_law(
     name: str,
     _own_code: str,
     _gains: str,
@@ -173,29 +202,12 @@ def _tabulate(
     top_speed: float,
     carrier: _Scenario,
 ) -> RadialLaw:
-    range_m = ranges_m[1]
-    function = law_function(carrier.scenario)
-    count = round(range_m / DISTANCE_STEP_M) + 1
-    distances = DISTANCE_STEP_M * np.arange(count)
-    distances[0] = 1e-9
-    forces = np.array([float(function(c, 0.0)) for c in distances.tolist()])
-    if not np.all(np.isfinite(forces)):
+    controller = make_controller(carrier.scenario)
+    function = getattr(controller, "radial_force", None)
+    if function is None:
         raise InputError(
-            "law", f"{name!r} gives a force that is not finite; bound the force"
+            "law",
+            f"{name!r} is a block without a force f(c, s), which energy "
+            "functions need; write it as a function law(c, s, laws)",
         )
-    work = 0.5 * DISTANCE_STEP_M * (forces[1:] + forces[:-1])
-    energies = np.append(np.cumsum(work[::-1])[::-1], 0.0)
-    increments = _increments(function, range_m, top_speed)
-    return RadialLaw(name, function, range_m, forces, energies, increments)
-
-
-def _increments(
-    function: Callable[[Any, Any], Any], range_m: float, top_speed: float
-) -> NDArray[np.float64]:
-    dc, ds = INCREMENT_STEPS
-    # The force of a law may jump, for example at rho_0. Therefore, users of the table
-    # take the row of the nearest distance and do not interpolate between rows.
-    distances = np.maximum(dc * np.arange(round(range_m / dc) + 1), 1e-9).tolist()
-    speeds = (ds * np.arange(int(np.ceil(top_speed / ds)) + 2)).tolist()
-    table = np.array([[float(function(c, s)) for s in speeds] for c in distances])
-    return table - table[:, :1]
+    return RadialLaw(name, function, ranges_m[1], top_speed)

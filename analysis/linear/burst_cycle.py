@@ -154,7 +154,7 @@ def burst_cycle(
 def _with_bursts(scenario: Scenario, hold: Hold, on: float, period: float) -> Scenario:
     changes = {
         "tracker": {"hold": hold, "maximum_age_s": max(6.0, 3.0 * period)},
-        "ideal_hearing": {"burst_gaps": True},
+        "hearing": "ideal",
         "sound": {"on_s": on, "period_s": period, "start_s": 0.0},
     }
     return changed(scenario, changes)

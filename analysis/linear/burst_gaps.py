@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.linear.burst_cycle import HOLDS, Hold, burst_cycle
 from analysis.models.equilibria import follow_equilibrium
-from analysis.models.linear_models import NEUTRAL
+from analysis.models.linear_models import NEUTRAL, growth_per_s
 from analysis.models.operating_points import OperatingPoint, motion_model
 from diagrams.scenario.scenario import Scenario
 
@@ -38,7 +38,7 @@ class GapChart:
     @property
     def growth_per_s(self) -> NDArray[np.float64]:
         """(holds, n) growth rates of the slowest motion, 1/s; negative if it decays."""
-        return np.asarray(np.log(self.multiplier) / (self.on_s + self.gaps_s))
+        return np.asarray(growth_per_s(self.multiplier, self.on_s + self.gaps_s))
 
     def longest_stable_s(self, hold: Hold) -> float:
         """Longest silence for which this one and all shorter ones are stable, s."""

@@ -25,7 +25,7 @@ from pydrake.systems.analysis import DiscreteTimeApproximation
 from pydrake.systems.primitives import Linearize
 from scipy.optimize import brentq
 
-from analysis.laws.push_and_pull import stiffest
+from analysis.laws.radial_law import radial_law
 from analysis.models.block_models import block_model
 from analysis.models.ideal_scenarios import require_rolling
 from analysis.models.linear_models import LinearModel
@@ -147,7 +147,7 @@ def delayed_output(model: LinearModel, output: str, ticks: int) -> LinearModel:
     )
 
 
-def contact_matrix(
+def contact_model(
     scenario: Scenario,
     stiffness_n_m: float,
     *,
@@ -156,8 +156,8 @@ def contact_matrix(
     latency_ticks: int = 0,
     approach_damping_n_s_m: float = 0.0,
     period_s: float | None = None,
-) -> NDArray[np.float64]:
-    """Returns the one-period matrix of the robot's motion straight towards an obstacle.
+) -> LinearModel:
+    """Returns the sampled model of the robot's motion straight towards an obstacle.
 
     Args:
         scenario: Scenario with mass, robot, plant and damping.
@@ -172,8 +172,8 @@ def contact_matrix(
         period_s: Control period to use instead of the scenario's, s.
 
     Returns:
-        (n, n) matrix A of x+ = A x. The states are those of ``motion_chain``, then the
-        delayed positions, m.
+        Closed loop with the signals of ``motion_chain``. The states are those of
+        ``motion_chain``, then the delayed positions, m.
     """
     damping = damping_n_s_m
     if damping is None:
@@ -182,7 +182,7 @@ def contact_matrix(
     now = delayed_output(chain, "p_WP", latency_ticks)
     law = np.array([[-stiffness_n_m, -damping]]) / scenario.only.robot.mass_kg
     if approach_damping_n_s_m == 0.0:
-        return now.A + now.B @ law @ now.C
+        return replace(now, A=now.A + now.B @ law @ now.C)
     before = delayed_output(chain, "p_WP", latency_ticks + 1)
     # The longer chain contains the position of the shorter chain, one state earlier.
     period = period_s or scenario.tick_s
@@ -190,36 +190,16 @@ def contact_matrix(
     position = np.hstack([now.C[0], [0.0]])
     row = law[0, 0] * position + law[0, 1] * before.C[1]
     row = row - speed * (position - before.C[0])
-    return before.A + before.B @ row[None]
+    return replace(before, A=before.A + before.B @ row[None])
 
 
 class ContactOptions(TypedDict, total=False):
-    """Options of ``contact_matrix`` that replace values of the scenario."""
+    """Options of ``contact_model`` that replace values of the scenario."""
 
     damping_n_s_m: float | None
     motor_lag_s: float | None
     latency_ticks: int
     period_s: float | None
-
-
-def contact_spectral_radius(
-    scenario: Scenario, stiffness_n_m: float, **options: Unpack[ContactOptions]
-) -> float:
-    """Returns the largest |z| of the motion straight towards an obstacle.
-
-    The motion is stable if the value is below 1. ``contact_matrix`` describes the
-    model.
-
-    Args:
-        scenario: Scenario with mass, robot, plant and damping.
-        stiffness_n_m: Sum of all springs, N/m.
-        **options: Options of ``contact_matrix``.
-
-    Returns:
-        |z| over one period, 0 or more.
-    """
-    matrix = contact_matrix(scenario, stiffness_n_m, **options)
-    return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
 def largest_contact_stiffness(
@@ -232,7 +212,7 @@ def largest_contact_stiffness(
 
     Args:
         scenario: Scenario with mass, robot, plant and damping.
-        **options: Options of ``contact_matrix``.
+        **options: Options of ``contact_model``.
 
     Returns:
         Stiffness, N/m. It is 0 if no spring is stable, for example without damping. It
@@ -240,7 +220,7 @@ def largest_contact_stiffness(
     """
 
     def excess(stiffness: float) -> float:
-        return contact_spectral_radius(scenario, stiffness, **options) - 1.0
+        return contact_model(scenario, stiffness, **options).spectral_radius - 1.0
 
     below = 0.0
     for stiffness in _STIFFNESSES:
@@ -310,7 +290,7 @@ def contact_limits(
     )
     left = total - scenario.follower.attraction.stiffness_n_m
     k_ref = scenario.follower.laws.active.reference_stiffness_n_m
-    slope = stiffest("active", scenario)
+    slope = radial_law(scenario.with_robot(law="active")).stiffest_n_m
     return ContactLimits(
         motor_lags_s=tuple(lags),
         latency_ticks=tuple(latency_ticks),

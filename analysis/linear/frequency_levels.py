@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 from scipy.optimize import brentq, minimize_scalar
 
-from analysis.models.linear_models import LinearModel
+from analysis.models.linear_models import LinearModel, s_plane
 
 #: First: points of a grid for figures. Second: points of the first grid of a search.
 GRID_POINTS, SEARCH_POINTS = 1500, 100
@@ -49,26 +49,6 @@ _PEAK = 1e-9
 #: Largest number of rounds for a peak. Two or three usually suffice. More would be due
 #: to rounding errors.
 _ROUNDS = 20
-
-
-def s_plane(
-    poles: NDArray[np.complex128], period_s: float | None
-) -> NDArray[np.complex128]:
-    """Maps poles to the s plane and leaves out those at z = 0 (pure delays).
-
-    Args:
-        poles: (n,) poles: in the z plane if ``period_s`` is set, otherwise in the s
-            plane, rad/s.
-        period_s: Sample period, s. In continuous time: None.
-
-    Returns:
-        (k,) poles in the s plane, rad/s.
-    """
-    poles = np.asarray(poles, dtype=complex)
-    if not period_s:
-        return poles
-    moving = np.asarray(poles[np.abs(poles) > 1e-300], dtype=np.complex128)
-    return np.asarray(np.log(moving) / period_s, dtype=np.complex128)
 
 
 def frequency_grid(
@@ -156,7 +136,7 @@ def level_frequencies(
             continue  # the form is zero at the shift, or everywhere
         mu = np.linalg.eigvals(inverse)
         points = at + 1.0 / mu[np.abs(mu) > 1e-300]
-        found.append(np.abs(s_plane(points, T).imag))
+        found.append(np.abs(np.angle(points) / T if T else points.imag))
         found.append(np.array([omega]))
     every = np.concatenate(found) if found else np.zeros(0)
     top = math.pi / T if T else math.inf
@@ -175,7 +155,7 @@ def _balanced(model: LinearModel) -> tuple[NDArray[np.float64], ...]:
 def _shifts(model: LinearModel) -> list[float]:
     """Frequencies of some modes; a shift gives accurate eigenvalues near itself."""
     top = math.pi / model.period_s if model.period_s else math.inf
-    size = np.sort(np.abs(s_plane(model.poles, model.period_s)))
+    size = np.sort(np.abs(model.s_poles))
     chosen: list[float] = []
     for omega in np.minimum(size[size > 0.0], 0.7 * top):
         if not chosen or omega > _SHIFT_RATIO * chosen[-1]:

@@ -32,7 +32,7 @@ class HeadingLoopMargins:
     crossover_rad_s: float
     phase_margin_deg: float
     delay_margin_s: float
-    """Additional delay at which the loop becomes unstable, s."""
+    """Phase margin divided by crossover frequency, s."""
     delay_margin_ticks: float
     gain_margin_db: float
     continuous_phase_margin_deg: float

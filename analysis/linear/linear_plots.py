@@ -20,6 +20,7 @@ from analysis.models.equilibria import EquilibriumSearch
 from analysis.models.equilibrium_search import CellSearch
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import ideal_loop
+from analysis.models.linear_models import s_plane
 from analysis.reporting.palette import COLOURS, draw_grid
 from systems.world.geometry import rectangle_corners
 
@@ -318,12 +319,12 @@ def plot_pole_cloud(cloud: PoleCloud) -> Figure:
     """Plots the poles ln(z)/T of all samples, with the nominal and the worst case."""
     figure = Figure(figsize=(8.0, 4.4), layout="constrained")
     axes = figure.subplots()
-    everything = _s(cloud, np.concatenate(cloud.poles))
-    for poles, marker, size, colour, label in (
-        (everything, ".", 3, COLOURS["left"], "random values"),
-        (_s(cloud, cloud.worst_poles), "x", 8, COLOURS["source"], "worst case"),
-        (_s(cloud, cloud.nominal_poles), "o", 6, COLOURS["robot"], "nominal"),
+    for z, marker, size, colour, label in (
+        (np.concatenate(cloud.poles), ".", 3, COLOURS["left"], "random values"),
+        (cloud.worst_poles, "x", 8, COLOURS["source"], "worst case"),
+        (cloud.nominal_poles, "o", 6, COLOURS["robot"], "nominal"),
     ):
+        poles = s_plane(z, cloud.period_s)
         slow = poles[np.abs(poles) < _SLOW_1_S]
         axes.plot(
             slow.real,
@@ -346,11 +347,6 @@ def plot_pole_cloud(cloud: PoleCloud) -> Figure:
         frameon=False,
     )
     return figure
-
-
-def _s(cloud: PoleCloud, poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    kept = poles[np.abs(poles) > 0.0].astype(complex)
-    return np.asarray(np.log(kept) / cloud.period_s)
 
 
 def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:

@@ -207,7 +207,7 @@ def frequency_response(model: LinearModel) -> FrequencyResponse:
 
 def _grid(model: LinearModel, points: int) -> NDArray[np.float64]:
     """(n,) frequencies, rad/s, that show the modes of the open and the closed loop."""
-    poles = np.concatenate((model.poles, np.linalg.eigvals(_closed_matrix(model))))
+    poles = np.concatenate((model.poles, _complementary(model).poles))
     return frequency_grid(poles, model.period_s, points=points)
 
 
@@ -235,9 +235,9 @@ def loop_margins(model: LinearModel) -> LoopMargins:
             f"has {model.B.shape[1]} inputs and {model.C.shape[0]} outputs; margins "
             "need exactly one loop; select one with LinearModel.part",
         )
-    if not _closed_is_stable(model):
-        return _nothing(model)
     T = _complementary(model)
+    if not T.stable:
+        return _nothing(model)
     omega = _grid(model, SEARCH_POINTS)
     upper, lower = _gain_margins(model, T, omega)
     lag, lead, crossover, delay = _phase_margins(model, T, omega)
@@ -286,24 +286,12 @@ def _nothing(model: LinearModel) -> LoopMargins:
     )
 
 
-def _closed_matrix(model: LinearModel) -> NDArray[np.float64]:
-    """(n, n) matrix A of the closed loop."""
-    return model.A - model.B @ model.C / (1.0 + model.D[0, 0])
-
-
-def _closed_is_stable(model: LinearModel) -> bool:
-    poles = np.linalg.eigvals(_closed_matrix(model))
-    if model.period_s:
-        return bool((np.abs(poles) < 1.0).all())
-    return bool((poles.real < 0.0).all())
-
-
 def _complementary(model: LinearModel) -> LinearModel:
     """T = L/(1 + L). If the loop is stable, T has no poles on the stability border."""
     share = 1.0 / (1.0 + model.D[0, 0])
     return replace(
         model,
-        A=_closed_matrix(model),
+        A=model.A - model.B @ model.C * share,
         B=share * model.B,
         C=share * model.C,
         D=share * model.D,

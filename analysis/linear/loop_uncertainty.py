@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.laws.radial_law import DISTANCE_STEP_M, radial_law
-from analysis.linear.contact_mode import contact_matrix
+from analysis.laws.radial_law import radial_law
+from analysis.linear.contact_mode import contact_model
 from analysis.linear.robustness import PoleFunction, UncertainParameter
 from analysis.models.equilibria import nearest_equilibrium
 from analysis.models.force_field import ForceField
@@ -49,7 +49,7 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     Raises:
         InputError: The repulsion does not grow as the obstacle comes nearer.
     """
-    stiffness = law_stiffness(scenario)
+    stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:
         raise InputError(
             "law",
@@ -181,11 +181,6 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
     return ((h + distance) / k + k * (h - distance)) / (2.0 * h)
 
 
-def law_stiffness(scenario: Scenario) -> float:
-    """Returns the largest slope -df/dc of the law for an obstacle at rest, N/m."""
-    return float(np.max(-np.diff(radial_law(scenario).forces_n)) / DISTANCE_STEP_M)
-
-
 def contact_poles(scenario: Scenario) -> PoleFunction:
     """Returns a function for the z-plane poles of the motion towards an obstacle.
 
@@ -204,10 +199,8 @@ def contact_poles(scenario: Scenario) -> PoleFunction:
         stiffness = changed.follower.attraction.stiffness_n_m + values.get(
             "law_stiffness_n_m", 0.0
         )
-        matrix = contact_matrix(
-            changed, stiffness, latency_ticks=round(values["extra_ticks"])
-        )
-        return np.linalg.eigvals(matrix).astype(np.complex128)
+        late = round(values["extra_ticks"])
+        return contact_model(changed, stiffness, latency_ticks=late).poles
 
     return poles
 

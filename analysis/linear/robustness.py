@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.models.linear_models import damping_ratio, growth_per_s, s_plane
 from systems.framework.input_error import InputError
 
 #: Function from parameter values by name to poles in the z plane. Poles that are
@@ -90,7 +91,17 @@ class PoleCloud:
     @property
     def worst_damping_ratio(self) -> float:
         """Damping ratio of the slowest pole in the worst case."""
-        return damping_ratio(slowest_pole(self.worst_poles), self.period_s)
+        return float(damping_ratio(slowest_pole(self.worst_poles, self.period_s)))
+
+    @property
+    def nominal_damping_ratio(self) -> float:
+        """Damping ratio of the slowest pole at the nominal values."""
+        return float(damping_ratio(slowest_pole(self.nominal_poles, self.period_s)))
+
+    @property
+    def worst_growth_per_s(self) -> float:
+        """Growth rate in the worst case, 1/s; negative if it decays."""
+        return float(growth_per_s(self.worst_radius, self.period_s))
 
 
 @dataclass(frozen=True)
@@ -106,46 +117,20 @@ class PoleSensitivity:
     """First-order change of the pole over the whole interval, 1/s."""
 
 
-def slowest_pole(poles: NDArray[np.complex128]) -> complex:
+def slowest_pole(poles: NDArray[np.complex128], period: float) -> complex:
     """Returns the pole with the largest |z|.
 
     Of a conjugate pair, the pole in the upper half plane is returned.
 
     Args:
         poles: (n,) poles in the z plane.
-
-    Returns:
-        The pole in the z plane.
-    """
-    pole = complex(poles[np.argmax(np.abs(poles))])
-    return pole if pole.imag >= 0.0 else pole.conjugate()
-
-
-def continuous(pole: complex, period: float) -> complex:
-    """Maps a pole from the z plane to the s plane.
-
-    Args:
-        pole: Pole z, not 0.
-        period: Sampling period T, s.
-
-    Returns:
-        ln(z)/T, 1/s.
-    """
-    return complex(np.log(pole) / period)
-
-
-def damping_ratio(pole: complex, period: float) -> float:
-    """Returns the damping ratio of a pole in the z plane.
-
-    Args:
-        pole: Pole z, neither 0 nor 1.
         period: Sampling period, s.
 
     Returns:
-        Damping ratio, -1 to 1; negative for a growing motion.
+        The pole in the s plane, 1/s.
     """
-    s = continuous(pole, period)
-    return -s.real / abs(s)
+    pole = complex(s_plane(poles[[np.argmax(np.abs(poles))]], period)[0])
+    return pole if pole.imag >= 0.0 else pole.conjugate()
 
 
 def pole_cloud(
@@ -243,21 +228,18 @@ def pole_sensitivities(
         One sensitivity per parameter, in the order of ``parameters``.
     """
     nominal = {p.name: p.nominal for p in parameters}
-    pole = slowest_pole(poles(nominal))
+    pole = slowest_pole(poles(nominal), period)
     rows = []
     for p in parameters:
         step = (1.0 if p.whole else _STEP) * (p.high - p.low)
         ends = (max(p.nominal - step, p.low), min(p.nominal + step, p.high))
         moved = [
-            continuous(_nearest(poles({**nominal, p.name: end}), pole), period)
+            _nearest(s_plane(poles({**nominal, p.name: end}), period), pole)
             for end in ends
         ]
         derivative = (moved[1] - moved[0]) / (ends[1] - ends[0])
-        rows.append(
-            PoleSensitivity(
-                p, continuous(pole, period), derivative, derivative * (p.high - p.low)
-            )
-        )
+        change = derivative * (p.high - p.low)
+        rows.append(PoleSensitivity(p, pole, derivative, change))
     return tuple(rows)
 
 

@@ -8,30 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.linear.contact_mode import contact_matrix
-from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import ideal_loop
-from analysis.models.ideal_scenarios import frozen_scenario, ideal_scenario
+from analysis.laws.radial_law import radial_law
+from analysis.linear.contact_mode import contact_model
+from analysis.models.linear_models import LinearModel
 from diagrams.scenario.scenario import Scenario
-from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 
 #: Factors on the scenario's gain.
 _FACTORS = np.geomspace(0.05, 20.0, 121)
-#: Distances at which a law's slopes are taken, m.
-_DISTANCES_M = np.linspace(0.02, 2.0, 397)
-
-
-@dataclass(frozen=True)
-class ContactSlopes:
-    """Stiffness and damping of a law, as P sees them before an obstacle at rest."""
-
-    distance_m: float
-    """Distance from the obstacle at which the law is stiffest, m."""
-    stiffness_n_m: float
-    """Stiffness -df/dc at this distance, N/m."""
-    approach_damping_n_s_m: float
-    """Damping df/ds there for an approaching obstacle, at s = 0, N s/m."""
 
 
 @dataclass(frozen=True)
@@ -65,34 +49,6 @@ class RootLocus:
         return float(self.values[max(above[0] - 1, 0)])
 
 
-def contact_slopes(scenario: Scenario) -> ContactSlopes:
-    """Returns the slopes of the repulsion at the distance where it is stiffest.
-
-    The forces are those of the scenario's controller block.
-
-    Args:
-        scenario: Scenario with the control law.
-
-    Returns:
-        Distance, stiffness and damping.
-
-    Raises:
-        InputError: The control law does not push the robot away from obstacles.
-    """
-    field = ForceField(ideal_loop(frozen_scenario(ideal_scenario(scenario))))
-    forces = field.law(_DISTANCES_M)
-    slope = -np.gradient(forces, _DISTANCES_M)
-    stiffest = int(slope.argmax())
-    if slope[stiffest] <= 0.0:
-        raise InputError(
-            "law",
-            f"{scenario.only.law!r} does not push off obstacles and has no contact "
-            "mode; use another law",
-        )
-    c = float(_DISTANCES_M[stiffest])
-    return ContactSlopes(c, float(slope[stiffest]), field.approach_damping(c))
-
-
 def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
     """Returns root loci over the stiffness K_r and the damping D_r of the attraction.
 
@@ -112,18 +68,16 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
         parameter: str,
         loop: str,
         today: float,
-        matrix: Callable[[float], NDArray[np.float64]],
+        model: Callable[[float], LinearModel],
     ) -> RootLocus:
         values = _FACTORS * (today if today > 0.0 else 1.0)
         return RootLocus(
             parameter=parameter,
             loop=loop,
             values=values,
-            poles=np.array(
-                [_poles(matrix(float(value)), scenario.tick_s) for value in values]
-            ),
+            poles=np.array([_poles(model(float(value))) for value in values]),
             today=today,
-            poles_today=_poles(matrix(today), scenario.tick_s),
+            poles_today=_poles(model(today)),
         )
 
     target = (
@@ -131,20 +85,21 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
             "attraction.stiffness_n_m",
             "target",
             K,
-            lambda value: contact_matrix(scenario, value),
+            lambda value: contact_model(scenario, value),
         ),
         locus(
             "attraction.damping_n_s_m",
             "target",
             D,
-            lambda value: contact_matrix(scenario, K, damping_n_s_m=value),
+            lambda value: contact_model(scenario, K, damping_n_s_m=value),
         ),
     )
     record = LAWS.get(scenario.only.law)
     if record is None or record.loop_gains is None:
         return target
-    slopes = contact_slopes(scenario)
-    k, d = slopes.stiffness_n_m, slopes.approach_damping_n_s_m
+    force = radial_law(scenario)
+    distance, k = force.stiffest
+    _, d = force.gradient(distance, 0.0)
     law = getattr(scenario.follower.laws, scenario.only.law)
     spring, damper = record.loop_gains
     today, strength = getattr(law, spring), getattr(law, damper)
@@ -154,23 +109,20 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
             f"laws.{scenario.only.law}.{spring}",
             "contact",
             today,
-            lambda value: contact_matrix(scenario, K + k * value / today),
+            lambda value: contact_model(scenario, K + k * value / today),
         ),
         locus(
             f"laws.{scenario.only.law}.{damper}",
             "contact",
             strength,
-            lambda value: contact_matrix(
+            lambda value: contact_model(
                 scenario, K + k, approach_damping_n_s_m=d * value / strength
             ),
         ),
     )
 
 
-def _poles(matrix: NDArray[np.float64], tick_s: float) -> NDArray[np.complex128]:
-    z = np.linalg.eigvals(matrix).astype(complex)
-    z[np.abs(z) < 1e-9] = 0.0
-    gone = z == 0.0
-    poles = np.log(np.where(gone, 1.0, z)) / tick_s
-    poles[gone] = -np.inf
-    return np.sort_complex(poles)
+def _poles(model: LinearModel) -> NDArray[np.complex128]:
+    poles = np.sort_complex(model.s_poles)
+    delays = np.full(len(model.A) - len(poles), -np.inf, dtype=np.complex128)
+    return np.concatenate([delays, poles])

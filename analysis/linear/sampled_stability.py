@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.linear.contact_mode import contact_matrix, delayed_output, motion_chain
-from analysis.models.linear_models import LinearModel
+from analysis.linear.contact_mode import contact_model, delayed_output, motion_chain
+from analysis.models.linear_models import LinearModel, growth_per_s
 from diagrams.scenario.scenario import Scenario
 from systems.framework.signals import TICK_S
 
@@ -127,7 +127,7 @@ class PolesAgainstPeriod:
     def growth_per_s(self) -> NDArray[np.float64]:
         """(n,) growth rate of the slowest mode, 1/s; negative if it decays."""
         radius = np.abs(self.poles).max(axis=1)
-        return np.asarray(np.log(radius) / self.periods_s, dtype=float)
+        return np.asarray(growth_per_s(radius, self.periods_s))
 
 
 def poles_against_period(
@@ -156,9 +156,9 @@ def poles_against_period(
         stiffness = scenario.follower.attraction.stiffness_n_m
     poles = np.zeros((len(periods), 3), dtype=complex)
     for row, period in zip(poles, periods, strict=True):
-        matrix = contact_matrix(scenario, stiffness, period_s=float(period))
+        found = contact_model(scenario, stiffness, period_s=float(period)).poles
         # In a long period the motor lag may vanish, and with it one pole.
-        row[: len(matrix)] = np.linalg.eigvals(matrix)
+        row[: len(found)] = found
     unstable = np.abs(poles).max(axis=1) >= 1.0
     first = int(np.argmax(unstable)) if unstable.any() else len(periods)
     return PolesAgainstPeriod(
@@ -195,18 +195,11 @@ class StabilityChart:
 
 
 def _growth(
-    matrix: Callable[[Any, float], NDArray[np.float64]],
-    x: NDArray[Any],
-    y: NDArray[np.float64],
-    tick_s: float,
+    model: Callable[[Any, float], LinearModel], x: NDArray[Any], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(ny, nx) growth rates of the slowest mode of ``matrix(x, y)``, 1/s."""
-
-    def growth(a: Any, b: float) -> float:
-        radius = float(np.abs(np.linalg.eigvals(matrix(a, b))).max())
-        return math.log(max(radius, 1e-12)) / tick_s
-
-    return np.array([[growth(a, b) for a in x.tolist()] for b in y.tolist()])
+    """(ny, nx) growth rates of the slowest mode of ``model(x, y)``, 1/s."""
+    xs = x.tolist()
+    return np.array([[model(a, b).growth_per_s for a in xs] for b in y.tolist()])
 
 
 def gain_chart(
@@ -241,7 +234,7 @@ def gain_chart(
         x=x,
         y=y,
         growth_per_s=_growth(
-            lambda k, d: contact_matrix(scenario, k, damping_n_s_m=d), x, y, tick_s
+            lambda k, d: contact_model(scenario, k, damping_n_s_m=d), x, y
         ),
         today=(K, D),
     )
@@ -278,7 +271,7 @@ def gain_delay_chart(
         x=ticks * tick_s,
         y=y,
         growth_per_s=_growth(
-            lambda n, k: contact_matrix(scenario, k, latency_ticks=n), ticks, y, tick_s
+            lambda n, k: contact_model(scenario, k, latency_ticks=n), ticks, y
         ),
         today=(0.0, scenario.follower.attraction.stiffness_n_m),
     )

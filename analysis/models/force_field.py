@@ -101,31 +101,6 @@ class ForceField:
                 forces[k] = -read.Eval(context)[2]
         return forces
 
-    def approach_damping(self, distance: float, speed: float = 1e-4) -> float:
-        """Returns the slope of the repulsion in the speed of an approaching obstacle.
-
-        Args:
-            distance: Distance of the obstacle, m.
-            speed: Speed of the obstacle for the finite difference, m/s.
-
-        Returns:
-            Derivative of the repulsion by the approach speed, N s/m. A positive value
-            means that the repulsion grows with the speed.
-        """
-        block, context = self._controller(twin=False)
-        self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
-        port = block.GetInputPort("collision_vectors_B")
-        port.FixValue(context, [distance, 0.0, 0.0, 0.0, 0.0, 0.0])
-        state = context.get_discrete_state(0).CopyToVector()
-        pushes, tick_s = [], self.loop.tick_s
-        for earlier in (distance, distance + speed * tick_s):
-            seen = np.zeros(len(state))
-            seen[:2] = 1.0, earlier
-            context.SetDiscreteState(0, seen)
-            pushes.append(-block.GetOutputPort("forces_W").Eval(context)[2])
-        context.SetDiscreteState(0, state)
-        return float(pushes[1] - pushes[0]) / speed
-
     def _controller(self, *, twin: bool) -> tuple[Any, Any]:
         block, made = self.loop.block("controller", twin=twin), ("controller", twin)
         if made not in self._contexts:

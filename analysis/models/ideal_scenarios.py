@@ -11,14 +11,9 @@ from systems.base.parameters import PlantParameters
 from systems.framework.input_error import InputError
 
 _ALL_IDEAL: dict[str, Any] = {
-    "hearing": "ideal",
+    "hearing": "ideal_always",
     "obstacle_sensing": "ideal",
-    "ideal_hearing": {
-        "burst_gaps": False,
-        "bearing_noise_deg": 0.0,
-        "range_noise_fraction": 0.0,
-    },
-    "odometry": {"rounding": False},
+    "plant": {"pulses_per_revolution": None},
     # A guard that passes the law's command does not change the loop.
     "guard": None,
 }
@@ -115,10 +110,9 @@ def require_ideal(scenario: Scenario) -> None:
     scenario.require_one_robot("a linear model")
     scenario.require_one_rate("a linear model")
     require_rolling(scenario.only.plant)
-    hearing = scenario.follower.ideal_hearing
     checks = (
         (
-            scenario.follower.hearing == "ideal",
+            not scenario.follower.listens,
             "hearing",
             "'audio' has no linear model, because a waveform has no equilibrium",
         ),
@@ -128,8 +122,8 @@ def require_ideal(scenario: Scenario) -> None:
             "'ultrasonic' has no linear model, because ranges of cones jump",
         ),
         (
-            not scenario.only.odometry.rounding,
-            "odometry.rounding",
+            scenario.only.plant.pulses_per_revolution is None,
+            "plant.pulses_per_revolution",
             "a rounded wheel angle has no derivative",
         ),
         (
@@ -139,11 +133,6 @@ def require_ideal(scenario: Scenario) -> None:
                 "the decisions of a guard have no derivative, and a guard that "
                 "passes a command does not change it"
             ),
-        ),
-        (
-            hearing.bearing_noise_deg == hearing.range_noise_fraction == 0.0,
-            "ideal_hearing",
-            "noise has no derivative",
         ),
     )
     for holds, field, reason in checks:

@@ -9,13 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 #: A sampled pole nearer to z = 1 than this counts as neutral. A rounding error of
 #: 1e-10 in a matrix moves a double pole by the square root, 1e-5.
 NEUTRAL = 1e-5
 #: A pole nearer to z = 0 than this counts as a delay, which has no pole in the s plane.
-_DELAY = 1e-6
+DELAY = 1e-6
 #: Number of matrix elements that are solved at once.
 _CHUNK = 100_000
 
@@ -42,8 +42,7 @@ class Mode:
     @property
     def damping_ratio(self) -> float:
         """Damping ratio -Re s / |s|; NaN for a pole at the origin."""
-        size = abs(self.eigenvalue)
-        return -self.eigenvalue.real / size if size > 0.0 else math.nan
+        return damping_ratio(self.eigenvalue) if self.eigenvalue else math.nan
 
     @property
     def time_constant_s(self) -> float:
@@ -106,6 +105,44 @@ class LinearModel:
         """(n,) eigenvalues of A, in the z plane (sampled) or s plane (continuous)."""
         return np.linalg.eigvals(self.A).astype(np.complex128)
 
+    @property
+    def s_poles(self) -> NDArray[np.complex128]:
+        """(k,) poles in the s plane, rad/s, without pure delays (z = 0)."""
+        return s_plane(self.poles, self.period_s)
+
+    @property
+    def spectral_radius(self) -> float:
+        """Largest |z| of a sampled model; 0 without states."""
+        return float(np.abs(self.poles).max(initial=0.0))
+
+    @property
+    def growth_per_s(self) -> float:
+        """Growth rate of the slowest mode, 1/s; negative if all modes decay.
+
+        If all poles are pure delays, the value is -infinity.
+        """
+        if self.period_s:
+            return float(growth_per_s(self.spectral_radius, self.period_s))
+        return float(self.poles.real.max(initial=-math.inf))
+
+    @property
+    def stable(self) -> bool:
+        """Whether all modes decay."""
+        if self.period_s:
+            return self.spectral_radius < 1.0
+        return self.growth_per_s < 0.0
+
+    @property
+    def damping_ratio(self) -> float:
+        """Damping ratio of the least damped mode; 1 if no mode oscillates."""
+        return float(damping_ratio(self.s_poles).min(initial=1.0))
+
+    @property
+    def settling_s(self) -> float:
+        """Time in which the slowest mode falls to 2 %, s; infinite if it grows."""
+        growth = self.growth_per_s
+        return -4.0 / growth if growth < 0.0 else math.inf
+
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
         """Modes of the model, slowest first, without pure delays (z = 0)."""
@@ -115,12 +152,11 @@ class LinearModel:
         shares = np.abs(left * right)
         modes = []
         for value, share in zip(values.astype(complex), shares.T, strict=True):
-            if value.imag < 0.0 or (self.period_s and abs(value) < _DELAY):
+            poles = s_plane(np.array([value]), self.period_s)
+            if value.imag < 0.0 or not len(poles):
                 continue
-            s = complex(np.log(value)) / self.period_s if self.period_s else value
-            modes.append(
-                Mode(value if self.period_s else None, s, self._participation(share))
-            )
+            z = value if self.period_s else None
+            modes.append(Mode(z, complex(poles[0]), self._participation(share)))
         return tuple(sorted(modes, key=lambda mode: -mode.eigenvalue.real))
 
     def _participation(self, share: NDArray[np.float64]) -> dict[str, float]:
@@ -159,6 +195,36 @@ class LinearModel:
             input_names=tuple(inputs),
             output_names=tuple(outputs),
         )
+
+
+def s_plane(
+    poles: NDArray[np.complex128], period_s: float | None
+) -> NDArray[np.complex128]:
+    """Returns poles in the s plane, ln(z)/T, without pure delays (z = 0).
+
+    Args:
+        poles: (n,) poles: in the z plane if ``period_s`` is set, otherwise in the s
+            plane, rad/s.
+        period_s: Sample period T, s. In continuous time: None.
+
+    Returns:
+        (k,) poles in the s plane, rad/s, in the order of ``poles``.
+    """
+    poles = np.asarray(poles, dtype=np.complex128)
+    if not period_s:
+        return poles
+    return np.asarray(np.log(poles[np.abs(poles) > DELAY]) / period_s)
+
+
+def growth_per_s(radius: ArrayLike, period_s: ArrayLike) -> Any:
+    """Returns ln(radius)/T, the growth rate of a mode with |z| = ``radius``, 1/s."""
+    with np.errstate(divide="ignore"):
+        return np.log(radius) / period_s
+
+
+def damping_ratio(s: Any) -> Any:
+    """Returns -Re s/|s| of poles in the s plane, other than 0; negative if growing."""
+    return -np.real(s) / np.abs(s)
 
 
 def simple_poles(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -19,7 +19,7 @@ from scipy.optimize import root_scalar
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
 from analysis.models.ideal_scenarios import changed, ideal_scenario
-from analysis.models.linear_models import NEUTRAL, LinearModel, Mode
+from analysis.models.linear_models import NEUTRAL, LinearModel, Mode, s_plane
 from analysis.models.model_reduction import minimal_model
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -116,8 +116,7 @@ class OperatingPoint:
     def eigenvalues(self) -> NDArray[np.complex128]:
         """Poles ln(z)/T of the motion in the s plane, rad/s, without neutral ones."""
         poles = self.motion.poles
-        poles = poles[(np.abs(poles - 1.0) > NEUTRAL) & (np.abs(poles) > 1e-6)]
-        return np.asarray(np.log(poles) / self.loop.tick_s, dtype=complex)
+        return s_plane(poles[np.abs(poles - 1.0) > NEUTRAL], self.loop.tick_s)
 
     @property
     def stable(self) -> bool:

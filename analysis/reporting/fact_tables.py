@@ -1,11 +1,11 @@
-"""HTML tables of named values."""
+"""Tables of named values."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analysis.reporting.html_page import Cell, number, table
+from analysis.reporting.section import Cell, Table, number
 
 #: Endings of names, and the units that they mean; longest endings first.
 _UNITS = {
@@ -45,23 +45,16 @@ def _words(name: str) -> str:
 
 def fact_table(
     facts: Mapping[str, Any], *, skip: Sequence[str] = (), caption: str = ""
-) -> str:
+) -> Table:
     """Makes a table with two columns: the name and the value of each fact.
 
     If a value is a mapping, its entries get a row each. Their names start with the name
-    of the mapping.
-
-    Args:
-        facts: Plain values by name (see ``analysis.reporting.plain_values``). The table
-            omits lists of mappings and lists of more than 8 values.
-        skip: Keys or dotted paths of values to omit.
-        caption: Text above the table.
-
-    Returns:
-        HTML.
+    of the mapping. The table omits lists of mappings and lists of more than 8 values,
+    and also the keys and dotted paths in ``skip``. ``facts`` are plain values (see
+    ``analysis.reporting.plain_values``).
     """
     rows = list(_facts(facts, "", "", frozenset(skip)))
-    return table(["", ""], rows, caption=caption)
+    return Table(["", ""], rows, caption)
 
 
 def _facts(
@@ -95,19 +88,12 @@ def _cell(value: Any) -> Any:
     return _LEFT_OUT
 
 
-def row_table(rows: Sequence[Mapping[str, Any]], *, caption: str = "") -> str:
-    """Makes a table with one row for each mapping.
+def row_table(rows: Sequence[Mapping[str, Any]], *, caption: str = "") -> Table:
+    """Makes a table with one row for each mapping; there is at least one.
 
-    Args:
-        rows: Plain values by name. The names of the first row are the headings of the
-            columns. The table omits values that do not fit into a cell.
-        caption: Text above the table.
-
-    Returns:
-        HTML; an empty text if there are no rows.
+    The names of the first row are the headings of the columns. The table omits values
+    that do not fit into a cell.
     """
-    if not rows:
-        return ""
     keys = [k for k, value in rows[0].items() if _cell(value) is not _LEFT_OUT]
     body: list[list[Cell]] = [[_cell(row.get(key)) for key in keys] for row in rows]
-    return table([readable_name(key) for key in keys], body, caption=caption)
+    return Table([readable_name(key) for key in keys], body, caption)

@@ -67,6 +67,11 @@ def _leaf(value: Any) -> Any:
     )
 
 
+def pick(value: Any, *names: str) -> dict[str, Any]:
+    """Returns some attributes of an object by name."""
+    return {name: getattr(value, name) for name in names}
+
+
 def write_json(document: Any, path: Path) -> None:
     """Writes a document as indented JSON.
 

@@ -6,7 +6,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 
 #: Version of the JSON documents. It increases when a key changes its meaning.
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 #: Packages that can change a result.
 _PACKAGES = ("phonotaxis", "drake", "numpy", "scipy", "numba", "soxr", "soundfile")
 

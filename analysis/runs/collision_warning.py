@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,41 +14,24 @@ from systems.world.geometry import fan_ranges
 SAME_M = 0.03
 
 
-def collision_warning(result: RunResult) -> dict[str, float | None]:
-    """Computes how early the range sensors saw the body that the robot touched.
-
-    The result has these entries:
-
-    - ``contact_warning_s``: time from the first echo of the body to the contact, s. The
-      value is None if the body never caused an echo.
-    - ``contact_unseen_s``: time from the last echo of the body to the contact, s. The
-      value is None if the body never caused an echo.
-    - ``contact_push_n``: magnitude of the repulsive force of the control law at the
-      last tick (control period), N. The force can come from any obstacle. The value is
-      None if the law does not log its forces.
+def echo_times(result: RunResult) -> tuple[float | None, float | None]:
+    """Computes when the range sensors saw the body that the robot touched.
 
     Args:
-        result: Result of a run, for one robot.
+        result: Result of a run, for one robot with range sensors.
 
     Returns:
-        Value of each entry, by name. If the run had no collision, all values are None.
-        If the robot has no range sensors, the dictionary is empty.
+        Two times, s: from the first and from the last echo of the body to the contact.
+        Both are None if the run had no collision, or the body never caused an echo.
     """
-    hit, columns = result.collision, result.columns
-    if "range_1" not in columns:
-        return {}
-    warning = unseen = push = None
-    if hit is not None:
-        known = result.time[_echoes(result, hit.object)]
-        if len(known):
-            warning, unseen = np.maximum(hit.time - known[[0, -1]], 0.0).tolist()
-        if "repulsion_x" in columns:
-            push = math.hypot(*result.vector("repulsion")[:, -1])
-    return {
-        "contact_warning_s": warning,
-        "contact_unseen_s": unseen,
-        "contact_push_n": push,
-    }
+    hit = result.collision
+    if hit is None:
+        return None, None
+    known = result.time[_echoes(result, hit.object)]
+    if not len(known):
+        return None, None
+    first, last = np.maximum(hit.time - known[[0, -1]], 0.0).tolist()
+    return first, last
 
 
 def _echoes(result: RunResult, name: str) -> NDArray[np.bool_]:

@@ -116,7 +116,6 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
         parameters=scenario.follower.own_map,
         sensors=sensors,
         robot=scenario.only.robot,
-        odometry=scenario.only.odometry,
         plant=scenario.only.plant,
         tick_s=tick_s,
     )

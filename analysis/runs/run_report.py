@@ -1,21 +1,16 @@
-"""Writes the files of a run, and a summary that fits on one screen."""
+"""Summarizes a run as a JSON document, and as text that fits on one screen."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from analysis.reporting.plain_values import plain, write_json
+from analysis.reporting.plain_values import plain
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.runs.guarded_motion import halts_of
-from analysis.runs.metrics import run_metrics
-from analysis.runs.proximity import Proximity
-from diagrams import RunResult, build_sound_follower, write_scenario
+from analysis.runs.metric_table import METRICS, run_metrics
+from diagrams import RunResult
 from diagrams.running.stop_rules import SUCCESSFUL
 from systems.search.search_ending import fault_names
 
@@ -70,71 +65,6 @@ def _outcome(result: RunResult) -> dict[str, Any]:
         faults = fault_names(result.columns["search_fault"][-1])
         ended |= {"reason": result.reason or None, "faults": faults}
     return ended
-
-
-def write_run(
-    result: RunResult,
-    summary: dict[str, Any],
-    directory: Path,
-    *,
-    pictures: bool = True,
-) -> None:
-    """Writes all files of a run into an existing directory.
-
-    The files are:
-
-    - ``scenario.yaml``: the complete scenario, which can be run again
-    - ``scenario.schema.json``: the schema of this scenario file
-    - ``summary.json``: the summary
-    - ``trajectory.parquet``: the table with one row per tick (control period)
-    - ``replay.html``: the replay in three dimensions
-    - ``trajectory.png``, ``time_series.png`` and ``diagram.svg``: the pictures
-    - ``report.html``: a page with the pictures, and with links to other files
-
-    With several robots, each robot has its own ``time_series_<name>.png`` and
-    ``diagram_<name>.svg``. The file ``diagram.svg`` then shows how the robots are
-    connected.
-
-    Args:
-        result: Result of the run.
-        summary: Summary of the run, from ``run_summary``.
-        directory: Existing directory.
-        pictures: Whether to write the PNG and SVG files.
-    """
-    from analysis.runs.replay import write_replay
-    from analysis.runs.run_page import run_page
-
-    write_scenario(result.full_scenario, directory)
-    write_json(summary, directory / "summary.json")
-    result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
-    clearance = {name: Proximity(o).clearance for name, o in result.robots.items()}
-    if pictures:
-        _write_pictures(result, clearance, directory)
-    write_replay(result, directory / "replay.html", clearance)
-    rows = summary_rows(result, summary)
-    (directory / "report.html").write_text(
-        run_page(result, rows, summary, directory), "utf-8"
-    )
-
-
-def _write_pictures(
-    result: RunResult, clearance: dict[str, NDArray[np.float64]], directory: Path
-) -> None:
-    from analysis.runs.run_plots import plot_time_series, plot_trajectory
-    from analysis.wiring.block_diagram import write_block_diagram
-
-    plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
-    for name, own in result.robots.items():
-        ending = f"_{name}" if result.several else ""
-        figure = plot_time_series(own, clearance[name])
-        figure.savefig(directory / f"time_series{ending}.png", dpi=150)
-    follower = build_sound_follower(result.full_scenario)
-    write_block_diagram(
-        follower.diagram, directory / "diagram.svg", flat=not result.several
-    )
-    if result.several:
-        for name, parts in follower.robots.items():
-            write_block_diagram(parts.diagram, directory / f"diagram_{name}.svg")
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
@@ -193,50 +123,32 @@ def _robot_rows(
     """Returns the rows of one robot; their names and metrics begin with the prefix."""
     robot, stop = result.scenario.only, result.scenario.stop
 
-    def metric(name: str) -> Any:
-        return metrics[f"{prefix}{name}"]
+    def text(name: str) -> str:
+        return METRICS[name].text(metrics[f"{prefix}{name}"])
 
     rows = {
-        "least clearance": _metres(metric("minimum_clearance_m")),
-        "distance at the end": _metres(metric("final_distance_m")),
-        "path length": _metres(metric("path_length_m")),
+        METRICS[name].title: text(name)
+        for name in ("minimum_clearance_m", "final_distance_m", "path_length_m")
     }
     if robot.searches is not None:
-        rows |= _search_rows(result, metric)
+        rows["steps"] = f"{text('search_steps')} in {text('search_time_s')}"
+        rows[METRICS["path_efficiency"].title] = text("path_efficiency")
+        if broken := fault_names(result.columns["search_fault"][-1]):
+            rows["broken"] = ", ".join(broken)
     elif robot.kind != "router":
+        fraction = metrics[f"{prefix}following_fraction"]
+        percent = "-" if fraction is None else f"{100.0 * fraction:.0f} %"
         rows |= {
-            "follow distance": _metres(robot.follow_distance_m),
-            "following": _percent(metric("following_fraction"))
-            + f" of the time within {stop.following_band_m:.2f} m of it",
-            "following error": _metres(metric("following_error_rms_m")) + " rms",
-            "frames heard": f"{metric('frames_with_sound_heard')} of "
-            f"{metric('frames_with_sound')} with sound; "
-            f"{metric('detections_with_range')} of {metric('detections')} with a range",
-            "position error": _metres(metric("source_error_median_m"))
-            + " median, "
-            + _metres(metric("source_error_p95_m"))
-            + " at 95 %",
+            "follow distance": f"{robot.follow_distance_m:.3f} m",
+            "following": f"{percent} of the time within {stop.following_band_m:.2f} m "
+            "of it",
+            "following error": f"{text('following_error_rms_m')} rms",
+            "frames heard": f"{text('frames_with_sound_heard')} of "
+            f"{text('frames_with_sound')} with sound; {text('detections_with_range')} "
+            f"of {text('detections')} with a range",
+            "position error": f"{text('source_error_median_m')} median, "
+            f"{text('source_error_p95_m')} at 95 %",
         }
     if halts := halts_of(result):
         rows["halted by the guard"] = "; ".join(map(str, halts))
     return {f"{prefix}{name}": value for name, value in rows.items()}
-
-
-def _search_rows(result: RunResult, metric: Callable[[str], Any]) -> dict[str, str]:
-    """Returns the effort of a search, and the faults that the search has found."""
-    efficiency = metric("path_efficiency")
-    rows = {
-        "steps": f"{metric('search_steps'):.0f} in {metric('search_time_s'):.0f} s",
-        "straight over driven": "-" if efficiency is None else f"{efficiency:.2f}",
-    }
-    if broken := fault_names(result.columns["search_fault"][-1]):
-        rows["broken"] = ", ".join(broken)
-    return rows
-
-
-def _metres(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f} m"
-
-
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100.0 * value:.0f} %"

@@ -15,12 +15,11 @@ from systems.base.robot import body_radius
 from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
+from systems.safety.parameters import START_BUBBLE_M
 from systems.world.geometry import beyond_rectangle, rectangle_clearance
 
 #: Duration of a run, s.
 DURATION_S = 10.0
-#: Radius of the circle about the start that contains no body, m.
-BUBBLE_M = 1.0
 #: Number of bodies in every layout. Bodies that a layout does not need are far away.
 _BODIES = 6
 #: Modes of a row of a driver's table.
@@ -184,12 +183,12 @@ VARIANTS: dict[str, dict[str, Any]] = {
 #: All settings. Unless ``draw_trial`` gets a setting, it uses only ``VARIANTS``.
 SETTINGS = {
     **VARIANTS,
-    "encoders not rounded": {"odometry": {"rounding": False}},
+    "encoders not rounded": {"plant": {"pulses_per_revolution": None}},
     "slip apart, known to 10 cm": {
         "plant": {"slip": (0.005, -0.005)},
         "guard": {"wheel_error": 0.005, "place_error_m": 0.1},
     },
-    "encoders of 650 pulses": {"odometry": {"pulses_per_revolution": 650}},
+    "encoders of 650 pulses": {"plant": {"pulses_per_revolution": 650}},
 }
 
 
@@ -201,7 +200,7 @@ def _box(
 
 def _posts(draw: np.random.Generator) -> list[tuple[float, ...]]:
     angle = draw.uniform(-math.pi, math.pi, _BODIES)
-    far = BUBBLE_M + 0.015 + draw.exponential(0.5, _BODIES)
+    far = START_BUBBLE_M + 0.015 + draw.exponential(0.5, _BODIES)
     return [
         _box(r * math.cos(a), r * math.sin(a), 0.0, 0.02, 0.02)
         for r, a in zip(far, angle, strict=True)
@@ -211,7 +210,7 @@ def _posts(draw: np.random.Generator) -> list[tuple[float, ...]]:
 def _slit(draw: np.random.Generator) -> list[tuple[float, ...]]:
     gap, thick = draw.uniform(0.78, 1.05), draw.uniform(0.02, 0.4)
     angle, tilt = draw.uniform(-math.pi, math.pi), draw.normal(0.0, 0.3)
-    far, aside = BUBBLE_M + draw.uniform(0.1, 0.8), draw.normal(0.0, 0.1)
+    far, aside = START_BUBBLE_M + draw.uniform(0.1, 0.8), draw.normal(0.0, 0.1)
     boxes = []
     for side in (1.0, -1.0):
         along = aside + side * (0.5 * gap + 0.75)
@@ -223,7 +222,7 @@ def _slit(draw: np.random.Generator) -> list[tuple[float, ...]]:
 
 def _wedge(draw: np.random.Generator) -> list[tuple[float, ...]]:
     angle, half = draw.uniform(-math.pi, math.pi), draw.uniform(0.3, 1.1)
-    far, boxes = BUBBLE_M + draw.uniform(0.2, 1.2), []
+    far, boxes = START_BUBBLE_M + draw.uniform(0.2, 1.2), []
     for side in (half, -half):
         towards = angle + math.pi + side
         x = far * math.cos(angle) + 1.0 * math.cos(towards)
@@ -235,7 +234,7 @@ def _wedge(draw: np.random.Generator) -> list[tuple[float, ...]]:
 def _walls(draw: np.random.Generator) -> list[tuple[float, ...]]:
     boxes = []
     for angle in draw.uniform(-math.pi, math.pi, int(draw.integers(1, 4))):
-        far = BUBBLE_M + 0.0505 + abs(draw.normal(0.0, 0.2))
+        far = START_BUBBLE_M + 0.0505 + abs(draw.normal(0.0, 0.2))
         boxes.append(_box(far * math.cos(angle), far * math.sin(angle), angle, 0.1, 3))
     return boxes
 
@@ -247,8 +246,8 @@ def _bubble(draw: np.random.Generator) -> list[tuple[float, ...]]:
         length, width = draw.uniform(0.02, 0.3, 2)
         boxes.append(
             _box(
-                (BUBBLE_M + length) * math.cos(angle),
-                (BUBBLE_M + length) * math.sin(angle),
+                (START_BUBBLE_M + length) * math.cos(angle),
+                (START_BUBBLE_M + length) * math.sin(angle),
                 angle + draw.choice([0.0, math.pi / 4.0]),
                 length,
                 width,
@@ -259,7 +258,10 @@ def _bubble(draw: np.random.Generator) -> list[tuple[float, ...]]:
 
 def _corner(draw: np.random.Generator) -> list[tuple[float, ...]]:
     """Two walls that meet at a random point and are perpendicular."""
-    angle, far = draw.uniform(-math.pi, math.pi), BUBBLE_M + draw.uniform(0.05, 0.6)
+    angle, far = (
+        draw.uniform(-math.pi, math.pi),
+        START_BUBBLE_M + draw.uniform(0.05, 0.6),
+    )
     turn = draw.uniform(-math.pi, math.pi)
     x, y = far * math.cos(angle), far * math.sin(angle)
     return [
@@ -328,7 +330,7 @@ def outside(boxes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
         while True:
             stretch = 1.0 + 0.002 * step / far
             box = x * stretch, y * stretch, *rest
-            if math.hypot(*beyond_rectangle((0.0, 0.0), box)) >= BUBBLE_M + 1e-4:
+            if math.hypot(*beyond_rectangle((0.0, 0.0), box)) >= START_BUBBLE_M + 1e-4:
                 break
             step += 1
         moved.append(box)
@@ -384,7 +386,7 @@ def make_trial(
             "rest_time_s": 1e4,
             "diverged_range_m": 1e3,
         },
-        "guard": {"obstacle_speed_m_s": 0.0, "start_bubble_m": BUBBLE_M},
+        "guard": {"obstacle_speed_m_s": 0.0},
     }
     fields = _merged(fields, SETTINGS[variant])
     table = np.array([Row(*row) for row in rows] or [Row(0.0)], dtype=float)

@@ -20,7 +20,6 @@ from scipy.optimize import differential_evolution
 
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.safety.driver_trials import (
-    BUBBLE_M,
     USUAL,
     Outcome,
     Row,
@@ -31,6 +30,7 @@ from analysis.safety.driver_trials import (
 )
 from analysis.safety.job_pool import run_jobs
 from systems.framework.signals import TICK_S
+from systems.safety.parameters import START_BUBBLE_M
 
 # Number of trials per job. A multiple of this has the same setting of the robot.
 _CHUNK = 50
@@ -92,7 +92,7 @@ def by_search(runs: int, seed: int) -> list[Found]:
     encloses the robot's body.
     """
     bounds = [(-math.pi, math.pi)]
-    bounds += [(-math.pi, math.pi), (BUBBLE_M + 0.012, 2.5)] * _POSTS
+    bounds += [(-math.pi, math.pi), (START_BUBBLE_M + 0.012, 2.5)] * _POSTS
     bounds += [(0.5, 5.0), (-0.72, 0.72), (-3.0, 3.0)] * _COMMANDS
     found: list[Found] = []
 

@@ -1,9 +1,9 @@
 """Stability analysis of the law of a scenario, part by part.
 
-A part is one analysis and its section in the report. A part has one function that
-computes a data object and one function that writes the object as HTML. The parts run in
-order, and a part may use the data of earlier parts. If a part does not apply to a law
-or to a scenario, its section states the reason. The other parts still run.
+A part is one analysis. It has a function that computes a data object, and a function
+that shows the object as contents of a section of the report. The parts run in order,
+and a part may use the data of earlier parts. If a part does not apply to a law or to a
+scenario, its section states the reason. The other parts still run.
 """
 
 from __future__ import annotations
@@ -11,14 +11,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from analysis.models.linear_models import LinearModel
+from analysis.reporting.criterion import Criterion, Verdict
+from analysis.reporting.section import Content, Note, Section
 from analysis.run_error import failure_text
 from analysis.stability.model_sheet import ModelSheet, model_sheet
-from analysis.stability.verdicts import Verdict
 from diagrams import Scenario
 from systems.framework.input_error import InputError
+
+Data = TypeVar("Data")
 
 
 @dataclass(frozen=True)
@@ -27,22 +30,14 @@ class Study:
 
     scenario: Scenario
     """The scenario with the law to analyze."""
+    full: bool = False
+    """Whether the parts may take minutes."""
     found: dict[str, Any] = field(default_factory=dict)
-    """Data objects of earlier parts, by key. None for a part without a result."""
+    """Data objects of earlier parts, by key. A part without a result has no entry."""
 
     def need(self, key: str) -> Any:
-        """Returns the data object of an earlier part.
-
-        Args:
-            key: Key of the earlier part.
-
-        Returns:
-            The data object.
-
-        Raises:
-            InputError: The earlier part has no result.
-        """
-        if self.found.get(key) is None:
+        """Returns the data of an earlier part; InputError if the part has no result."""
+        if key not in self.found:
             raise InputError(
                 f"{key}",
                 "has no result, and this part depends on it; correct the problem "
@@ -52,44 +47,60 @@ class Study:
 
 
 @dataclass(frozen=True)
-class Part:
-    """One analysis and its section in the report."""
+class Part(Generic[Data]):
+    """One analysis, which becomes a section of the report."""
 
     key: str
-    """Name of the part in the JSON document and in links."""
+    """Name of the section in the JSON document and in links."""
     title: str
-    compute: Callable[[Study], Any]
+    compute: Callable[[Study], Data]
     """Computes the data object. If the part does not apply, the function raises an
     InputError with the reason."""
-    render: Callable[[Any, str], list[str]]
-    """Makes pieces of HTML from the data object and from a prefix for the names of
-    figures."""
+    show: Callable[[Data], Sequence[Content]]
+    """Returns the contents of the section, in the order in which they are read."""
+    criteria: tuple[Criterion[Data], ...] = ()
+    """Criteria that judge numbers of the data object."""
+    document: Callable[[Data], Any] | None = None
+    """Returns what the JSON document states. If this field is None, the document states
+    the whole data object."""
+    models: Callable[[Data], Sequence[LinearModel]] = lambda data: ()
+    """Returns the linear models that are written to files."""
+    notes: Callable[[Data], Sequence[str]] = lambda data: ()
+    """Returns notes that readers must know before they use the numbers."""
     fresh: bool = False
     """Whether the section begins on a new page of paper."""
-    document: Callable[[Any], dict[str, Any]] | None = None
-    """Makes the entries of the JSON document from the data object. If this field is
-    None, the data object is the only entry, and its key is the key of the part."""
-    models: Callable[[Any], Sequence[LinearModel]] | None = None
-    """Returns the linear models that are written to files. If this field is None, the
-    part has no models."""
-    notes: Callable[[Any], Sequence[str]] | None = None
-    """Returns notes that readers must know before they use the numbers. If this field
-    is None, the part has no notes."""
+    slow: bool = False
+    """Whether the part takes minutes. Only a full report has such parts."""
 
+    def section(self, data: Data) -> Section:
+        """Returns the section of the report about a data object."""
+        return Section(
+            self.key,
+            self.title,
+            self.show(data),
+            self.document(data) if self.document else data,
+            tuple(criterion.judge(data) for criterion in self.criteria),
+            self.fresh,
+        )
 
-@dataclass(frozen=True)
-class Finding:
-    """The result of one part, or the reason why the part has no result."""
+    def problem(self, text: str, *, failed: bool = False) -> Section:
+        """Returns the section of a part without a result, which states the reason.
 
-    part: Part
-    data: Any | None
-    problem: str
-    """Reason why there is no data object. Empty if there is one."""
-    seconds: float
-    """Computing time of the part, s."""
-    failed: bool = False
-    """Whether the part has no result because of a fault of the program. The fault is
-    then not in the law or in the scenario."""
+        ``failed`` states whether the reason is a fault of the program, and not of the
+        law or of the scenario.
+        """
+        words = "This part failed" if failed else "Not computed"
+        return Section(
+            self.key,
+            self.title,
+            [Note(f"{words}: {text}.")],
+            {"problem": text} | ({"failed": True} if failed else {}),
+            tuple(
+                criterion.without_number(f"the part '{self.title}' has no result")
+                for criterion in self.criteria
+            ),
+            self.fresh,
+        )
 
 
 @dataclass(frozen=True)
@@ -98,9 +109,18 @@ class LawAnalysis:
 
     scenario: Scenario
     sheet: ModelSheet
-    findings: dict[str, Finding]
+    sections: list[Section] = field(default_factory=list)
+    """Sections of all parts, in the order of the parts."""
+    found: dict[str, Any] = field(default_factory=dict)
+    """Data objects by key of the part. A part without a result has no entry."""
+    models: list[LinearModel] = field(default_factory=list)
+    """Linear models of all parts, which are written to files."""
+    notes: list[str] = field(default_factory=list)
+    """Notes of all parts for the first page, each a sentence."""
+    computing_time_s: dict[str, float] = field(default_factory=dict)
+    """Computing time by key of the part."""
     failures: dict[str, Exception] = field(default_factory=dict)
-    """Unexpected exceptions, by key of the part that raised them."""
+    """Unexpected exceptions by key of the part that raised them."""
 
     @property
     def law(self) -> str:
@@ -108,40 +128,21 @@ class LawAnalysis:
         return self.scenario.only.law
 
     @property
-    def models(self) -> tuple[LinearModel, ...]:
-        """Linear models of all parts, which are written to files."""
-        return tuple(
-            model
-            for finding in self.findings.values()
-            if finding.part.models and not finding.problem
-            for model in finding.part.models(finding.data)
-        )
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Notes of all parts for the first page, each a sentence."""
-        return tuple(
-            note
-            for finding in self.findings.values()
-            if finding.part.notes and not finding.problem
-            for note in finding.part.notes(finding.data)
-        )
-
-    @property
     def verdicts(self) -> Sequence[Verdict]:
-        """Verdicts of the last part. Empty if this part has no result."""
-        return self.data("verdicts") or ()
+        """Verdicts of all sections."""
+        return [verdict for each in self.sections for verdict in each.verdicts]
 
-    def data(self, key: str) -> Any | None:
-        """Returns the data object of a part, or None if the part has no result."""
-        finding = self.findings.get(key)
-        return finding and finding.data
+    def fail(self, key: str, error: Exception) -> str:
+        """Notes an unexpected exception of a part, and describes it in one line."""
+        self.failures[key] = error
+        return failure_text(error)
 
 
 def analyse_law(
     scenario: Scenario,
-    parts: Sequence[Part],
+    parts: Sequence[Part[Any]],
     *,
+    full: bool = False,
     step: Callable[[str], None] = lambda title: None,
 ) -> LawAnalysis:
     """Runs the parts of the stability analysis for the law of a scenario.
@@ -150,37 +151,40 @@ def analyse_law(
         scenario: The scenario with the law. The sensors may be exact or realistic,
             because each part chooses its own sensors.
         parts: The parts, in the order in which they run.
+        full: Whether the parts may take minutes.
         step: Function that is called with the title of each part before the part runs.
 
     Returns:
-        The analysis, with one finding per part. If a part has no result, its finding
+        The analysis, with one section per part. If a part has no result, its section
         states the reason.
 
     Raises:
         InputError: The first part has no result. All other parts depend on this part.
             If the first part raises another exception, this exception is also raised.
     """
-    study = Study(scenario)
-    analysis = LawAnalysis(scenario, model_sheet(scenario), {})
+    analysis = LawAnalysis(scenario, model_sheet(scenario))
+    study = Study(scenario, full, analysis.found)
     for part in parts:
         step(part.title)
-        finding = _run(part, study, analysis)
-        analysis.findings[part.key] = finding
-        study.found[part.key] = finding.data
+        start = time.perf_counter()
+        analysis.sections.append(_run(part, study, analysis))
+        analysis.computing_time_s[part.key] = round(time.perf_counter() - start, 3)
     return analysis
 
 
-def _run(part: Part, study: Study, analysis: LawAnalysis) -> Finding:
-    start, data, problem, failed = time.perf_counter(), None, "", False
+def _run(part: Part[Any], study: Study, analysis: LawAnalysis) -> Section:
     try:
         data = part.compute(study)
+        section = part.section(data)
+        analysis.models.extend(part.models(data))
+        analysis.notes.extend(part.notes(data))
     except InputError as error:
-        if not analysis.findings:
+        if not analysis.sections:
             raise
-        problem = str(error)
+        return part.problem(str(error))
     except Exception as error:  # the other parts must go on
-        if not analysis.findings:
+        if not analysis.sections:
             raise
-        analysis.failures[part.key] = error
-        problem, failed = failure_text(error), True
-    return Finding(part, data, problem, time.perf_counter() - start, failed)
+        return part.problem(analysis.fail(part.key, error), failed=True)
+    analysis.found[part.key] = data
+    return section

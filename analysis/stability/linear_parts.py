@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from analysis.design.requirements import REQUIRED
 from analysis.linear.linear_plots import plot_equilibria, plot_step
 from analysis.linear.step_response import Oscillation, StepCheck, check_step
 from analysis.models.equilibria import EquilibriumSearch, find_equilibria
@@ -21,16 +23,21 @@ from analysis.models.linearisation import (
     sampled_model,
 )
 from analysis.models.operating_points import OperatingPoint, moving_equilibrium
-from analysis.reporting.html_page import (
+from analysis.reporting.criterion import Criterion
+from analysis.reporting.plain_values import pick
+from analysis.reporting.section import (
     ZERO,
     Cell,
-    figure_html,
-    note,
+    Column,
+    Content,
+    Figure,
+    Note,
+    Table,
     number,
-    paragraph,
-    table,
 )
 from analysis.stability.law_analysis import Part, Study
+from analysis.stability.margin_parts import least_damped
+from diagrams import Scenario
 from systems.framework.input_error import InputError
 
 #: Matrix elements with a smaller magnitude are printed as a dot.
@@ -56,6 +63,8 @@ class OperatingPoints:
     if there is no such equilibrium."""
     no_moving: str
     """Reason why ``moving`` is None. Empty if ``moving`` exists."""
+    jams: int
+    """Number of places outside the goal where the robot can get stuck."""
 
 
 @dataclass(frozen=True)
@@ -69,135 +78,103 @@ class LinearModels:
     gradient: GradientCheck
 
 
-def linear_parts(*, full: bool) -> tuple[Part, ...]:
-    """Returns the parts about operating points, linear models, and a small step.
-
-    The part about operating points is the first one, because all other parts of the
-    report depend on it.
-
-    Args:
-        full: Whether the small step is also simulated with the sensors of the scenario.
-
-    Returns:
-        Three parts, in the order of the report.
-    """
-    return (
-        Part(
-            "equilibria",
-            "Operating points",
-            _operating_points,
-            _render_points,
-            document=_points_document,
-            notes=lambda data: data.search.notes,
-        ),
-        Part(
-            "linear_models",
-            "Linear models",
-            _linear_models,
-            _render_models,
-            fresh=True,
-            document=_models_document,
-            models=lambda data: (data.continuous, data.sampled, data.at.motion),
-        ),
-        Part(
-            "step",
-            "Prediction against simulation",
-            lambda study: check_step(study.scenario, full=full),
-            _render_step,
-            document=_step_document,
-        ),
-    )
-
-
 def _operating_points(study: Study) -> OperatingPoints:
-    search = find_equilibria(study.scenario)
-    at = search.follow_point()
+    scenario = study.scenario
+    search = find_equilibria(scenario)
+    at, moving, no_moving = search.follow_point(), None, ""
     try:
-        return OperatingPoints(search, at, moving_equilibrium(study.scenario), "")
+        moving = moving_equilibrium(scenario)
     except InputError as error:
-        return OperatingPoints(search, at, None, str(error))
+        no_moving = str(error)
+    return OperatingPoints(search, at, moving, no_moving, count_jams(scenario, search))
 
 
-def point_document(point: OperatingPoint) -> dict[str, Any]:
-    """Returns an operating point as an entry of the list ``equilibria`` in the JSON."""
-    return {
-        "position_W": point.p_WP,
-        "heading_rad": point.theta_WB,
-        "kind": point.kind,
-        "stable": point.stable,
-        "continuum": point.continuum,
-        "source_distance_m": point.source_distance_m,
-        "offset_m": point.offset_m,
-        "clearance_m": point.clearance_m,
-        "nearest_body": point.nearest_body,
-        "force_n": point.force_n,
-        "stiffness_n_m": point.stiffness_n_m,
-        "velocity_W": point.v_WS,
-        "eigenvalues": point.eigenvalues,
-    }
+def count_jams(scenario: Scenario, search: EquilibriumSearch) -> int:
+    """Counts the places outside the goal where the robot can get stuck.
+
+    Such a place is a stable equilibrium or an attractive switching point. A switching
+    point is a point at which several bodies are equally near. A run that ends at such a
+    place has the outcome "stuck" or "timeout".
+    """
+    margin = scenario.goal_radius_m - scenario.follower.attraction.follow_distance_m
+    p_WS = scenario.source.path().pose(0.0)[:2]
+    jams = sum(p.stable and p.offset_m > margin for p in search.points)
+    return jams + sum(
+        p.attractive and math.dist(p.p_WP, p_WS) > scenario.goal_radius_m
+        for p in search.switching
+    )
 
 
 def _points_document(data: OperatingPoints) -> dict[str, Any]:
     search = data.search
     return {
-        "equilibria": [point_document(point) for point in search.points],
-        "equilibrium_search": {
-            "statement": search.statement,
-            "complete": search.complete,
-            "area_m": search.area_m,
+        "points": [_point_document(point) for point in search.points],
+        "search": {
+            **pick(search, "statement", "complete", "area_m", "cells", "unresolved"),
             "smallest_cell_m": search.cell_m,
-            "cells": search.cells,
-            "unresolved": search.unresolved,
-            "switching": [vars(point) for point in search.switching],
+            "switching": search.switching,
         },
-        "operating_point": point_document(data.at),
-        "moving_equilibrium": point_document(data.moving)
+        "operating_point": _point_document(data.at),
+        "moving": _point_document(data.moving)
         if data.moving
         else {"problem": data.no_moving},
+        "jams": data.jams,
     }
 
 
-def _render_points(data: OperatingPoints, name: str) -> list[str]:
-    rows: list[list[Cell]] = [_point_row(point) for point in data.search.points]
-    headings = [
-        "x (m)", "y (m)", "kind", "from the source (m)", "offset (m)",
-        "nearest body", "clearance (m)", "slowest poles (1/s)",
-    ]  # fmt: skip
-    moving = (
-        table(headings, [_point_row(data.moving)], caption="Following a moving source")
-        if data.moving
-        else note(f"No moving equilibrium: {data.no_moving}.")
-    )
+def _point_document(point: OperatingPoint) -> dict[str, Any]:
+    return {
+        "position_W": point.p_WP,
+        "heading_rad": point.theta_WB,
+        "velocity_W": point.v_WS,
+        **pick(
+            point, "kind", "stable", "continuum", "source_distance_m", "offset_m",
+            "clearance_m", "nearest_body", "force_n", "stiffness_n_m", "eigenvalues",
+        ),
+    }  # fmt: skip
+
+
+def _show_points(data: OperatingPoints) -> list[Content]:
     return [
-        paragraph(data.search.statement),
-        paragraph(
+        data.search.statement,
+        (
             "The heading at rest is free, so that its neutral poles are left out. The "
             "offset is the distance from the source minus the follow distance. The "
             f"report is about the sink at ({data.at.p_WP[0]:.3f}, "
             f"{data.at.p_WP[1]:.3f}) m."
         ),
-        table(headings, rows, caption="Equilibria at rest"),
-        moving,
-        figure_html(
-            plot_equilibria(data.search),
-            name,
+        _point_table(data.search.points, "Equilibria at rest"),
+        _point_table([data.moving], "Following a moving source")
+        if data.moving
+        else Note(f"No moving equilibrium: {data.no_moving}."),
+        Figure(
+            lambda: plot_equilibria(data.search),
             "Equilibria of P on the floor, and the force on P.",
         ),
     ]
 
 
-def _point_row(point: OperatingPoint) -> list[Cell]:
+def _point_table(points: Sequence[OperatingPoint], caption: str) -> Table:
+    return Table.of(
+        points,
+        {
+            Column("x", "m"): lambda point: round(float(point.p_WP[0]), 6),
+            Column("y", "m"): lambda point: round(float(point.p_WP[1]), 6),
+            "kind": lambda point: point.kind + " (continuum)" * point.continuum,
+            Column("from the source", "m"): "source_distance_m",
+            Column("offset", "m"): "offset_m",
+            "nearest body": "nearest_body",
+            Column("clearance", "m"): "clearance_m",
+            Column("slowest poles", "1/s"): _slowest_poles,
+        },
+        caption,
+    )
+
+
+def _slowest_poles(point: OperatingPoint) -> str:
     poles = sorted(point.eigenvalues, key=lambda pole: -pole.real)
     upper = [complex(pole) for pole in poles if pole.imag >= 0.0][:2]
-    return [
-        *(round(float(value), 6) for value in point.p_WP),
-        point.kind + (" (continuum)" if point.continuum else ""),
-        point.source_distance_m,
-        point.offset_m,
-        point.nearest_body,
-        point.clearance_m,
-        "; ".join(number(pole, 3) for pole in upper),
-    ]
+    return "; ".join(number(pole, 3) for pole in upper)
 
 
 def _linear_models(study: Study) -> LinearModels:
@@ -213,33 +190,20 @@ def _linear_models(study: Study) -> LinearModels:
 
 
 def _models_document(data: LinearModels) -> dict[str, Any]:
+    names = (
+        "A", "B", "C", "D", "period_s", "state_names", "input_names", "output_names",
+        "poles",
+    )  # fmt: skip
     return {
-        "linear_models": {
-            "continuous": _model_document(data.continuous),
-            "sampled": _model_document(data.sampled),
-            "routes": data.routes,
-            "gradient": data.gradient,
-        }
+        "continuous": pick(data.continuous, *names),
+        "sampled": pick(data.sampled, *names),
+        "routes": data.routes,
+        "gradient": data.gradient,
     }
 
 
-def _model_document(model: LinearModel) -> dict[str, Any]:
-    return {
-        "A": model.A,
-        "B": model.B,
-        "C": model.C,
-        "D": model.D,
-        "period_s": model.period_s,
-        "state_names": model.state_names,
-        "input_names": model.input_names,
-        "output_names": model.output_names,
-        "poles": model.poles,
-    }
-
-
-def _render_models(data: LinearModels, name: str) -> list[str]:
-    routes, check = data.routes, data.gradient
-    continuous = data.continuous
+def _show_models(data: LinearModels) -> list[Content]:
+    routes, check, continuous = data.routes, data.gradient, data.continuous
     checks: list[list[Cell]] = [
         [
             (
@@ -263,15 +227,15 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
     ]
     tick_ms = 1e3 * (data.sampled.period_s or 0.0)
     return [
-        paragraph(
+        (
             "The states are deviations from the operating point, in SI units. The "
             "continuous model has no sampling and no tick of latency. The sampled "
             f"model is one period of {tick_ms:g} ms of the built diagram, with "
             f"{routes.states} states; its matrices are in the exported files."
         ),
-        table(["check", "of", "largest difference"], checks),
+        Table(["check", "of", "largest difference"], checks),
         *(
-            matrix_table(continuous, matrix)
+            _matrix_table(continuous, matrix)
             for matrix in ("A", "B", "C", "D")
             if getattr(continuous, matrix).any()
         ),
@@ -280,66 +244,52 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
     ]
 
 
-def matrix_table(model: LinearModel, matrix: str) -> str:
-    """Returns a matrix as an HTML table with the names of its rows and columns.
-
-    A dot in the table is a zero.
-
-    Args:
-        model: The linear model with the matrix and the names.
-        matrix: Name of the matrix: ``A``, ``B``, ``C``, or ``D``.
-
-    Returns:
-        The HTML table.
-    """
+def _matrix_table(model: LinearModel, matrix: str) -> Table:
+    """Returns a matrix with the names of its rows and columns; a dot is a zero."""
     x, u, y = model.state_names, model.input_names, model.output_names
     rows, columns = {"A": (x, x), "B": (x, u), "C": (y, x), "D": (y, u)}[matrix]
     body: list[list[Cell]] = [
         [row, *(_element(value) for value in values)]
         for row, values in zip(rows, getattr(model, matrix), strict=True)
     ]
-    return table([matrix, *columns], body, dense=len(columns) > _WIDE)
+    return Table([matrix, *columns], body, dense=len(columns) > _WIDE)
 
 
 def _element(value: float) -> Cell:
     return ZERO if abs(value) < _ZERO else float(np.round(value, 12))
 
 
-def _shares(mode: Mode) -> list[str]:
-    return [f"{k} {100.0 * v:.0f} %" for k, v in mode.participation.items()]
-
-
-def _mode_table(modes: Sequence[Mode], caption: str) -> str:
+def _mode_table(modes: Sequence[Mode], caption: str) -> Table:
     moving = [m for m in modes if m.frequency_rad_s > _NEUTRAL_1_S]
-    rows: list[list[Cell]] = [
-        [
-            mode.eigenvalue,
-            mode.z,
-            mode.damping_ratio,
-            mode.frequency_rad_s,
-            mode.time_constant_s,
-            mode.settling_s,
-            ", ".join(_shares(mode)[:3]),
-        ]
-        for mode in moving[:_MODES]
-    ]
-    faster = len(moving) - len(rows)
     left = f"; left out: {len(modes) - len(moving)} neutral"
-    left += f" and {faster} faster ones" if faster else ""
-    return table(
-        ["pole (1/s)", "z", "damping ratio", "rad/s", "time constant (s)",
-         "to 2 % (s)", "participation"],
-        rows,
-        caption=caption + left,
-    )  # fmt: skip
+    if len(moving) > _MODES:
+        left += f" and {len(moving) - _MODES} faster ones"
+    return Table.of(
+        moving[:_MODES],
+        {
+            Column("pole", "1/s"): "eigenvalue",
+            "z": "z",
+            "damping ratio": "damping_ratio",
+            "rad/s": "frequency_rad_s",
+            Column("time constant", "s"): "time_constant_s",
+            Column("to 2 %", "s"): "settling_s",
+            "participation": _participation,
+        },
+        caption + left,
+    )
+
+
+def _participation(mode: Mode) -> str:
+    shares = [f"{k} {100.0 * v:.0f} %" for k, v in mode.participation.items()]
+    return ", ".join(shares[:3])
 
 
 def _step_document(data: StepCheck) -> dict[str, Any]:
     names = ("predicted", "ideal", "full", "step_m", "frequency_error", "damping_error")
-    return {"step": {name: getattr(data, name) for name in names}}
+    return pick(data, *names)
 
 
-def _render_step(data: StepCheck, name: str) -> list[str]:
+def _show_step(data: StepCheck) -> list[Content]:
     found: list[tuple[str, Oscillation | None]] = [
         ("predicted by the linear model", data.predicted),
         ("simulated, exact sensors", data.ideal),
@@ -351,19 +301,105 @@ def _render_step(data: StepCheck, name: str) -> list[str]:
         if each
     ]
     return [
-        paragraph(
+        (
             f"P starts {data.step_m:g} m off the operating point, along the line to "
             "the source. With exact sensors the prediction is "
             f"{100.0 * data.frequency_error:z.2f} % off in frequency and "
             f"{100.0 * data.damping_error:z.2f} % off in damping. With the sensors of "
-            "the scenario (in a full report) the difference is larger: a cone does "
-            "not report the nearest point, and hearing has noise and silences."
+            "the scenario (in a full report) the difference is larger: a cone does not "
+            "report the nearest point, and hearing has noise and silences."
         ),
-        table(["", "rad/s", "damping ratio"], rows),
-        figure_html(
-            plot_step(data),
-            name,
+        Table(["", "rad/s", "damping ratio"], rows),
+        Figure(
+            lambda: plot_step(data),
             "A small step: the linear model, released at rest, and simulation. A law "
             "whose velocity term acts from afar pushes once at the beginning of a run.",
         ),
     ]
+
+
+def _damping_ratio(data: OperatingPoints) -> float:
+    pole = least_damped(data.at.eigenvalues)
+    return -pole.real / abs(pole)
+
+
+#: Equilibria of the loop. All other parts depend on this part.
+OPERATING_POINTS = Part[OperatingPoints](
+    "equilibria",
+    "Operating points",
+    _operating_points,
+    _show_points,
+    criteria=(
+        Criterion(
+            "growth at rest", "1/s", "below", 0.0,
+            "small deviations from the follow point die out",
+            "small deviations from the follow point grow",
+            "stability",
+            lambda data: data.at.eigenvalues.real.max(),
+        ),
+        Criterion(
+            "damping ratio at rest", "", "at least", REQUIRED.damping_ratio,
+            "overshoots are small",
+            "it overshoots and swings for several cycles",
+            "usual: 0.4 to 0.8 (Astrom and Murray)",
+            _damping_ratio,
+        ),
+        Criterion(
+            "places where the robot can jam", "", "at most", 0.0,
+            "it rests near the follow distance only",
+            "it can come to rest away from the source",
+            "no such place is wanted; away means outside the goal of a run",
+            lambda data: data.jams,
+        ),
+        Criterion(
+            "offset from the follow point at rest", "m", "at most",
+            REQUIRED.rest_offset_m,
+            "it rests at the follow distance",
+            "obstacles, or the source's own body, push it off that distance",
+            "set by this project",
+            lambda data: round(abs(data.at.offset_m), 9),
+        ),
+    ),
+    document=_points_document,
+    notes=lambda data: data.search.notes,
+)  # fmt: skip
+
+LINEAR_MODELS = Part[LinearModels](
+    "linear_models",
+    "Linear models",
+    _linear_models,
+    _show_models,
+    criteria=(
+        Criterion(
+            "difference between two computations of the model", "", "at most", 1e-8,
+            "two independent computations of the linear model agree",
+            "two computations of the linear model differ",
+            "rounding",
+            lambda data: data.routes.matrix_difference,
+        ),
+    ),
+    document=_models_document,
+    models=lambda data: (data.continuous, data.sampled, data.at.motion),
+    fresh=True,
+)  # fmt: skip
+
+#: A small step, predicted by the linear model and simulated.
+STEP = Part[StepCheck](
+    "small_step",
+    "Prediction against simulation",
+    lambda study: check_step(study.scenario, full=study.full),
+    _show_step,
+    criteria=(
+        Criterion(
+            "error of the linear prediction of a small step", "% off", "at most", 2.0,
+            "frequency and damping agree with the nonlinear simulation",
+            "the corner of the velocity term at rest, which no linear model has, has "
+            "an effect",
+            "2 % in frequency and damping, with exact sensors",
+            lambda data: 100.0 * max(
+                abs(data.frequency_error), abs(data.damping_error)
+            ),
+        ),
+    ),
+    document=_step_document,
+)  # fmt: skip

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.design.requirements import REQUIRED
 from analysis.linear.gang_of_four import GangOfFour, gang_of_four
 from analysis.linear.linear_plots import (
     plot_bode,
@@ -27,7 +29,9 @@ from analysis.linear.loop_margins import (
 from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import BREAK_POINTS, target_loop
 from analysis.models.operating_points import OperatingPoint
-from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
+from analysis.reporting.criterion import Criterion, Reading
+from analysis.reporting.plain_values import pick
+from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
 from analysis.stability.law_analysis import Part, Study
 
 #: Explanation of the margins for readers of the report.
@@ -42,16 +46,16 @@ _EXPLANATION = (
 )
 #: Modes with a higher natural frequency belong to motors and filters, rad/s.
 _SLOW_RAD_S = 12.0
-#: Fields of ``LoopMargins`` by the heading of their column.
+#: Fields of ``LoopMargins`` in the table of margins, with their columns.
 _COLUMNS = {
-    "gain up (dB)": "gain_increase_margin_db",
-    "gain down (dB)": "gain_reduction_margin_db",
-    "phase (deg)": "phase_margin_deg",
-    "crossover (rad/s)": "crossover_rad_s",
-    "modulus": "modulus_margin",
-    "M_s": "sensitivity_peak",
-    "M_t": "complementary_peak",
-    "delay (s)": "delay_margin_s",
+    "gain_increase_margin_db": Column("gain up", "dB"),
+    "gain_reduction_margin_db": Column("gain down", "dB"),
+    "phase_margin_deg": Column("phase", "deg"),
+    "crossover_rad_s": Column("crossover", "rad/s"),
+    "modulus_margin": Column("modulus"),
+    "sensitivity_peak": Column("M_s"),
+    "complementary_peak": Column("M_t"),
+    "delay_margin_s": Column("delay", "s"),
 }
 #: Place and direction of the cut loop that represents the implemented loop.
 _MAIN = ("sensor", "along")
@@ -75,15 +79,10 @@ class Margins:
     at: OperatingPoint
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
-        """Returns the stability margins of the implemented loop for one cut.
+        """Returns the stability margins of one cut, or None if there is no such loop.
 
-        Args:
-            at: Place of the cut: ``sensor``, ``actuator``, or ``wheels``.
-            direction: Direction of the motion: ``along`` the line to the source, or
-                ``across`` this line.
-
-        Returns:
-            The margins. If there is no such loop, None.
+        The cut is at the ``sensor``, at the ``actuator``, or at the ``wheels``. The
+        direction of the motion is ``along`` the line to the source, or ``across`` it.
         """
         for found in self.implemented:
             if (found.at, found.direction) == (at, direction):
@@ -98,17 +97,11 @@ class Margins:
 
 
 def least_damped(poles: NDArray[np.complex128]) -> complex:
-    """Returns the pole with the least damping ratio among all slow oscillations.
+    """Returns the pole with the least damping ratio among all slow oscillations, 1/s.
 
     If nothing oscillates slowly, the function returns the pole with the largest real
-    part.
-
-    Args:
-        poles: (n,) poles in the s plane, 1/s.
-
-    Returns:
-        The pole in the s plane, 1/s. Of a conjugate pair, it is the pole with the
-        positive imaginary part.
+    part. Of a conjugate pair, it returns the pole with the positive imaginary part.
+    ``poles`` has the shape (n,) and the unit 1/s (s plane).
     """
     slow = poles[np.abs(poles) < _SLOW_RAD_S]
     swinging = slow[np.abs(slow.imag) > 1e-6]
@@ -116,21 +109,6 @@ def least_damped(poles: NDArray[np.complex128]) -> complex:
         return complex(poles[np.argmax(poles.real)])
     pole = complex(swinging[np.argmin(-swinging.real / np.abs(swinging))])
     return pole if pole.imag > 0.0 else pole.conjugate()
-
-
-def margin_parts() -> tuple[Part, ...]:
-    """Returns the part on margins of the target loop and of the implemented loop."""
-    return (
-        Part(
-            "margins",
-            "Margins",
-            _margins,
-            _render,
-            fresh=True,
-            document=_document,
-            models=lambda data: (data.target_model,),
-        ),
-    )
 
 
 def _margins(study: Study) -> Margins:
@@ -185,50 +163,43 @@ def _loop_document(
 
 
 def _margin_document(margins: LoopMargins) -> dict[str, Any]:
-    names = (
-        "stable", "gain_increase_margin", "gain_reduction_margin", "gain_margin_db",
-        "phase_lag_margin_deg", "phase_lead_margin_deg", "crossover_rad_s",
-        "phase_margin_deg", "delay_margin_s", "modulus_margin",
+    return pick(
+        margins, "stable", "gain_increase_margin", "gain_reduction_margin",
+        "gain_margin_db", "phase_lag_margin_deg", "phase_lead_margin_deg",
+        "crossover_rad_s", "phase_margin_deg", "delay_margin_s", "modulus_margin",
         "modulus_frequency_rad_s", "sensitivity_peak", "complementary_peak", "disks",
     )  # fmt: skip
-    return {name: getattr(margins, name) for name in names}
 
 
-def _render(data: Margins, name: str) -> list[str]:
+def _show(data: Margins) -> list[Content]:
     rows: list[list[Cell]] = [["Ideal target loop: no lag, no sampling, no obstacle"]]
     rows += [_row(at, "along", margins) for at, margins in data.target.items()]
     tick_ms = 1e3 * data.at.loop.tick_s
     rows.append([f"Implemented loop, {tick_ms:g} ms, at the operating point"])
     rows += [_row(m.at, m.direction, m.margins) for m in data.implemented]
-    headings = ["cut at", "direction", *_COLUMNS]
     loops = [m.margins for m in data.implemented]
+    skews = [f"skew {disk.skew:+g}" for disk in loops[0].disks]
     disks: list[list[Cell]] = [
         [m.at, m.direction, *_disk_cells(m.margins.disks)] for m in data.implemented
     ]
     return [
-        paragraph(_EXPLANATION),
-        table(headings, rows),
-        table(
-            [
-                "cut at",
-                "direction",
-                *(f"skew {d.skew:+g}" for d in data.implemented[0].margins.disks),
-            ],
+        _EXPLANATION,
+        Table(["cut at", "direction", *_COLUMNS.values()], rows),
+        Table(
+            ["cut at", "direction", *skews],
             disks,
-            caption="Disk margins: size alpha; range of the gain in dB; phase, plus or "
-            "minus, in deg",
+            "Disk margins: size alpha; range of the gain in dB; phase, plus or minus, "
+            "in deg",
         ),
-        figure_html(plot_bode(loops), f"{name}-bode", "Bode diagram with margins."),
-        figure_html(
-            plot_nyquist(loops),
-            f"{name}-nyquist",
+        Figure(lambda: plot_bode(loops), "Bode diagram with margins."),
+        Figure(
+            lambda: plot_nyquist(loops),
             "Nyquist curves, and the disk that they must not enter.",
         ),
-        figure_html(plot_nichols(loops), f"{name}-nichols", "Nichols diagram."),
+        Figure(lambda: plot_nichols(loops), "Nichols diagram."),
         *(
-            figure_html(
-                plot_gang_of_four(gang),
-                f"{name}-gang-{gang.direction}",
+            Figure(
+                partial(plot_gang_of_four, gang),
                 f"Gang of four, {gang.direction} the line to the source.",
             )
             for gang in data.gangs
@@ -237,7 +208,7 @@ def _render(data: Margins, name: str) -> list[str]:
 
 
 def _row(at: str, direction: str, margins: LoopMargins) -> list[Cell]:
-    return [at, direction, *(getattr(margins, name) for name in _COLUMNS.values())]
+    return [at, direction, *pick(margins, *_COLUMNS).values()]
 
 
 def _disk_cells(disks: Sequence[DiskMargin]) -> list[Cell]:
@@ -250,3 +221,56 @@ def _disk_cells(disks: Sequence[DiskMargin]) -> list[Cell]:
 
 def _db(factor: float) -> str:
     return number(20.0 * math.log10(factor) if factor > 0.0 else -math.inf, 3)
+
+
+def _worst(
+    worst: Callable[[list[float]], float], of: Callable[[LoopMargins], float]
+) -> Callable[[Margins], Reading]:
+    """Reads the worst value over all places of the cut and both directions."""
+    return lambda data: (
+        worst([of(each.margins) for each in data.implemented])
+        if data.implemented
+        else math.nan
+    )
+
+
+MARGINS = Part[Margins](
+    "margins",
+    "Margins",
+    _margins,
+    _show,
+    criteria=(
+        Criterion(
+            "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
+            "every cut loop tolerates the usual extra phase lag or lead",
+            "a small extra phase makes the loop oscillate",
+            "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
+            _worst(min, lambda margins: margins.phase_margin_deg),
+        ),
+        Criterion(
+            "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
+            "gains may double, or fall to half",
+            "a gain that is off by less than a factor of two, up or down, makes it "
+            "unstable",
+            "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
+            _worst(min, lambda margins: margins.gain_margin_db),
+        ),
+        Criterion(
+            "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
+            "disturbances are hardly amplified",
+            "disturbances near the crossover are amplified more than twice",
+            "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",
+            _worst(max, lambda margins: margins.sensitivity_peak),
+        ),
+        Criterion(
+            "least disk margin", "", "at least", REQUIRED.disk_margin,
+            "gain and phase may change at once, by 6 dB and 37 deg",
+            "a change of gain and phase at once makes the loop oscillate early",
+            "alpha = 2/3: 6 dB in each direction (Seiler, Packard and Gahinet 2020)",
+            _worst(min, lambda margins: margins.disk.alpha),
+        ),
+    ),
+    document=_document,
+    models=lambda data: (data.target_model,),
+    fresh=True,
+)  # fmt: skip

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from analysis.reporting.provenance import versions
@@ -19,6 +19,7 @@ from systems.framework.parameters import Parameters
 from systems.heading.heading_controller import TURNING_BEYOND_DEG
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Equation
+from systems.laws.parameters import ImpedanceParameters
 
 #: Parts of a scenario that affect a loop with exact sensors, by kind of robot.
 _PARTS = {
@@ -43,6 +44,7 @@ _PARTS = {
 _OTHERS = frozenset(
     {
         "robot.microphones_m",
+        "plant.pulses_per_revolution",
         "collision_vector.aggregation",
         *(f"sound.{name}" for name in ("kind", "file", "level_pa")),
         *(f"sound.{name}_hz" for name in ("low", "high", "tone")),
@@ -115,7 +117,10 @@ class ParameterRow:
     @property
     def of_law(self) -> bool:
         """Whether the parameter belongs to the law, rather than to every loop."""
-        return self.field.startswith("laws.") or self.field == _VELOCITY_TERM
+        return (
+            self.field.startswith(("impedance.", "laws."))
+            or self.field == _VELOCITY_TERM
+        )
 
 
 @dataclass(frozen=True)
@@ -217,12 +222,17 @@ def _parameters(scenario: Scenario) -> Iterator[ParameterRow]:
     groups: dict[str, Parameters] = {
         f"{part}.": getattr(robot, part) for part in _PARTS[robot.kind]
     }
-    if isinstance(robot, Follower | Router) and robot.gains is not None:
-        groups[f"laws.{robot.law}."] = robot.gains
     if isinstance(robot, Follower):
+        if robot.gains is not None:
+            groups[f"laws.{robot.law}."] = robot.gains
         groups["sound."] = scenario.source.sound
     for prefix, group in groups.items():
         yield from (row for row in _rows(group, prefix) if row.field not in _OTHERS)
+    if isinstance(robot, Router):
+        for row in _rows(robot.gains, ""):
+            shared = row.field in ImpedanceParameters.model_fields
+            name = "impedance" if shared else f"laws.{robot.law}"
+            yield replace(row, field=f"{name}.{row.field}")
 
 
 def _rows(parameters: Parameters, prefix: str) -> Iterator[ParameterRow]:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from analysis.models.model_export import write_models
+from analysis.reporting.criterion import compare_verdicts
 from analysis.reporting.plain_values import plain
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.reporting.render import text
+from analysis.reporting.section import Table
 from analysis.stability.law_analysis import LawAnalysis
-from analysis.stability.report_page import stability_page
-from analysis.stability.verdicts import compare_verdicts, shown_value
+from analysis.stability.report_page import stability_page, verdict_table
 from diagrams import write_scenario
 
 
@@ -24,15 +26,8 @@ def stability_document(
 
     The document of one law has its results as keys at the top level. The document of
     several laws has the key ``laws`` with one document per law, and the key
-    ``comparison`` with the verdicts side by side.
-
-    Args:
-        analyses: One analysis per law, all of the same scenario.
-        out: The result directory, whose name is written into the document. None if no
-            files are written.
-
-    Returns:
-        Plain values that can be written as JSON.
+    ``comparison`` with the verdicts side by side. ``out`` is the result directory,
+    whose name is written into the document, or None if no files are written.
     """
     first = analyses[0].scenario
     common = {
@@ -44,81 +39,31 @@ def stability_document(
     laws = [_law_document(analysis) for analysis in analyses]
     if len(laws) == 1:
         return {**common, **laws[0], **ending}
-    return {**common, "laws": laws, "comparison": plain(comparison(analyses)), **ending}
-
-
-def comparison(analyses: Sequence[LawAnalysis]) -> tuple[Any, ...]:
-    """Returns the verdicts of all laws side by side. One law is also allowed."""
-    return compare_verdicts({a.law: a.verdicts for a in analyses})
+    rows = compare_verdicts({a.law: a.verdicts for a in analyses})
+    return {**common, "laws": laws, "comparison": plain(rows), **ending}
 
 
 def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
-    findings = analysis.findings.values()
-    parts: dict[str, Any] = {}
-    for finding in findings:
-        part = finding.part
-        if finding.problem:
-            failed = {"failed": True} if finding.failed else {}
-            parts[part.key] = {"problem": finding.problem, **failed}
-        elif part.document is None:
-            parts[part.key] = plain(finding.data)
-        else:
-            for key, value in plain(part.document(finding.data)).items():
-                # A part may add entries to a list of an earlier part.
-                earlier = parts.get(key)
-                parts[key] = earlier + value if isinstance(earlier, list) else value
     return {
         "law": analysis.law,
-        "notes": list(analysis.notes),
-        **parts,
-        "model": plain(asdict(analysis.sheet)),
-        "seconds": {f.part.key: round(f.seconds, 3) for f in findings},
+        "notes": analysis.notes,
+        **{section.key: plain(section.data) for section in analysis.sections},
+        "verdicts": plain(analysis.verdicts),
+        "model": plain(analysis.sheet),
+        "computing_time_s": analysis.computing_time_s,
     }
 
 
-def stability_text(document: dict[str, Any]) -> str:
+def stability_text(analyses: Sequence[LawAnalysis]) -> str:
     """Returns the verdicts and the notes of a stability analysis as text."""
-    rows = document.get("comparison")
-    if rows is None:
-        verdicts = document["verdicts"]
-        known = verdicts if isinstance(verdicts, list) else []
-        rows = [_as_comparison(row, document["law"]) for row in known]
-    laws = list(rows[0]["values"]) if rows else []
-    width = max(22, 2 + max(map(len, laws), default=0))
-    heads = "".join(f"{law:>{width}}" for law in laws)
-    name = max(34, 2 + max((len(row["name"]) for row in rows), default=0))
-    lines = [f"{'':<{name}}{'threshold':>14}{heads}"]
-    for row in rows:
-        cells = "".join(
-            f"{_value(row['values'][law], row['unit']):>{width - 10}}"
-            f"{_mark(row['verdicts'][law]):>10}"
-            for law in laws
-        )
-        lines.append(f"{row['name']:<{name}}{row['threshold']:>14}{cells}")
-    documents = document.get("laws", [document])
-    for each in documents:
-        before = f"{each['law']}: " if len(documents) > 1 else ""
-        lines += [f"note: {before}{note}" for note in each.get("notes", ())]
+    table = verdict_table(analyses)
+    # Texts in plain words are too long for a terminal.
+    columns, rows = table.columns[:-1], [row[:-1] for row in table.rows]
+    lines = [text(Table(["", *columns[1:]], rows))] if rows else []
+    for each in analyses:
+        before = f"{each.law}: " if len(analyses) > 1 else ""
+        lines += [f"note: {before}{note}" for note in each.notes]
     return "\n".join(lines)
-
-
-def _as_comparison(row: dict[str, Any], law: str) -> dict[str, Any]:
-    return {
-        **row,
-        "values": {law: row["value"]},
-        "verdicts": {law: row["verdict"]},
-    }
-
-
-def _value(value: float | None, unit: str) -> str:
-    shown = shown_value(value, unit)
-    if shown is None:
-        return "-"
-    return shown if isinstance(shown, str) else f"{shown:.4g}"
-
-
-def _mark(verdict: str) -> str:
-    return {"not applicable": "n/a"}.get(verdict, verdict)
 
 
 def write_stability(

@@ -6,24 +6,26 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
-from analysis.reporting.html_page import (
+from markupsafe import Markup
+
+from analysis.reporting.criterion import Verdict, compare_verdicts, shown_value
+from analysis.reporting.render import html, page
+from analysis.reporting.section import (
+    Bullets,
     Cell,
+    Column,
+    Content,
+    Definitions,
+    Formula,
     Judged,
-    bullets,
-    definitions,
-    equation,
-    links,
-    note,
+    Links,
+    Note,
+    Section,
+    Table,
     number,
-    page,
-    paragraph,
-    section,
-    table,
 )
-from analysis.run_error import failure_text
-from analysis.stability.law_analysis import Finding, LawAnalysis
+from analysis.stability.law_analysis import LawAnalysis
 from analysis.stability.model_sheet import ModelSheet, ParameterRow
-from analysis.stability.verdicts import VerdictRow, compare_verdicts, shown_value
 from systems.laws.catalogue import law_title
 from systems.laws.law import Equation
 
@@ -32,57 +34,22 @@ def stability_page(analyses: Sequence[LawAnalysis]) -> str:
     """Returns the complete stability report as one HTML page."""
     first = analyses[0].scenario
     laws = ", ".join(law_title(a.law).lower() for a in analyses)
-    contents = [("summary", "Summary"), ("model", "Model sheet")]
-    parts = [_summary(analyses), _model(analyses[0].sheet)]
-    for k, analysis in enumerate(analyses):
-        law = law_title(analysis.law)
-        prefix = f"law{k}"
-        contents.append((prefix, law))
-        parts.append(section(prefix, law, _law_parts(analysis, prefix), fresh=True))
-    return page(f"Stability of {first.name}: {laws}", contents, parts)
-
-
-def _summary(analyses: Sequence[LawAnalysis]) -> str:
-    verdicts = {a.law: a.verdicts for a in analyses}
-    rows = compare_verdicts(verdicts)
-    sheet = analyses[0].sheet
-    about = definitions(
-        [
-            ("Scenario", f"{sheet.scenario}: {sheet.description}"),
-            ("Seed", str(sheet.seed)),
-            ("Versions", ", ".join(f"{k} {v}" for k, v in sheet.versions.items())),
-        ]
+    sections = [
+        _summary(analyses),
+        _model(analyses[0].sheet),
+        *(_law(analysis, f"law{k}") for k, analysis in enumerate(analyses)),
+    ]
+    return page(
+        f"Stability of {first.name}: {laws}",
+        [(each.key, each.title) for each in sections],
+        [html(each, each.key) for each in sections],
     )
-    counts = [
-        f"{law_title(law)}: {sum(v.verdict == 'pass' for v in found)} of "
-        f"{sum(v.verdict != 'not applicable' for v in found)} criteria pass."
-        for law, found in verdicts.items()
-    ]
-    parts = [about, bullets(counts), *_notes(analyses)]
-    parts.append(_verdict_table(rows, list(verdicts)))
-    parts += [
-        paragraph(f"{law_title(a.law)}: {gains.advice}")
-        for a in analyses
-        if (gains := a.data("recommended_gains"))
-    ]
-    return section("summary", "Summary", parts)
 
 
-def _notes(analyses: Sequence[LawAnalysis]) -> list[str]:
-    """Returns the notes that readers must know before they use the numbers.
-
-    If the report covers several laws, each note begins with the name of its law.
-    """
-    found = [
-        note_ if len(analyses) == 1 else f"{law_title(analysis.law)}: {note_}"
-        for analysis in analyses
-        for note_ in analysis.notes
-    ]
-    return [paragraph("Before you use the numbers:"), bullets(found)] if found else []
-
-
-def _verdict_table(rows: Sequence[VerdictRow], laws: Sequence[str]) -> str:
-    body: list[list[Cell]] = [
+def verdict_table(analyses: Sequence[LawAnalysis]) -> Table:
+    """Returns the verdicts of all laws side by side."""
+    laws = [analysis.law for analysis in analyses]
+    rows: list[list[Cell]] = [
         [
             row.name,
             row.threshold,
@@ -92,62 +59,86 @@ def _verdict_table(rows: Sequence[VerdictRow], laws: Sequence[str]) -> str:
             ),
             row.text,
         ]
-        for row in rows
+        for row in compare_verdicts({a.law: a.verdicts for a in analyses})
     ]
-    return table(["criterion", "threshold", *laws, "in plain words"], body)
+    return Table(["criterion", "threshold", *laws, "in plain words"], rows)
 
 
-def _law_parts(analysis: LawAnalysis, prefix: str) -> list[str]:
+def _summary(analyses: Sequence[LawAnalysis]) -> Section:
+    sheet = analyses[0].sheet
+    notes = [
+        note if len(analyses) == 1 else f"{law_title(analysis.law)}: {note}"
+        for analysis in analyses
+        for note in analysis.notes
+    ]
+    before: list[Content] = ["Before you use the numbers:", Bullets(notes)]
+    contents: list[Content] = [
+        Definitions(
+            [
+                ("Scenario", f"{sheet.scenario}: {sheet.description}"),
+                ("Seed", str(sheet.seed)),
+                ("Versions", ", ".join(f"{k} {v}" for k, v in sheet.versions.items())),
+            ]
+        ),
+        Bullets([_count(analysis) for analysis in analyses]),
+        *(before if notes else []),
+        verdict_table(analyses),
+        *(
+            f"{law_title(a.law)}: {a.found['recommended_gains'].advice}"
+            for a in analyses
+            if "recommended_gains" in a.found
+        ),
+    ]
+    return Section("summary", "Summary", contents)
+
+
+def _count(analysis: LawAnalysis) -> str:
+    found = [verdict.verdict for verdict in analysis.verdicts]
+    return (
+        f"{law_title(analysis.law)}: {found.count('pass')} of "
+        f"{len(found) - found.count('not applicable')} criteria pass."
+    )
+
+
+def _law(analysis: LawAnalysis, anchor: str) -> Section:
     sheet = analysis.sheet
-    parts = [
-        links(
-            (f"{prefix}-{key}", finding.part.title)
-            for key, finding in analysis.findings.items()
-        )
+    sections = [*analysis.sections, _verdicts(analysis.verdicts)]
+    contents: list[Content] = [
+        Links((f"{anchor}-{each.key}", each.title) for each in sections),
+        *_equations(sheet.law_equations),
+        _parameter_table([row for row in sheet.parameters if row.of_law]),
+        f"SHA-256 of the effective scenario: `{sheet.scenario_sha256}`.",
+        *(_drawn(analysis, each, f"{anchor}-{each.key}") for each in sections),
     ]
-    parts += _equations(sheet.law_equations, prefix)
-    parts.append(_parameter_table([row for row in sheet.parameters if row.of_law]))
-    parts.append(
-        paragraph(f"SHA-256 of the effective scenario: `{sheet.scenario_sha256}`.")
-    )
-    for key, finding in analysis.findings.items():
-        parts.append(
-            section(
-                f"{prefix}-{key}",
-                finding.part.title,
-                _finding(analysis, finding, prefix),
-                level=3,
-                fresh=finding.part.fresh,
-            )
-        )
-    return parts
+    return Section(anchor, law_title(analysis.law), contents, fresh=True)
 
 
-def _finding(analysis: LawAnalysis, finding: Finding, prefix: str) -> list[str]:
-    if finding.failed:
-        return [note(f"This part failed: {finding.problem}.")]
-    if finding.problem:
-        return [note(f"Not computed: {finding.problem}.")]
-    key = finding.part.key
+def _drawn(analysis: LawAnalysis, section: Section, anchor: str) -> Markup:
+    """Returns a section as HTML; a figure that fails leaves the other sections."""
     try:
-        return finding.part.render(finding.data, f"{prefix}-{key}")
-    except Exception as error:  # noqa: BLE001  # the other parts must be shown
-        analysis.failures[key] = error
-        return [note(f"This part failed: {failure_text(error)}.")]
+        return html(section, anchor, level=3)
+    except Exception as error:  # noqa: BLE001  # the other sections must be shown
+        failed = Note(f"This part failed: {analysis.fail(section.key, error)}.")
+        return html(Section(section.key, section.title, [failed]), anchor, level=3)
 
 
-def _model(sheet: ModelSheet) -> str:
-    """Returns the section with the model sheet, which holds for every law."""
-    parts = _equations(sheet.motion, "motion")
-    parts.append(bullets(sheet.assumptions))
-    parts.append(_parameter_table([row for row in sheet.parameters if not row.of_law]))
-    parts.append(
-        table(
-            ["limit", "value", "unit", "remark"],
-            [(x.quantity, x.value, x.unit, x.remark) for x in sheet.envelope],
-            caption="Operating envelope",
-        )
+def _verdicts(verdicts: Sequence[Verdict]) -> Section:
+    table = Table.of(
+        verdicts,
+        {
+            "criterion": "name",
+            "value": lambda verdict: shown_value(verdict.value, verdict.unit),
+            "threshold": "threshold",
+            "verdict": "verdict",
+            "in plain words": "text",
+            "source": "source",
+        },
     )
+    return Section("verdicts", "Verdicts", [table], fresh=True)
+
+
+def _model(sheet: ModelSheet) -> Section:
+    """Returns the section with the model sheet, which holds for every law."""
     latencies: list[list[Cell]] = []
     for path in sheet.paths:
         latencies.append([f"From {path} to wheels: {1e3 * sheet.latency_s(path):g} ms"])
@@ -156,24 +147,29 @@ def _model(sheet: ModelSheet) -> str:
             for x in sheet.latencies
             if x.path == path
         ]
-    parts.append(
-        table(["part", "mean (ms)", "remark"], latencies, caption="Latency budget")
-    )
-    return section("model", "Model sheet", parts, fresh=True)
+    contents: list[Content] = [
+        *_equations(sheet.motion),
+        Bullets(sheet.assumptions),
+        _parameter_table([row for row in sheet.parameters if not row.of_law]),
+        Table(
+            ["limit", "value", "unit", "remark"],
+            [(x.quantity, x.value, x.unit, x.remark) for x in sheet.envelope],
+            "Operating envelope",
+        ),
+        Table(["part", Column("mean", "ms"), "remark"], latencies, "Latency budget"),
+    ]
+    return Section("model", "Model sheet", contents, fresh=True)
 
 
-def _equations(formulas: Sequence[Equation], prefix: str) -> list[str]:
+def _equations(formulas: Sequence[Equation]) -> list[Content]:
     return [
-        part
-        for k, formula in enumerate(formulas)
-        for part in (
-            paragraph(f"{formula.title}:"),
-            equation(formula.tex, f"{prefix}-equation{k}", formula.text),
-        )
+        content
+        for formula in formulas
+        for content in (f"{formula.title}:", Formula(formula.tex, formula.text))
     ]
 
 
-def _parameter_table(parameters: Sequence[ParameterRow]) -> str:
+def _parameter_table(parameters: Sequence[ParameterRow]) -> Table:
     rows: list[list[Cell]] = []
     for part, group in groupby(parameters, key=lambda row: row.part):
         rows.append([part])
@@ -181,10 +177,10 @@ def _parameter_table(parameters: Sequence[ParameterRow]) -> str:
             [f"`{row.field}`", _shown(row.value, changed=row.changed), row.text]
             for row in group
         ]
-    return table(
+    return Table(
         ["parameter", "value", "meaning, unit, source"],
         rows,
-        caption="Parameters; an asterisk marks a value that is not the default",
+        "Parameters; an asterisk marks a value that is not the default",
     )
 
 

@@ -3,76 +3,111 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
+from analysis.reporting.section import Bullets
+from analysis.stability.gain_parts import RECOMMENDED_GAINS
 from analysis.stability.law_analysis import Part
-from analysis.stability.linear_parts import linear_parts
-from analysis.stability.margin_parts import margin_parts
-from analysis.stability.nonlinear_parts import extended_parts, nonlinear_parts
-from analysis.stability.robustness_parts import robustness_parts
-from analysis.stability.route_parts import route_parts
-from analysis.stability.route_readings import ROUTE_CRITERIA
-from analysis.stability.safety_parts import safety_parts
-from analysis.stability.sampling_parts import gain_parts, sampling_parts
-from analysis.stability.search_parts import SEARCH_CRITERIA, search_parts
-from analysis.stability.verdict_parts import verdict_parts
+from analysis.stability.linear_parts import LINEAR_MODELS, OPERATING_POINTS, STEP
+from analysis.stability.margin_parts import MARGINS
+from analysis.stability.nonlinear_parts import (
+    CERTIFIED_STARTS,
+    CONTACT_OSCILLATION,
+    DISTURBANCE_BOUNDS,
+    ENERGY_BALANCE,
+    GAP_MAPS,
+    OFFSET_MAPS,
+    PHASE_PORTRAIT,
+    RATIO_MAP,
+    SOS_REGION,
+    VELOCITY_TERMS,
+)
+from analysis.stability.robustness_parts import CONTACT_ROBUSTNESS, ROBUSTNESS
+from analysis.stability.route_parts import (
+    ADAPTATION,
+    FROZEN_GAINS,
+    GAIN_BOUNDS,
+    ROBOT_CHAIN,
+)
+from analysis.stability.safety_parts import GUARD
+from analysis.stability.sampling_parts import (
+    BURST_CYCLE,
+    CONTACT_MODE,
+    DELAY_MARGINS,
+    ROOT_LOCI,
+    SAMPLING,
+)
+from analysis.stability.search_parts import HEADING_LOOP
 from diagrams import Scenario
 
+#: Parts for a robot that follows a sound. The first part is about operating points,
+#: because all others depend on it.
+SOUND_PARTS: tuple[Part[Any], ...] = (
+    OPERATING_POINTS,
+    LINEAR_MODELS,
+    STEP,
+    MARGINS,
+    DELAY_MARGINS,
+    BURST_CYCLE,
+    ROOT_LOCI,
+    SAMPLING,
+    CONTACT_MODE,
+    VELOCITY_TERMS,
+    CONTACT_OSCILLATION,
+    CERTIFIED_STARTS,
+    ENERGY_BALANCE,
+    ROBUSTNESS,
+    CONTACT_ROBUSTNESS,
+    GAP_MAPS,
+    OFFSET_MAPS,
+    RATIO_MAP,
+    PHASE_PORTRAIT,
+    SOS_REGION,
+    DISTURBANCE_BOUNDS,
+    RECOMMENDED_GAINS,
+)
+#: Parts for a robot on a route.
+ROUTE_PARTS: tuple[Part[Any], ...] = (
+    FROZEN_GAINS,
+    GAIN_BOUNDS,
+    ADAPTATION,
+    ROBOT_CHAIN,
+)
+#: Parts for a robot that searches step by step.
+SEARCH_PARTS: tuple[Part[Any], ...] = (HEADING_LOOP,)
 
-def parts(
-    *,
-    full: bool,
-    guarded: bool = False,
-    routed: bool = False,
-    searching: bool = False,
-) -> tuple[Part, ...]:
-    """Returns the parts of a stability report for one kind of robot.
-
-    Args:
-        full: Whether the report also has the parts that take minutes.
-        guarded: Whether the robot has a guard. If so, the report has a part about the
-            guard.
-        routed: Whether the robot drives on a route. If so, the report has parts about
-            the route, and no parts about following a sound.
-        searching: Whether the robot searches step by step. If so, the report has only
-            the parts about the search.
-
-    Returns:
-        The parts, in the order of the report.
-    """
-    guard = safety_parts() if guarded else ()
-    left_out = [part.title for part in _sound_parts(full=full)]
-    if searching:
-        return (*search_parts(left_out), *verdict_parts(SEARCH_CRITERIA))
-    if routed:
-        return (*route_parts(left_out), *guard, *verdict_parts(ROUTE_CRITERIA))
-    return (*_sound_parts(full=full), *guard, *verdict_parts())
+_NOT_FOR_ROUTES = (
+    "The following parts do not apply, because they are about a robot that follows a "
+    "sound: its follow distance, its tracker, its bursts and its law's push."
+)
+_NOT_FOR_SEARCHES = (
+    "A search has no virtual mass, no springs and no equilibrium: the following parts, "
+    "which are about robots that follow a sound, do not apply."
+)
 
 
-def parts_for(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part, ...]:
+def parts_for(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part[Any], ...]:
     """Returns the parts of a stability report that suit the robot of the scenarios.
 
-    Args:
-        scenarios: One scenario per law. All scenarios have the same robot.
-        full: Whether the report also has the parts that take minutes.
-
-    Returns:
-        The parts, in the order of the report.
+    There is one scenario per law, and all have the same robot. A full report also has
+    the parts that take minutes.
     """
-    return parts(
-        full=full,
-        guarded=any(each.only.own_guard is not None for each in scenarios),
-        routed=scenarios[0].only.kind == "router",
-        searching=scenarios[0].only.searches is not None,
-    )
+    robot = scenarios[0].only
+    sound = tuple(part for part in SOUND_PARTS if full or not part.slow)
+    if robot.searches is not None:
+        return (*SEARCH_PARTS, _left_out(_NOT_FOR_SEARCHES, sound))
+    guarded = any(each.only.own_guard is not None for each in scenarios)
+    guard = (GUARD,) if guarded else ()
+    if robot.kind == "router":
+        return (*ROUTE_PARTS, _left_out(_NOT_FOR_ROUTES, sound), *guard)
+    return (*sound, *guard)
 
 
-def _sound_parts(*, full: bool) -> tuple[Part, ...]:
-    return (
-        *linear_parts(full=full),
-        *margin_parts(),
-        *sampling_parts(full=full),
-        *nonlinear_parts(full=full),
-        *robustness_parts(full=full),
-        *(extended_parts() if full else ()),
-        *gain_parts(),
+def _left_out(reason: str, parts: Sequence[Part[Any]]) -> Part[list[str]]:
+    titles = [part.title for part in parts]
+    return Part(
+        "left_out",
+        "Parts that do not apply",
+        lambda study: titles,
+        lambda data: [reason, Bullets(data)],
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
 from analysis.linear.loop_uncertainty import (
     contact_poles,
     contact_uncertainty,
@@ -16,14 +17,13 @@ from analysis.linear.robustness import (
     PoleFunction,
     PoleSensitivity,
     UncertainParameter,
-    continuous,
-    damping_ratio,
     pole_cloud,
     pole_sensitivities,
-    slowest_pole,
 )
-from analysis.reporting.html_page import Cell, figure_html, paragraph, table
-from analysis.stability.law_analysis import Part
+from analysis.reporting.criterion import Criterion
+from analysis.reporting.plain_values import pick
+from analysis.reporting.section import Column, Content, Figure, Table
+from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
 
 #: Number of random points in the parameter box, in a short and in a full report.
@@ -37,25 +37,6 @@ class LoopRobustness:
     cloud: PoleCloud
     sensitivities: tuple[PoleSensitivity, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns everything except the poles of each sample, for the JSON document."""
-        cloud = self.cloud
-        return {
-            "period_s": cloud.period_s,
-            "parameters": cloud.parameters,
-            "samples": len(cloud.values),
-            "stable_share": cloud.stable_share,
-            "nominal_radius": cloud.nominal_radius,
-            "worst_radius": cloud.worst_radius,
-            "worst_damping_ratio": cloud.worst_damping_ratio,
-            "worst_values": cloud.worst_values,
-            "worst_poles": cloud.worst_poles,
-            "sensitivities": [
-                vars(row) | {"parameter": row.parameter.name}
-                for row in self.sensitivities
-            ],
-        }
-
 
 def loop_robustness(
     scenario: Scenario,
@@ -67,16 +48,8 @@ def loop_robustness(
     """Computes the poles of a sampled loop for uncertain parameters.
 
     Each uncertain parameter has an interval. All intervals together form a box.
-
-    Args:
-        scenario: The scenario with the control period and the seed.
-        poles: Function from parameter values to the poles of the loop, z plane.
-        parameters: The uncertain parameters with their intervals.
-        samples: Number of random points in the box.
-
-    Returns:
-        The poles at the random points, the worst case, and the sensitivity of the
-        slowest pole to each parameter.
+    ``poles`` takes parameter values and returns the poles of the loop in the z plane;
+    ``samples`` is the number of random points in the box.
     """
     return LoopRobustness(
         pole_cloud(
@@ -90,77 +63,44 @@ def loop_robustness(
     )
 
 
-def robustness_parts(*, full: bool) -> tuple[Part, ...]:
-    """Returns the two parts on robustness under uncertain parameters.
-
-    The first part is about the operating point. The second part is about the motion in
-    front of an obstacle.
-
-    Args:
-        full: Whether more random points of the parameter box are analyzed.
-
-    Returns:
-        The two parts, in the order of the report.
-    """
-    samples = _SAMPLES[full]
-    return (
-        Part(
-            "robustness",
-            "Robustness at the operating point",
-            lambda study: loop_robustness(
-                study.scenario,
-                following_poles(study.need("equilibria").at),
-                following_uncertainty(study.scenario),
-                samples=samples,
-            ),
-            _render,
-            fresh=True,
-        ),
-        Part(
-            "contact_robustness",
-            "Robustness before an obstacle",
-            lambda study: loop_robustness(
-                study.scenario,
-                contact_poles(study.scenario),
-                contact_uncertainty(study.scenario),
-                samples=4 * samples,
-            ),
-            _render,
-        ),
+def _following(study: Study) -> LoopRobustness:
+    return loop_robustness(
+        study.scenario,
+        following_poles(study.need("equilibria").at),
+        following_uncertainty(study.scenario),
+        samples=_SAMPLES[study.full],
     )
 
 
-def _render(data: LoopRobustness, name: str) -> list[str]:
-    from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
+def _before_an_obstacle(study: Study) -> LoopRobustness:
+    return loop_robustness(
+        study.scenario,
+        contact_poles(study.scenario),
+        contact_uncertainty(study.scenario),
+        samples=4 * _SAMPLES[study.full],
+    )
 
+
+def _document(data: LoopRobustness) -> dict[str, Any]:
+    """Returns everything except the poles of each sample."""
+    return {
+        **pick(
+            data.cloud, "period_s", "parameters", "stable_share", "nominal_radius",
+            "worst_radius", "worst_damping_ratio", "worst_values", "worst_poles",
+        ),
+        "samples": len(data.cloud.values),
+        "sensitivities": [
+            vars(row) | {"parameter": row.parameter.name} for row in data.sensitivities
+        ],
+    }  # fmt: skip
+
+
+def _show(data: LoopRobustness) -> list[Content]:
     cloud = data.cloud
-    slowest = slowest_pole(cloud.worst_poles)
-    rate = continuous(slowest, cloud.period_s).real
-    boxes: list[list[Cell]] = [
-        [
-            f"{p.symbol}, `{p.name}`",
-            p.low,
-            p.nominal,
-            p.high,
-            p.unit.replace(" ", "\u00a0"),
-            cloud.worst_values[p.name],
-            p.reason,
-        ]
-        for p in cloud.parameters
-    ]
-    headings = ["parameter", "least", "nominal", "most", "unit", "worst case", "why"]
-    nominal = damping_ratio(slowest_pole(cloud.nominal_poles), cloud.period_s)
-    shares: list[list[Cell]] = [
-        [
-            row.parameter.symbol,
-            row.derivative,
-            row.parameter.unit.replace(" ", "\u00a0"),
-            row.per_interval,
-        ]
-        for row in sorted(data.sensitivities, key=lambda r: -abs(r.per_interval))
-    ]
+    rate = cloud.worst_growth_per_s
+    nominal = cloud.nominal_damping_ratio
     return [
-        paragraph(
+        (
             f"The analysis takes {len(cloud.values)} random points within the ranges "
             "below, and the worst corner of these ranges. "
             f"{100.0 * cloud.stable_share:.0f} % of the points are stable. In the "
@@ -168,27 +108,72 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
             f"{abs(rate):.3g} 1/s and its damping ratio is "
             f"{cloud.worst_damping_ratio:.3f} (nominal {nominal:.3f})."
         ),
-        table(headings, boxes),
-        figure_html(
-            plot_pole_cloud(cloud),
-            f"{name}-cloud",
+        Table.of(
+            cloud.parameters,
+            {
+                "parameter": lambda p: f"{p.symbol}, `{p.name}`",
+                "least": "low",
+                "nominal": "nominal",
+                "most": "high",
+                "unit": lambda p: p.unit.replace(" ", "\u00a0"),
+                "worst case": lambda p: cloud.worst_values[p.name],
+                "why": "reason",
+            },
+        ),
+        Figure(
+            lambda: plot_pole_cloud(cloud),
             "Poles within the ranges of all parameters, ln(z)/T of the sampled loop. "
             "Poles faster than 12 1/s are left out.",
         ),
-        table(
-            [
-                "parameter",
-                "d(pole)/dp (1/s per unit)",
-                "unit",
-                "over the interval (1/s)",
-            ],
-            shares,
-            caption="Sensitivity of the slowest pole",
+        Table.of(
+            sorted(data.sensitivities, key=lambda row: -abs(row.per_interval)),
+            {
+                "parameter": "parameter.symbol",
+                Column("d(pole)/dp", "1/s per unit"): "derivative",
+                "unit": lambda row: row.parameter.unit.replace(" ", "\u00a0"),
+                Column("over the interval", "1/s"): "per_interval",
+            },
+            "Sensitivity of the slowest pole",
         ),
-        figure_html(
-            plot_sensitivities(data.sensitivities),
-            f"{name}-sensitivity",
+        Figure(
+            lambda: plot_sensitivities(data.sensitivities),
             "Change of the slowest pole over each interval, to first order. Orange "
             "marks less decay or a higher frequency.",
         ),
     ]
+
+
+ROBUSTNESS = Part[LoopRobustness](
+    "robustness",
+    "Robustness at the operating point",
+    _following,
+    _show,
+    criteria=(
+        Criterion(
+            "growth at rest, worst parameters", "1/s", "below", 0.0,
+            "it stays stable for all parameters in their ranges",
+            "some parameters in their ranges make it unstable",
+            "stability over the ranges of all parameters",
+            lambda data: data.cloud.worst_growth_per_s,
+        ),
+    ),
+    document=_document,
+    fresh=True,
+)  # fmt: skip
+
+CONTACT_ROBUSTNESS = Part[LoopRobustness](
+    "contact_robustness",
+    "Robustness before an obstacle",
+    _before_an_obstacle,
+    _show,
+    criteria=(
+        Criterion(
+            "growth before an obstacle, worst parameters", "1/s", "below", 0.0,
+            "it comes to rest before an obstacle for all parameters in their ranges",
+            "some parameters in their ranges make it swing where the law is stiffest",
+            "stability over the ranges of all parameters",
+            lambda data: data.cloud.worst_growth_per_s,
+        ),
+    ),
+    document=_document,
+)  # fmt: skip

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from analysis.design.requirements import REQUIRED
 from analysis.linear.loop_margins import LoopMargins
-from analysis.models.linear_models import LinearModel
-from analysis.reporting.html_page import (
-    Cell,
-    bullets,
-    figure_html,
-    number,
-    paragraph,
-    table,
-)
+from analysis.reporting.criterion import Criterion, Reading
+from analysis.reporting.plain_values import pick
+from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
 from analysis.stability.law_analysis import Part, Study
 from analysis.trajectory.adaptation_stability import (
     AdaptationStability,
@@ -36,6 +31,7 @@ from analysis.trajectory.frozen_gains import (
     gain_bounds,
 )
 from analysis.trajectory.robot_chain import ROBOTS, RobotChain, robot_chain
+from analysis.trajectory.route_loop import route_law
 from analysis.trajectory.trajectory_plots import (
     plot_adaptation,
     plot_braked_chains,
@@ -43,6 +39,7 @@ from analysis.trajectory.trajectory_plots import (
     plot_frozen_poles,
     plot_gain_bounds,
 )
+from systems.ranging.parameters import OBJECT_SLOTS
 
 #: Fields of ``LoopMargins`` that the JSON document contains.
 _MARGINS = (
@@ -51,298 +48,353 @@ _MARGINS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ChainStudy:
-    """Frequency responses of a chain of robots, and simulations of the same chain.
+def _frozen_document(data: Sequence[FrozenPoint]) -> list[dict[str, Any]]:
+    return [
+        {
+            **pick(point, "at", "stiffness_n_m", "damping_n_s_m"),
+            "poles": point.model.s_poles,
+            **pick(point.model, "growth_per_s", "damping_ratio"),
+            "margins": {
+                axis: pick(margins, *_MARGINS)
+                for axis, margins in point.margins.items()
+            },
+        }
+        for point in data
+    ]
 
-    In a chain, each robot follows the robot in front of it.
-    """
 
-    chain: RobotChain
-    runs: tuple[ChainRun, ...]
-    braked: tuple[BrakedChain, ...]
-
-
-def route_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
-    """Returns the parts for a robot on a route, and a list of parts that do not apply.
-
-    The parts are about these subjects:
-
-    - Poles and margins with frozen gains.
-    - Bounds of stiffness and damping.
-    - Adaptation of the gains.
-    - Chains of robots that follow one another.
-
-    Args:
-        left_out: Titles of the parts for a robot that follows a sound. They do not
-            apply to a robot on a route.
-
-    Returns:
-        Five parts, in the order of the report. The last one lists ``left_out``.
-    """
-    titles = tuple(left_out)
-    return (
-        Part(
-            "frozen_gains",
-            "Frozen gains",
-            lambda study: frozen_gains(study.scenario),
-            _render_frozen,
-            document=_frozen_document,
-            models=_frozen_models,
-        ),
-        Part(
-            "gain_bounds",
-            "Bounds of stiffness and damping",
-            lambda study: gain_bounds(study.scenario),
-            _render_bounds,
-            document=lambda data: {
-                "gain_bounds": {**vars(data), "mass": data.mass._asdict()}
+def _show_frozen(data: Sequence[FrozenPoint]) -> list[Content]:
+    return [
+        ("The models describe the loop about P's target with constant gains: law, "
+         "wheel command, plant and odometry as built, each linearized, over one tick. "
+         "On the route the robot drives at the target's speed. In contact a wall at "
+         "rest is across its path; K and D act along the path. The safety filter does "
+         "not intervene, and no limit is reached."),
+        Table.of(
+            data,
+            {
+                "place": "at.name",
+                Column("K", "N/m"): "stiffness_n_m",
+                Column("D", "N s/m"): "damping_n_s_m",
+                Column("poles ln(z)/T", "rad/s"): lambda at: ", ".join(_poles_of(at)),
+                Column("growth", "1/s"): "model.growth_per_s",
+                "damping ratio": "model.damping_ratio",
             },
         ),
-        Part(
-            "adaptation",
-            "Adaptation",
-            lambda study: adaptation_stability(study.scenario),
-            _render_adaptation,
-            document=_adaptation_document,
+        Table(
+            [
+                "place", "direction", Column("gain", "dB"), Column("phase", "deg"),
+                Column("delay", "s"), "M_s",
+            ],
+            [
+                [point.at.name, axis, each.gain_margin_db, each.phase_margin_deg,
+                 each.delay_margin_s, each.sensitivity_peak]
+                for point in data
+                for axis, each in point.margins.items()
+            ],
+            "Margins of the loop cut at the acceleration",
         ),
-        Part(
-            "robot_chain",
-            "Robots that follow one another",
-            _chain,
-            _render_chain,
-            document=_chain_document,
-        ),
-        Part(
-            "left_out",
-            "Parts that do not apply",
-            lambda study: titles,
-            _render_left_out,
-        ),
-    )
-
-
-def _frozen_models(data: Sequence[FrozenPoint]) -> tuple[LinearModel, ...]:
-    return tuple(
-        replace(point.model, name=f"frozen gains {point.at.name}") for point in data
-    )
-
-
-def _frozen_document(data: Sequence[FrozenPoint]) -> dict[str, Any]:
-    return {
-        "frozen_gains": [
-            {
-                "at": point.at,
-                "stiffness_n_m": point.stiffness_n_m,
-                "damping_n_s_m": point.damping_n_s_m,
-                "poles": point.poles,
-                "growth_per_s": point.growth_per_s,
-                "damping_ratio": point.damping_ratio,
-                "margins": {
-                    axis: {name: getattr(margins, name) for name in _MARGINS}
-                    for axis, margins in point.margins.items()
-                },
-            }
-            for point in data
-        ]
-    }
-
-
-def _render_frozen(data: Sequence[FrozenPoint], name: str) -> list[str]:
-    poles: list[list[Cell]] = [
-        [
-            point.at.name,
-            point.stiffness_n_m,
-            point.damping_n_s_m,
-            ", ".join(_poles_of(point)),
-            point.growth_per_s,
-            point.damping_ratio,
-        ]
-        for point in data
-    ]
-    margins: list[list[Cell]] = [
-        [point.at.name, axis, *_margin_cells(each)]
-        for point in data
-        for axis, each in point.margins.items()
-    ]
-    return [
-        paragraph(
-            "The models describe the loop about P's target with constant gains: law, "
-            "wheel command, plant and odometry as built, each linearized, over one "
-            "tick. On the route the robot drives at the target's speed. In contact a "
-            "wall at rest is across its path; K and D act along the path. The safety "
-            "filter does not intervene, and no limit is reached."
-        ),
-        table(
-            ["place", "K (N/m)", "D (N s/m)", "poles ln(z)/T (rad/s)", "growth (1/s)",
-             "damping ratio"],
-            poles,
-        ),
-        table(
-            ["place", "direction", "gain (dB)", "phase (deg)", "delay (s)", "M_s"],
-            margins,
-            caption="Margins of the loop cut at the acceleration",
-        ),
-        figure_html(plot_frozen_poles(data), name, "Poles with frozen gains."),
+        Figure(lambda: plot_frozen_poles(data), "Poles with frozen gains."),
     ]  # fmt: skip
 
 
 def _poles_of(point: FrozenPoint) -> list[str]:
     """Returns the poles as texts, slowest first; of a conjugate pair only one pole."""
-    poles = sorted(point.poles.tolist(), key=lambda pole: -pole.real)
+    poles = sorted(point.model.s_poles.tolist(), key=lambda pole: -pole.real)
     shown = [pole for pole in poles if pole.imag >= -1e-9]
     return [number(p if abs(p.imag) > 1e-9 else p.real) for p in shown]
 
 
-def _margin_cells(each: LoopMargins) -> list[Cell]:
-    return [
-        each.gain_margin_db,
-        each.phase_margin_deg,
-        each.delay_margin_s,
-        each.sensitivity_peak,
-    ]
+def _worst(
+    worst: Callable[[list[float]], float], of: Callable[[LoopMargins], float]
+) -> Callable[[Sequence[FrozenPoint]], float]:
+    """Reads the worst value over all operating points and both directions."""
+    return lambda data: worst(
+        [of(margins) for point in data for margins in point.margins.values()]
+    )
 
 
-def _render_bounds(data: GainBounds, name: str) -> list[str]:
+FROZEN_GAINS = Part[Sequence[FrozenPoint]](
+    "frozen_gains",
+    "Frozen gains",
+    lambda study: frozen_gains(study.scenario),
+    _show_frozen,
+    criteria=(
+        Criterion(
+            "growth with frozen gains", "1/s", "below", 0.0,
+            "small deviations die out, on the route, at rest and before a wall",
+            "small deviations grow, on the route, at rest or before a wall",
+            "stability",
+            lambda data: max(point.model.growth_per_s for point in data),
+        ),
+        Criterion(
+            "damping ratio out of contact", "", "at least", WELL_DAMPED,
+            "it hardly overshoots its target",
+            "it overshoots its target",
+            "set by this project: 5 % of overshoot",
+            lambda data: min(
+                point.model.damping_ratio for point in data if point.at.wall_m is None
+            ),
+        ),
+        Criterion(
+            "least damping ratio", "", "at least", 0.4,
+            "it does not swing before a wall either",
+            "somewhere in the zone of a wall it swings for several cycles",
+            "usual: 0.4 to 0.8 (Astrom and Murray)",
+            lambda data: min(point.model.damping_ratio for point in data),
+        ),
+        Criterion(
+            "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
+            "the loop tolerates the usual extra phase lag or lead",
+            "a small extra phase makes the loop oscillate",
+            "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
+            _worst(min, lambda margins: margins.phase_margin_deg),
+        ),
+        Criterion(
+            "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
+            "gains may double, or fall to half",
+            "a gain that is off by less than a factor of two makes it unstable",
+            "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
+            _worst(min, lambda margins: margins.gain_margin_db),
+        ),
+        Criterion(
+            "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
+            "disturbances are hardly amplified",
+            "disturbances near the crossover are amplified more than twice",
+            "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",
+            _worst(max, lambda margins: margins.sensitivity_peak),
+        ),
+        Criterion(
+            "least delay margin of the loop without sampling", "s", "at least", 0.1,
+            "it tolerates more added delay than the threshold",
+            "less added delay than the threshold makes it oscillate",
+            "set by this project; phase margin divided by crossover frequency",
+            _worst(min, lambda margins: margins.delay_margin_s),
+        ),
+    ),
+    document=_frozen_document,
+    models=lambda data: [
+        replace(point.model, name=f"frozen gains {point.at.name}") for point in data
+    ],
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SpringBounds:
+    """Bounds of stiffness and damping, and the stiffness of the scenario."""
+
+    bounds: GainBounds
+    total_stiffness_n_m: float
+    """Sum of the stiffness to the target and the stiffness of a contact, N/m."""
+
+    @property
+    def share(self) -> float:
+        """Total stiffness relative to its stability limit.
+
+        The limit is for the damping of the target alone and for positions that are one
+        tick late.
+        """
+        bound = self.bounds.stable_today_n_m[-1]
+        return self.total_stiffness_n_m / bound if bound > 0.0 else math.inf
+
+
+def _bounds(study: Study) -> SpringBounds:
+    own = route_law(study.scenario)
+    return SpringBounds(
+        gain_bounds(study.scenario), own.stiffness_n_m + own.contact_stiffness_n_m
+    )
+
+
+def _show_bounds(data: SpringBounds) -> list[Content]:
+    bounds = data.bounds
     rows: list[list[Cell]] = [
         [
             f"{late} tick{'s' * (late > 1)} late" if late else "as built",
-            data.stable_today_n_m[k],
-            data.closed_form_n_m[k],
-            data.damped_today_n_m[k],
+            bounds.stable_today_n_m[k],
+            bounds.closed_form_n_m[k],
+            bounds.damped_today_n_m[k],
         ]
-        for k, late in enumerate(data.late_ticks)
+        for k, late in enumerate(bounds.late_ticks)
     ]
-    stiffness, damping = data.today["target"]
-    contacts = "any number of" if math.isinf(data.contacts) else f"{data.contacts:g}"
+    stiffness, damping = bounds.today["target"]
+    contacts = (
+        "any number of" if math.isinf(bounds.contacts) else f"{bounds.contacts:g}"
+    )
     return [
-        paragraph(
+        (
             f"The bounds are for D = {number(damping)} N s/m (K is set to "
             f"{number(stiffness)} N/m), a motor lag of "
-            f"{number(data.mass.motor_lag_s)} s and ticks of "
-            f"{number(data.mass.tick_s * 1e3)} ms. They come from bisection on the "
+            f"{number(bounds.mass.motor_lag_s)} s and ticks of "
+            f"{number(bounds.mass.tick_s * 1e3)} ms. They come from bisection on the "
             "one-period matrix of the blocks, and from the closed form that is used "
             "for warnings before a run."
         ),
-        table(
-            ["position that springs act on", "stable below K (N/m)", "closed form",
-             f"damping ratio {WELL_DAMPED:g} up to K (N/m)"],
+        Table(
+            [
+                "position that springs act on",
+                Column("stable below K", "N/m"),
+                "closed form",
+                Column(f"damping ratio {WELL_DAMPED:g} up to K", "N/m"),
+            ],
             rows,
         ),
-        paragraph(
+        (
             "Dampers act on the velocity of the virtual mass. Together they may reach "
-            f"{number(data.most_damping_n_s_m)} N s/m; 2 M/T is "
-            f"{number(data.closed_damping_n_s_m)}. Therefore {contacts} contacts may "
+            f"{number(bounds.most_damping_n_s_m)} N s/m; 2 M/T is "
+            f"{number(bounds.closed_damping_n_s_m)}. Therefore {contacts} contacts may "
             "act at once with full damping: combine a scan of more beams into objects "
             "first."
         ),
-        figure_html(plot_gain_bounds(data), name, "Bounds of K over D."),
-    ]  # fmt: skip
+        Figure(lambda: plot_gain_bounds(bounds), "Bounds of K over D."),
+    ]
 
 
-def _adaptation_document(data: AdaptationStability) -> dict[str, Any]:
-    run = data.lyapunov
+GAIN_BOUNDS = Part[SpringBounds](
+    "gain_bounds",
+    "Bounds of stiffness and damping",
+    _bounds,
+    _show_bounds,
+    criteria=(
+        Criterion(
+            "sum of all springs, share of the stable limit", "", "below", 1.0,
+            "target and contact together are soft enough, even if positions are one "
+            "tick late",
+            "target and contact together are too stiff if positions are one tick late",
+            "stability, with the damping of the target alone",
+            lambda data: data.share,
+        ),
+        Criterion(
+            "contacts that may act at once", "", "at least", float(OBJECT_SLOTS),
+            "the dampers of all objects that it sees may act at once",
+            "the dampers of several objects at once reverse the velocity at each tick",
+            "D + n D_e < 2 M/T, with as many objects as the sensor can report",
+            lambda data: data.bounds.contacts,
+        ),
+    ),
+    document=lambda data: {
+        **vars(data.bounds),
+        "mass": data.bounds.mass._asdict(),
+        "total_stiffness_n_m": data.total_stiffness_n_m,
+    },
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Adaptation:
+    """Stability of the adaptation, and the stiffness that it learns in a jam."""
+
+    stability: AdaptationStability
+    jam_share: float
+    """Stiffness at the end of a jam relative to its stability limit. In a jam, a wall
+    holds the robot back while the target moves on. The limit is for the damping of the
+    target alone. NaN if the limit is unknown."""
+
+
+def _adaptation(study: Study) -> Adaptation:
+    stability = adaptation_stability(study.scenario)
+    found = study.found.get("gain_bounds")
+    bound = found.bounds.stable_today_n_m[0] if found else math.nan
+    learned = stability.jam.end_n_m[1]
+    return Adaptation(stability, math.inf if bound <= 0.0 else learned / bound)
+
+
+def _adaptation_document(data: Adaptation) -> dict[str, Any]:
+    found = data.stability
+    run = found.lyapunov
     return {
-        "adaptation": {
-            "rule": data.rule,
-            "rate": data.rate,
-            "reference_rad_s": data.reference[0],
-            "reference_damping_ratio": data.reference[1],
-            "reference_poles": data.reference_poles,
-            "reference_poles_z": data.held_poles,
-            "lyapunov": run
-            and {
-                "falls": run.falls,
-                "largest_rise": run.largest_rise,
-                "sampled_rise": run.sampled_rise,
-                "left": float(run.continuous[-1]),
-                "sampled_left": float(run.sampled[-1]),
-            },
-            "drift": {
-                name: getattr(data.drift, name)
-                for name in (
-                    "push_n", "time_s", "gradient_n_m", "simulated_n_m", "limited_n_m"
-                )
-            },
-            "jam": data.jam,
-            "critical_rate": data.critical.rate,
-            "critical_amplitude_m": data.critical.amplitude_m,
-            "critical_products": {
-                f"{each.amplitude_m:g}": each.product for each in data.products
-            },
-            "margin": data.margin,
-            "bounded": data.bounded,
-        }
+        **pick(found, "rule", "rate", "reference_poles", "jam", "margin", "bounded"),
+        "reference_rad_s": found.reference[0],
+        "reference_damping_ratio": found.reference[1],
+        "reference_poles_z": found.held_poles,
+        "lyapunov": run
+        and {
+            **pick(run, "falls", "largest_rise", "sampled_rise"),
+            "left": run.continuous[-1],
+            "sampled_left": run.sampled[-1],
+        },
+        "drift": pick(
+            found.drift, "push_n", "time_s", "gradient_n_m", "simulated_n_m",
+            "limited_n_m",
+        ),
+        "critical_rate": found.critical.rate,
+        "critical_amplitude_m": found.critical.amplitude_m,
+        "critical_products": {
+            f"{each.amplitude_m:g}": each.product for each in found.products
+        },
+        "jam_share": data.jam_share,
     }  # fmt: skip
 
 
-def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
-    frequency, ratio = data.reference
+def _show_adaptation(data: Adaptation) -> list[Content]:
+    found = data.stability
+    frequency, ratio = found.reference
+    drift, jam = found.drift, found.jam
     return [
-        paragraph(
-            f"The reference has w_n = {number(frequency)} rad/s, xi = "
-            f"{number(ratio)}, the poles "
-            f"{', '.join(number(_plain(pole)) for pole in data.reference_poles)} "
+        (
+            f"The reference has w_n = {number(frequency)} rad/s, xi = {number(ratio)}, "
+            "the poles "
+            f"{', '.join(number(_plain(pole)) for pole in found.reference_poles)} "
             "rad/s, and over a tick the poles "
-            f"{', '.join(number(_plain(z)) for z in data.held_poles)}. The sampled "
+            f"{', '.join(number(_plain(z)) for z in found.held_poles)}. The sampled "
             "reference is exact. It has the nominal gains, so that there is nothing to "
             "learn on free floor: contacts, limits and motors cause all that the law "
             "learns."
         ),
-        paragraph(_of_lyapunov(data)),
-        paragraph(
-            f"The adaptation rate is gamma = {number(data.rate)}. Without limits K "
-            f"and D run away at rates from {number(data.critical.rate)} on, "
-            f"{number(data.margin)} times the current rate, if the target swings by "
-            f"{number(data.critical.amplitude_m)} m; this is the lag at which the "
-            "target pulls P through a contact. gamma_crit a\u00b2 is "
-            + ", ".join(
-                f"{number(each.product)} at {number(each.amplitude_m)} m"
-                for each in data.products
-            )
-            + "."
-        ),
-        table(
-            ["time (s)", "gradient, closed form", "without limits", "as set"],
+        _of_lyapunov(found),
+        f"The adaptation rate is gamma = {number(found.rate)}. Without limits K and D "
+        f"run away at rates from {number(found.critical.rate)} on, "
+        f"{number(found.margin)} times the current rate, if the target swings by "
+        f"{number(found.critical.amplitude_m)} m; this is the lag at which the target "
+        "pulls P through a contact. gamma_crit a\u00b2 is "
+        + ", ".join(
+            f"{number(each.product)} at {number(each.amplitude_m)} m"
+            for each in found.products
+        )
+        + ".",
+        Table(
+            [
+                Column("time", "s"),
+                "gradient, closed form",
+                "without limits",
+                "as set",
+            ],
             [
                 [float(time), *values]
                 for time, *values in zip(
-                    data.drift.time_s,
-                    data.drift.gradient_n_m,
-                    data.drift.simulated_n_m,
-                    data.drift.limited_n_m,
+                    drift.time_s,
+                    drift.gradient_n_m,
+                    drift.simulated_n_m,
+                    drift.limited_n_m,
                     strict=True,
                 )
             ],
-            caption=
-                f"Drift of K (N/m) under a push of {number(data.drift.push_n)} N that "
-                "the reference does not include: closed form (K_0\u2074 + 4 gamma "
-                "F\u00b2 t)^(1/4), and simulation without limits and as set"
-            ,
+            f"Drift of K (N/m) under a push of {number(drift.push_n)} N that the "
+            "reference does not include: closed form (K_0\u2074 + 4 gamma F\u00b2 "
+            "t)^(1/4), and simulation without limits and as set",
         ),
-        table(
-            ["", f"after {number(data.jam.jam_s)} s of jam",
-             f"{number(data.jam.after_s)} s later"],
+        Table(
             [
-                [text, data.jam.end_n_m[k], data.jam.left_n_m[k]]
+                "",
+                f"after {number(jam.jam_s)} s of jam",
+                f"{number(jam.after_s)} s later",
+            ],
+            [
+                [text, jam.end_n_m[k], jam.left_n_m[k]]
                 for k, text in enumerate(("without limits", "as set"))
             ],
-            caption=
-                "Jam: K (N/m) while a wall holds P and the target moves on, and after "
-                "the wall is gone; infinite means that the loop is unstable with the "
-                "gains that it learned"
-            ,
+            "Jam: K (N/m) while a wall holds P and the target moves on, and after the "
+            "wall is gone; infinite means that the loop is unstable with the gains "
+            "that it learned",
         ),
-        paragraph(
-            "The limits of `projected` keep K and D within bounds. They do not bring K "
-            "and D back."
-            if data.bounded
-            else "Nothing bounds K and D; set `projected` to bound them."
+        "The limits of `projected` keep K and D within bounds. They do not bring K and "
+        "D back."
+        if found.bounded
+        else "Nothing bounds K and D; set `projected` to bound them.",
+        Figure(
+            lambda: plot_adaptation(found),
+            "Lyapunov function, and drift under a push.",
         ),
-        figure_html(
-            plot_adaptation(data), name, "Lyapunov function, and drift under a push."
-        ),
-    ]  # fmt: skip
+    ]
 
 
 def _plain(pole: complex) -> complex:
@@ -370,6 +422,56 @@ def _of_lyapunov(data: AdaptationStability) -> str:
     )
 
 
+def _lyapunov_rise(data: Adaptation) -> Reading:
+    run = data.stability.lyapunov
+    return run.largest_rise if run else "no Lyapunov function is known for the rule"
+
+
+ADAPTATION = Part[Adaptation](
+    "adaptation",
+    "Adaptation",
+    _adaptation,
+    _show_adaptation,
+    criteria=(
+        Criterion(
+            "rise of the Lyapunov function", "", "at most", 1e-9,
+            "without contacts, the rule's Lyapunov function falls all the time",
+            "the rule's Lyapunov function rises",
+            "rounding",
+            _lyapunov_rise,
+        ),
+        Criterion(
+            "critical adaptation rate over the current rate", "", "above", 1.0,
+            "K and D do not run away where the target leads by the largest lag",
+            "K and D run away where the target leads by the largest lag",
+            "simulated without contacts and without limits",
+            lambda data: data.stability.margin,
+        ),
+        Criterion(
+            "stiffness learned in a jam, share of the stable limit", "", "below", 1.0,
+            "it stays stable with the stiffness that it learns behind a wall",
+            "the stiffness that it learns behind a wall makes it unstable when the "
+            "wall is gone",
+            "after 90 s of jam the target rests; with the limits of the scenario",
+            lambda data: data.jam_share,
+        ),
+    ),
+    document=_adaptation_document,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ChainStudy:
+    """Frequency responses of a chain of robots, and simulations of the same chain.
+
+    In a chain, each robot follows the robot in front of it.
+    """
+
+    chain: RobotChain
+    runs: tuple[ChainRun, ...]
+    braked: tuple[BrakedChain, ...]
+
+
 def _chain(study: Study) -> ChainStudy:
     scenario = study.scenario
     chain = robot_chain(scenario)
@@ -392,37 +494,26 @@ def _chain(study: Study) -> ChainStudy:
 def _chain_document(data: ChainStudy) -> dict[str, Any]:
     chain = data.chain
     return {
-        "robot_chain": {
-            "stiffness_n_m": chain.stiffness_n_m,
-            "damping_n_s_m": chain.damping_n_s_m,
-            "least_damping_n_s_m": chain.least_damping_n_s_m,
-            "least_damping_in_contact_n_s_m": chain.least_damping_in_contact_n_s_m,
-            "most_feed_forward": chain.most_feed_forward,
-            "time_headway_s": chain.time_headway_s,
-            "chains": [
-                {
-                    "name": name,
-                    "feed_forward": peak.feed_forward,
-                    "spacing_m": peak.spacing_m,
-                    "peak": peak.peak,
-                    "frequency_rad_s": peak.frequency_rad_s,
-                    "grows": peak.grows,
-                    "tail": {str(n): value for n, value in peak.tail.items()},
-                    "simulated": run.simulated,
-                    "predicted": run.predicted,
-                    "difference": run.difference,
-                    "least_gap_m": braked.least_gap_m,
-                    "overshoot_m": braked.overshoot_m,
-                }
-                for (name, peak), run, braked in zip(
-                    chain.peaks.items(), data.runs, data.braked, strict=True
-                )
-            ],
-        }
-    }
+        **pick(
+            chain, "stiffness_n_m", "damping_n_s_m", "least_damping_n_s_m",
+            "least_damping_in_contact_n_s_m", "most_feed_forward", "time_headway_s",
+        ),
+        "chains": [
+            {
+                "name": name,
+                **pick(peak, "feed_forward", "spacing_m", "peak", "frequency_rad_s",
+                       "grows", "tail"),
+                **pick(run, "simulated", "predicted", "difference"),
+                **pick(braked, "least_gap_m", "overshoot_m"),
+            }
+            for (name, peak), run, braked in zip(
+                chain.peaks.items(), data.runs, data.braked, strict=True
+            )
+        ],
+    }  # fmt: skip
 
 
-def _render_chain(data: ChainStudy, name: str) -> list[str]:
+def _show_chain(data: ChainStudy) -> list[Content]:
     chain = data.chain
     rows: list[list[Cell]] = [
         [
@@ -439,10 +530,10 @@ def _render_chain(data: ChainStudy, name: str) -> list[str]:
         [run.name, *(1e3 * value for value in run.overshoot_m.tolist())]
         for run in data.braked
     ]
-    headings = ["chain", "spacing (m)", *(f"{n} robots" for n in ROBOTS)]
+    lengths = [f"{n} robots" for n in ROBOTS]
     pairs = range(1, len(data.braked[0].overshoot_m) + 1)
     return [
-        paragraph(
+        (
             "Robots like this one drive on a line by the same law. The target of each "
             "robot is a place behind its predecessor, with feed-forward of the "
             "predecessor's velocity or without it. The object sensors are exact. In "
@@ -451,29 +542,33 @@ def _render_chain(data: ChainStudy, name: str) -> list[str]:
             "of the first robot, at the frequency where this ratio is largest. The "
             "safety filter does not intervene."
         ),
-        table(
-            [*headings, "error of simulation", "a disturbance"],
+        Table(
+            [
+                "chain",
+                Column("spacing", "m"),
+                *lengths,
+                "error of simulation",
+                "a disturbance",
+            ],
             rows,
-            caption="Amplification from the first to the last robot",
+            "Amplification from the first to the last robot",
         ),
-        paragraph(_of_chain(chain)),
-        table(
+        _of_chain(chain),
+        Table(
             ["chain", *(f"robots {k} and {k + 1}" for k in pairs)],
             brakes,
-            caption="How far each gap falls below its final value, mm, when the first "
-            "robot brakes from the target's speed to rest",
+            "How far each gap falls below its final value, mm, when the first robot "
+            "brakes from the target's speed to rest",
         ),
-        figure_html(
-            plot_chain(chain, data.runs),
-            f"{name}-response",
+        Figure(
+            lambda: plot_chain(chain, data.runs),
             "Left: amplification by a pair of robots over frequency. Middle: eight "
             "robots at the frequency where their chain amplifies most, or at a "
             "robot's natural frequency if nothing grows. Right: a pair out of "
             "contact, over D.",
         ),
-        figure_html(
-            plot_braked_chains(data.braked),
-            f"{name}-braked",
+        Figure(
+            lambda: plot_braked_chains(data.braked),
             "Gaps after the first robot has braked.",
         ),
     ]
@@ -507,12 +602,42 @@ def _of_chain(chain: RobotChain) -> str:
     return text
 
 
-def _render_left_out(data: Sequence[str], name: str) -> list[str]:
-    return [
-        paragraph(
-            "The following parts do not apply, because they are about a robot that "
-            "follows a sound: its follow distance, its tracker, its bursts and its "
-            "law's push."
+def _amplification(name: str, where: str, good: str, bad: str) -> Criterion[ChainStudy]:
+    def read(data: ChainStudy) -> Reading:
+        peaks = data.chain.peaks
+        return max(peaks[name].each) if name in peaks else "there are no contacts"
+
+    return Criterion(
+        f"chain amplification {where}", "", "at most", 1.0 + 1e-6, good, bad,
+        "l2 string stability: no frequency is amplified; 1e-6 allows for rounding",
+        read,
+    )  # fmt: skip
+
+
+ROBOT_CHAIN = Part[ChainStudy](
+    "robot_chain",
+    "Robots that follow one another",
+    _chain,
+    _show_chain,
+    criteria=(
+        *(
+            _amplification(
+                where,
+                where,
+                "no robot swings more than the first robot if each follows its "
+                "predecessor",
+                "a disturbance grows from robot to robot along the chain",
+            )
+            for where in ("with feed-forward", "without feed-forward")
         ),
-        bullets(data),
-    ]
+        _amplification(
+            "in contact, without feed-forward",
+            "in contact",
+            "where zones of neighboring robots meet, no robot swings more than the "
+            "first robot",
+            "where zones of neighboring robots meet, a disturbance grows along the "
+            "chain",
+        ),
+    ),
+    document=_chain_document,
+)

@@ -1,14 +1,18 @@
-"""Parts of the stability report: delay, bursts, sample period, gains, contact."""
+"""Parts of the stability report: delay, bursts, sample period, and contact."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.design.requirements import REQUIRED
+from analysis.laws.radial_law import radial_law
 from analysis.linear.burst_cycle import (
     HOLDS,
     BurstCycle,
@@ -17,7 +21,11 @@ from analysis.linear.burst_cycle import (
     simulate_burst_cycle,
 )
 from analysis.linear.burst_gaps import GapChart, gap_chart
-from analysis.linear.contact_mode import ContactLimits, contact_limits
+from analysis.linear.contact_mode import (
+    ContactLimits,
+    contact_limits,
+    contact_model,
+)
 from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
 from analysis.linear.delayed_run import DelayCheck, check_delay_margin
 from analysis.linear.root_locus import RootLocus, root_loci
@@ -32,7 +40,9 @@ from analysis.linear.sampled_stability import (
 )
 from analysis.models.open_loops import DIRECTIONS
 from analysis.models.operating_points import OperatingPoint
-from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
+from analysis.reporting.criterion import Criterion, Reading
+from analysis.reporting.plain_values import pick
+from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
 from analysis.stability.chart_plots import (
     plot_chart,
     plot_contact_limits,
@@ -42,11 +52,7 @@ from analysis.stability.chart_plots import (
     plot_root_loci,
 )
 from analysis.stability.law_analysis import Part, Study
-from analysis.stability.recommended_gains import (
-    GainFigures,
-    RecommendedGains,
-    recommend_gains,
-)
+from diagrams import Scenario
 
 #: Duration of the runs that check delay margins, s, in a short and in a full report.
 _CHECK_S = (60.0, 300.0)
@@ -68,10 +74,9 @@ class SampledLoop:
     this margin is infinite."""
 
     @property
-    def delay_margin_s(self) -> float:
-        """Delay margin at the sensor for motion along the line to the source, s."""
-        found = [m for m in self.margins if (m.at, m.direction) == ("sensor", "along")]
-        return found[0].delay_s if found else float("inf")
+    def least_s(self) -> float:
+        """Least of the delay margins, s. NaN if there are none."""
+        return min((margin.delay_s for margin in self.margins), default=math.nan)
 
 
 @dataclass(frozen=True)
@@ -92,54 +97,7 @@ class BurstCycles:
     """Largest multipliers over the duration of the silence."""
 
 
-def sampling_parts(*, full: bool) -> tuple[Part, ...]:
-    """Returns the parts about sampling, delays, the burst cycle, and contact.
-
-    Args:
-        full: Whether the simulations that check the results are long.
-
-    Returns:
-        Five parts, in the order of the report.
-    """
-    duration_s, cycles = _CHECK_S[full], _CYCLES[full]
-    return (
-        Part(
-            "sampled",
-            "Delay margins of the sampled loop",
-            lambda study: _sampled(study, duration_s),
-            _render_sampled,
-            document=_document,
-        ),
-        Part(
-            "burst_cycle",
-            "Burst cycle",
-            lambda study: _bursts(study, cycles),
-            _render_bursts,
-            document=_burst_document,
-        ),
-        Part(
-            "root_loci",
-            "Root loci",
-            lambda study: root_loci(study.scenario),
-            _render_loci,
-        ),
-        Part(
-            "sampling",
-            "Sample period, gains and delay",
-            _sampling,
-            _render_sampling,
-            document=_sampling_document,
-        ),
-        Part(
-            "contact_mode",
-            "Contact mode",
-            lambda study: contact_limits(study.scenario),
-            _render_contact,
-        ),
-    )
-
-
-def _sampled(study: Study, duration_s: float) -> SampledLoop:
+def _sampled(study: Study) -> SampledLoop:
     at: OperatingPoint = study.need("equilibria").at
     existing = {(m.at, m.direction) for m in study.need("margins").implemented}
     margins = tuple(
@@ -153,93 +111,104 @@ def _sampled(study: Study, duration_s: float) -> SampledLoop:
         if (margin.at, margin.direction) == ("sensor", "along") and np.isfinite(
             margin.delay_s
         ):
-            check = check_delay_margin(at, duration_s=duration_s)
+            check = check_delay_margin(at, duration_s=_CHECK_S[study.full])
     return SampledLoop(at.loop.tick_s, at.motion.poles, margins, check)
 
 
-def _document(data: SampledLoop) -> dict[str, Any]:
+def _sampled_document(data: SampledLoop) -> dict[str, Any]:
+    run = ("delay_s", "duration_s", "growth_per_s", "frequency_rad_s")
     return {
-        "sampled": {
-            "period_s": data.period_s,
-            "poles": data.poles,
-            "delay_margin_s": data.delay_margin_s,
-            "delay_margins": data.margins,
-            "check": data.check
-            and {
-                "below": _run_document(data.check.below),
-                "above": _run_document(data.check.above),
-                "confirmed": data.check.confirmed,
-            },
-        }
+        **pick(data, "period_s", "poles", "least_s", "margins"),
+        "check": data.check
+        and {
+            "below": pick(data.check.below, *run),
+            "above": pick(data.check.above, *run),
+            "confirmed": data.check.confirmed,
+        },
     }
 
 
-def _run_document(run: Any) -> dict[str, float]:
-    names = ("delay_s", "duration_s", "growth_per_s", "frequency_rad_s")
-    return {name: getattr(run, name) for name in names}
-
-
-def _render_sampled(data: SampledLoop, name: str) -> list[str]:
-    rows: list[list[Cell]] = [
-        [m.at, m.direction, m.delay_s, m.delay_s / data.period_s, m.frequency_rad_s]
-        for m in data.margins
-    ]
-    parts = [
-        paragraph(
-            "A delay margin is the delay that may be added before the loop "
-            "oscillates, in fractions of a tick. It comes from bisection on the "
-            "spectral radius of the one-period map with that delay. A delay at the "
-            "sensor makes an estimate later than the tracker assumes; a delay at the "
-            "wheels makes a command later."
+def _show_sampled(data: SampledLoop) -> list[Content]:
+    contents: list[Content] = [
+        (
+            "A delay margin is the delay that may be added before the loop oscillates, "
+            "in fractions of a tick. It comes from bisection on the spectral radius of "
+            "the one-period map with that delay. A delay at the sensor makes an "
+            "estimate later than the tracker assumes; a delay at the wheels makes a "
+            "command later."
         ),
-        table(["late at", "motion", "delay (s)", "ticks", "rad/s"], rows),
+        Table.of(
+            data.margins,
+            {
+                "late at": "at",
+                "motion": "direction",
+                Column("delay", "s"): "delay_s",
+                "ticks": lambda margin: margin.delay_s / data.period_s,
+                "rad/s": "frequency_rad_s",
+            },
+        ),
     ]
-    if data.check:
-        runs = (("0.95", data.check.below), ("1.05", data.check.above))
-        checks: list[list[Cell]] = [
-            [share, run.delay_s, run.growth_per_s, run.frequency_rad_s]
-            for share, run in runs
-        ]
-        parts.append(
-            table(
-                ["share of the margin", "delay (s)", "growth (1/s)", "rad/s"],
-                checks,
-                caption="Simulation of the diagram with that delay at the sensor, for "
-                f"{data.check.below.duration_s:g} s after a small kick",
-            )
-        )
-        parts.append(
-            figure_html(
-                plot_delay_check(data.check),
-                name,
+    check = data.check
+    if check:
+        contents += [
+            Table.of(
+                [("0.95", check.below), ("1.05", check.above)],
+                {
+                    "share of the margin": lambda run: run[0],
+                    Column("delay", "s"): lambda run: run[1].delay_s,
+                    Column("growth", "1/s"): lambda run: run[1].growth_per_s,
+                    "rad/s": lambda run: run[1].frequency_rad_s,
+                },
+                "Simulation of the diagram with that delay at the sensor, for "
+                f"{check.below.duration_s:g} s after a small kick",
+            ),
+            Figure(
+                lambda: plot_delay_check(check),
                 "Runs just below the margin and just above it.",
-            )
-        )
-    return parts
+            ),
+        ]
+    return contents
 
 
-def _bursts(study: Study, count: int) -> BurstCycles:
+#: Delay margins of the sampled loop.
+DELAY_MARGINS = Part[SampledLoop](
+    "delay_margins",
+    "Delay margins of the sampled loop",
+    _sampled,
+    _show_sampled,
+    criteria=(
+        Criterion(
+            "least delay margin", "s", "at least", REQUIRED.delay_margin_s,
+            "it tolerates more added delay than the threshold",
+            "less added delay than the threshold makes it oscillate",
+            "set by this project; exact margin of the sampled loop",
+            lambda data: data.least_s,
+        ),
+    ),
+    document=_sampled_document,
+)  # fmt: skip
+
+
+def _bursts(study: Study) -> BurstCycles:
     at: OperatingPoint = study.need("equilibria").at
     cycles = tuple(burst_cycle(study.scenario, hold, point=at) for hold in HOLDS)
-    runs = tuple(simulate_burst_cycle(cycle, count) for cycle in cycles)
+    runs = tuple(simulate_burst_cycle(cycle, _CYCLES[study.full]) for cycle in cycles)
     gaps = gap_chart(study.scenario, point=at)
     return BurstCycles(study.scenario.follower.tracker.hold, cycles, runs, gaps)
 
 
 def _burst_document(data: BurstCycles) -> dict[str, Any]:
     return {
-        "burst_cycle": [
+        "hold": data.today,
+        "cycles": [
             {
-                "hold": cycle.hold,
-                "on_s": cycle.on_s,
-                "period_s": cycle.period_s,
+                **pick(cycle, "hold", "on_s", "period_s", "largest"),
                 "multipliers": _slowest(cycle.multipliers),
-                "largest": cycle.largest,
                 "simulated_largest": run.factor,
             }
             for cycle, run in zip(data.cycles, data.runs, strict=True)
         ],
-        "burst_gaps": data.gaps,
+        "gaps": data.gaps,
     }
 
 
@@ -253,7 +222,7 @@ def _slowest(multipliers: NDArray[np.complex128]) -> Sequence[complex]:
     return found[:4]
 
 
-def _render_bursts(data: BurstCycles, name: str) -> list[str]:
+def _show_bursts(data: BurstCycles) -> list[Content]:
     rows: list[list[Cell]] = [
         [
             cycle.hold + (" (current)" if cycle.hold == data.today else ""),
@@ -266,22 +235,68 @@ def _render_bursts(data: BurstCycles, name: str) -> list[str]:
     first = data.cycles[0]
     cycles = round(data.runs[0].time_s[-1] / first.period_s)
     return [
-        paragraph(
+        (
             f"The source sounds for {first.on_s:g} s in every {first.period_s:g} s. "
-            "Between two bursts, the target rests in W (`world`), moves with the "
-            "robot (`robot`) or goes on with its own velocity (`motion`). A "
-            "multiplier is the share of a deviation from rest that remains after one "
-            "cycle. It comes from the product of the one-period matrices, and from a "
-            f"fit to {cycles} simulated cycles after a kick along the line to the "
-            "source; the fit shows the motion along this line only."
+            "Between two bursts, the target rests in W (`world`), moves with the robot "
+            "(`robot`) or goes on with its own velocity (`motion`). A multiplier is "
+            "the share of a deviation from rest that remains after one cycle. It comes "
+            f"from the product of the one-period matrices, and from a fit to {cycles} "
+            "simulated cycles after a kick along the line to the source; the fit shows "
+            "the motion along this line only."
         ),
-        table(["hold", "multipliers", "simulated, along", "stable"], rows),
-        figure_html(
-            plot_gap_chart(data.gaps),
-            name,
+        Table(["hold", "multipliers", "simulated, along", "stable"], rows),
+        Figure(
+            lambda: plot_gap_chart(data.gaps),
             "Growth over the silence between bursts, for each way to hold the target.",
         ),
     ]
+
+
+BURST_CYCLE = Part[BurstCycles](
+    "burst_cycle",
+    "Burst cycle",
+    _bursts,
+    _show_bursts,
+    criteria=(
+        Criterion(
+            "deviation remaining after a burst cycle", "", "below", 1.0,
+            "it settles although the source is silent most of the time",
+            "it swings ever farther because the source is silent most of the time",
+            "stability over a cycle of the sound",
+            lambda data: next(c.largest for c in data.cycles if c.hold == data.today),
+        ),
+    ),
+    document=_burst_document,
+)  # fmt: skip
+
+
+def _show_loci(data: Sequence[RootLocus]) -> list[Content]:
+    return [
+        (
+            "The figures show the poles ln(z)/T of the sampled loop as one gain "
+            "varies, for the loop to the target and for the contact mode where the law "
+            "is stiffest."
+        ),
+        Table.of(
+            data,
+            {
+                "gain": lambda locus: f"`{locus.parameter}`",
+                "loop": "loop",
+                "current": "today",
+                "stability ends at": "limit",
+            },
+        ),
+        Figure(
+            lambda: plot_root_loci(data),
+            "Root loci with marks at the current poles.",
+            scale=True,
+        ),
+    ]
+
+
+ROOT_LOCI = Part[Sequence[RootLocus]](
+    "root_loci", "Root loci", lambda study: root_loci(study.scenario), _show_loci
+)
 
 
 @dataclass(frozen=True)
@@ -294,18 +309,6 @@ class SamplingCharts:
     charts: tuple[StabilityChart, ...]
 
 
-def _sampling_document(data: SamplingCharts) -> dict[str, Any]:
-    return {
-        "sampling": {
-            "conditions": data.conditions,
-            "longest_stable_period_s": data.period.longest_stable_s,
-            "charts": [
-                {**vars(c), "stable_share": c.stable_share} for c in data.charts
-            ],
-        }
-    }
-
-
 def _sampling(study: Study) -> SamplingCharts:
     scenario = study.scenario
     return SamplingCharts(
@@ -315,134 +318,140 @@ def _sampling(study: Study) -> SamplingCharts:
     )
 
 
-def _render_loci(data: Sequence[RootLocus], name: str) -> list[str]:
-    rows: list[list[Cell]] = [
-        [f"`{locus.parameter}`", locus.loop, locus.today, locus.limit] for locus in data
-    ]
-    return [
-        paragraph(
-            "The figures show the poles ln(z)/T of the sampled loop as one gain "
-            "varies, for the loop to the target and for the contact mode where the "
-            "law is stiffest."
-        ),
-        table(["gain", "loop", "current", "stability ends at"], rows),
-        figure_html(
-            plot_root_loci(data),
-            name,
-            "Root loci with marks at the current poles.",
-            scale=True,
-        ),
-    ]
+def _sampling_document(data: SamplingCharts) -> dict[str, Any]:
+    return {
+        "conditions": data.conditions,
+        "longest_stable_period_s": data.period.longest_stable_s,
+        "charts": [
+            {**vars(chart), "stable_share": chart.stable_share} for chart in data.charts
+        ],
+    }
 
 
-def _render_sampling(data: SamplingCharts, name: str) -> list[str]:
-    conditions: list[list[Cell]] = [
-        [c.scheme, c.condition, c.pairs, c.stable, c.mismatches]
-        for c in data.conditions
-    ]
+def _show_sampling(data: SamplingCharts) -> list[Content]:
     return [
-        table(
-            ["scheme", "stable exactly for", "pairs tried", "stable", "mismatches"],
-            conditions,
-            caption="Sampled double integrator: closed form against eigenvalues",
+        Table.of(
+            data.conditions,
+            {
+                "scheme": "scheme",
+                "stable exactly for": "condition",
+                "pairs tried": "pairs",
+                "stable": "stable",
+                "mismatches": "mismatches",
+            },
+            "Sampled double integrator: closed form against eigenvalues",
         ),
-        paragraph(
+        (
             "The loop to the target stays stable up to a sample period of "
             f"{data.period.longest_stable_s:.3g} s; the current period is "
             f"{data.period.today_s:g} s."
         ),
-        figure_html(
-            plot_poles_against_period(data.period),
-            f"{name}-period",
+        Figure(
+            lambda: plot_poles_against_period(data.period),
             "Poles over the sample period.",
             scale=True,
         ),
         *(
-            figure_html(
-                plot_chart(chart),
-                f"{name}-chart{k}",
-                f"Growth: {chart.title}.",
-                scale=True,
-            )
-            for k, chart in enumerate(data.charts)
+            Figure(partial(plot_chart, chart), f"Growth: {chart.title}.", scale=True)
+            for chart in data.charts
         ),
     ]
 
 
-def _render_contact(data: ContactLimits, name: str) -> list[str]:
-    headings = ["motor lag (s)", *(f"{t} ticks" for t in data.latency_ticks)]
+SAMPLING = Part[SamplingCharts](
+    "sampling",
+    "Sample period, gains and delay",
+    _sampling,
+    _show_sampling,
+    document=_sampling_document,
+)
+
+
+@dataclass(frozen=True)
+class ContactMode:
+    """Motion in front of an obstacle, where the law adds a spring to the attraction."""
+
+    limits: ContactLimits
+    growth_per_s: float | None
+    """Growth rate where the law is stiffest, 1/s. None if the law does not push away
+    from obstacles."""
+    growth_one_tick_late_per_s: float | None
+    """The same growth rate if echoes arrive one control period later, 1/s."""
+
+
+def contact_growth(scenario: Scenario, ticks: int) -> float | None:
+    """Returns the growth rate of the motion in front of an obstacle, 1/s.
+
+    The spring to the obstacle has the largest stiffness of the law, and the measured
+    position of the obstacle is some control periods (``ticks``) old. The result is
+    negative if the motion decays. If the law does not push away from obstacles, it is
+    None.
+    """
+    stiffness = radial_law(scenario).stiffest_n_m
+    if stiffness <= 0.0:
+        return None
+    total = scenario.follower.attraction.stiffness_n_m + stiffness
+    return contact_model(scenario, total, latency_ticks=ticks).growth_per_s
+
+
+def _contact_mode(study: Study) -> ContactMode:
+    scenario = study.scenario
+    growth = (contact_growth(scenario, ticks) for ticks in (0, 1))
+    return ContactMode(contact_limits(scenario), *growth)
+
+
+def _of_push(growth_per_s: float | None) -> Reading:
+    if growth_per_s is None:
+        return "the law does not push off obstacles"
+    return growth_per_s
+
+
+def _show_contact(data: ContactMode) -> list[Content]:
+    limits = data.limits
+    lag, ticks = limits.today
     rows: list[list[Cell]] = [
-        [lag, *(float(value) for value in row)]
-        for lag, row in zip(data.motor_lags_s, data.stiffness_n_m, strict=True)
+        [lag_s, *map(float, row)]
+        for lag_s, row in zip(limits.motor_lags_s, limits.stiffness_n_m, strict=True)
     ]
-    caption = (
-        "Largest slope -df/dc of a law, N/m: now "
-        f"{number(data.stiffness_today_n_m)} with the conventional law, "
-        f"{number(data.active_slope_today_n_m)} with the active law of 2019"
-    )
-    lag, ticks = data.today
     return [
-        paragraph(
+        (
             "Before an obstacle the law's spring adds to K_r, while the damping is "
-            "still D_r. The table lists the largest springs with which the robot "
-            "comes to rest, over the motors' lag and the age of an echo (in ticks of "
-            f"{data.tick_s * 1e3:g} ms). This scenario has {lag:g} s and {ticks} "
+            "still D_r. The table lists the largest springs with which the robot comes "
+            "to rest, over the motors' lag and the age of an echo (in ticks of "
+            f"{limits.tick_s * 1e3:g} ms). This scenario has {lag:g} s and {ticks} "
             "ticks."
         ),
-        table(headings, rows, caption=caption),
-        figure_html(plot_contact_limits(data), name, "Limits of the contact mode."),
-    ]
-
-
-def gain_parts() -> tuple[Part, ...]:
-    """Returns the part that recommends gains and states what these gains cost."""
-    return (
-        Part(
-            "recommended_gains",
-            "Recommended gains",
-            lambda study: recommend_gains(study.scenario),
-            _render_gains,
+        Table(
+            [Column("motor lag", "s"), *(f"{t} ticks" for t in limits.latency_ticks)],
+            rows,
+            "Largest slope -df/dc of a law, N/m: now "
+            f"{number(limits.stiffness_today_n_m)} with the conventional law, "
+            f"{number(limits.active_slope_today_n_m)} with the active law of 2019",
         ),
-    )
+        Figure(lambda: plot_contact_limits(limits), "Limits of the contact mode."),
+    ]
 
 
-def _render_gains(data: RecommendedGains, name: str) -> list[str]:
-    t, today = data.thresholds, data.today
-    headings = [
-        "K_r", "D_r", "damping ratio", "phase (deg)", "gain (dB)", "M_s", "disk",
-        "delay (s)", "lag (m)", "to 2 % (s)", "stiffest law (N/m)",
-    ]  # fmt: skip
-    rows: list[list[Cell]] = [
-        ["Current gains"],
-        _figures(today),
-        ["Least D_r that meets all requirements"],
-    ]
-    rows += [
-        _figures(choice.figures)
-        if choice.figures
-        else [choice.stiffness_n_m, "none", *([None] * 9)]
-        for choice in data.choices
-    ]
-    return [
-        paragraph(
-            f"The requirements are a damping ratio of {t.damping_ratio:g}, a phase "
-            f"margin of {t.phase_margin_deg:g} deg, M_s of {t.sensitivity_peak:g}, a "
-            f"disk margin of {t.disk_margin:.2f}, at sensor and actuator, and rest "
-            f"before an obstacle with echoes that are {t.spare_ticks} tick late. The "
-            "loop is the sampled loop of the attraction with motor lag; margins are "
-            "the least in both directions. The lag is the distance of P behind the "
-            "follow point of a source that moves like the source of this scenario. "
-            "The stiffest law is the largest spring to obstacles with which P comes "
-            "to rest."
+CONTACT_MODE = Part[ContactMode](
+    "contact_mode",
+    "Contact mode",
+    _contact_mode,
+    _show_contact,
+    criteria=(
+        Criterion(
+            "growth where the law is stiffest", "1/s", "below", 0.0,
+            "it comes to rest however hard it presses against an obstacle",
+            "it swings where it presses to the law's stiffest point",
+            "stability of the contact mode at the law's largest slope",
+            lambda data: _of_push(data.growth_per_s),
         ),
-        table(headings, rows),
-        paragraph(data.advice),
-    ]
-
-
-def _figures(f: GainFigures) -> list[Cell]:
-    return [
-        f.stiffness_n_m, f.damping_n_s_m, f.damping_ratio, f.phase_margin_deg,
-        f.gain_margin_db, f.sensitivity_peak, f.disk_margin, f.delay_margin_s,
-        f.following_lag_m, f.settling_s, f.largest_law_stiffness_n_m,
-    ]  # fmt: skip
+        Criterion(
+            "growth where the law is stiffest, echoes one tick late", "1/s", "below",
+            0.0,
+            "the loop tolerates a processor that needs one more tick",
+            "with one more tick of latency it swings where the law is stiffest",
+            "set by this project",
+            lambda data: _of_push(data.growth_one_tick_late_per_s),
+        ),
+    ),
+)  # fmt: skip

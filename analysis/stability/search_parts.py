@@ -2,32 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-
 from analysis.linear.heading_loop import HeadingLoopMargins, heading_loop_margins
-from analysis.reporting.html_page import bullets, number, paragraph, table
+from analysis.reporting.criterion import Criterion
+from analysis.reporting.section import Column, Content, Table, number
 from analysis.stability.law_analysis import Part, Study
-from analysis.stability.verdict_readings import Reading
-from analysis.stability.verdicts import Criterion
 
 _MARGINS = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
-
-
-def search_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
-    """Returns the part about the heading loop, and a list of parts that do not apply.
-
-    Args:
-        left_out: Titles of the parts for a robot that follows a sound. They do not
-            apply to a search.
-
-    Returns:
-        Two parts, in the order of the report.
-    """
-    titles = tuple(left_out)
-    return (
-        Part("heading_loop", "The loop of the heading", _heading_loop, _render),
-        Part("left_out", "Parts that do not apply", lambda _: titles, _render_left),
-    )
 
 
 def _heading_loop(study: Study) -> HeadingLoopMargins:
@@ -40,9 +20,9 @@ def _heading_loop(study: Study) -> HeadingLoopMargins:
     )
 
 
-def _render(data: HeadingLoopMargins, name: str) -> list[str]:
+def _show(data: HeadingLoopMargins) -> list[Content]:
     return [
-        paragraph(
+        (
             "A searching robot stops, decides on a heading, and turns to it while it "
             "drives. The loop has a compass, a PID controller, pulse widths, motors "
             "and the heading that the wheels produce; PID output and motor duties are "
@@ -52,57 +32,47 @@ def _render(data: HeadingLoopMargins, name: str) -> list[str]:
             "would. Linear models do not cover steps, phases and finds: "
             "docs/searches.md states how often each occurs."
         ),
-        table(
-            ["crossover (rad/s)", "phase margin (deg)", "delay margin (s)",
-             "delay margin (ticks)", "gain margin (dB)", "lost by sampling (deg)"],
-            [[data.crossover_rad_s, data.phase_margin_deg, data.delay_margin_s,
-              data.delay_margin_ticks, data.gain_margin_db, data.phase_lost_deg]],
-            caption=f"With a tick of {number(1e3 * data.tick_s)} ms",
+        Table.of(
+            [data],
+            {
+                Column("crossover", "rad/s"): "crossover_rad_s",
+                Column("phase margin", "deg"): "phase_margin_deg",
+                Column("delay margin", "s"): "delay_margin_s",
+                Column("delay margin", "ticks"): "delay_margin_ticks",
+                Column("gain margin", "dB"): "gain_margin_db",
+                Column("lost by sampling", "deg"): "phase_lost_deg",
+            },
+            f"With a tick of {number(1e3 * data.tick_s)} ms",
         ),
-    ]  # fmt: skip
-
-
-def _render_left(data: Sequence[str], name: str) -> list[str]:
-    return [
-        paragraph(
-            "A search has no virtual mass, no springs and no equilibrium: the "
-            "following parts, which are about robots that follow a sound, do not "
-            "apply."
-        ),
-        bullets(list(data)),
     ]
 
 
-def _of(name: str) -> Callable[[Study], Reading]:
-    def read(study: Study) -> Reading:
-        data = study.found.get("heading_loop")
-        return (
-            float(getattr(data, name))
-            if data
-            else ("the heading loop was not computed")
-        )
-
-    return read
-
-
-#: Criteria for the heading loop, each with the function that reads its number.
-SEARCH_CRITERIA: Mapping[Criterion, Callable[[Study], Reading]] = {
-    Criterion(
-        "phase margin of the heading", "deg", "at least", 45.0,
-        "it turns to its heading without swinging",
-        "it swings about its heading",
-        _MARGINS,
-    ): _of("phase_margin_deg"),
-    Criterion(
-        "gain margin of the heading", "dB", "at least", 6.0,
-        "the motors may be twice as strong",
-        "motors of less than twice the nominal strength make it unstable",
-        _MARGINS,
-    ): _of("gain_margin_db"),
-    Criterion(
-        "delay margin of the heading", "ticks", "at least", 4.0,
-        "four more ticks of delay do no harm",
-        "fewer than four more ticks of delay make it oscillate",
-        "set by this project: four ticks",
-    ): _of("delay_margin_ticks"),
-}  # fmt: skip
+HEADING_LOOP = Part[HeadingLoopMargins](
+    "heading_loop",
+    "The loop of the heading",
+    _heading_loop,
+    _show,
+    criteria=(
+        Criterion(
+            "phase margin of the heading", "deg", "at least", 45.0,
+            "it turns to its heading without swinging",
+            "it swings about its heading",
+            _MARGINS,
+            lambda data: data.phase_margin_deg,
+        ),
+        Criterion(
+            "gain margin of the heading", "dB", "at least", 6.0,
+            "the motors may be twice as strong",
+            "motors of less than twice the nominal strength make it unstable",
+            _MARGINS,
+            lambda data: data.gain_margin_db,
+        ),
+        Criterion(
+            "delay margin of the heading", "ticks", "at least", 4.0,
+            "it tolerates more added ticks of delay than the threshold",
+            "fewer added ticks of delay than the threshold make it oscillate",
+            "set by this project",
+            lambda data: data.delay_margin_ticks,
+        ),
+    ),
+)  # fmt: skip

@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.run_error import RunError
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from analysis.sweeps.plan import SweepPoint
 from diagrams import RunResult, Scenario, simulate
 from diagrams.running.stop_rules import Collision

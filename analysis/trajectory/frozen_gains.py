@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.linear.contact_mode import contact_matrix
+from analysis.linear.contact_mode import contact_model
 from analysis.linear.loop_margins import LoopMargins, loop_margins
 from analysis.models.linear_models import LinearModel
 from analysis.trajectory.route_loop import (
@@ -46,8 +45,6 @@ LATE_TICKS = (0, 1)
 # a share of its bound.
 _CHART_POINTS, _LEAST_N_S_M, _MOST = 60, 0.5, 0.97
 _HALVINGS = 50
-#: Poles nearer to z = 0 than this count as delays.
-_DELAY = 1e-6
 
 
 @dataclass(frozen=True)
@@ -64,26 +61,6 @@ class FrozenPoint:
     """Closed loop from the target to the control point P."""
     margins: dict[str, LoopMargins]
     """Margins of the loop cut at the acceleration, along and across the route."""
-
-    @property
-    def poles(self) -> NDArray[np.complex128]:
-        """(n,) poles ln(z)/T in the s plane, rad/s."""
-        return _s_plane(self.model.poles, self.model.period_s or 1.0)
-
-    @property
-    def growth_per_s(self) -> float:
-        """Growth rate of the slowest mode, 1/s; negative if all modes decay."""
-        return float(self.poles.real.max())
-
-    @property
-    def damping_ratio(self) -> float:
-        """Damping ratio of the least damped mode; 1 if no mode oscillates."""
-        return float((-self.poles.real / np.abs(self.poles)).min())
-
-
-def _s_plane(z: NDArray[Any], period_s: float) -> NDArray[np.complex128]:
-    moving = z[np.abs(z) > _DELAY].astype(complex)
-    return np.log(moving) / period_s
 
 
 def frozen_gains(scenario: Scenario) -> tuple[FrozenPoint, ...]:
@@ -228,11 +205,9 @@ def axis_damping_ratio(
     Returns:
         Least value of -Re s/|s| over all modes; 1 if no mode oscillates.
     """
-    matrix = contact_matrix(
+    return contact_model(
         scenario, stiffness, damping_n_s_m=damping, latency_ticks=late_ticks
-    )
-    poles = _s_plane(np.linalg.eigvals(matrix), scenario.tick_s)
-    return float((-poles.real / np.abs(poles)).min())
+    ).damping_ratio
 
 
 def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) -> float:
@@ -255,10 +230,9 @@ def _bounds(scenario: Scenario, damping: float, late: int) -> tuple[float, float
     """Stiffness at which one axis becomes unstable, and at which it oscillates, N/m."""
 
     def rests(stiffness: float) -> bool:
-        matrix = contact_matrix(
+        return contact_model(
             scenario, stiffness, damping_n_s_m=damping, latency_ticks=late
-        )
-        return bool(np.abs(np.linalg.eigvals(matrix)).max() < 1.0)
+        ).stable
 
     return _last(rests), damped_stiffness(scenario, damping, late)
 
@@ -280,8 +254,7 @@ def _most_damping(scenario: Scenario) -> float:
     """Damping at which a damper without a spring becomes unstable, N s/m."""
 
     def rests(damping: float) -> bool:
-        matrix = contact_matrix(scenario, 0.0, damping_n_s_m=damping)
-        poles = np.linalg.eigvals(matrix)
+        poles = contact_model(scenario, 0.0, damping_n_s_m=damping).poles
         # Without a spring, the position has a pole at z = 1.
         moving = np.delete(poles, np.abs(poles - 1.0).argmin())
         return bool(np.abs(moving).max() < 1.0)

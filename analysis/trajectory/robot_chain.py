@@ -13,6 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from analysis.linear.contact_mode import motion_chain
 from analysis.linear.frequency_levels import frequency_grid
+from analysis.models.linear_models import LinearModel
 from analysis.trajectory.route_loop import contact_gains, route_law
 from diagrams.scenario.scenario import Scenario
 from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
@@ -362,8 +363,8 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
 
 def _grid(scenario: Scenario, links: Sequence[ChainLinks]) -> NDArray[np.float64]:
     """Frequencies that resolve every mode of the chain, even lightly damped modes."""
-    poles = np.linalg.eigvals(chain_matrix(scenario, links)).astype(np.complex128)
-    return frequency_grid(poles, scenario.tick_s, lowest=_LOWEST, points=_POINTS)
+    model = chain_model(scenario, links)
+    return frequency_grid(model.poles, model.period_s, lowest=_LOWEST, points=_POINTS)
 
 
 def _peak(
@@ -386,18 +387,17 @@ def _peak(
     return float(values[k]), float(omega[k])
 
 
-def chain_matrix(
-    scenario: Scenario, links: Sequence[ChainLinks]
-) -> NDArray[np.float64]:
-    """Computes the matrix A of x+ = A x for the robots behind a first robot at rest.
+def chain_model(scenario: Scenario, links: Sequence[ChainLinks]) -> LinearModel:
+    """Returns the sampled model of the robots behind a first robot at rest.
 
     Args:
         scenario: Scenario with the mass, motors and control period.
         links: Springs and dampers of each robot except the first.
 
     Returns:
-        (n, n) matrix. The states of each robot are those of ``sampled_matrix``,
-        followed by the earlier positions that its neighbors observe.
+        Closed loop without inputs. The outputs are the positions of the robots, m. The
+        states of each robot are those of ``sampled_matrix``, followed by the earlier
+        positions that its neighbors observe.
     """
     tick_s, mass = scenario.tick_s, scenario.only.robot.mass_kg
     of = SampledMass(mass, scenario.only.plant.motor_lag_s, tick_s)
@@ -425,20 +425,26 @@ def chain_matrix(
         matrix[own + 3, own] = 1.0
         for n in range(late):
             matrix[own + 4 + n, own + 3 + n] = 1.0
-    return matrix
-
-
-def _rests(scenario: Scenario, links: Sequence[ChainLinks]) -> bool:
-    """Whether the robots behind a first robot at rest come to rest."""
-    matrix = chain_matrix(scenario, links)
-    return bool(np.abs(np.linalg.eigvals(matrix)).max() < 1.0)
+    return LinearModel(
+        name="chain of robots",
+        A=matrix,
+        B=np.zeros((len(matrix), 0)),
+        C=np.eye(len(matrix))[::size],
+        D=np.zeros((len(links), 0)),
+        state_names=tuple(f"chain_{k}" for k in range(len(matrix))),
+        input_names=(),
+        output_names=tuple(f"p_{i + 2}" for i in range(len(links))),
+        period_s=tick_s,
+    )
 
 
 def _stable_peak(
     scenario: Scenario, links: Sequence[ChainLinks], robot: int = -1
 ) -> float:
     """Largest amplification of one robot; infinite if the chain is unstable."""
-    return _peak(scenario, links, robot)[0] if _rests(scenario, links) else math.inf
+    if not chain_model(scenario, links).stable:
+        return math.inf
+    return _peak(scenario, links, robot)[0]
 
 
 def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
@@ -454,7 +460,7 @@ def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
 
     def calm(damping: float) -> bool:
         damped = [link._replace(damping=damping) for link in links]
-        if not _rests(scenario, damped):
+        if not chain_model(scenario, damped).stable:
             return False
         peaks = (_peak(scenario, damped, i)[0] for i in range(len(damped)))
         return all(peak <= 1.0 + _ROUNDING for peak in peaks)

@@ -16,7 +16,6 @@ from analysis.models.model_reduction import minimal_model
 from diagrams.running.simulation import simulator_config
 from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant
-from systems.base.parameters import OdometryParameters
 from systems.base.wheel_odometry import WheelOdometry_
 from systems.base.wheel_speed_command import WheelCommand_
 from systems.framework.block import Block, part_of
@@ -231,10 +230,8 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
     target = np.array([p[0] + ahead, 0.0, speed, 0.0])
     plant = DiffDrivePlant(robot=robot, plant=scenario.only.plant)
     config = simulator_config(scenario)
-    unrounded = OdometryParameters(rounding=False)
-    odometry = WheelOdometry_[AutoDiffXd](
-        robot=robot, odometry=unrounded, plant=scenario.only.plant, tick_s=tick_s
-    )
+    exact = scenario.only.plant.model_copy(update={"pulses_per_revolution": None})
+    odometry = WheelOdometry_[AutoDiffXd](robot=robot, plant=exact, tick_s=tick_s)
     command = WheelCommand_[AutoDiffXd](robot=robot, tick_s=tick_s)
     # Eq. 6, which stops P, has no linear model. It is therefore switched off.
     unblocked = own.model_copy(update={"block_distance_m": None})

@@ -26,7 +26,7 @@ def plot_frozen_poles(points: Sequence[FrozenPoint]) -> Figure:
     figure = Figure(figsize=(7.2, 4.6), layout="constrained")
     axes = figure.subplots()
     for k, point in enumerate(points):
-        poles = point.poles
+        poles = point.model.s_poles
         axes.plot(
             poles.real,
             poles.imag,
@@ -40,7 +40,8 @@ def plot_frozen_poles(points: Sequence[FrozenPoint]) -> Figure:
         )
     _, left = axes.get_ylim(), axes.get_xlim()[0]
     slope = np.sqrt(1.0 / WELL_DAMPED**2 - 1.0)
-    reach = max(4.0, 1.3 * max(float(np.abs(p.poles.imag).max()) for p in points))
+    fastest = max(float(np.abs(p.model.s_poles.imag).max()) for p in points)
+    reach = max(4.0, 1.3 * fastest)
     for sign in (1.0, -1.0):
         axes.plot(
             [0.0, left],

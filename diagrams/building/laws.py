@@ -92,7 +92,9 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         return _radial(LAWS[name], parts)
     law = import_own(name, "law")
     if inspect.isclass(law):
-        gains = _gains_of_base(law, robot.laws)
+        gains = robot.gains
+        if isinstance(robot, Follower):
+            gains = _gains_of_base(law, robot.laws)
         return _own_block(name, law, {**parts, "laws": robot.laws, "gains": gains})
     function = checked_law(name, law)
     reach, top_speed = robot.ultrasonic.maximum_range_m, robot.robot.top_speed_m_s

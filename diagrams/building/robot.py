@@ -186,7 +186,6 @@ def robot_blocks(
         ),
         WheelOdometry(
             robot=robot.robot,
-            odometry=robot.odometry,
             faults=robot.faults,
             plant=robot.plant,
             initial_pose=robot.start.pose,
@@ -222,9 +221,10 @@ def make_robot(
     """Builds the diagram of a robot.
 
     The fields ``hearing`` and ``obstacle_sensing`` select simulated or ideal sensors.
-    Both kinds of blocks have the same ports. If both fields are ``ideal`` and
-    ``odometry.rounding`` is off, Drake can convert the diagram to AutoDiffXd. Each
-    input of a block connects to the only output with the same name (see docs/model.md).
+    Both kinds of blocks have the same ports. If both are ideal and
+    ``plant.pulses_per_revolution`` is null, Drake can convert the diagram to
+    AutoDiffXd. Each input of a block connects to the only output with the same name
+    (see docs/model.md).
 
     The diagram has each of the following inputs only if one of its blocks needs it:
 

@@ -28,7 +28,7 @@ def check_audible(scenario: Scenario) -> None:
     listening = [name for name, own in robots.items() if own.listens]
     if not listening:
         ideal = any(not own.has_goal for own in robots.values())
-        why = " (hearing is 'ideal')" if ideal else ""
+        why = " (hearing is ideal)" if ideal else ""
         remedy = (
             "set hearing=audio"
             if ideal

@@ -76,7 +76,8 @@ def renewed(data: dict[str, Any]) -> dict[str, Any]:
     """
     notes: dict[str, None] = {}
     for where, fields in _robots_and_sources(data):
-        notes |= dict.fromkeys(_renewed(where, fields))
+        law = fields.get("law", data.get("law"))
+        notes |= dict.fromkeys(_renewed(where, fields, law))
     if notes:
         _drop_groups_of_other_kinds(data)
         _LOGGER.warning("fields of the previous version: %s", "; ".join(notes))
@@ -142,8 +143,11 @@ def _robots_and_sources(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, A
                 yield f"{group}.{name}.", own
 
 
-def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
+def _renewed(where: str, fields: dict[str, Any], law: Any) -> Iterator[str]:
     _renew_safety_filter(fields)
+    _renew_rounding(fields)
+    _renew_gaps(fields)
+    _renew_band(fields)
     for former in former_fields():
         path = former.path
         if where.startswith("sources."):
@@ -155,6 +159,8 @@ def _renewed(where: str, fields: dict[str, Any]) -> Iterator[str]:
             continue
         if former.new.startswith("guard.") and not _has_guard(fields):
             yield f"{where}{path} has no effect without a guard"
+        elif former.new.startswith("impedance.") and path.split(".")[1] != law:
+            yield f"{where}{path} has no effect with law {law!r}"
         elif former.new:
             _put(fields, former.new.split("."), value)
             yield f"{where}{path} is now {former.new}"
@@ -176,6 +182,36 @@ def _renew_safety_filter(fields: Mapping[str, Any]) -> None:
         if isinstance(adaptive, dict) and "safety_filter" in adaptive:
             given = adaptive["safety_filter"]
             adaptive["safety_filter"] = given is not None and given is not False
+
+
+def _renew_rounding(fields: dict[str, Any]) -> None:
+    """Replaces encoders that do not round angles by encoders without pulses."""
+    odometry = fields.get("odometry")
+    if isinstance(odometry, dict) and odometry.get("rounding") is False:
+        fields["odometry"] = {**odometry, "pulses_per_revolution": None}
+        del fields["odometry"]["rounding"]
+
+
+def _renew_gaps(fields: dict[str, Any]) -> None:
+    """Replaces ideal hearing without gaps by hearing ``ideal_always``."""
+    ideal = fields.get("ideal_hearing")
+    if isinstance(ideal, dict) and ideal.get("burst_gaps") is False:
+        fields["ideal_hearing"] = {**ideal, "burst_gaps": True}
+        if fields.get("hearing") == "ideal":
+            fields["hearing"] = "ideal_always"
+
+
+def _renew_band(fields: dict[str, Any]) -> None:
+    """Replaces the ends of the estimator's band by one field."""
+    tdoa = fields.get("tdoa")
+    if not isinstance(tdoa, dict) or "band_hz" in tdoa:
+        return
+    ends = [tdoa.get("low_hz", 300.0), tdoa.get("high_hz", 15_000.0)]
+    kept = {name: v for name, v in tdoa.items() if name not in ("low_hz", "high_hz")}
+    if kept.get("band") == "found":
+        fields["tdoa"] = {**kept, "band": "set", "band_hz": "found"}
+    elif ends != [300.0, 15_000.0]:
+        fields["tdoa"] = {**kept, "band": "set", "band_hz": ends}
 
 
 def _renewed_faults(where: str, fields: dict[str, Any]) -> Iterator[str]:

@@ -10,9 +10,9 @@ from diagrams.scenario.yaml_text import dump_yaml
 from systems.base.robot import microphones_B
 from systems.framework.input_error import shortened
 
-#: Least standard deviations in the file: the first of the positions, and the second of
-#: the speed of sound.
-_LEAST_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
+#: Standard deviations in the file: the first of the positions (the rounding of a
+#: drawing), and the second of the speed of sound.
+_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
 #: Positions are rounded to a nanometer, which removes the rounding errors of sums.
 _DECIMALS = 9
 
@@ -21,7 +21,7 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
     """Returns the YAML text that describes the microphones of a recording.
 
     The text has the nominal positions of the microphones in the body frame B, m, and
-    the speed of sound, m/s. Its comments describe the recording and the errors of the
+    the speed of sound, m/s. Its comments describe the recording and the faults of the
     microphones.
 
     Args:
@@ -42,37 +42,18 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
         f"its full scale is {own.microphones.full_scale} counts of the converter.",
         "Positions in the robot's frame B, m: origin midway between the wheels,",
         "x ahead, y to the left.",
-        *_faults(own),
+        *(
+            f"Microphone {each.number} is {each.kind} from {each.start_s:g} s on."
+            for each in own.faults
+            if each.sensor == "microphones"
+        ),
     ]
-    # Positions are uniformly distributed within the tolerance. The least standard
-    # deviation is the rounding of a drawing.
-    drawn = own.microphones.position_tolerance_m / 3.0**0.5
     document = dump_yaml(
         {
             "microphones": places,
-            "position_std_m": max(drawn, _LEAST_POSITION_STD_M),
+            "position_std_m": _POSITION_STD_M,
             "sound_speed": scenario.sound_speed_m_s,
             "sound_speed_std": _SOUND_SPEED_STD,
         }
     )
     return "".join(f"# {line}\n" for line in comments) + document
-
-
-def _faults(own: HasMicrophones) -> list[str]:
-    """Returns errors of the array that the fields cannot express, one line each."""
-    array, lines = own.microphones, []
-    if any(array.channel_skew_s):
-        times = ", ".join(f"{1e6 * skew:g}" for skew in array.channel_skew_s)
-        lines.append(f"The channels are sampled {times} us late (channel_skew_s).")
-    for name, value, unit in (
-        ("position_tolerance_m", array.position_tolerance_m, "m in x and in y"),
-        ("delay_tolerance_s", array.delay_tolerance_s, "s of delay"),
-        ("gain_tolerance_db", array.gain_tolerance_db, "dB of gain"),
-    ):
-        if value:
-            lines.append(f"Each may be off by {value:g} {unit} ({name}), see the seed.")
-    return lines + [
-        f"Microphone {each.number} is {each.kind} from {each.start_s:g} s on."
-        for each in own.faults
-        if each.sensor == "microphones"
-    ]

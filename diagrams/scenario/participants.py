@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -24,19 +25,21 @@ from pydantic import (
 
 from diagrams.scenario.suggestions import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
-from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.faults import Faults, FaultySensor, faults_of
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Angle, Parameters, Point, SoundSpeed
 from systems.heading.parameters import CompassParameters, MotorDriverParameters
 from systems.hearing.parameters import (
-    IdealHearingParameters,
     TDOAParameters,
     TrackerParameters,
 )
 from systems.laws.catalogue import LAWS
-from systems.laws.parameters import AttractionParameters
+from systems.laws.parameters import AttractionParameters, ImpedanceParameters
+from systems.laws.trajectory.trajectory_conventional import (
+    TrajectoryImpedanceParameters,
+)
 from systems.odor.parameters import (
     GAS_SENSORS,
     AirflowParameters,
@@ -50,7 +53,7 @@ from systems.ranging.parameters import (
 from systems.routes.parameters import RouteParameters
 from systems.safety.parameters import GuardParameters
 from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
-from systems.sound.parameters import MicArrayParameters, SoundParameters, channel_skew
+from systems.sound.parameters import MicArrayParameters, SoundParameters
 
 #: Law of a robot that states none.
 DEFAULT_LAW = "active"
@@ -129,7 +132,6 @@ class Robot(Parameters):
     of sound."""
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
-    odometry: OdometryParameters = OdometryParameters()
     faults: Faults = ()
     """Sensors that fail during a run."""
 
@@ -185,15 +187,15 @@ class Follower(Robot):
 
     kind: ClassVar[str] = "follower"
 
-    hearing: Literal["audio", "ideal"] = "audio"
-    """``audio``: sound waves and microphones; ``ideal``: exact positions."""
+    hearing: Literal["audio", "ideal", "ideal_always"] = "audio"
+    """``audio``: sound waves and microphones. ``ideal``: exact positions of the source
+    while it sounds. ``ideal_always``: exact positions at all times."""
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
     """``ultrasonic``: sensors with cones; ``ideal``: exact nearest points."""
     follows: str = ""
     """Name of the source or the leader to follow; empty: the first source."""
     microphones: MicArrayParameters = MicArrayParameters()
     tdoa: TDOAParameters = TDOAParameters()
-    ideal_hearing: IdealHearingParameters = IdealHearingParameters()
     tracker: TrackerParameters = TrackerParameters()
     ultrasonic: UltrasonicParameters = UltrasonicParameters()
     collision_vector: CollisionVectorParameters = CollisionVectorParameters()
@@ -202,11 +204,6 @@ class Follower(Robot):
     guard: GuardParameters | None = None
     """The guard limits the commands of any law, so that the robot stays in space that
     its sensors have seen as free. null: no guard, unless the law is ``guarded``."""
-
-    @model_validator(mode="after")
-    def _check_channels(self) -> Follower:
-        channel_skew(self.microphones, len(self.robot.microphones_m))
-        return self
 
     @property
     def sensor_counts(self) -> dict[FaultySensor, int]:
@@ -258,6 +255,7 @@ class Router(Robot):
     """``ultrasonic``: sensors with cones; ``ideal``: exact objects."""
     ultrasonic: UltrasonicParameters = UltrasonicParameters()
     route: RouteParameters
+    impedance: ImpedanceParameters = ImpedanceParameters()
     laws: LawGains = LawGains()
     """Gains by law. Only the gains of the robot's law have an effect."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
@@ -277,10 +275,16 @@ class Router(Robot):
         """Number of sensors of each kind that can fail."""
         return super().sensor_counts | {"ultrasonic": self.ultrasonic.count}
 
-    @property
+    @cached_property
     def gains(self) -> Any:
-        """Gains of the robot's control law; None for a law without gains."""
-        return getattr(self.laws, self.law, None)
+        """Parameters of the control law: ``impedance`` and the law's own in ``laws``.
+
+        A value that is null in ``impedance`` is the default of the law.
+        """
+        law = LAWS.get(self.law)
+        model = (law and law.impedance) or TrajectoryImpedanceParameters
+        given = {name: v for name, v in self.impedance if v is not None}
+        return model(**given, **dict(getattr(self.laws, self.law, None) or ()))
 
 
 class OdorSearcher(Robot):
@@ -317,11 +321,6 @@ class SoundSearcher(Robot):
     sound_search: SoundSearchParameters = SoundSearchParameters()
     compass: CompassParameters = CompassParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
-
-    @model_validator(mode="after")
-    def _check_channels(self) -> SoundSearcher:
-        channel_skew(self.microphones, len(self.robot.microphones_m))
-        return self
 
     @property
     def sensor_counts(self) -> dict[FaultySensor, int]:

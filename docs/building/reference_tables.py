@@ -9,8 +9,9 @@ from functools import partial
 from pathlib import Path
 
 from analysis.commands.command_line import make_parser
-from analysis.exports.columns import COLUMNS
 from analysis.reporting.markdown import markdown_table
+from analysis.runs.columns import COLUMNS
+from analysis.runs.metric_table import GROUPS
 from diagrams.scenario.fields.field_list import list_fields
 from diagrams.scenario.fields.shipped import scenario_schema
 
@@ -22,6 +23,18 @@ def columns() -> str:
     """One row per column of a run's table."""
     rows = ((f"`{each.name}`", each.unit, each.meaning) for each in COLUMNS)
     return markdown_table(("column", "unit", "meaning"), rows)
+
+
+def metrics(group: str) -> str:
+    """One row per metric of a group: name, unit, averaging, and definition."""
+    rows = (
+        (f"`{m.name}`", m.unit or "1", m.average, m.of, m.robots, m.meaning)
+        for each in GROUPS
+        if each.name == group
+        for m in each.metrics
+    )
+    head = ("metric", "unit", "average", "of runs", "of robots", "definition")
+    return markdown_table(head, rows)
 
 
 def parameters() -> str:

@@ -23,12 +23,14 @@ from __future__ import annotations
 import json
 import re
 import sys
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from analysis.reporting.markdown import markdown_table
-from docs.building.reference_tables import columns, commands, parameters
+from analysis.runs.metric_table import GROUPS
+from docs.building.reference_tables import columns, commands, metrics, parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "docs" / "results"
@@ -132,11 +134,12 @@ def _document(name: str) -> dict[str, Any]:
     return document
 
 
-_GENERATORS = {
+_GENERATORS: dict[str, Callable[[], str]] = {
     "columns": columns,
     "commands": commands,
     "fields": parameters,
     "gallery": _gallery,
+    **{f"metrics_{group.name}": partial(metrics, group.name) for group in GROUPS},
 }
 
 

@@ -153,16 +153,19 @@ def run_cell(
     noise_pa = loudspeaker.level_pa / range_m * 10.0 ** (-snr_db / 20.0)
     fixes: dict[str, list[SourceFix | None]] = {name: [] for name in estimators}
     bounds = []
+    converter = MicArrayParameters()
     for _ in range(trials):
         begin = rng.uniform(_LEAD_S, loudspeaker.seconds - _LEAD_S)
         pressure = loudspeaker.pressure(begin, p_AS, shape.p_AM, c)
         noise = rng.standard_normal(pressure.shape, dtype=np.float32)
         loudest = np.abs(pressure + np.float32(noise_pa) * noise).max()
-        converter = _fitted_converter(float(loudest))
-        counts = convert(pressure, noise, noise_pa, converter)
+        full_scale_pa = _HEADROOM * float(loudest)
+        counts = convert(
+            pressure, noise, noise_pa, converter, full_scale_pa=full_scale_pa
+        )
         for name, estimate in estimators.items():
             fixes[name].append(estimate(counts.astype(np.float32)))
-        rounding_pa = 1.0 / converter.counts_per_pa / math.sqrt(12.0)
+        rounding_pa = 1.0 / (converter.full_scale / full_scale_pa) / math.sqrt(12.0)
         bounds.append(
             position_bound(
                 loudspeaker.energy,
@@ -179,11 +182,6 @@ def run_cell(
         name: _cell(found, bounds, range_m, bearing_deg)
         for name, found in fixes.items()
     }
-
-
-def _fitted_converter(peak_pa: float) -> MicArrayParameters:
-    """Default converter with a full scale of 1.2 times a peak pressure in Pa."""
-    return MicArrayParameters(full_scale_pa=_HEADROOM * peak_pa)
 
 
 def _cell(

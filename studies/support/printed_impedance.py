@@ -24,7 +24,7 @@ class _ChangedImpedance(Block):
 
     def __init__(self, *, scenario: Scenario) -> None:
         super().__init__()
-        own = scenario.router.laws.trajectory_conventional
+        own = scenario.router.gains
         numbers = trajectory_numbers(own, scenario.only.robot, scenario.tick_s)
         step = Step(trajectory_impedance_step, self.changed(numbers))
         self.declare(step, tick_s=scenario.tick_s)

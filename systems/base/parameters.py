@@ -1,4 +1,4 @@
-"""Parameters of motors, tires, and wheel encoders."""
+"""Parameters of motors, tires and wheel encoders."""
 
 from __future__ import annotations
 
@@ -6,16 +6,13 @@ from typing import Annotated
 
 from pydantic import Field, Strict
 
-from systems.framework.parameters import (
-    Duration,
-    Parameters,
-)
+from systems.framework.parameters import Duration, Parameters
 
 _Slip = Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 
 class PlantParameters(Parameters):
-    """Motors, and contact of the wheels with the floor."""
+    """Motors, encoders, and contact of the wheels with the floor."""
 
     motor_lag_s: Duration = 0.05
     """Time constant of each wheel's speed loop, s (not printed, our choice)."""
@@ -26,13 +23,7 @@ class PlantParameters(Parameters):
     friction: Annotated[float, Field(ge=1e-3, le=100.0)] | None = None
     """Coefficient of friction between tires and floor. If the motion needs more force
     than this share of the weight, the wheels slip. None: the wheels never slip."""
-
-
-class OdometryParameters(Parameters):
-    """Wheel encoders (Han 2019, 4.1)."""
-
-    pulses_per_revolution: int = Field(default=2600, gt=0, le=10_000_000)
-    """Encoder pulses per wheel revolution."""
-    rounding: bool = True
-    """Whether angles are rounded to whole pulses. A linearization needs exact
-    angles."""
+    pulses_per_revolution: Annotated[int, Field(gt=0, le=10_000_000)] | None = 2600
+    """Pulses of each wheel's encoder per revolution (Han 2019, 4.1). The measured angle
+    of a wheel is rounded to whole pulses. null: the measured angle is exact, which a
+    linearization requires."""

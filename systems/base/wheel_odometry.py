@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 
 from systems.base.diff_drive_plant import body_twist, saturated
 from systems.base.lagged_motion import LaggedMotion, advance_pose, lagged_motion
-from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block_, Port, RunFacts, Step
 from systems.framework.faults import Fault, fault_ticks
@@ -98,15 +98,14 @@ def WheelOdometry_(T):
 
         Args:
             robot: Wheel radius and separation.
-            odometry: Pulses of the encoders, and whether angles are rounded.
             faults: Faults of the robot. The block uses only the fault of ``odometry``.
-            plant: Lag of the motors.
+            plant: Lag of the motors, and pulses of the encoders.
             initial_pose: Known pose (x, y, theta) in the world frame W at time zero, m
                 and rad.
             tick_s: Period of the update, s.
 
         Raises:
-            InputError: Rounding is on in an AutoDiffXd system.
+            InputError: The angles are rounded to pulses in an AutoDiffXd system.
             ValueError: The initial pose is not finite.
         """
 
@@ -130,7 +129,6 @@ def WheelOdometry_(T):
             self,
             *,
             robot: RobotParameters = RobotParameters(),
-            odometry: OdometryParameters = OdometryParameters(),
             faults: Sequence[Fault] = (),
             plant: PlantParameters = PlantParameters(),
             initial_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -139,17 +137,18 @@ def WheelOdometry_(T):
         ) -> None:
             super().__init__(converter=converter)
             check_finite("WheelOdometry: initial_pose", initial_pose)
-            if odometry.rounding and T is not float:
+            pulses = plant.pulses_per_revolution
+            if pulses is not None and T is not float:
                 raise InputError(
                     "WheelOdometry",
-                    "odometry.rounding is true, and a rounded angle "
-                    "has no derivative; set odometry.rounding to false",
+                    f"plant.pulses_per_revolution is {pulses}, and an angle that is "
+                    "rounded to pulses has no derivative; set it to null",
                 )
             self.set_name("wheel_odometry")
             ((kind, begin),) = fault_ticks(faults, "odometry", 1, tick_s).tolist()
             numbers = OdometryNumbers(
                 robot,
-                odometry.pulses_per_revolution if odometry.rounding else 0,
+                pulses or 0,
                 lagged_motion(tick_s, plant.motor_lag_s),
                 begin if kind else -1,
             )

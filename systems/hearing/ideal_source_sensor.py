@@ -12,12 +12,8 @@ from pydrake.math import atan2
 
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block_, Port, RunFacts, Step
-from systems.framework.input_error import InputError
-from systems.framework.noise import tick_generator
-from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.hearing.parameters import IdealHearingParameters
 from systems.sound.parameters import SoundParameters
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 from systems.world.geometry import control_point, rotate, safe_norm
@@ -41,52 +37,6 @@ def relative_position(pose_WB: Any, pose_WS: Any, control_point_m: Any) -> Any:
     return rotate(-pose_WB[2], pose_WS[0] - x_P, pose_WS[1] - y_P)
 
 
-@register_jitable
-def disturbed(x: Any, y: Any, numbers: Any, hearing: Any) -> Any:
-    """Adds noise of bearing and range to the position of a source.
-
-    Args:
-        x: First coordinate of the source relative to the control point P, in the axes
-            of the body frame B, m.
-        y: Second coordinate, m.
-        numbers: Two standard normal numbers.
-        hearing: Standard deviations of bearing and range.
-
-    Returns:
-        (x, y) of the disturbed position, m.
-    """
-    bearing = math.atan2(y, x) + numbers[0] * math.radians(hearing.bearing_noise_deg)
-    factor = 1.0 + numbers[1] * hearing.range_noise_fraction
-    distance = math.sqrt(x * x + y * y) * max(factor, 0.0)
-    return distance * math.cos(bearing), distance * math.sin(bearing)
-
-
-@register_jitable
-def stated_covariance(x: Any, y: Any, hearing: Any) -> Any:
-    """Computes the covariance of a position that has noise of bearing and range.
-
-    Args:
-        x: First coordinate of the source relative to the control point P, in the axes
-            of the body frame B, m; float or AutoDiffXd.
-        y: Second coordinate, m.
-        hearing: Standard deviations of bearing and range.
-
-    Returns:
-        Elements xx, xy, yx, yy of the covariance, m^2.
-    """
-    bearing = atan2(y, x)
-    across = math.radians(hearing.bearing_noise_deg) ** 2 * (x * x + y * y)
-    along = hearing.range_noise_fraction**2 * (x * x + y * y)
-    c, s = cos(bearing), sin(bearing)
-    mixed = (along - across) * c * s
-    return (
-        along * c * c + across * s * s,
-        mixed,
-        mixed,
-        along * s * s + across * c * c,
-    )
-
-
 class _PerFrame:
     """Table with one row per measurement. Each row is computed when it is read.
 
@@ -107,15 +57,11 @@ class IdealSourceNumbers(NamedTuple):
 
     control_point_m: float
     """Distance of P ahead of the axle, m."""
-    hearing: IdealHearingParameters
     frame_ticks: int
     """Ticks between two measurements."""
     sounds: Any
     """One Boolean value per measurement, true if there is sound: ``_PerFrame`` or (n,)
     array."""
-    noisy: bool
-    noise: Any
-    """Two standard normal numbers per measurement: ``_PerFrame`` or (n, 2) array."""
 
 
 def ideal_source_step(
@@ -130,11 +76,8 @@ def ideal_source_step(
         return
     frame = tick // numbers.frame_ticks
     pose_WB, pose_WS = inputs
-    hearing = numbers.hearing
     x, y = relative_position(pose_WB, pose_WS, numbers.control_point_m)
     heard = numbers.sounds[frame] and safe_norm(x, y) <= MAXIMUM_RANGE_M
-    if numbers.noisy:
-        x, y = disturbed(x, y, numbers.noise[frame], hearing)
     # Sums, because AutoDiffXd elements accept no float.
     nothing = 0.0 * state[2]
     state[0], state[1], state[2] = nothing, nothing, nothing
@@ -148,9 +91,8 @@ def _publish_ideal_source(state, outputs, numbers):
     x, y = state[0], state[1]
     bearing[0], distance[0] = atan2(y, x), safe_norm(x, y)
     p_PS_B[0], p_PS_B[1] = x, y
-    stated = stated_covariance(x, y, numbers.hearing)
     for k in range(4):
-        covariance[k] = stated[k]
+        covariance[k] = 0.0 * state[2]
     # Every sound has a range: NOTHING_HEARD is 0, and RANGED is 1.
     detected[0] = range_valid[0] = status[0] = state[2]
 
@@ -158,7 +100,7 @@ def _publish_ideal_source(state, outputs, numbers):
 @define_for_scalars("IdealSourceSensor_", __name__)
 def IdealSourceSensor_(T):
     class Impl(Block_[T]):
-        """Measures where the source is, exactly or with noise.
+        """Measures exactly where the source is.
 
         The block replaces ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator``. It has
         the outputs of ``TDOAEstimator``. Its discrete state has the position of the
@@ -170,14 +112,10 @@ def IdealSourceSensor_(T):
 
         Args:
             robot: Distance of P ahead of the axle.
-            hearing: Noise of bearing and range, and whether the sensor hears between
-                bursts.
             sound: Schedule of the sound, which defines when there is sound.
+            always: Whether the sensor hears in every measurement, even if there is no
+                sound.
             frame_s: Period of the measurements, s.
-            seed: Seed of the noise.
-
-        Raises:
-            InputError: The parameters contain noise, and the scalar type is AutoDiffXd.
         """
 
         part, stage = "hearing", "hearing"
@@ -197,31 +135,16 @@ def IdealSourceSensor_(T):
             self,
             *,
             robot: RobotParameters = RobotParameters(),
-            hearing: IdealHearingParameters = IdealHearingParameters(),
             sound: SoundParameters = SoundParameters(),
+            always: bool = False,
             frame_s: float = TICK_S,
-            seed: int = 0,
             converter: Any = None,
         ) -> None:
             super().__init__(converter=converter)
-            noisy = (
-                hearing.bearing_noise_deg > 0.0 or hearing.range_noise_fraction > 0.0
-            )
-            if noisy and T is not float:
-                raise InputError(
-                    "IdealSourceSensor",
-                    "noise is set, and noise has no derivative; "
-                    "set bearing_noise_deg and range_noise_fraction to 0",
-                )
             self.set_name("ideal_source_sensor")
-            self._sound, self._frame_s = sound, frame_s
+            self._sound, self._always, self._frame_s = sound, always, frame_s
             numbers = IdealSourceNumbers(
-                robot.control_point_m,
-                hearing,
-                1,
-                _PerFrame(self._sounds),
-                noisy,
-                _noise(seed),
+                robot.control_point_m, 1, _PerFrame(self._sounds)
             )
             state = [0.0] * len(self.states)
             step = Step(ideal_source_step, numbers, state, _publish_ideal_source)
@@ -234,31 +157,18 @@ def IdealSourceSensor_(T):
             the measurement, or an array of numbers.
             """
             sounds = self._sound.sounds((frame - 0.5) * self._frame_s)
-            return sounds | (not self.step.numbers.hearing.burst_gaps)
+            return sounds | self._always
 
         def step_for(self, run: RunFacts) -> Step:
             """Returns the step with tables for all measurements of the run."""
             step, frame_s = self.step, self._frame_s
             frames = np.arange(math.ceil((run.ticks + 1) * run.tick_s / frame_s) + 1)
-            noise = np.empty((0, 2))
-            if step.numbers.noisy:
-                rows = _noise(run.seed_of(self.get_name()))
-                noise = np.array([rows[frame] for frame in frames.tolist()])
             numbers = step.numbers._replace(
-                frame_ticks=round(frame_s / run.tick_s),
-                sounds=self._sounds(frames),
-                noise=noise,
+                frame_ticks=round(frame_s / run.tick_s), sounds=self._sounds(frames)
             )
             return step._replace(numbers=numbers)
 
     return Impl
-
-
-def _noise(seed: int) -> _PerFrame:
-    """Returns two standard normal numbers for each measurement."""
-    return _PerFrame(
-        lambda frame: tick_generator(seed, frame).standard_normal(2).tolist()
-    )
 
 
 IdealSourceSensor = IdealSourceSensor_[None]

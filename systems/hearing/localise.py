@@ -185,7 +185,8 @@ class Localiser:
         limited: bool = True,
     ) -> None:
         whole = parameters.method == "amdf" or frame_samples % 2 == 1
-        self._halved = not whole and parameters.high_hz <= PASSED * sample_rate_hz
+        low_hz, high_hz = parameters.limits_hz
+        self._halved = not whole and high_hz <= PASSED * sample_rate_hz
         self._sample_rate_hz = sample_rate_hz
         divisor = 2 if self._halved else 1
         plan = DelayPlan(
@@ -193,8 +194,8 @@ class Localiser:
             c=c,
             sample_rate_hz=sample_rate_hz / divisor,
             frame_samples=frame_samples // divisor,
-            low_hz=parameters.low_hz,
-            high_hz=parameters.high_hz,
+            low_hz=low_hz,
+            high_hz=high_hz,
         )
         self.plan = plan
         self.parameters = parameters
@@ -217,7 +218,7 @@ class Localiser:
         # For the setting "found", the band may be arbitrarily narrow, so the weakest
         # sound is unknown.
         self._weakest = 0.0
-        if parameters.band == "set":
+        if parameters.band_hz != "found":
             self._weakest = weakest_sound(plan, parameters.false_alarm_rate)
 
     def blank(self) -> HearingMemory:
@@ -325,7 +326,7 @@ class Localiser:
             heard,
             self.plan,
             self.parameters.method,
-            find_band=self.parameters.band == "found",
+            find_band=self.parameters.band_hz == "found",
         )
         if seen is None:
             return None, memory
@@ -449,7 +450,7 @@ class Localiser:
             frame,
             self.plan,
             self.parameters.method,
-            find_band=self.parameters.band == "found",
+            find_band=self.parameters.band_hz == "found",
             seen=seen,
         )
 

@@ -1,20 +1,22 @@
-"""Parameters of the estimators, the tracker and ideal hearing."""
+"""Parameters of the estimator and of the tracker."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Angle,
     Duration,
-    Frequency,
-    NonNegative,
     Parameters,
 )
 from systems.framework.signals import SAMPLE_RATE_HZ
+
+_Edge = Annotated[float, Field(ge=1.0, le=SAMPLE_RATE_HZ / 2)]
+#: Band that the estimator uses by default, Hz.
+_BAND_HZ = (300.0, 15_000.0)
 
 
 class TDOAParameters(Parameters):
@@ -25,13 +27,9 @@ class TDOAParameters(Parameters):
     cross-correlation of the whitened spectrum. ``ml``: maximum likelihood, started from
     cross-correlation. ``amdf``: the average magnitude difference function of the
     papers."""
-    low_hz: Frequency = 300.0
-    """Lower end of the band, Hz."""
-    high_hz: float = Field(default=15_000.0, ge=1.0, le=SAMPLE_RATE_HZ / 2)
-    """Upper end of the band, Hz."""
-    band: Literal["set", "found"] = "set"
-    """Part of the band to use. ``set``: the whole band. ``found``: the part of the band
-    that the sound of each frame occupies."""
+    band_hz: Annotated[tuple[_Edge, _Edge], Strict(False)] | Literal["found"] = _BAND_HZ
+    """Lower and upper end of the band that is used, Hz. ``found``: the part of the
+    default band that the sound of each frame occupies."""
     false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
     """Largest share of frames of steady noise in which a sound is detected by
     mistake."""
@@ -51,10 +49,9 @@ class TDOAParameters(Parameters):
 
     @model_validator(mode="after")
     def _check(self) -> TDOAParameters:
-        if self.low_hz >= self.high_hz:
-            raise InputError(
-                "low_hz", f"{self.low_hz:g} must be below high_hz = {self.high_hz:g}"
-            )
+        low, high = self.limits_hz
+        if low >= high:
+            raise InputError("band_hz", f"{low:g} must be below {high:g}")
         if self.first_bearing_deg is not None and self.choose == "loudest":
             raise InputError(
                 "first_bearing_deg",
@@ -62,6 +59,11 @@ class TDOAParameters(Parameters):
                 "leave the bearing out",
             )
         return self
+
+    @property
+    def limits_hz(self) -> tuple[float, float]:
+        """Lower and upper end of the band, or of the band to search, Hz."""
+        return _BAND_HZ if self.band_hz == "found" else self.band_hz
 
 
 class TrackerParameters(Parameters):
@@ -74,15 +76,3 @@ class TrackerParameters(Parameters):
     maximum_age_s: Duration = 6.0
     """Longest time since the target was last heard, s. After a longer time, the target
     counts as lost. The default is three periods of the sound."""
-
-
-class IdealHearingParameters(Parameters):
-    """Imperfections of ideal hearing."""
-
-    burst_gaps: bool = True
-    """Whether the sensor hears only while the source sounds. Off: the sensor hears in
-    every control period."""
-    bearing_noise_deg: NonNegative = 0.0
-    """Standard deviation of a bearing, deg."""
-    range_noise_fraction: NonNegative = 0.0
-    """Standard deviation of a range, as a share of the range."""

@@ -139,10 +139,6 @@ ACTIVE = Law(
     loop_gains=("reference_stiffness_n_m", "reference_damping_n_s_m"),
     tuning=Tuning(
         rule="matched",
-        # The slope is steepest at c = 2 alpha: k_ref/e^2.
-        stiffest=lambda gains, least_range_m: (
-            gains.reference_stiffness_n_m * math.exp(-2.0)
-        ),
         # The velocity term is d_ref mu_0 at rest. It is 0 at mu_0 and above.
         spring_speed=lambda gains: gains.speed_limit_m_s,
         sets_follow_distance=True,

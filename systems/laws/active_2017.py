@@ -76,11 +76,5 @@ ACTIVE_2017 = Law(
     controller_name="ActiveImpedance2017Controller",
     gains=Active2017Parameters,
     loop_gains=("distance_gain_j", "damping_n_s_m"),
-    tuning=Tuning(
-        rule="barrier",
-        # The slope is steepest just outside rho_1: K_0/rho_1^2.
-        stiffest=lambda gains, least_range_m: (
-            gains.distance_gain_j / gains.saturation_distance_m**2
-        ),
-    ),
+    tuning=Tuning(rule="barrier"),
 )

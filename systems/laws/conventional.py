@@ -55,7 +55,6 @@ CONVENTIONAL = Law(
     loop_gains=("stiffness_n_m", "damping_n_s_m"),
     tuning=Tuning(
         rule="barrier",
-        stiffest=lambda gains, least_range_m: gains.stiffness_n_m,
         sets_follow_distance=True,
     ),
 )

@@ -60,9 +60,5 @@ CONVENTIONAL_2017 = Law(
     least_range=True,
     gains=Conventional2017Parameters,
     loop_gains=("distance_gain_j", "damping_n_s_m"),
-    tuning=Tuning(
-        rule="barrier",
-        # The slope is steepest just outside the least range c_min: K_0/c_min^2.
-        stiffest=lambda gains, least_range_m: gains.distance_gain_j / least_range_m**2,
-    ),
+    tuning=Tuning(rule="barrier"),
 )

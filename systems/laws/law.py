@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any, Literal
 
 from systems.framework.parameters import Parameters
+from systems.laws.parameters import ImpedanceParameters
 
 #: Columns of the port ``forces_W`` of a law's block.
 FORCE_COLUMNS = "attraction_x", "attraction_y", "repulsion_x", "repulsion_y"
@@ -48,10 +49,6 @@ class Tuning:
     ``matched`` is the rule of the active law of 2019. It suits laws with the same gains
     as that law.
     """
-    stiffest: Callable[[Any, float], float]
-    """Function that returns the largest slope -df/dc of the force for an obstacle at
-    rest, N/m. Its arguments are the gains and the least range of the sensors in m.
-    """
     spring_speed: Callable[[Any], float] = _always_at_rest
     """Function of the gains. It returns the speed s, m/s, at which the force f(c, s)
     consists only of its spring term.
@@ -87,7 +84,10 @@ class Law:
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
-    """Model of the gains. Every field has a default."""
+    """Model of the gains in ``laws.<name>``. Every field has a default."""
+    impedance: type[ImpedanceParameters] | None = None
+    """Model of all parameters of a law on planned routes: those in ``impedance`` and
+    those in ``laws.<name>``."""
     controller_name: str = ""
     """Name of the class of the law's block in ``systems``. If it is empty, the block
     ``RadialLawController`` computes the force.

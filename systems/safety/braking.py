@@ -307,11 +307,12 @@ def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (c
 def _keeps_off_moving(
     place: Any, ahead_s: float, moved: float, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether the robot keeps away from moving obstacles.
+    """Returns whether the robot keeps away from obstacles that it cannot see.
 
-    The result is true if no obstacle in view can be within ``keep_m`` of ``place`` at
-    the time ``ahead_s`` from now. It is also true if the robot moves away from the end
-    of the sensors' view.
+    Such an obstacle may be just behind the end of a sensor's view, and may come toward
+    the robot. The result is true if no such obstacle can be within ``keep_m`` of
+    ``place`` at the time ``ahead_s`` from now. The result is also true if the robot
+    moves away from the nearest end of a view.
     """
     x, y = place
     speed = numbers.obstacle_speed_m_s

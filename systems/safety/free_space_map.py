@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.lagged_motion import lagged_motion
-from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
@@ -23,7 +23,7 @@ from systems.safety.free_space import (
     move_window,
     see,
 )
-from systems.safety.parameters import GuardParameters
+from systems.safety.parameters import START_BUBBLE_M, GuardParameters
 from systems.safety.views import (
     PlaceError,
     Sectors,
@@ -165,7 +165,7 @@ class FreeSpaceMap(Block):
     count whole pulses, and the travel of each wheel has the relative error
     ``wheel_error``.
 
-    At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
+    At the start, a disc around the axle with the radius ``START_BUBBLE_M`` counts as
     free. The disc that contains the body always counts as free, because ``MotionGuard``
     keeps it free.
 
@@ -173,15 +173,14 @@ class FreeSpaceMap(Block):
     The output depends on the state and the present inputs. There is no latency.
 
     Args:
-        parameters: Cells, start bubble, and errors of positions.
+        parameters: Cells, and errors of positions.
         sensors: Positions, apertures, ranges, and noise of the sensors.
         robot: Body, and position of the control point P.
-        odometry: Pulses of the encoders.
-        plant: Lag of the motors.
+        plant: Lag of the motors, and pulses of the encoders.
         tick_s: Control period, s.
 
     Raises:
-        InputError: The start bubble is too small for the robot.
+        InputError: The robot is too large for the start bubble.
 
     Reference: our own work; docs/guard.md has the theorem that depends on this block.
     """
@@ -202,7 +201,6 @@ class FreeSpaceMap(Block):
         parameters: GuardParameters = GuardParameters(),
         sensors: UltrasonicParameters = UltrasonicParameters(),
         robot: RobotParameters = RobotParameters(),
-        odometry: OdometryParameters = OdometryParameters(),
         plant: PlantParameters = PlantParameters(),
         tick_s: float = TICK_S,
     ) -> None:
@@ -210,7 +208,7 @@ class FreeSpaceMap(Block):
         parameters.check(robot)
         self.set_name("free_space_map")
         axes, places, half_angles = sensors.beams
-        place_error = PlaceError.of(parameters, robot, odometry)
+        place_error = PlaceError.of(parameters, robot, plant)
         least_way = 0.0
         if place_error.pulse_m > 0.0:
             motion = lagged_motion(tick_s, plant.motor_lag_s)
@@ -231,7 +229,7 @@ class FreeSpaceMap(Block):
             place_error,
             least_way,
             body_radius(robot),
-            parameters.start_bubble_m,
+            START_BUBBLE_M,
             tick_s,
             sensors.round_ticks(tick_s),
         )

@@ -26,7 +26,7 @@ from systems.safety.braking import (
     danger_of,
     rolled_speeds,
 )
-from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
+from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M, GuardParameters
 from systems.safety.views import stopping_way, tick_parts
 
 #: Sizes of the four parts of the state: velocity of P, wheel speeds, report, and
@@ -119,7 +119,7 @@ class MotionGuard(Block):
     The block replaces ``WheelCommand``: it converts the command of the law to wheel
     speeds. It passes these speeds for one control period if the robot could then brake
     to rest in free space. For this check, the block uses the smallest disc around the
-    axle that contains the body. The disc must stay ``margin_m`` away from all cells
+    axle that contains the body. The disc must stay ``MARGIN_M`` away from all cells
     that are not known to be free.
 
     Otherwise, the block passes lower speeds along the same curve. If these do not help,
@@ -127,7 +127,7 @@ class MotionGuard(Block):
     the block passes.
 
     If ``obstacle_speed_m_s`` is above zero, the block assumes that obstacles in the
-    sensors' view approach at this speed. The disc then also has to stay ``margin_m``
+    sensors' view approach at this speed. The disc then also has to stay ``MARGIN_M``
     away from all points that these obstacles may reach. This second condition does not
     apply while the robot withdraws from the obstacles.
 
@@ -211,7 +211,7 @@ def _numbers(
     tick_s: float,
 ) -> GuardNumbers:
     radius = body_radius(robot) + own.place_error_m
-    keep = radius + own.margin_m
+    keep = radius + MARGIN_M
     parts = tick_parts(tick_s)
     braking = BrakingNumbers(
         robot.wheel_radius_m,

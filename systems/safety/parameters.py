@@ -16,11 +16,17 @@ from systems.framework.parameters import (
     Parameters,
 )
 
-#: Smaller margin, m, that applies to a robot nearer than ``margin_m``. A robot can come
+#: Distance that the guard keeps between the disc around the body and non-free space, m.
+#: The guard keeps this distance in addition to ``place_error_m``.
+MARGIN_M = 0.006
+#: Smaller margin, m, that applies to a robot nearer than ``MARGIN_M``. A robot can come
 #: this near if a model is wrong.
 LEAST_MARGIN_M = 0.003
 #: Side of the square that the map remembers, m. The square moves along with the robot.
 WINDOW_M = 12.8
+#: Radius of the start bubble, the disc around the axle that counts as free at the
+#: start, m.
+START_BUBBLE_M = 1.0
 
 
 class GuardParameters(Parameters):
@@ -32,20 +38,15 @@ class GuardParameters(Parameters):
     the law ``guarded`` and 0 for other laws."""
     braking_m_s2: Acceleration = 1.5
     """Deceleration of the faster wheel's rim when the guard brakes, m/s^2."""
-    margin_m: float = Field(default=0.006, ge=LEAST_MARGIN_M, le=100.0)
-    """Distance that the guard keeps between the disc around the body and non-free
-    space, m. The guard keeps this distance in addition to ``place_error_m``."""
     cell_m: float = Field(default=0.05, ge=0.005, le=0.25)
     """Side of a cell of the map, m."""
-    start_bubble_m: float = Field(default=1.0, gt=0.0, le=WINDOW_M / 4.0)
-    """Radius of the disc around the axle that counts as free at the start, m."""
     wheel_error: Fraction = 0.0
     """Relative error of the travel of each wheel. Errors due to the pulses of the
     encoders are not included."""
     place_error_m: NonNegativeLength = 0.006
     """Largest position error of a cell that counts as free, m. The encoders and
-    ``wheel_error`` cause this error. The guard keeps this distance in addition to
-    ``margin_m``."""
+    ``wheel_error`` cause this error. The guard keeps this distance, and 6 mm more,
+    between the disc around the body and non-free space."""
 
     @property
     def cells(self) -> int:
@@ -59,11 +60,11 @@ class GuardParameters(Parameters):
         at the start. If it is too small, the function raises an ``InputError``.
         """
         radius = body_radius(robot)
-        if self.start_bubble_m < radius + 2.0 * self.cell_m:
+        if radius + 2.0 * self.cell_m > START_BUBBLE_M:
             raise InputError(
-                "start_bubble_m",
-                f"{self.start_bubble_m:g} m is too small for the body, which "
-                f"turns within {radius:.3g} m, and two cells of {self.cell_m:g} "
-                f"m; raise it to {radius + 2.0 * self.cell_m:.3g}, or lower "
-                "cell_m",
+                "guard",
+                f"assumes that a disc of {START_BUBBLE_M:g} m around the axle is free "
+                f"at the start, but the body turns within {radius:.3g} m, and two "
+                f"cells of {self.cell_m:g} m do not fit beside it; leave guard out, or "
+                "lower guard.cell_m or the size of the body",
             )

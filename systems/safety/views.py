@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import GuardParameters
@@ -71,16 +71,16 @@ class PlaceError(NamedTuple):
         cls,
         guard: GuardParameters,
         robot: RobotParameters,
-        odometry: OdometryParameters,
+        plant: PlantParameters,
     ) -> PlaceError:
         """Collects the quantities from the parameters.
 
         ``guard`` has the wheel error and the allowed position error. ``robot`` has the
-        dimensions of the wheels. ``odometry`` has the pulses of the encoders.
+        dimensions of the wheels. ``plant`` has the pulses of the encoders.
         """
         pulse_m = 0.0
-        if odometry.rounding:
-            pulse = math.tau / odometry.pulses_per_revolution
+        if plant.pulses_per_revolution is not None:
+            pulse = math.tau / plant.pulses_per_revolution
             pulse_m = robot.wheel_radius_m * pulse
         return cls(
             guard.wheel_error, pulse_m, robot.wheel_separation_m, guard.place_error_m

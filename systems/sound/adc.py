@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.framework.finite import check_finite
-from systems.sound.parameters import MicArrayParameters
+from systems.sound.parameters import FULL_SCALE_PA, MicArrayParameters
 
 
 @njit(cache=True)
@@ -39,6 +39,7 @@ def convert(
     noise_pa: float,
     parameters: MicArrayParameters,
     gains: NDArray[np.float64] | None = None,
+    full_scale_pa: float = FULL_SCALE_PA,
 ) -> NDArray[np.int16]:
     """Converts sound pressure to counts of the A/D converter, rounded and clipped.
 
@@ -46,8 +47,9 @@ def convert(
         pressure: (m, n) sound pressure of m channels, Pa; None for silence.
         noise: (m, n) noise of unit variance.
         noise_pa: RMS of the noise, Pa. The function multiplies ``noise`` by it.
-        parameters: Full scale and resolution.
+        parameters: Resolution.
         gains: (m,) true gain divided by stated gain of each channel. None: all are 1.
+        full_scale_pa: Sound pressure at full scale, Pa.
 
     Returns:
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
@@ -60,7 +62,7 @@ def convert(
         gains = np.ones(len(noise))
     if pressure is None:
         pressure = np.zeros_like(noise)
-    gain = parameters.counts_per_pa
+    gain = parameters.full_scale / full_scale_pa
     full_scale = np.float32(parameters.full_scale)
     out = np.empty(noise.shape, dtype=np.int16)
     if _counts(pressure, noise, gains, gain, gain * noise_pa, full_scale, out):

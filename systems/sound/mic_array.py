@@ -21,12 +21,13 @@ from systems.framework.signals import (
     Emission,
 )
 from systems.sound.acoustics import SOUND_SPEED_M_S
-from systems.sound.array_tolerances import (
+from systems.sound.parameters import MicArrayParameters, RoomParameters
+from systems.sound.real_array import (
+    ChannelErrors,
     RealArray,
-    Tolerances,
+    no_errors,
     real_array,
 )
-from systems.sound.parameters import MicArrayParameters, RoomParameters
 from systems.sound.recorder import MicMemory, Recorder
 from systems.sound.room import room_images
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
@@ -72,8 +73,8 @@ class MicArray(Block):
     - ``GAINS``: (n,) factors, where 1 means no error;
     - ``SOUND_SPEED``: (1,) speed of sound in the air, m/s.
 
-    The first three parameters are explained in ``systems.sound.array_tolerances``.
-    Their defaults are drawn from the seed, within the tolerances of the parameters.
+    The first three parameters are explained in ``systems.sound.real_array``. By
+    default, the array has no errors.
 
     The state has the time, the pose and the velocity of the robot at the end of the
     last frame. In a room, the state also has three values from the last update of the
@@ -89,11 +90,11 @@ class MicArray(Block):
         faults: Faults of the robot. The block uses only the faults of ``microphones``.
         others: Names of further sources that the robot does not follow. Each name adds
             an input port ``emission_<name>`` [Emission].
-        seed: Seed of the noise and of the errors of the array.
+        seed: Seed of the noise.
 
     Raises:
-        ValueError: The number of skew values differs from the number of microphones,
-            the room is not possible, or the file of the ego noise cannot be used.
+        ValueError: The room is not possible, or the file of the ego noise cannot be
+            used.
     """
 
     part, stage = "microphones", "hearing"
@@ -119,7 +120,6 @@ class MicArray(Block):
         super().__init__()
         self._parameters, self._robot = parameters, robot
         self.set_name("mic_array")
-        # The recorder refuses an invalid skew before the run starts.
         self._recorder = Recorder(
             parameters,
             robot,
@@ -148,12 +148,12 @@ class MicArray(Block):
         self.declare_output("audio", self._record, sources)
 
     def _declare_errors(self, c: float) -> None:
-        drawn = self._recorder.tolerances
+        none = no_errors(len(self._robot.microphones_m))
         # The order is that of the constants POSITION_ERRORS to SOUND_SPEED.
         groups: Any = (
-            drawn.position_errors.ravel(),
-            drawn.channel_delays,
-            drawn.gains,
+            none.position_errors.ravel(),
+            none.channel_delays,
+            none.gains,
             np.array([c]),
         )
         for values in groups:
@@ -174,9 +174,9 @@ class MicArray(Block):
         for name, values in zip(names, groups, strict=True):
             check_finite(f"MicArray: {name}", values)
         positions, delays, gains, (c,) = groups
-        tolerances = Tolerances(positions.reshape(-1, 2), delays, gains)
+        errors = ChannelErrors(positions.reshape(-1, 2), delays, gains)
         p_BM = microphones_B(self._robot)
-        return real_array(p_BM, self._parameters, tolerances, float(c))
+        return real_array(p_BM, self._parameters, errors, float(c))
 
     def _memory(self, context: Any) -> MicMemory:
         groups = range(context.num_discrete_state_groups())

@@ -28,9 +28,9 @@ from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, whole
 #: commutes with propagation, apart from a Doppler shift of about 0.1 %.
 MICROPHONE_BAND_HZ = (50.0, 18_000.0)
 
-#: Sound pressure at full scale, Pa. The sensitivity of the microphones is -23 dB re 1
-#: V/Pa. The gain of the preamplifier is 40 dB (Han 2019, 4.1). The converter clips at
-#: 1.65 V (our choice).
+#: Sound pressure at full scale, Pa: the largest pressure that the converter does not
+#: clip. The sensitivity of the microphones is -23 dB re 1 V/Pa. The gain of the
+#: preamplifier is 40 dB (Han 2019, 4.1). The converter clips at 1.65 V (our choice).
 FULL_SCALE_PA = 1.65 / 10.0 ** ((-23.0 + 40.0) / 20.0)
 
 #: Length of the raised-cosine edges of every burst, s. The edges prevent clicks.
@@ -117,17 +117,8 @@ class MicArrayParameters(Parameters):
     The noise is white and Gaussian up to half the sample rate. It has equal power in
     every channel and does not depend on distance.
     """
-    full_scale_pa: Positive = FULL_SCALE_PA
-    """Magnitude of the largest sound pressure that the converter does not clip, Pa."""
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
-    channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
-    """Delay with which each channel is sampled, s. It is shorter than one sample.
-
-    Give one delay per microphone. If all channels are sampled at once, give an empty
-    list.
-    """
-
     ego_noise_file: str | None = None
     """Recording of the noise of the robot itself (WAV, FLAC ...). The recording is
     repeated without end.
@@ -137,26 +128,9 @@ class MicArrayParameters(Parameters):
     """
     ego_noise_snr_db_at_1m: float = Field(default=20.0, ge=-40.0, le=150.0)
     """Level of the source at 1 m relative to the ego noise, dB."""
-    position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
-    """Largest error of the position of each microphone in x and in y, m.
-
-    This error and the errors of the next two fields are uniformly distributed. They are
-    drawn once from the seed.
-    """
-    delay_tolerance_s: float = Field(default=0.0, ge=0.0, le=1e-4)
-    """Largest time by which each channel is sampled earlier or later, s."""
-    gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
-    """Largest error of the gain of each channel, dB. The gain applies to sound and
-    noise."""
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
-        sample = 1.0 / self.sample_rate_hz
-        if not all(0.0 <= skew < sample for skew in self.channel_skew_s):
-            raise InputError(
-                "channel_skew_s",
-                f"{self.channel_skew_s} must lie in [0, {sample:g}) s, one sample",
-            )
         if not whole(samples := self.frame_s * self.sample_rate_hz):
             raise InputError(
                 "sample_rate_hz",
@@ -178,30 +152,7 @@ class MicArrayParameters(Parameters):
     @cached_property
     def counts_per_pa(self) -> float:
         """Number of counts per pascal."""
-        return self.full_scale / self.full_scale_pa
-
-
-def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
-    """Returns the delays with which the channels are sampled.
-
-    Args:
-        parameters: Parameters with the delays. If the list is empty, all delays are 0.
-        count: Number of microphones.
-
-    Returns:
-        (count,) delays, s.
-
-    Raises:
-        InputError: The number of delays differs from the number of microphones.
-    """
-    skew = parameters.channel_skew_s
-    if len(skew) not in (0, count):
-        raise InputError(
-            "microphones.channel_skew_s",
-            f"{skew} has {len(skew)} times for {count} microphones; give one "
-            "time for each microphone, or []",
-        )
-    return np.array(skew) if skew else np.zeros(count)
+        return self.full_scale / FULL_SCALE_PA
 
 
 #: Largest allowed number of reflections of one sound. It leads to more than four

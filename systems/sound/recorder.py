@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.faults import Fault, faults_of
-from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
+from systems.framework.noise import frame_noise
 from systems.framework.signals import AudioFrame, Emission, read_only
 from systems.sound.adc import convert
-from systems.sound.array_tolerances import RealArray, draw_tolerances, real_array
 from systems.sound.ego_noise import EgoNoise
 from systems.sound.parameters import (
     UPDATE_PERIOD_S,
@@ -22,6 +21,7 @@ from systems.sound.parameters import (
     RoomParameters,
 )
 from systems.sound.propagation import check_reach, microphone_paths, propagate
+from systems.sound.real_array import RealArray, no_errors, real_array
 from systems.sound.reverberation import Reverberation
 
 # Two times closer than this count as the same time, s.
@@ -137,7 +137,7 @@ class Recorder:
         c: Speed of sound, m/s.
         room: Walls; None for the free field.
         sources: Number of sources.
-        seed: Seed of the noise and of the errors of the array.
+        seed: Seed of the noise.
         faults: Faults of the robot. Only the faults of ``microphones`` have an effect.
 
     Raises:
@@ -157,7 +157,7 @@ class Recorder:
     ) -> None:
         count = len(robot.microphones_m)
         self._faults = faults_of(faults, "microphones", count)
-        self._parameters, self._robot, self._c = parameters, robot, c
+        self._parameters = parameters
         self._reverberation, self._ego_noise, places = None, None, None
         if room:
             self._reverberation = Reverberation(room, c, parameters)
@@ -167,25 +167,16 @@ class Recorder:
             self._ego_noise = EgoNoise(parameters, count, seed)
         self.blank = MicMemory(np.r_[-np.inf, np.zeros(6)], places)
         """State before the first frame."""
-        self._draw(seed)
-
-    def _draw(self, seed: int) -> None:
         self._seed = seed
-        count = len(self._robot.microphones_m)
-        generator = tick_generator(seed, BEFORE_THE_RUN)
-        self.tolerances = draw_tolerances(self._parameters, count, generator)
-        """Errors of the array."""
-        self.array = real_array(
-            microphones_B(self._robot), self._parameters, self.tolerances, self._c
-        )
-        """Array with these errors."""
+        self.array = real_array(microphones_B(robot), parameters, no_errors(count), c)
+        """Array without errors."""
 
     def of_seed(self, seed: int) -> Recorder:
-        """Returns the same recorder with other noise and other errors of the array."""
+        """Returns the same recorder with other noise."""
         other = copy(self)
         if self._ego_noise is not None:
             other._ego_noise = self._ego_noise.of_seed(seed)
-        other._draw(seed)
+        other._seed = seed
         return other
 
     def remembered(

@@ -11,9 +11,9 @@ from scipy import fft
 
 from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ, Emission
-from systems.sound.array_tolerances import RealArray
 from systems.sound.parameters import MicArrayParameters, RoomParameters
 from systems.sound.propagation import KERNEL_REACH, sampled_at
+from systems.sound.real_array import RealArray
 from systems.sound.room import room_images, room_impulse_responses
 from systems.world.geometry import rotate
 

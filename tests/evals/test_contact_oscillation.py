@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.laws.head_on import head_on
-from analysis.linear.contact_mode import contact_spectral_radius
+from analysis.linear.contact_mode import contact_model
 from analysis.nonlinear.contact_oscillation import contact_oscillation
 from analysis.nonlinear.harmonic_balance import predict_oscillation
 from diagrams import load_scenario
@@ -72,5 +72,5 @@ def test_growth_of_small_oscillations_is_that_of_the_linear_chain(stiffness):
     case = scenario("conventional", f"laws.conventional.stiffness_n_m={stiffness}")
     contact = head_on(case, to_go_m=1.0)
     small = predict_oscillation(contact, "printed", largest_m=0.01, points=1)
-    radius = contact_spectral_radius(case, stiffness + 2.0)
+    radius = contact_model(case, stiffness + 2.0).spectral_radius
     assert np.exp(0.025 * small.growth_per_s[0]) == pytest.approx(radius, abs=1e-6)

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from analysis.comparison.plans import comparison_plan
-from analysis.design.requirements import DesignRequirements, metres_to_go
+from analysis.design.requirements import Requirements, metres_to_go
 from analysis.laws.push_and_pull import DESIGNED_LAWS
+from analysis.sweeps.comparison_plans import comparison_plan
 from diagrams import load_scenario, simulate
 from diagrams.scenario.scenario import Scenario
 from phonotaxis import main
@@ -31,16 +31,15 @@ def run_at_wall(law: str, share: float):
     gains = getattr(Scenario().follower.laws, law).model_dump()
     for field in SPRINGS[law]:
         gains[field] *= share
-    to_go = metres_to_go(Scenario(), DesignRequirements())
+    to_go = metres_to_go(Scenario(), Requirements())
     source = WALL_X + to_go + Scenario().follower.attraction.follow_distance_m
     return simulate(
         Scenario.model_validate(
             {
                 "law": law,
-                "hearing": "ideal",
-                "ideal_hearing": {"burst_gaps": False},
+                "hearing": "ideal_always",
                 "obstacle_sensing": "ideal",
-                "odometry": {"rounding": False},
+                "plant": {"pulses_per_revolution": None},
                 "duration_s": 15.0,
                 "source": {"waypoints_m": [[source, 0.0]]},
                 "obstacles": [
@@ -88,7 +87,8 @@ def test_command_derives_the_defaults(tmp_path, capsys):
     assert all(runs["jams"] == 0 for runs in summary["today"]["jams"])
     better = summary["recommended"]
     assert [law["acceptable"] for law in better["laws"]] == [True, True, False, False]
-    assert better["damping_ratio"] >= 0.7
+    assert better["figures"]["damping_ratio"] >= 0.4
+    assert better["figures"] == summary["gains"]["recommended"]
     assert_layouts_have_the_gains_of(load_scenario(out / "recommended.yaml"))
     assert {path.name for path in out.iterdir()} == {
         "summary.json",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from diagrams import load_scenario, simulate
 
 pytestmark = pytest.mark.slow

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from diagrams import RunResult, load_scenario, simulate
 from systems.hearing.tracking import source_tracker
 from systems.hearing.tracking.tracker_model import tracker_numbers

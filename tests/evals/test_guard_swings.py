@@ -58,7 +58,7 @@ def test_exact_encoders_keep_to_the_true_path(hz, tick_s):
     """One minute of swings; an hour may take the place away by 1 mm."""
     setting = {0.0125: "tick of 12.5 ms", 0.025: "plain", 0.05: "tick of 50 ms"}[tick_s]
     trial = swing_alone(BY_HAND._replace(hz=hz), setting, 68.0)
-    exact = {"odometry": {"rounding": False}}
+    exact = {"plant": {"pulses_per_revolution": None}}
     assert odometry_error(run_result(trial, exact)).max() < 1e-4
 
 

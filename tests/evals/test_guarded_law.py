@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from analysis.comparison.plans import comparison_plan
+from analysis.sweeps.comparison_plans import comparison_plan
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 
@@ -142,5 +142,5 @@ def test_it_needs_ranges():
 
 def test_it_needs_its_bubble(tmp_path: Path):
     near = "obstacles=[{waypoints_m: [[0.9, 0.0]]}]"
-    with pytest.raises(InputError, match=r"start_bubble_m, 1 m"):
+    with pytest.raises(InputError, match=r"a disc of 1 m around the axle is free"):
         load_scenario("default", ["law=guarded", near])

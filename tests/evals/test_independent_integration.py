@@ -90,7 +90,7 @@ def scenario(law: str, velocity_term: str = "printed") -> Scenario:
             "hearing": "ideal",
             "obstacle_sensing": "ideal",
             "duration_s": DURATION,
-            "odometry": {"rounding": False},
+            "plant": {"pulses_per_revolution": None},
             "tracker": {"hold": "world"},
             "attraction": ATTRACTION,
             "collision_vector": {"velocity_term": velocity_term},

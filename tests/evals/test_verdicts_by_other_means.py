@@ -1,8 +1,8 @@
 """Every verdict of the stability report by other means than the report's own.
 
 Hand-made polynomials and potentials, responses of unreduced models, and runs.
-``tests/analysis/stability/test_verdict_readings.py`` says which number a verdict
-reads; here the numbers themselves are found again.
+``tests/analysis/stability/test_criteria.py`` says which number a criterion reads;
+here the numbers themselves are found again.
 """
 
 from __future__ import annotations
@@ -32,41 +32,35 @@ from analysis.models import linearisation
 from analysis.models.equilibria import find_equilibria
 from analysis.models.open_loops import closed, cut_model
 from analysis.stability.law_analysis import Study, analyse_law
-from analysis.stability.report_parts import parts
-from analysis.stability.verdict_readings import (
-    read_contact,
-    read_cycle,
-    read_damping,
-    read_decay,
-    read_delay,
-    read_jams,
-    read_offset,
-    read_passive,
-    read_prediction,
-    read_routes,
-    read_start,
-    read_trials,
-    read_worst_case,
-    read_worst_margin,
-)
+from analysis.stability.linear_parts import count_jams
+from analysis.stability.report_parts import SOUND_PARTS
+from analysis.stability.robustness_parts import LoopRobustness
+from analysis.stability.sampling_parts import SampledLoop, contact_growth
 from diagrams import load_scenario
 
 T = 0.025
 LAWS = ("conventional", "active", "active2017")
-PARTS = ("equilibria", "linear_models", "step", "margins", "energy_balance")
+PARTS = ("equilibria", "linear_models", "small_step", "margins", "energy_balance")
 
 
 @pytest.fixture(scope="module")
 def studies():
     """Of each law, the parts of the report that take little time."""
-    wanted = [part for part in parts(full=False) if part.key in PARTS]
+    wanted = [part for part in SOUND_PARTS if part.key in PARTS]
     found = {}
     for law in LAWS:
         scenario = load_scenario("default", [f"law={law}"])
         analysis = analyse_law(scenario, wanted)
-        data = {key: finding.data for key, finding in analysis.findings.items()}
-        found[law] = Study(scenario, data)
+        found[law] = Study(scenario, found=analysis.found)
     return found
+
+
+def read(name, data):
+    """The number that the criterion of this name reads from the data of its part."""
+    (criterion,) = (
+        each for part in SOUND_PARTS for each in part.criteria if each.name == name
+    )
+    return criterion.read(data)
 
 
 def push(scenario, c, s=0.0):
@@ -135,7 +129,9 @@ def test_growth_at_rest_is_that_of_simulated_steps(studies, law):
     z = np.linalg.eigvals(matrix)
     z = z[np.abs(z - 1.0) > 1e-3]  # the heading, wheel angles and odometry are free
     growth = math.log(np.abs(z).max()) / T
-    assert read_decay(studies[law]) == pytest.approx(growth, abs=1e-3)
+    assert read("growth at rest", studies[law].found["equilibria"]) == pytest.approx(
+        growth, abs=1e-3
+    )
 
 
 def extremes(time, x):
@@ -150,19 +146,21 @@ def extremes(time, x):
 def test_damping_and_prediction_are_those_of_a_simulated_step(studies, law, share):
     """The decrement of turning points; |dC/dt| leaves the active law's 1 % off."""
     study = studies[law]
-    step = study.found["step"]
+    step = study.found["small_step"]
     later = step.time_s > 2.0
     times, values = extremes(step.time_s[later], step.ideal_m[later])
     swings = np.abs(np.diff(values))
     decrement = np.log(swings[:-1] / swings[1:]).mean()
     ratio = decrement / math.hypot(math.pi, decrement)
-    assert read_damping(study) == pytest.approx(ratio, rel=share)
+    found = read("damping ratio at rest", study.found["equilibria"])
+    assert found == pytest.approx(ratio, rel=share)
     natural = math.pi / np.diff(times).mean() / math.sqrt(1.0 - ratio**2)
     off = 100.0 * max(
         abs(step.predicted.frequency_rad_s / natural - 1.0),
         abs(step.predicted.damping_ratio / ratio - 1.0),
     )
-    assert read_prediction(study) == pytest.approx(off, abs=100.0 * share)
+    found = read("error of the linear prediction of a small step", step)
+    assert found == pytest.approx(off, abs=100.0 * share)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -177,7 +175,9 @@ def test_offset_is_where_the_forces_balance(studies, law):
 
     rest = brentq(left, attraction.follow_distance_m - 1e-3, 3.0, xtol=1e-12)
     expected = rest - attraction.follow_distance_m
-    assert read_offset(studies[law]) == pytest.approx(expected, abs=1e-6)
+    found = studies[law].found["equilibria"]
+    offset = read("offset from the follow point at rest", found)
+    assert offset == pytest.approx(expected, abs=1e-6)
 
 
 def largest_stable(polynomial, change, most):
@@ -223,14 +223,13 @@ def test_margins_of_the_conventional_law_are_those_of_polynomials(studies):
         peaks.append(np.abs(S).max())
         disks.append(1.0 / np.abs(S - 0.5).max())
     expected = {
-        "gain_margin_db": (min(gains), 0.1),
-        "phase_margin_deg": (min(turns), 0.01),
-        "sensitivity_peak": (max(peaks), 0.01),
-        "disk": (min(disks), 1e-3),
+        "least gain margin": (min(gains), 0.1),
+        "least phase margin": (min(turns), 0.01),
+        "largest sensitivity peak": (max(peaks), 0.01),
+        "least disk margin": (min(disks), 1e-3),
     }
     for name, (value, off) in expected.items():
-        read = read_worst_margin(name, largest=name == "sensitivity_peak")
-        assert read(study) == pytest.approx(value, abs=off), name
+        assert read(name, study.found["margins"]) == pytest.approx(value, abs=off), name
 
 
 @pytest.mark.parametrize("law", ["active", "active2017"])
@@ -262,14 +261,15 @@ def test_margins_of_active_laws_are_those_of_unreduced_models(studies, law):
             disks.append(1.0 / np.abs(1.0 / (1.0 + L) - 0.5).max())
     epsilon, r = study.scenario.only.robot.control_point_m, at.source_distance_m
     expected = {
-        "gain_margin_db": 20.0 * math.log10((r + epsilon) / r),
-        "phase_margin_deg": math.degrees(min(phases)),
-        "sensitivity_peak": max(peaks),
-        "disk": min(disks),
+        "least gain margin": 20.0 * math.log10((r + epsilon) / r),
+        "least phase margin": math.degrees(min(phases)),
+        "largest sensitivity peak": max(peaks),
+        "least disk margin": min(disks),
     }
     for name, value in expected.items():
-        read = read_worst_margin(name, largest=name == "sensitivity_peak")
-        assert read(study) == pytest.approx(value, rel=5e-3), name
+        assert read(name, study.found["margins"]) == pytest.approx(value, rel=5e-3), (
+            name
+        )
 
 
 def radius_with_delay(model, ticks):
@@ -310,8 +310,9 @@ def test_delay_margin_lies_between_two_whole_ticks(studies, law):
             ticks = range(40)
             late = (n for n in ticks if radius_with_delay(one, n) > 1.0)
             whole.append(next(late, math.inf))
-    study = Study(study.scenario, {**study.found, "sampled": Made(margins=exact)})
-    assert T * (min(whole) - 1) <= float(read_delay(study)) < T * min(whole)
+    sampled = SampledLoop(T, np.array([]), tuple(exact), None)
+    found = read("least delay margin", sampled)
+    assert T * (min(whole) - 1) <= found < T * min(whole)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -328,7 +329,7 @@ def test_contact_growth_is_a_root_of_a_polynomial(law, ticks):
     total = scenario.follower.attraction.stiffness_n_m + steepest
     growth = growth_with(scenario, total, ticks=ticks)
     # The table of the law has steps of 0.2 mm.
-    assert read_contact(Study(scenario), ticks) == pytest.approx(growth, abs=5e-3)
+    assert contact_growth(scenario, ticks) == pytest.approx(growth, abs=5e-3)
 
 
 def test_burst_cycle_forgets_the_silence(studies):
@@ -344,7 +345,7 @@ def test_burst_cycle_forgets_the_silence(studies):
     left = math.exp(
         2.0 * growth_with(scenario, scenario.follower.attraction.stiffness_n_m)
     )
-    found = read_cycle(Study(scenario, {"burst_cycle": cycles}))
+    found = read("deviation remaining after a burst cycle", cycles)
     assert found == pytest.approx(left, abs=1e-3)
 
 
@@ -383,9 +384,8 @@ def test_worst_cases_are_those_of_all_corners(studies, contact):
                 values=(values["robot.mass_kg"], values["attraction.damping_n_s_m"]),
             )
         )
-    worst = {"robustness": Made(cloud=cloud)}
-    read = read_worst_case("robustness")(Study(scenario, worst))
-    assert read == pytest.approx(max(found), abs=3e-3)
+    worst = read("growth at rest, worst parameters", LoopRobustness(cloud, ()))
+    assert worst == pytest.approx(max(found), abs=3e-3)
 
 
 def stretch(scenario, true_speed):
@@ -412,7 +412,9 @@ def test_power_of_the_velocity_term_by_search(studies, law):
     c, s = np.meshgrid(np.linspace(0.01, 3.0, 300), np.linspace(0.004, 1.4, 700))
     slopes = (push(scenario, c, s) - push(scenario, c, 0.0)) / s
     expected = np.abs(slopes).max() / scenario.follower.attraction.damping_n_s_m
-    assert read_passive(studies[law]) == pytest.approx(expected, rel=3e-3)
+    found = studies[law].found["energy_balance"]
+    share = read("largest power of the velocity term", found)
+    assert share == pytest.approx(expected, rel=3e-3)
 
 
 def bodies(scenario):
@@ -475,7 +477,7 @@ def test_places_to_jam_are_where_runs_end():
         "two_static_obstacles", ["law=conventional", wall, "source.waypoints_m=[[5,0]]"]
     )
     search = find_equilibria(scenario)
-    jams = read_jams(Study(scenario, {"equilibria": Made(search=search)}))
+    jams = count_jams(scenario, search)
     starts = np.zeros((60, 4))
     starts[:, :2] = np.random.default_rng(3).uniform((0.0, -1.5), (1.5, 1.5), (60, 2))
     ends, _ = fly(scenario, starts, 80.0, h=0.02)
@@ -547,8 +549,8 @@ def test_certified_starts_are_those_of_an_own_flood(spring_n_m):
             "laws.conventional.damping_n_s_m=0.001",
         ],
     )
-    found = [Made(certificate=certify_energy(scenario, cell_m=0.03))]
-    start = read_start(Study(scenario, {"certificates": found}))
+    certified = Made(certificate=certify_energy(scenario, cell_m=0.03))
+    start = read("start certified", certified)
     assert start == float(flooded(scenario)) == float(spring_n_m > 10.0)
 
 
@@ -557,10 +559,10 @@ def test_collisions_from_certified_starts_by_an_own_integration():
     scenario = load_scenario("two_static_obstacles", ["law=conventional", "seed=5"])
     certificate = certify_energy(scenario, cell_m=0.03)
     trials = try_certificate(certificate, starts=80, duration_s=15.0)
-    found = [Made(certificate=certificate, trials=trials)]
     _, closest = fly(scenario, trials.inside.starts, 15.0)
     touched = np.count_nonzero(closest <= certificate.contact_m)
-    assert read_trials(Study(scenario, {"certificates": found})) == touched == 0
+    found = read("collisions from certified starts", Made(trials=trials))
+    assert found == touched == 0
     _, closest = fly(scenario, trials.outside.starts, 15.0)
     hit = closest <= certificate.contact_m
     clear = np.abs(closest - certificate.contact_m) > 0.02
@@ -570,7 +572,8 @@ def test_collisions_from_certified_starts_by_an_own_integration():
 def test_difference_of_two_routes_shows_an_error_in_one(studies, monkeypatch):
     """Rounding; and an error of 1e-6 put into one route is what the verdict reads."""
     study = studies["conventional"]
-    assert float(read_routes(study)) < 1e-12
+    name = "difference between two computations of the model"
+    assert read(name, study.found["linear_models"]) < 1e-12
     true = linearisation.blockwise_model
 
     def wrong(point):
@@ -580,5 +583,4 @@ def test_difference_of_two_routes_shows_an_error_in_one(studies, monkeypatch):
 
     monkeypatch.setattr(linearisation, "blockwise_model", wrong)
     routes = linearisation.compare_routes(study.found["equilibria"].at)
-    tampered = Study(study.scenario, {"linear_models": Made(routes=routes)})
-    assert read_routes(tampered) == pytest.approx(1e-6, rel=1e-3)
+    assert read(name, Made(routes=routes)) == pytest.approx(1e-6, rel=1e-3)

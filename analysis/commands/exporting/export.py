@@ -13,7 +13,7 @@ from analysis.commands.command import Command, Job, Take
 from analysis.commands.exporting.files import Exports, take_exports
 
 if TYPE_CHECKING:
-    from analysis.exports.recorded_run import RecordedRun
+    from analysis.runs.recorded_run import RecordedRun
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[RecordedRun]:
-    from analysis.exports.recorded_run import RecordedRun
+    from analysis.runs.recorded_run import RecordedRun
     from systems.framework.input_error import InputError
 
     exports, result = Exports.chosen(options), Path(options.result)

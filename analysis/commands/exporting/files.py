@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from analysis.exports.recorded_run import RecordedRun
+    from analysis.runs.recorded_run import RecordedRun
 
 MCAP_FILE, CSV_FILE = "run.mcap", "trajectory.csv"
 
@@ -44,7 +44,7 @@ class Exports(NamedTuple):
             InputError: A package that writes MCAP files is not installed.
         """
         if options.mcap:
-            from analysis.exports.mcap_file import require_mcap
+            from analysis.views.mcap_file import require_mcap
 
             require_mcap()
         return cls(options.mcap, options.csv)
@@ -63,7 +63,7 @@ class Exports(NamedTuple):
             directory: Existing directory for the files.
         """
         if self.mcap:
-            from analysis.exports.mcap_file import write_mcap
+            from analysis.views.mcap_file import write_mcap
 
             write_mcap(run, directory / MCAP_FILE)
         if self.csv:

@@ -60,14 +60,13 @@ def _hearing(
     others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
-    if robot.hearing == "ideal":
+    if not robot.listens:
         return [
             IdealSourceSensor(
                 robot=robot.robot,
-                hearing=robot.ideal_hearing,
                 sound=scenario.source.sound,
+                always=robot.hearing == "ideal_always",
                 frame_s=robot.microphones.frame_s,
-                seed=seed_of("ideal_source_sensor"),
             )
         ]
     return [
@@ -97,7 +96,7 @@ def _tracker(scenario: Scenario, robot: Follower) -> Any:
     estimate is older by half an audio frame.
     """
     tick, frame = scenario.tick_s, robot.microphones.frame_s
-    exact = robot.hearing == "ideal"
+    exact = not robot.listens
     return SourceTracker(
         robot=robot.robot,
         tracker=robot.tracker,
@@ -173,7 +172,6 @@ def _obstacle_sensing(
             parameters=robot.own_map,
             sensors=robot.ultrasonic,
             robot=robot.robot,
-            odometry=robot.odometry,
             plant=robot.plant,
             tick_s=scenario.tick_s,
         )

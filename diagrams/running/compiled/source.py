@@ -44,10 +44,12 @@ _COUNT = count()
 
 
 class LoopPart:
-    """Builds the source code of one part of a compiled loop, and collects its values.
+    """Builds the source code of one part of a compiled loop.
 
-    A part is a function of the tick (control period). ``expression`` adds a value to
-    the source. ``name`` adds a function to the source.
+    A part is a generated function with the number of the tick (control period) as its
+    argument. The object also stores the values and functions to which the source code
+    refers. ``expression`` returns the source code for a value, and ``name`` returns the
+    name of a function in the source code.
     """
 
     def __init__(self) -> None:

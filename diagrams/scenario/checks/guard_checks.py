@@ -11,7 +11,7 @@ from diagrams.scenario.bodies import Body
 from diagrams.scenario.participants import Follower
 from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
-from systems.safety.parameters import GuardParameters
+from systems.safety.parameters import START_BUBBLE_M, GuardParameters
 from systems.safety.views import (
     PlaceError,
     place_error,
@@ -51,20 +51,18 @@ def check_guard(
     try:
         guard.check(robot.robot)
     except InputError as error:
-        field = f"{prefix}guard.{error.field}"
-        raise InputError(field, error.message) from None
+        raise InputError(f"{prefix}{error.field}", error.message) from None
     _check_view(prefix, robot)
     _check_memory(prefix, robot, guard, tick_s)
-    bubble, (x, y) = guard.start_bubble_m, robot.start.position_m
+    x, y = robot.start.position_m
     for name, body in bodies.items():
         distance = math.hypot(*beyond_rectangle((x, y), body.rectangle(0.0)))
-        if distance < bubble:
+        if distance < START_BUBBLE_M:
             raise InputError(
                 f"{prefix}start.position_m",
-                f"{name!r} is {distance:.3g} m from the axle, within "
-                f"{prefix}guard.start_bubble_m, {bubble:g} m, which the "
-                "guard assumes to be free; move one of them, or lower "
-                "start_bubble_m",
+                f"{name!r} is {distance:.3g} m from the axle, but the guard assumes "
+                f"that a disc of {START_BUBBLE_M:g} m around the axle is free; move "
+                "one of them",
             )
 
 
@@ -91,7 +89,7 @@ def _check_memory(
     """
     body = robot.robot
     stopping = stopping_way(guard, body, robot.plant, tick_s)
-    error = PlaceError.of(guard, body, robot.odometry)
+    error = PlaceError.of(guard, body, robot.plant)
     distance = body_radius(body) + stopping
     needed = place_error(distance, stopping, error)
     if needed > guard.place_error_m:

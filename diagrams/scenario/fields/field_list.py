@@ -170,6 +170,8 @@ def _meaning(schema: Mapping[str, Any], node: Mapping[str, Any]) -> str:
 
 
 def _kind(node: Mapping[str, Any]) -> str:
+    if "const" in node:
+        return str(node["const"])
     if "enum" in node:
         return " or ".join(node["enum"])
     if "prefixItems" in node:

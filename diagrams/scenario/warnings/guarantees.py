@@ -19,7 +19,7 @@ from systems.base.robot import body_radius
 from systems.base.tyre_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError, shortened
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.parameters import LEAST_MARGIN_M
+from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M, START_BUBBLE_M
 from systems.safety.views import (
     RANGE_MARGIN_M,
     PlaceError,
@@ -148,7 +148,7 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
             "guard", "is unset, so that there is no guard to promise anything; set it"
         )
     tick_s = scenario.tick_s
-    keep = body_radius(scenario.only.robot) + guard.place_error_m + guard.margin_m
+    keep = body_radius(scenario.only.robot) + guard.place_error_m + MARGIN_M
     sensors, lag = scenario.follower.ultrasonic, scenario.only.plant.motor_lag_s
     # The range error of the noisiest sensor counts for all sensors.
     error = float(max(range_errors(sensors)))
@@ -266,10 +266,10 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
         (math.hypot(*beyond_rectangle(place, body.rectangle(0.0))) for body in bodies),
         default=math.inf,
     )
-    field = "guard.start_bubble_m"
-    bubble = scenario.follower.own_map.start_bubble_m
-    text = "nearest body at the start"
-    return Assumption("A3", text, nearest, bubble, "m", at_least=True, field=field)
+    field, text = "start.position_m", "nearest body at the start"
+    return Assumption(
+        "A3", text, nearest, START_BUBBLE_M, "m", at_least=True, field=field
+    )
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
@@ -314,7 +314,7 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
     guard, robot, plant = own.own_guard, own.robot, own.plant
     assert guard is not None
     stopping = stopping_way(guard, robot, plant, tick_s)
-    error = PlaceError.of(guard, robot, scenario.only.odometry)
+    error = PlaceError.of(guard, robot, plant)
     lost = place_error(body_radius(robot) + stopping, stopping, error)
     slip = max(map(abs, plant.slip))
     grip = math.inf if plant.friction is None else plant.friction

@@ -45,7 +45,7 @@ def route_warnings(prefix: str, robot: Router, tick_s: float) -> list[ScenarioWa
         return []
     own = robot.gains
     of = SampledMass(robot.robot.mass_kg, robot.plant.motor_lag_s, tick_s)
-    field = f"{prefix}laws.{robot.law}"
+    field = f"{prefix}impedance"
     found = _of_damping(field, own, of) or _of_stiffness(field, own, of)
     body, block = robot.robot, own.block_distance_m
     reach = math.hypot(body.control_point_m + 0.5 * body.length_m, 0.5 * body.width_m)
@@ -56,6 +56,7 @@ def route_warnings(prefix: str, robot: Router, tick_s: float) -> list[ScenarioWa
         )
         found.append(ScenarioWarning(f"{field}.block_distance_m", message))
     if isinstance(own, AdaptiveTrajectoryParameters):
+        field = f"{prefix}laws.{robot.law}"
         found += _of_rate(field, own, of)
         if not own.safety_filter and block is None:
             found += _of_safety(field, own)
@@ -203,6 +204,6 @@ def goal_warnings(
         f"stop.goal_margin_m, {margin_m:g} m, so that the robot does not arrive; "
         f"move the goal (next to one wall {room:.2g} m away from it is enough), "
         "raise that margin, or lower "
-        f"{prefix}laws.{robot.law}.security_zone_m"
+        f"{prefix}impedance.security_zone_m"
     )
     return [ScenarioWarning(f"{prefix}route.goal_m", message)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from systems.framework.parameters import NonNegative
+from systems.framework.parameters import NonNegative, Parameters
 from systems.laws.law import Equation
 from systems.laws.trajectory.trajectory_conventional import (
     TrajectoryImpedanceParameters,
@@ -12,8 +12,8 @@ from systems.laws.trajectory.trajectory_conventional import (
 )
 
 
-class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
-    """Parameters of the adaptive law. The paper prints no rates and no limits."""
+class AdaptationParameters(Parameters):
+    """Parameters of the adaptation. The paper prints no rates and no limits."""
 
     rule: Literal["lyapunov", "sensitivity"] = "lyapunov"
     """Rule that adapts the gains.
@@ -33,9 +33,9 @@ class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
     """Weight lambda of the safety term, without unit. With 0 the term is off.
 
     For each object at the distance d, the term is lambda/2 max(0, S - d)^2, where S is
-    ``security_zone_m``. It replaces the term lambda/2 (d_sec^2 - d^2) of eq. 27 of
-    Engelbrecht 2021. Its gradient is -lambda (S - d) n, where n is the unit vector from
-    the object to P.
+    ``impedance.security_zone_m``. It replaces the term lambda/2 (d_sec^2 - d^2) of eq.
+    27 of Engelbrecht 2021. Its gradient is -lambda (S - d) n, where n is the unit
+    vector from the object to P.
 
     The term has an effect only with ``rule: sensitivity``. Without the term, a robot
     with adaptive gains collides more often than a robot with fixed gains.
@@ -46,6 +46,10 @@ class AdaptiveTrajectoryParameters(TrajectoryImpedanceParameters):
     """
     safety_filter: bool = False
     """Whether ``SafetyFilter`` keeps P away from objects, whatever the gains."""
+
+
+class AdaptiveTrajectoryParameters(AdaptationParameters, TrajectoryImpedanceParameters):
+    """Parameters of the adaptive law. The paper prints no rates and no limits."""
 
     @property
     def damping_fades(self) -> bool:
@@ -64,4 +68,5 @@ TRAJECTORY_ADAPTIVE = trajectory_law(
         r"\dot{D}=\frac{\gamma}{M}e_v\cdot(v-v_d)",
         "K' = (gamma/M) e_v . (p - p_d), D' = (gamma/M) e_v . (v - v_d)",
     ),
+    gains=AdaptationParameters,
 )

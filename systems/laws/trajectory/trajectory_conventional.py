@@ -2,45 +2,18 @@
 
 from __future__ import annotations
 
-from systems.framework.parameters import (
-    Damping,
-    Length,
-    NonNegativeDamping,
-    NonNegativeStiffness,
-    Parameters,
-    Stiffness,
-)
+from systems.framework.parameters import Length, NonNegativeStiffness, Parameters
 from systems.laws.law import Equation, Law
+from systems.laws.parameters import ImpedanceParameters
 
 
-class TrajectoryImpedanceParameters(Parameters):
-    """Springs and dampers from the robot to the target and to contacts.
+class TrajectoryImpedanceParameters(ImpedanceParameters):
+    """Springs and dampers from the robot to the target and to contacts."""
 
-    K and D are the stiffness and damping to the target, and K_e and D_e are those to
-    contacts. Contacts begin at the distance S. K, D, and S have the values of tables 1
-    and 2 of Engelbrecht, Steyn and Djouani (2021). The paper prints only one stiffness
-    and one damping. Therefore K_e = K and D_e = D by default.
-    """
-
-    stiffness_n_m: Stiffness = 3.0
-    """Stiffness K to the target, N/m (tables 1 and 2)."""
-    damping_n_s_m: Damping = 4.0
-    """Damping D to the target, N s/m (tables 1 and 2)."""
     contact_stiffness_n_m: NonNegativeStiffness = 3.0
     """Stiffness K_e to robots and obstacles, N/m."""
-    contact_damping_n_s_m: NonNegativeDamping = 4.0
-    """Damping D_e to robots and obstacles, N s/m."""
     security_zone_m: Length = 1.0
     """Distance S from P at which contacts begin, m (1 m in tables 1 and 2)."""
-    block_distance_m: Length | None = None
-    """Distance L_block of eq. 6 of Engelbrecht 2021, m. With null, eq. 6 is off.
-
-    With eq. 6, the control point P stops if its next step would end within this
-    distance of an object and would not lead away from the object.
-
-    The paper prints no value. A distance of 0.2 m is enough for ``turtlebot3_burger``,
-    whose rear corners are 0.174 m from P.
-    """
 
     @property
     def damping_fades(self) -> bool:
@@ -56,14 +29,16 @@ def trajectory_law(
     name: str,
     title: str,
     label: str,
-    gains: type[TrajectoryImpedanceParameters],
+    impedance: type[TrajectoryImpedanceParameters],
     *more: Equation,
+    gains: type[Parameters] | None = None,
 ) -> Law:
     """Makes the record of a law whose block is ``TrajectoryImpedanceController``.
 
     ``name`` is the name in scenarios, ``title`` the heading in reports, and ``label``
-    the label in legends. ``gains`` is the parameter class of the gains. The record
-    lists the equation of motion, then the equations ``more``.
+    the label in legends. ``impedance`` is the class of all parameters, and ``gains``
+    the class of those that only this law has. The record lists the equation of motion,
+    then the equations ``more``.
     """
     motion = Equation(
         "Impedance to the target and to contacts",
@@ -76,6 +51,7 @@ def trajectory_law(
         label=label,
         equations=(motion, *more),
         gains=gains,
+        impedance=impedance,
         controller_name="TrajectoryImpedanceController",
         robot="router",
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import phonotaxis
-from analysis.exports.columns import COLUMNS
+from analysis.runs.columns import COLUMNS
 
 SHORT = ["--set", "hearing=ideal", "--set", "duration_s=0.3"]
 

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from analysis.design.attraction_search import (
-    attraction_damping_ratio,
     braking_overshoot,
     follow_distance,
-    following_lag,
+    gain_figures,
 )
-from analysis.design.requirements import DesignRequirements
+from analysis.design.requirements import Requirements
 from diagrams.scenario.scenario import Scenario
 
-SCENARIO, REQUIREMENTS = Scenario(), DesignRequirements()
+SCENARIO, REQUIREMENTS = Scenario(), Requirements()
 
 
 def changed(part: str, **changes) -> Scenario:
@@ -29,7 +28,9 @@ def changed(part: str, **changes) -> Scenario:
 
 def test_damping_ratio_of_the_printed_gains():
     """0.160 with the motors' lag, found by independent code."""
-    assert attraction_damping_ratio(SCENARIO) == pytest.approx(0.160, abs=1e-3)
+    assert gain_figures(SCENARIO, REQUIREMENTS).damping_ratio == pytest.approx(
+        0.160, abs=1e-3
+    )
 
 
 def test_damping_ratio_without_lag_is_that_of_the_sampled_mass():
@@ -37,14 +38,15 @@ def test_damping_ratio_without_lag_is_that_of_the_sampled_mass():
     d, k = 1.0 * 0.025 / 3.94, 2.0 * 0.025**2 / 3.94
     s = cmath.log(np.roots([1.0, d + k - 2.0, 1.0 - d])[0])
     scenario = changed("plant", motor_lag_s=1e-6)
-    assert attraction_damping_ratio(scenario) == pytest.approx(
+    assert gain_figures(scenario, REQUIREMENTS).damping_ratio == pytest.approx(
         -s.real / abs(s), rel=1e-4
     )
 
 
 def test_lag_behind_a_moving_source():
-    assert following_lag(SCENARIO) == pytest.approx(0.15)
-    assert following_lag(changed("attraction", damping_n_s_m=4.0)) == pytest.approx(0.6)
+    assert gain_figures(SCENARIO, REQUIREMENTS).following_lag_m == pytest.approx(0.15)
+    damped = changed("attraction", damping_n_s_m=4.0)
+    assert gain_figures(damped, REQUIREMENTS).following_lag_m == pytest.approx(0.6)
 
 
 def test_default_follow_distance_has_room_for_the_overshoot():
@@ -58,7 +60,7 @@ def test_default_follow_distance_has_room_for_the_overshoot():
 def test_damping_spares_the_room():
     """Critically damped: the lag of the motors alone."""
     stiff = changed("attraction", stiffness_n_m=2.0, damping_n_s_m=5.7)
-    assert attraction_damping_ratio(stiff) > 0.95
+    assert gain_figures(stiff, REQUIREMENTS).damping_ratio > 0.95
     overshoot = braking_overshoot(stiff)
     assert overshoot < 0.03
     found = follow_distance(stiff, REQUIREMENTS, overshoot)

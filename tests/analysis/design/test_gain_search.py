@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from analysis.design.gain_search import gain_for_barrier, search_gains
 from analysis.design.requirements import (
     Check,
-    DesignRequirements,
     LawDesign,
+    Requirements,
     allowed_stiffness,
     check_law,
     metres_to_go,
@@ -22,7 +22,8 @@ from diagrams.scenario.participants import LawGains
 from diagrams.scenario.scenario import Scenario
 from tests.results import documented, numbers
 
-SCENARIO, REQUIREMENTS = Scenario(), DesignRequirements()
+SCENARIO = Scenario()
+REQUIREMENTS = Requirements().within_goal(SCENARIO)
 
 
 def with_attraction(**changes) -> Scenario:
@@ -93,7 +94,7 @@ def test_K_0_of_2017_holds_the_barrier_in_closed_form():
 def test_contact_allows_what_independent_code_found():
     """Largest K_0 with 50 ms of motor lag and 0, 1, 2, 4 periods of latency."""
     limits = [
-        allowed_stiffness(SCENARIO, DesignRequirements(spare_latency_ticks=ticks))
+        allowed_stiffness(SCENARIO, Requirements(spare_latency_ticks=ticks))
         for ticks in (0, 1, 2, 4)
     ]
     np.testing.assert_allclose(limits, [18.2, 11.5, 8.1, 4.7], atol=0.06)

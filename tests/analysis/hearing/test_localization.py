@@ -131,7 +131,7 @@ def test_what_is_lost_is_counted_and_never_zero(summary):
 
 def test_json_document(summary):
     document = json.loads(json.dumps(summary, allow_nan=False))
-    assert document["schema_version"] == 1
+    assert document["schema_version"] == 2
     cell = document["cells"][3]
     assert {
         "range_m", "bearing_deg", "estimator", "trials", "range_mean_m", "range_std_m",

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.laws.law_curves import law_curves, radial_forces
+from analysis.laws.law_curves import law_curves
 from analysis.laws.law_curves_plots import plot_law_curves
 from analysis.reporting.plain_values import plain
-from diagrams.building.laws import make_controller
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS
 from systems.ranging.parameters import CollisionVectorParameters
+from tests.block_forces import block_force
 
 SCENARIO = Scenario.model_validate(
     {
@@ -38,10 +38,22 @@ def curves_by_law(velocity_term="printed"):
 
 def test_laws_meet_where_the_paper_matches_them():
     """K_0 rho_0/2 = 4 N at 0.4 m and D_0 mu_0/2 = 0.72 N more at mu_0/2."""
-    scenario = SCENARIO
     for law in ("conventional", "active"):
-        controller = make_controller(scenario.with_robot(law=law))
-        assert radial_forces(controller, 0.4, 0.36) == pytest.approx(4.72)
+        scenario = SCENARIO.with_robot(law=law)
+        assert block_force(scenario, 0.4, 0.36) == pytest.approx(4.72)
+
+
+@pytest.mark.parametrize("velocity_term", ["printed", "closing"])
+@pytest.mark.parametrize("law", FORCE_LAWS)
+def test_curves_are_those_of_the_block(law, velocity_term):
+    echoes = CollisionVectorParameters(velocity_term=velocity_term)
+    scenario = SCENARIO.with_robot(law=law, collision_vector=echoes)
+    curve = curves_by_law(velocity_term)[law]
+    for k in (10, 99, 130, 180):
+        expected = block_force(scenario, curve.at_distance_m, curve.speed_m_s[k])
+        assert curve.force_n[k] == pytest.approx(expected, abs=1e-9)
+        expected = block_force(scenario, curve.distance_m[k], 0.0)
+        assert curve.push_n[k] == pytest.approx(expected, abs=1e-9)
 
 
 def test_active_force_reaches_beyond_rho_0_and_the_conventional_does_not():

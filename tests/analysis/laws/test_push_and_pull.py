@@ -16,12 +16,11 @@ from analysis.laws.push_and_pull import (
     far_offset,
     injected_share,
     kinetic_energy,
-    law_force,
     net_barrier,
     rest_offset,
     spring,
-    stiffest,
 )
+from analysis.laws.radial_law import radial_law
 from diagrams.scenario.scenario import Scenario
 
 SCENARIO = Scenario()
@@ -92,7 +91,7 @@ def test_stiffest_slope_is_that_of_the_curve(law):
     push = spring(law, SCENARIO)
     c = np.linspace(0.02, 3.0, 300_000)
     slopes = -np.diff([push(x) for x in c]) / np.diff(c)
-    found = stiffest(law, SCENARIO)
+    found = radial_law(SCENARIO.with_robot(law=law)).stiffest_n_m
     assert found == pytest.approx(slopes.max(), rel=1e-3)
 
 
@@ -118,7 +117,9 @@ def test_offset_where_the_master_robot_covers_the_follow_point():
     """Printed: d_f = 0. P rests outside of the body, where push and pull balance."""
     scenario = with_attraction(follow_distance_m=0.0)
     offset = rest_offset("active2017", scenario)
-    push = law_force("active2017", scenario)(offset - 0.163, 0.0)
+    push = radial_law(scenario.with_robot(law="active2017")).function(
+        offset - 0.163, 0.0
+    )
     assert offset > 0.163
     assert push == pytest.approx(K_R * offset)
 
@@ -165,7 +166,8 @@ def largest_gain(law: str, scenario: Scenario, start: list[float]) -> float:
 
     In the plane, in continuous time, exact sensing; s = |v| as printed.
     """
-    force, mass = law_force(law, scenario), scenario.only.robot.mass_kg
+    force = radial_law(scenario.with_robot(law=law)).function
+    mass = scenario.only.robot.mass_kg
     to_rest, D_r = np.array([-2.0, 0.0]), scenario.follower.attraction.damping_n_s_m
 
     def motion(_, x):
@@ -203,4 +205,4 @@ def test_energy_grows_above_a_share_of_one(law):
 
 def test_unknown_law_is_refused():
     with pytest.raises(ValueError, match=r"'none' has no gains .* use conventional"):
-        law_force("none", SCENARIO)
+        spring("none", SCENARIO)

@@ -95,6 +95,20 @@ def test_slopes_at_rest(two_boxes):
     assert active.gradient(0.5, 0.0) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(
+    ("law", "place", "stiffness"),
+    [
+        ("active", 2.0 * ALPHA, 64.0 / math.e**2),
+        ("conventional2017", 0.03, 1.1 / 0.03**2),
+        ("active2017", 0.1, 1.1 / 0.1**2),
+    ],
+)
+def test_stiffest_point_is_that_of_the_formula(two_boxes, law, place, stiffness):
+    distance, found = radial_law(two_boxes(law)).stiffest
+    assert distance == pytest.approx(place, abs=2e-3)
+    assert found == pytest.approx(stiffness, rel=1e-6)
+
+
 def test_increments_are_those_of_the_velocity_term(two_boxes):
     table = radial_law(two_boxes("conventional")).increments_n
     np.testing.assert_allclose(table[250, :51], 0.8 * 0.01 * np.arange(51), atol=1e-12)

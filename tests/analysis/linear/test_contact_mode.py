@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 
 from analysis.linear.contact_mode import (
     contact_limits,
-    contact_matrix,
-    contact_spectral_radius,
+    contact_model,
     largest_contact_stiffness,
     motion_chain,
 )
@@ -51,7 +50,7 @@ def test_chain_has_no_more_states_than_the_motion():
 @given(st.floats(0.1, 60.0), st.floats(0.05, 20.0), st.integers(0, 4))
 def test_matrix_has_the_poles_of_the_difference_equation(stiffness, damping, ticks):
     """(z - 1) v = T a, the lag's recursion, p of some ticks ago: a polynomial."""
-    matrix = contact_matrix(
+    model = contact_model(
         SCENARIO, stiffness, damping_n_s_m=damping, latency_ticks=ticks
     )
     decay = math.exp(-T / LAG)
@@ -62,7 +61,7 @@ def test_matrix_has_the_poles_of_the_difference_equation(stiffness, damping, tic
     late = np.poly1d([1.0] + [0.0] * ticks)
     k, d = stiffness * T / MASS, damping * T / MASS
     polynomial = (z - 1 + d) * (z - 1) * (z - decay) * late + k * moved * z
-    found = np.poly(matrix)
+    found = np.poly(model.A)
     np.testing.assert_allclose(found, polynomial.coeffs, atol=1e-9)
 
 
@@ -77,8 +76,8 @@ def test_largest_stiffness_is_that_of_the_design_notes(lag):
 
 def test_limit_separates_decay_from_growth():
     limit = largest_contact_stiffness(SCENARIO)
-    assert contact_spectral_radius(SCENARIO, 0.99 * limit) < 1.0
-    assert contact_spectral_radius(SCENARIO, 1.01 * limit) > 1.0
+    assert contact_model(SCENARIO, 0.99 * limit).spectral_radius < 1.0
+    assert contact_model(SCENARIO, 1.01 * limit).spectral_radius > 1.0
 
 
 @settings(max_examples=20)
@@ -113,11 +112,11 @@ def test_radial_modes_of_the_whole_diagram_are_those_of_the_chain(stiffness):
     )
     points = find_equilibria(scenario, area_m=(-1.0, 0.99, -1.0, 1.0)).points
     (point,) = [p for p in points if p.p_WP[1] == pytest.approx(0.0, abs=1e-6)]
-    radial = np.log(np.linalg.eigvals(contact_matrix(SCENARIO, stiffness + 2.0))) / T
+    radial = np.log(contact_model(SCENARIO, stiffness + 2.0).poles) / T
     # The lag's own pole is off by the third-order step: exp(-0.5) as 0.6042.
     for pole in radial[np.abs(radial) < 5.0]:
         assert np.abs(point.eigenvalues - pole).min() < 5e-3
-    radius = contact_spectral_radius(SCENARIO, stiffness + 2.0)
+    radius = contact_model(SCENARIO, stiffness + 2.0).spectral_radius
     assert (radius < 1.0) == (stiffness < 18.25)
 
 

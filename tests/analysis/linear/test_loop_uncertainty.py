@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from analysis.linear.contact_mode import contact_spectral_radius
+from analysis.laws.radial_law import radial_law
+from analysis.linear.contact_mode import contact_model
 from analysis.linear.loop_uncertainty import (
     contact_poles,
     contact_uncertainty,
     following_poles,
     following_uncertainty,
-    law_stiffness,
     range_slope,
     with_values,
 )
@@ -46,13 +46,18 @@ def test_stiffness_of_the_laws_is_their_closed_form():
     # K_0; k_ref / e^2 at c = 2 alpha; K_0 / rho_1^2 where the force stops growing.
     gains = scenario().follower.laws
     K_0 = gains.conventional.stiffness_n_m
-    assert law_stiffness(scenario()) == pytest.approx(K_0, rel=1e-6)
+    assert radial_law(scenario()).stiffest_n_m == pytest.approx(K_0, rel=1e-6)
     peak = gains.active.reference_stiffness_n_m * math.exp(-2.0)
-    assert law_stiffness(scenario("active")) == pytest.approx(peak, rel=1e-4)
+    assert radial_law(scenario("active")).stiffest_n_m == pytest.approx(peak, rel=1e-7)
     kim = gains.active2017
     steepest = kim.distance_gain_j / kim.saturation_distance_m**2
-    assert law_stiffness(scenario("active2017")) == pytest.approx(steepest, rel=5e-3)
-    assert law_stiffness(scenario("none")) == 0.0
+    found = radial_law(scenario("active2017")).stiffest_n_m
+    assert found == pytest.approx(steepest, rel=1e-7)
+    kim = gains.conventional2017
+    steepest = kim.distance_gain_j / 0.03**2  # the least range of the sensors
+    found = radial_law(scenario("conventional2017")).stiffest_n_m
+    assert found == pytest.approx(steepest, rel=1e-7)
+    assert radial_law(scenario("none")).stiffest_n_m == 0.0
 
 
 def test_values_reach_their_fields():
@@ -80,8 +85,8 @@ def test_values_reach_their_fields():
 def test_nominal_poles_are_the_contact_modes(law):
     box = contact_uncertainty(scenario(law))
     poles = contact_poles(scenario(law))({p.name: p.nominal for p in box})
-    total = 2.0 + law_stiffness(scenario(law))
-    radius = contact_spectral_radius(scenario(law), total)
+    total = 2.0 + radial_law(scenario(law)).stiffest_n_m
+    radius = contact_model(scenario(law), total).spectral_radius
     assert np.abs(poles).max() == pytest.approx(radius, rel=1e-12)
 
 

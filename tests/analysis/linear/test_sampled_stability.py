@@ -9,8 +9,8 @@ import pytest
 
 from analysis.linear.burst_cycle import burst_cycle
 from analysis.linear.burst_gaps import gap_chart
-from analysis.linear.contact_mode import contact_matrix, largest_contact_stiffness
-from analysis.linear.root_locus import contact_slopes, root_loci
+from analysis.linear.contact_mode import contact_model, largest_contact_stiffness
+from analysis.linear.root_locus import root_loci
 from analysis.linear.sampled_stability import (
     check_conditions,
     gain_chart,
@@ -131,37 +131,22 @@ def test_root_loci_of_the_attraction_follow_the_cubic():
     assert damping.today == D
 
 
-def test_contact_slopes_are_the_laws_own():
-    """Conventional: K_0 and D_0. Active: k_ref / e^2 at 2 alpha."""
-    gains = {
-        "conventional": {"stiffness_n_m": 9.0, "damping_n_s_m": 0.7},
-        "active": {"reference_stiffness_n_m": 50.0, "matched_stiffness_n_m": 12.0},
-    }
-    laws = [
-        contact_slopes(Scenario.model_validate({"law": law, "laws": gains}))
-        for law in ("conventional", "active")
-    ]
-    assert laws[0].stiffness_n_m == pytest.approx(9.0, rel=1e-6)
-    assert laws[0].approach_damping_n_s_m == pytest.approx(0.7, rel=1e-3)
-    alpha = 0.8 / (2 * math.log(50.0 / 12.0))
-    assert laws[1].stiffness_n_m == pytest.approx(50.0 / math.e**2, rel=1e-3)
-    assert laws[1].distance_m == pytest.approx(2 * alpha, abs=0.01)
+def test_contact_locus_starts_from_the_slopes_of_the_law():
+    """Conventional: K_0 = 9 N/m and D_0 = 0.7 N s/m; the attraction adds 2 N/m."""
+    gains = {"conventional": {"stiffness_n_m": 9.0, "damping_n_s_m": 0.7}}
+    case = Scenario.model_validate({"law": "conventional", "laws": gains})
+    *_, spring, damper = root_loci(case)
+    undamped = contact_model(case, 11.0)
+    damped = contact_model(case, 11.0, approach_damping_n_s_m=0.7)
+    for locus, model in ((spring, undamped), (damper, damped)):
+        found = locus.poles_today[np.isfinite(locus.poles_today)]
+        np.testing.assert_allclose(found, np.sort_complex(model.s_poles), rtol=1e-6)
 
 
 def test_approaching_obstacles_damp():
     """D_0 on the change over a tick acts as on a velocity half a tick ago."""
-    damped = np.linalg.eigvals(
-        contact_matrix(Scenario(), 12.0, approach_damping_n_s_m=0.8)
-    )
-    as_velocity = np.linalg.eigvals(contact_matrix(Scenario(), 12.0, damping_n_s_m=1.8))
-    rates = [np.log(np.abs(z).max()) / T for z in (damped, as_velocity)]
-    plain = (
-        np.log(np.abs(np.linalg.eigvals(contact_matrix(Scenario(), 12.0))).max()) / T
-    )
+    damped = contact_model(Scenario(), 12.0, approach_damping_n_s_m=0.8).growth_per_s
+    as_velocity = contact_model(Scenario(), 12.0, damping_n_s_m=1.8).growth_per_s
+    plain = contact_model(Scenario(), 12.0).growth_per_s
     # The damper acts on the true motion, behind the motors' lag.
-    assert plain - rates[0] == pytest.approx(plain - rates[1], rel=0.2)
-
-
-def test_without_a_push_there_is_no_contact():
-    with pytest.raises(ValueError, match=r"law: 'none' does not push"):
-        contact_slopes(Scenario(law="none"))
+    assert plain - damped == pytest.approx(plain - as_velocity, rel=0.2)

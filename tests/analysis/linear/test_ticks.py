@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis.laws.law_curves import radial_forces
+from analysis.laws.radial_law import radial_law
 from analysis.linear.burst_cycle import burst_cycle, simulate_burst_cycle
-from analysis.linear.contact_mode import contact_matrix, largest_contact_stiffness
+from analysis.linear.contact_mode import contact_model, largest_contact_stiffness
 from analysis.linear.delay_margin import delay_margin
 from analysis.linear.delayed_run import check_delay_margin
 from analysis.linear.loop_margins import loop_margins
@@ -17,14 +17,11 @@ from analysis.linear.root_locus import root_loci
 from analysis.linear.sampled_stability import check_conditions, gain_delay_chart
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import follow_equilibrium
-from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import ideal_loop
-from analysis.models.ideal_scenarios import ideal_scenario
 from analysis.models.linearisation import compare_routes, continuous_model
 from analysis.models.open_loops import open_loop
-from diagrams.building.laws import make_controller
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
+from tests.block_forces import block_force
 
 M, K, D, LAG = 3.94, 2.0, 1.0, 0.05
 TICKS_S = (0.0125, 0.05)
@@ -55,7 +52,7 @@ def by_size(poles: np.ndarray) -> np.ndarray:
 def test_contact_mode_is_the_matrix_exponentials(tick_s):
     for stiffness in (K, 12.0):
         np.testing.assert_allclose(
-            by_size(np.linalg.eigvals(contact_matrix(scenario(tick_s), stiffness))),
+            by_size(contact_model(scenario(tick_s), stiffness).poles),
             by_size(np.linalg.eigvals(held_over_a_tick(stiffness, tick_s))),
             atol=1e-9,
         )
@@ -141,15 +138,13 @@ def test_conditions_and_delays_count_in_ticks(tick_s):
 @pytest.mark.parametrize("tick_s", TICKS_S)
 @pytest.mark.parametrize("law", ["conventional", "active"])
 def test_obstacle_speed_is_that_of_a_tick(tick_s, law):
-    """D_0 N of push for each m/s at half the reach, whatever the tick."""
+    """The controller's block divides by its own tick: the slope of f(c, s) in s."""
     case = scenario(tick_s, law=law)
-    field = ForceField(ideal_loop(ideal_scenario(case)), time_s=0.0)
-    controller = make_controller(case)
-    at_rest, slow = radial_forces(controller, 0.4, [0.0, 1e-4])
-    assert field.approach_damping(0.4) == pytest.approx((slow - at_rest) / 1e-4)
+    at_rest, slow = (block_force(case, 0.4, speed) for speed in (0.0, 1e-4))
+    _, damping = radial_law(case).gradient(0.4, 0.0)
+    assert (slow - at_rest) / 1e-4 == pytest.approx(damping, rel=1e-3)
     if law == "conventional":
-        damping = case.follower.laws.conventional.damping_n_s_m
-        assert field.approach_damping(0.4) == pytest.approx(damping, rel=1e-6)
+        assert damping == case.follower.laws.conventional.damping_n_s_m
 
 
 @pytest.mark.parametrize("field", ["microphones", "ultrasonic"])

@@ -115,8 +115,7 @@ def test_frozen_scenario_holds_bodies_where_they_are():
     [
         ({"hearing": "audio"}, "waveform"),
         ({"obstacle_sensing": "ultrasonic"}, "cones"),
-        ({"odometry": {"rounding": True}}, "rounded"),
-        ({"ideal_hearing": {"range_noise_fraction": 0.1}}, "noise"),
+        ({"plant": {"pulses_per_revolution": 2600}}, "rounded"),
     ],
 )
 def test_what_has_no_derivative_is_refused_with_a_remedy(change, message):

@@ -34,6 +34,36 @@ def test_modes_have_the_oscillators_frequency_and_damping(omega, zeta, period):
     assert sum(mode.participation.values()) == pytest.approx(1.0)
 
 
+@given(st.floats(0.5, 20.0), st.floats(-0.5, 0.99), st.sampled_from([None, 0.025]))
+def test_model_has_the_growth_and_damping_of_the_oscillator(omega, zeta, period):
+    model = spring(omega**2, 2 * zeta * omega, period)
+    pole = complex(-zeta * omega, omega * math.sqrt(1.0 - zeta**2))
+    pair = sorted([pole, pole.conjugate()], key=lambda s: s.imag)
+    found = sorted(model.s_poles.tolist(), key=lambda s: s.imag)
+    np.testing.assert_allclose(found, pair, rtol=1e-7)
+    assert model.growth_per_s == pytest.approx(-zeta * omega, rel=1e-6, abs=1e-9)
+    assert model.damping_ratio == pytest.approx(zeta, rel=1e-6, abs=1e-9)
+    if zeta > 1e-6:
+        assert model.stable
+        assert model.settling_s == pytest.approx(4.0 / (zeta * omega), rel=1e-6)
+    if zeta < -1e-6:
+        assert not model.stable
+        assert model.settling_s == math.inf
+
+
+def test_delays_have_no_pole_in_the_s_plane():
+    """Two ticks of delay behind a lag that keeps half of its value per tick."""
+    A = np.array([[0.5, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    model = LinearModel(
+        "late lag", A, np.eye(3), np.eye(3), np.zeros((3, 3)),
+        ("lag", "once", "twice"), ("a", "b", "c"), ("d", "e", "f"), period_s=0.1,
+    )  # fmt: skip
+    np.testing.assert_allclose(model.s_poles, [math.log(0.5) / 0.1])
+    assert model.spectral_radius == pytest.approx(0.5)
+    assert model.growth_per_s == pytest.approx(math.log(0.5) / 0.1)
+    assert model.damping_ratio == 1.0
+
+
 def test_participation_tells_states_apart():
     """Two masses that do not know of each other."""
     A = np.array([[-1.0, 0.0], [0.0, -5.0]])

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from analysis.reporting.body_labels import BodyLabel, spread_labels
-from analysis.runs.run_plots import plot_trajectory
+from analysis.views.picture import plot_trajectory
 from diagrams import load_scenario, simulate
 from systems.world.geometry import rectangle_corners
 

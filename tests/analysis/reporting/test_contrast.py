@@ -25,8 +25,9 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from analysis.reporting import palette
-from analysis.reporting.html_page import COLOURS_CSS
-from analysis.runs.run_plots import plot_time_series, plot_trajectory
+from analysis.reporting.render import COLOURS_CSS
+from analysis.views.picture import plot_trajectory
+from analysis.views.time_series import plot_time_series
 
 ROOT = Path(__file__).resolve().parents[3]
 SCHEMES = ("light", "dark")

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import re
-
 import pytest
 
 from analysis.reporting.fact_tables import fact_table, readable_name, row_table
-
-
-def cells(table: str) -> list[list[str]]:
-    rows = re.findall(r"<tr>(.*?)</tr>", table)
-    return [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row) for row in rows]
 
 
 @pytest.mark.parametrize(
@@ -38,12 +31,12 @@ def test_facts_of_groups_stand_under_their_group():
         "rows": [{"a": 1}],
         "none": None,
     }
-    assert cells(fact_table(facts, skip=["margins.hidden"])) == [
+    assert list(map(list, fact_table(facts, skip=["margins.hidden"]).rows)) == [
         ["law", "active"],
-        ["runs", "300"],
+        ["runs", 300],
         ["covered", "no"],
-        ["margins: delay (s)", "0.5"],
-        ["none", "\u2013"],
+        ["margins: delay (s)", 0.5],
+        ["none", None],
     ]
 
 
@@ -52,9 +45,6 @@ def test_rows_of_mappings():
         {"speed_m_s": 0.3, "kind": "sink"},
         {"speed_m_s": None, "kind": "saddle"},
     ]
-    assert cells(row_table(rows)) == [
-        ["speed (m/s)", "kind"],
-        ["0.3", "sink"],
-        ["\u2013", "saddle"],
-    ]
-    assert row_table([]) == ""
+    table = row_table(rows)
+    assert table.columns == ["speed (m/s)", "kind"]
+    assert table.rows == [[0.3, "sink"], [None, "saddle"]]

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
-from analysis.runs.collision_warning import collision_warning
-from analysis.runs.metrics import frames_with_sound, run_metrics
+from analysis.runs.measured_run import MeasuredRun
+from analysis.runs.metric_table import run_metrics
 from analysis.runs.proximity import Proximity
 from analysis.runs.smoothness import log_dimensionless_jerk, spectral_arc_length
 from diagrams import RunResult, build_sound_follower, load_scenario, simulate
@@ -281,7 +281,7 @@ def burst_frames(distance: float, **scenario: Any) -> NDArray[np.int64]:
     still = np.zeros(1641)
     source = {"waypoints_m": [[FRONT + distance, 0.0]]}
     run = motion(still, still, still, source=source, **scenario)
-    return np.flatnonzero(frames_with_sound(run))
+    return np.flatnonzero(MeasuredRun(run).frames_with_sound)
 
 
 @pytest.mark.parametrize("hearing", ["audio", "ideal"])
@@ -305,8 +305,7 @@ def test_frames_with_sound_of_other_gates():
     assert len(burst_frames(1.0, sound=sound)) == 20 * 4
     endless = {"on_s": 2.0}
     assert len(burst_frames(1.0, sound=endless)) == 1640
-    always = {"burst_gaps": False}
-    assert len(burst_frames(1.0, hearing="ideal", ideal_hearing=always)) == 1640
+    assert len(burst_frames(1.0, hearing="ideal_always")) == 1640
 
 
 @pytest.mark.parametrize("hearing", ["audio", "ideal"])
@@ -318,7 +317,7 @@ def test_what_is_heard_and_what_sounds_agree(hearing):
     assert metrics["frames_with_sound"] == 20 + 20 + 12
     assert metrics["frames_with_sound_heard"] == metrics["detections"] == 52
     np.testing.assert_array_equal(
-        frames_with_sound(result), result.columns["detected"] > 0.5
+        MeasuredRun(result).frames_with_sound, result.columns["detected"] > 0.5
     )
 
 
@@ -577,4 +576,4 @@ def test_without_cones_nothing_is_said_of_echoes():
     fields = ["law=trajectory_conventional"]
     result = simulate(load_scenario("unknown_wall", fields), engine="compiled")
     assert result.cause == "collision"
-    assert collision_warning(result) == {}
+    assert "contact_warning_s" not in run_metrics(result)

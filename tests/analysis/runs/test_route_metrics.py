@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.runs.metrics import run_metrics
-from analysis.runs.route_metrics import near_and_after, yaw_ripple
+from analysis.runs.measured_run import near_and_after, yaw_ripple
+from analysis.runs.metric_table import run_metrics
 from diagrams import load_scenario, simulate
 
 TICK_S = 0.025

@@ -3,38 +3,49 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 
-from analysis.reporting.html_page import paragraph
+from analysis.reporting.criterion import Criterion
 from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import Part, analyse_law
+from analysis.stability.linear_parts import OPERATING_POINTS
+from analysis.stability.margin_parts import MARGINS
 from analysis.stability.report_files import stability_document, stability_text
 from analysis.stability.report_page import stability_page
-from analysis.stability.verdicts import Criterion, judge
 from diagrams import load_scenario
+from docs.building.page_code import page_file
 from systems.framework.input_error import InputError
 
-LIGHT = Criterion("mass", "kg", "below", 4.0, "light", "heavy", "a test")
+LIGHT = Criterion[float](
+    "mass", "kg", "below", 4.0, "light", "heavy", "a test", lambda mass: mass
+)
+DENSE = Criterion[float](
+    "density", "kg/l", "below", 1.0, "floats", "sinks", "a test", lambda mass: mass
+)
 
 
-def render(data, name):
-    return [paragraph(f"{name}: {data}")]
+def show(data):
+    return [f"found: {data}"]
 
 
 def refuse(study):
     raise InputError("law", "cannot; choose another")
 
 
-MASS = Part("mass", "Mass", lambda study: study.scenario.only.robot.mass_kg, render)
-TWICE = Part("twice", "Twice", lambda study: 2.0 * study.need("mass"), render)
-BUILT = Part("built", "Built", lambda study: study.need("refused"), render)
-REFUSED = Part("refused", "Refused", refuse, render)
-VERDICTS = Part(
-    "verdicts", "Verdicts", lambda study: (judge(LIGHT, study.found["mass"]),), render
+MASS = Part(
+    "mass",
+    "Mass",
+    lambda study: study.scenario.only.robot.mass_kg,
+    show,
+    criteria=(LIGHT,),
 )
+TWICE = Part("twice", "Twice", lambda study: 2.0 * study.need("mass"), show)
+BUILT = Part("built", "Built", lambda study: study.need("refused"), show)
+REFUSED = Part("refused", "Refused", refuse, show, criteria=(DENSE,))
 SPREAD = Part(
-    "spread", "Spread", lambda study: 1.5, render, document=lambda x: {"a": x, "b": 2}
+    "spread", "Spread", lambda study: 1.5, show, document=lambda x: {"a": x, "b": 2}
 )
 
 
@@ -44,10 +55,10 @@ def test_parts_run_in_order_and_see_what_was_found():
         load_scenario(), [MASS, REFUSED, TWICE, BUILT], step=titles.append
     )
     assert titles == ["Mass", "Refused", "Twice", "Built"]
-    assert analysis.data("twice") == 2.0 * 3.94
-    assert analysis.findings["refused"].problem == "law: cannot; choose another"
-    assert analysis.data("refused") is None
-    assert analysis.findings["built"].problem.startswith("refused: has no result")
+    assert analysis.found == {"mass": 3.94, "twice": 2.0 * 3.94}
+    problems = [section.data for section in analysis.sections]
+    assert problems[1] == {"problem": "law: cannot; choose another"}
+    assert problems[3]["problem"].startswith("refused: has no result")
 
 
 def test_nothing_stands_without_the_first_part():
@@ -71,19 +82,27 @@ def test_laws_are_chosen_once_each():
 
 
 def test_document_of_one_law_has_its_parts_at_the_top():
-    analysis = analyse_law(load_scenario(), [MASS, REFUSED, SPREAD, VERDICTS])
+    analysis = analyse_law(load_scenario(), [MASS, REFUSED, SPREAD])
     document = stability_document([analysis], None)
     assert document["law"] == "active"
     assert document["mass"] == 3.94
     assert document["refused"] == {"problem": "law: cannot; choose another"}
-    assert (document["a"], document["b"]) == (1.5, 2)
-    assert document["verdicts"][0]["verdict"] == "pass"
+    assert document["spread"] == {"a": 1.5, "b": 2}
+    light, dense = document["verdicts"]
+    assert (light["value"], light["verdict"]) == (3.94, "pass")
+    assert (dense["value"], dense["verdict"]) == (None, "not applicable")
+    assert dense["text"] == "the part 'Refused' has no result"
     assert document["model"]["seed"] == 1
-    assert "mass" in stability_text(document)
+    header, *rows = stability_text([analysis]).splitlines()
+    assert header.split() == ["threshold", "active"]
+    assert [row.split() for row in rows] == [
+        ["mass", "<", "4", "kg", "3.94", "pass"],
+        ["density", "<", "1", "kg/l", "\u2013", "n/a"],
+    ]
 
 
 def test_page_of_several_laws():
-    parts = [MASS, REFUSED, VERDICTS]
+    parts = [MASS, REFUSED]
     analyses = [
         analyse_law(each, parts)
         for each in chosen_laws(load_scenario(), ["conventional", "active"])
@@ -93,7 +112,26 @@ def test_page_of_several_laws():
     assert len(ids) == len(set(ids))
     assert set(re.findall(r'href="#([^"]+)"', page)) <= set(ids)
     assert page.count("Not computed: law: cannot; choose another.") == 2
-    assert "law0-mass: 3.94" in page
+    assert page.count("<p>found: 3.94</p>") == 2
     assert "All: light." not in page
     assert "conventional and active: light." in page
     assert not re.findall(r'(?:src|href)="(?!#|data:)', page)
+
+
+def test_a_section_is_added_as_docs_extending_says():
+    """Its numbers are those of the section "Margins"."""
+    names: dict[str, Any] = {}
+    exec(compile(page_file("extending.md", "nichols.py"), "nichols.py", "exec"), names)
+    parts = [OPERATING_POINTS, MARGINS, names["NICHOLS"]]
+    analysis = analyse_law(load_scenario("obstacle_free", ["law=none"]), parts)
+    document = stability_document([analysis], None)
+    loops = document["margins"]["implemented_loop"]["margins"]
+    assert document["nichols"]["L at the sensor, along"] == pytest.approx(
+        loops["sensor_along"]["crossover_rad_s"]
+    )
+    assert len(document["nichols"]) == len(loops)
+    page = stability_page([analysis])
+    shown = page[page.index('<h3 id="law0-nichols">') :]
+    shown = shown[: shown.index("</section>")]
+    assert shown.count("<figure>") == shown.count("<table>") == 1
+    assert "crossover (rad/s)" in shown

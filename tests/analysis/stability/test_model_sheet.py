@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.reporting.html_page import equation
+from analysis.reporting.svg import formula_svg
 from analysis.stability.model_sheet import model_sheet
 from diagrams import load_scenario
 from systems.laws.catalogue import LAWS
@@ -53,4 +53,4 @@ def test_every_law_has_its_equations(law: str) -> None:
     sheet = model_sheet(load_scenario(scenarios[LAWS[law].robot], [f"law={law}"]))
     assert sheet.law_equations
     for k, formula in enumerate((*sheet.motion, *sheet.law_equations)):
-        assert "<svg" in equation(formula.tex, f"e{k}", formula.text)
+        assert "<svg" in formula_svg(formula.tex, f"e{k}", formula.text)

@@ -9,7 +9,7 @@ from analysis.stability.choice import chosen_laws, chosen_robot
 from analysis.stability.law_analysis import analyse_law
 from analysis.stability.report_files import stability_document, stability_text
 from analysis.stability.report_page import stability_page
-from analysis.stability.report_parts import parts
+from analysis.stability.report_parts import parts_for
 from diagrams import load_scenario
 from systems.framework.input_error import InputError
 
@@ -18,20 +18,22 @@ from systems.framework.input_error import InputError
 def analyses():
     scenario = load_scenario("unknown_block")
     laws = ["trajectory_adaptive", "trajectory_filtered"]
-    work = parts(full=False, routed=True)
-    return [analyse_law(each, work) for each in chosen_laws(scenario, laws)]
+    scenarios = chosen_laws(scenario, laws)
+    work = parts_for(scenarios, full=False)
+    return [analyse_law(each, work) for each in scenarios]
 
 
 def test_every_part_is_there_or_says_why_not(analyses):
     for analysis in analyses:
         assert analysis.failures == {}
     adaptive, filtered = analyses
-    assert not any(finding.problem for finding in adaptive.findings.values())
-    assert filtered.findings["adaptation"].problem.startswith(
+    assert list(adaptive.found) == [section.key for section in adaptive.sections]
+    (missing,) = (each for each in filtered.sections if each.key not in filtered.found)
+    assert missing.key == "adaptation"
+    assert missing.data["problem"].startswith(
         "law: 'trajectory_filtered' has no adaptation"
     )
-    assert "Burst cycle" in adaptive.data("left_out")
-    assert "verdicts" in adaptive.findings
+    assert "Burst cycle" in adaptive.found["left_out"]
 
 
 def test_the_document_has_the_numbers(analyses):
@@ -94,7 +96,7 @@ def test_page_shows_a_law_and_the_table_both(analyses):
         "Not computed: law: 'trajectory_filtered' has no adaptation",
     ):
         assert text in page
-    lines = stability_text(stability_document(analyses, None)).splitlines()
+    lines = stability_text(analyses).splitlines()
     assert lines[0].split() == [
         "threshold",
         "trajectory_adaptive",

@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from analysis.sweeps.one_run import Outcome, Task, run_task
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.processes import WorkerError, WorkerProcess

@@ -100,7 +100,9 @@ def differences(where, point):
 def test_the_linear_model_is_that_of_the_diagram(law, point):
     """Law, sensor, filter, odometry and plant as they simulate, by differences."""
     wall = WALL if point.wall_m else "obstacles=[]"
-    where = scenario(law, wall, "odometry.rounding=false", "route.goal_m=[-6, 0]")
+    where = scenario(
+        law, wall, "plant.pulses_per_revolution=null", "route.goal_m=[-6, 0]"
+    )
     model = whole_route_model(where, point)
     order = [
         k

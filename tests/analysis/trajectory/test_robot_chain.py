@@ -12,7 +12,7 @@ from analysis.linear.contact_mode import motion_chain
 from analysis.trajectory.chain_run import brake_chain, run_chain, shake_chain
 from analysis.trajectory.robot_chain import (
     ChainLinks,
-    chain_matrix,
+    chain_model,
     chain_response,
     chain_spacings,
     disc_offsets,
@@ -85,7 +85,7 @@ def test_the_matrix_of_a_chain_is_that_of_its_response(late):
     loose = [ChainLinks(0.0, 0.0, 0.0, late_ticks=late)] * 3
     determinants = [
         np.array([np.linalg.det(each * np.eye(len(A)) - A) for each in z])
-        for A in (chain_matrix(where, links), chain_matrix(where, loose))
+        for A in (chain_model(where, links).A, chain_model(where, loose).A)
     ]
     found = chain_response(where, links, omega)[:, -1]
     expected = coupled * determinants[1] / determinants[0]
@@ -93,7 +93,7 @@ def test_the_matrix_of_a_chain_is_that_of_its_response(late):
 
 
 def test_robots_that_come_to_no_rest_are_no_chain():
-    field = "laws.trajectory_filtered.damping_n_s_m=90"
+    field = "impedance.damping_n_s_m=90"
     chain = robot_chain(load_scenario("unknown_block", [field]))
     for peak in chain.peaks.values():
         assert peak.grows

@@ -27,10 +27,9 @@ pytestmark = pytest.mark.drake
 
 T = 0.025
 IDEAL: dict[str, Any] = {
-    "hearing": "ideal",
+    "hearing": "ideal_always",
     "obstacle_sensing": "ideal",
-    "odometry": {"rounding": False},
-    "ideal_hearing": {"burst_gaps": False},
+    "plant": {"pulses_per_revolution": None},
     "ultrasonic": {"noise_m": 0.0},
 }
 COMMON_BLOCKS = {
@@ -393,6 +392,6 @@ def test_jacobian_of_a_step_agrees_with_finite_differences(law):
 
 
 def test_rounding_bars_the_way_to_autodiff():
-    follower = build(odometry={"rounding": True})
-    with pytest.raises(ValueError, match=r"set odometry\.rounding to false"):
+    follower = build(plant={"pulses_per_revolution": 2600})
+    with pytest.raises(ValueError, match="pulses_per_revolution is 2600"):
         follower.diagram.ToAutoDiffXd()

@@ -51,7 +51,7 @@ HEAD_ON = "obstacles.0.waypoints_m=[[3.0, 0.0]]", "route.replan=false", "duratio
 @pytest.mark.parametrize("law", ["trajectory_conventional", "trajectory_adaptive"])
 def test_eq_6_stops_the_robot_before_a_block(law):
     """P stays 0.2 m off a face at x = 2.8 m, less what it coasts in 50 ms."""
-    field = f"laws.{law}.block_distance_m"
+    field = "impedance.block_distance_m"
     free, held = (
         load_scenario("unknown_block", [f"law={law}", f"{field}={block_m}", *HEAD_ON])
         for block_m in ("null", "0.2")

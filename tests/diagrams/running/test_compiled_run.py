@@ -99,11 +99,11 @@ def assert_same(name, *overrides):
         ("one_moving_obstacle", ("ultrasonic.dropout_probability=0.1",)),
         ("two_moving_obstacles", ("ultrasonic.firing=sequential",)),
         ("corridor", ("tick_s=0.0125", "microphones.frame_s=0.05")),
-        ("obstacle_free", ("ideal_hearing.bearing_noise_deg=3", "tracker.hold=robot")),
+        ("obstacle_free", ("tracker.hold=robot",)),
         ("default", ("sound.start_s=30", "stop.lost_after_s=5")),
         ("default", ("start.heading_deg=180", "stop.diverged_range_m=2.5")),
         ("u_trap", ("ultrasonic.sensors=8", "collision_vector.aggregation=sum")),
-        ("convoy", ("ideal_hearing.range_noise_fraction=0.01", "law=none", *FINER)),
+        ("convoy", ("hearing=ideal_always", "law=none", *FINER)),
         ("convoy", (*TOUCHING, "law=none", *FINER)),
     ],
 )

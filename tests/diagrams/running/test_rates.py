@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metric_table import run_metrics
 from diagrams import Scenario, simulate
 
 EXACT = {
-    "hearing": "ideal",
+    "hearing": "ideal_always",
     "obstacle_sensing": "ideal",
-    "ideal_hearing": {"burst_gaps": False},
-    "odometry": {"rounding": False},
+    "plant": {"pulses_per_revolution": None},
     "law": "none",
     "obstacles": [],
 }

@@ -205,8 +205,7 @@ def test_both_engines_agree_on_what_is_state(name):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_first_row_and_the_last_are_as_those_between(engine):
     """A longer run has the same row in its midst."""
-    settings = ["hearing=ideal", "law=none", "obstacles=[]"]
-    settings += ["ideal_hearing.burst_gaps=false"]
+    settings = ["hearing=ideal_always", "law=none", "obstacles=[]"]
     short, longer = (
         simulate(
             load_scenario("default", [*settings, f"duration_s={s}"]), engine=engine

@@ -28,16 +28,15 @@ from systems.world.geometry import rectangle_clearance
 
 BASE: dict[str, Any] = {
     "law": "none",
-    "hearing": "ideal",
+    "hearing": "ideal_always",
     "obstacle_sensing": "ideal",
-    "ideal_hearing": {"burst_gaps": False},
     "source": {"waypoints_m": [[4.0, 0.0]]},
     "duration_s": 3.0,
 }
 #: Neither spring nor avoidance: the robot waits where it is.
 WAITING: dict[str, Any] = {"attraction": {"stiffness_n_m": 0.0}}
 #: The source does not sound during the run.
-SILENT: dict[str, Any] = {"sound": {"start_s": 60.0}, "ideal_hearing": {}}
+SILENT: dict[str, Any] = {"sound": {"start_s": 60.0}, "hearing": "ideal"}
 
 
 def run(**data: Any) -> RunResult:
@@ -208,7 +207,7 @@ def test_a_moving_source_that_is_not_followed_and_gone_is_lost():
         source=source,
         tracker={"maximum_age_s": 1.0},
         sound={"on_s": 2.1, "period_s": 20.0},
-        ideal_hearing={},
+        hearing="ideal",
         duration_s=8.0,
     )
     assert result.simulated_s == pytest.approx(8.0)
@@ -367,7 +366,6 @@ def test_a_fast_robot_does_not_pass_through_a_film(engine):
             | {
                 "robot": {"mass_kg": 0.05, "top_speed_m_s": 25.0},
                 "attraction": {"stiffness_n_m": 100.0},
-                "ideal_hearing": {"burst_gaps": False},
                 "source": {"waypoints_m": [[18.0, 0.0]]},
                 "obstacles": [
                     {

@@ -32,13 +32,15 @@ def test_a_former_file_gives_the_same_scenario(tmp_path):
 name: cart
 law: guarded
 compass: {noise_deg: 0.5}
+hearing: ideal
+ideal_hearing: {burst_gaps: false, bearing_noise_deg: 0.0}
 repulsion: {velocity_term: closing, active: {reach_m: 0.7}}
-guard: {margin_m: 0.01}
+guard: {margin_m: 0.006, place_error_m: 0.01}
 free_space: {cell_m: 0.04, window_m: 12.8}
-tdoa: {maximum_misfit: 0.05}
+tdoa: {maximum_misfit: 0.05, low_hz: 400.0, band: set}
 integrator: {step_s: 0.005, scheme: runge_kutta5}
 microphones: {faults: [{microphone: 2, start_s: 1.5}]}
-odometry: {lost_at_s: 3.0}
+odometry: {lost_at_s: 3.0, rounding: false, pulses_per_revolution: 650}
 """,
         "utf-8",
     )
@@ -46,10 +48,13 @@ odometry: {lost_at_s: 3.0}
         """
 name: cart
 law: guarded
+hearing: ideal_always
 collision_vector: {velocity_term: closing}
 laws: {active: {reach_m: 0.7}}
-guard: {margin_m: 0.01, cell_m: 0.04}
+guard: {place_error_m: 0.01, cell_m: 0.04}
 integration_step_s: 0.005
+plant: {pulses_per_revolution: null}
+tdoa: {band_hz: [400, 15000]}
 faults:
   - {sensor: microphones, number: 2, kind: dead, start_s: 1.5}
   - {sensor: odometry, kind: lost, start_s: 3.0}
@@ -57,6 +62,25 @@ faults:
         "utf-8",
     )
     assert load_scenario(former) == load_scenario(now)
+
+
+def test_the_impedance_is_that_of_the_robots_law(tmp_path):
+    """The previous version had it for each law, with all values in a saved file."""
+    file = tmp_path / "old.yaml"
+    file.write_text(
+        """
+law: trajectory_filtered
+route: {goal_m: [4, 0]}
+laws:
+  trajectory_conventional: {security_zone_m: 0.7, stiffness_n_m: 5}
+  trajectory_filtered: {contact_stiffness_n_m: 9}
+""",
+        "utf-8",
+    )
+    own = load_scenario(file).router.gains
+    assert own.stiffness_n_m == 3.0
+    assert own.security_zone_m == 0.8
+    assert own.contact_stiffness_n_m == 9.0
 
 
 def test_a_map_without_a_guard_makes_no_guard(tmp_path):

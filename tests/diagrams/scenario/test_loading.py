@@ -50,16 +50,14 @@ robots:
   second: {hearing: audio, obstacle_sensing: ultrasonic, start: {position_m: [-2, -1]}}
 sound_speed_m_s: 346.5
 assumed_sound_speed_m_s: 340
-ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
 ultrasonic: {noise_m: 0, firing: sequential}
 collision_vector: {aggregation: sum, velocity_term: closing}
 attraction: {follow_distance_m: 0.6, damping_n_s_m: 4}
 laws: {conventional: {damping_n_s_m: 0.9}}
 robot: {mass_kg: 5}
-plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
-odometry: {rounding: false}
-guard: {margin_m: 0.02, cell_m: 0.04}
+plant: {motor_lag_s: 0.1, slip: [0.1, 0], pulses_per_revolution: null}
+guard: {wheel_error: 0.001, cell_m: 0.04}
 integration_step_s: 0.005
 faults: [{sensor: ultrasonic, number: 2, kind: noisy, start_s: 1}]
 """
@@ -229,8 +227,8 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("duration_s=.nan", "duration_s", "finite"),
         ("duration_s=.inf", "duration_s", "finite"),
         ("seed=1.5", "seed", "valid integer"),
-        ("hearing=ears", "hearing", "'audio' or 'ideal'"),
-        ("odometry.rounding=1", "odometry.rounding", "valid boolean"),
+        ("hearing=ears", "hearing", "'audio', 'ideal' or 'ideal_always'"),
+        ("tdoa.suppress_echoes=1", "tdoa.suppress_echoes", "valid boolean"),
         ("arena_m=[1]", "arena_m.1", "is missing; set it"),
         ("arena_m=[1, -1]", "arena_m.1", "greater than"),
         ("start.position_m=[0, .nan]", "start.position_m.1", "finite"),

@@ -51,10 +51,9 @@ def scenario(name: str) -> Scenario:
         "default",
         [
             f"law={name}",
-            "hearing=ideal",
+            "hearing=ideal_always",
             "obstacle_sensing=ideal",
-            "odometry.rounding=false",
-            "ideal_hearing.burst_gaps=false",
+            "plant.pulses_per_revolution=null",
         ],
     )
 

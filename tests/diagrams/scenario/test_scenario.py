@@ -80,12 +80,6 @@ def test_every_body_has_a_name_of_its_own(names):
         Scenario.model_validate({"obstacles": bodies})
 
 
-def test_skew_is_given_for_every_microphone_or_none():
-    Scenario.model_validate({"microphones": {"channel_skew_s": [0.0, 1e-6, 2e-6]}})
-    with pytest.raises(ValidationError, match=r"microphones\.channel_skew_s.*3 mic"):
-        Scenario.model_validate({"microphones": {"channel_skew_s": [0.0, 1e-6]}})
-
-
 @pytest.mark.parametrize(
     ("data", "message"),
     [

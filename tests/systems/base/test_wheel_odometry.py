@@ -16,14 +16,14 @@ from scipy.integrate import quad
 
 from systems.base.diff_drive_plant import DiffDrivePlant
 from systems.base.lagged_motion import advance_pose, lagged_motion
-from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_odometry import WheelOdometry, encoder_angle, odometry_step
 
 pytestmark = pytest.mark.drake
 
 ROBOT = RobotParameters()
-EXACT = OdometryParameters(rounding=False)
+EXACT = PlantParameters(pulses_per_revolution=None)
 PULSE = math.tau / 2600
 FIVE: Any = np.array([5.0, 5.0])
 
@@ -85,11 +85,11 @@ def driven(commands: NDArray[np.float64], tick_s: float = TICK_S) -> Driven:
 def by_odometry(
     commands: NDArray[np.float64],
     angles: NDArray[np.float64],
-    odometry: OdometryParameters,
+    plant: PlantParameters,
     tick_s: float = TICK_S,
 ) -> NDArray[np.float64]:
     """(n + 1, 3) poses of the block's step, at each tick before its new command."""
-    block: Any = WheelOdometry(odometry=odometry, tick_s=tick_s)
+    block: Any = WheelOdometry(plant=plant, tick_s=tick_s)
     state, poses = [0.0] * 5, [[0.0] * 3]
     for tick, command in enumerate(commands.tolist()):
         outputs = [[0.0] * 3, [0.0] * 3]
@@ -148,8 +148,8 @@ def test_pulses_leave_the_place_within_the_bound_that_follows_from_them(pulses):
     q = 0.06 * math.tau / pulses
     for commands in (*swings, held, dither, 0.05 * held):
         true = driven(commands)
-        odometry = OdometryParameters(pulses_per_revolution=pulses)
-        poses = by_odometry(commands, true.angles, odometry)
+        plant = PlantParameters(pulses_per_revolution=pulses)
+        poses = by_odometry(commands, true.angles, plant)
         error = np.hypot(*(poses[:, :2] - true.places).T)
         bound = q / 0.41 * true.rolled + q
         assert np.all(error <= bound)
@@ -204,7 +204,7 @@ def test_quadrature_follows_any_lag_and_any_tick(tick_s, lag):
 
 
 def test_pose_follows_the_angles_without_a_tick_of_delay(bench):
-    block = WheelOdometry(odometry=EXACT, initial_pose=(1.0, 2.0, 0.0))
+    block = WheelOdometry(plant=EXACT, initial_pose=(1.0, 2.0, 0.0))
     at = bench(block, wheel_angles=[0.0, 0.0], wheel_speeds=[10.0, 10.0])
     at.block.GetInputPort("wheel_angles").FixValue(at.context, [0.25, 0.25])
     np.testing.assert_allclose(at.output("pose_WB_estimated"), [1.015, 2.0, 0.0])
@@ -215,7 +215,7 @@ def test_pose_follows_the_angles_without_a_tick_of_delay(bench):
 
 def test_pose_adds_up_over_ticks(bench):
     at = bench(
-        WheelOdometry(odometry=EXACT), wheel_angles=[0.0, 0.0], wheel_speeds=[8.0, 12.0]
+        WheelOdometry(plant=EXACT), wheel_angles=[0.0, 0.0], wheel_speeds=[8.0, 12.0]
     )
     for k in range(1, 30):
         at.block.GetInputPort("wheel_angles").FixValue(at.context, [0.2 * k, 0.3 * k])
@@ -255,7 +255,7 @@ def test_slip_goes_unseen():
     command = builder.AddSystem(ConstantVectorSource(FIVE))
     slipping = PlantParameters(slip=(0.2, 0.0))
     plant = builder.AddSystem(DiffDrivePlant(plant=slipping))
-    odometry = builder.AddSystem(WheelOdometry(odometry=EXACT))
+    odometry = builder.AddSystem(WheelOdometry(plant=EXACT))
     builder.Connect(command.get_output_port(), plant.GetInputPort("wheel_speeds"))
     builder.Connect(command.get_output_port(), odometry.GetInputPort("wheel_speeds"))
     builder.Connect(
@@ -275,7 +275,7 @@ def test_slip_goes_unseen():
 
 
 def test_a_rounded_angle_has_no_derivative():
-    with pytest.raises(ValueError, match=r"set odometry\.rounding to false"):
+    with pytest.raises(ValueError, match="pulses_per_revolution is 2600"):
         WheelOdometry().ToAutoDiffXd()
 
 
@@ -286,5 +286,5 @@ def test_gradient(bench, check_gradient):
         return [*pose, *at.output("velocity_WB_estimated"), *at.updated()]
 
     robot = RobotParameters(wheel_radius_m=0.1, wheel_separation_m=0.5)
-    block = WheelOdometry(robot=robot, odometry=EXACT)
+    block = WheelOdometry(robot=robot, plant=EXACT)
     check_gradient(block, respond, [0.3, -0.2, 0.9, 4.0, 5.0, 4.3, 5.6, 3.0, -2.0])

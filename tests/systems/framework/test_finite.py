@@ -16,7 +16,7 @@ from pydrake.systems.analysis import Simulator_
 from pydrake.systems.framework import LeafSystem, LeafSystem_, PortDataType
 
 import systems
-from systems.base.parameters import OdometryParameters
+from systems.base.parameters import PlantParameters
 from systems.framework.finite import check_finite, read_arrays, read_lists
 from systems.framework.signals import (
     FRAME_SAMPLES,
@@ -58,7 +58,7 @@ BLOCKS: dict[str, tuple[dict[str, Any], ...]] = {
         {"obstacle_count": 2},
         {"obstacle_count": 2, "parameters": UltrasonicParameters(firing="sequential")},
     ),
-    "WheelOdometry": ({}, {"odometry": OdometryParameters(rounding=False)}),
+    "WheelOdometry": ({}, {"plant": PlantParameters(pulses_per_revolution=None)}),
 }
 CASES = [(name, config) for name, configs in BLOCKS.items() for config in configs]
 

@@ -1,4 +1,4 @@
-"""Exact hearing: geometry, the tick of latency, the gate, the noise."""
+"""Exact hearing: geometry, the tick of latency, the gate."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from hypothesis import given, strategies as st
 
 from systems.base.robot import RobotParameters
 from systems.hearing.ideal_source_sensor import IdealSourceSensor, relative_position
-from systems.hearing.parameters import IdealHearingParameters
 from systems.sound.parameters import SoundParameters
 
 pytestmark = pytest.mark.drake
 
-ALWAYS = IdealHearingParameters(burst_gaps=False)
 place = st.floats(-5.0, 5.0)
 angle = st.floats(-3.0, 3.0)
 
@@ -24,7 +22,7 @@ POSES = {"pose_WB": [1.0, 1.0, math.pi / 2], "pose_WS": [0.0, 3.175, 0.3]}
 
 
 def test_position_bearing_and_range_a_tick_later(bench):
-    at = bench(IdealSourceSensor(hearing=ALWAYS), **POSES)
+    at = bench(IdealSourceSensor(always=True), **POSES)
     assert at.output("detected")[0] == 0.0
     at.tick()
     np.testing.assert_allclose(at.output("p_PS_B"), [2.0, 1.0], atol=1e-12)
@@ -34,7 +32,7 @@ def test_position_bearing_and_range_a_tick_later(bench):
 
 
 def test_present_poses_do_not_show_before_the_tick(bench):
-    at = bench(IdealSourceSensor(hearing=ALWAYS), **POSES).tick()
+    at = bench(IdealSourceSensor(always=True), **POSES).tick()
     port = at.block.GetInputPort("pose_WS")
     port.FixValue(at.context, [9.0, 9.0, 0.0])
     np.testing.assert_allclose(at.output("p_PS_B"), [2.0, 1.0], atol=1e-12)
@@ -44,7 +42,7 @@ def test_present_poses_do_not_show_before_the_tick(bench):
 
 def test_tells_front_from_back(bench):
     poses = {"pose_WB": [0, 0, 0], "pose_WS": [-1.825, 0.5, 0]}
-    at = bench(IdealSourceSensor(hearing=ALWAYS), **poses).tick()
+    at = bench(IdealSourceSensor(always=True), **poses).tick()
     np.testing.assert_allclose(at.output("p_PS_B"), [-2.0, 0.5], atol=1e-12)
     assert abs(at.output("source_bearing")[0]) > math.pi / 2
 
@@ -87,54 +85,13 @@ def test_gate_is_set_by_its_parameters(bench):
 
 def test_a_source_too_far_is_not_heard(bench):
     far = POSES | {"pose_WS": [0.0, 31.3, 0.3]}
-    at = bench(IdealSourceSensor(hearing=ALWAYS), **far)
+    at = bench(IdealSourceSensor(always=True), **far)
     np.testing.assert_array_equal(at.updated(), [0, 0, 0])
 
 
-def test_noise_has_the_covariance_that_the_block_gives(bench):
-    """First-order covariance of a bearing (2 deg) and a range (5 %) at 2.24 m."""
-    hearing = IdealHearingParameters(
-        burst_gaps=False, bearing_noise_deg=2.0, range_noise_fraction=0.05
-    )
-    at = bench(IdealSourceSensor(hearing=hearing, seed=5), **POSES)
-    samples = []
-    for tick in range(3000):
-        at.context.SetTime(tick * 0.025)
-        samples.append(at.updated()[:2])
-    measured = np.cov(np.transpose(samples))
-    axis = np.array([2.0, 1.0]) / math.sqrt(5)
-    across = np.array([-axis[1], axis[0]])
-    along_std = 0.05 * math.sqrt(5)
-    across_std = math.radians(2.0) * math.sqrt(5)
-    expected = np.outer(axis, axis) * along_std**2
-    expected += np.outer(across, across) * across_std**2
-    np.testing.assert_allclose(measured, expected, atol=0.15 * along_std**2)
-
-    at.context.SetDiscreteState(0, [2.0, 1.0, 1.0])
-    np.testing.assert_allclose(at.output("covariance"), expected.ravel())
-    np.testing.assert_allclose(np.mean(samples, axis=0), [2.0, 1.0], atol=0.01)
-
-
-def test_noise_is_the_seed_s_and_the_tick_s(bench):
-    hearing = IdealHearingParameters(burst_gaps=False, range_noise_fraction=0.1)
-
-    def heard(seed, tick):
-        block = IdealSourceSensor(hearing=hearing, seed=seed)
-        return tuple(bench(block, time=0.025 * tick, **POSES).updated())
-
-    assert heard(1, 7) == heard(1, 7)
-    assert len({heard(1, 7), heard(1, 8), heard(2, 7)}) == 3
-
-
 def test_exact_hearing_claims_no_error(bench):
-    at = bench(IdealSourceSensor(hearing=ALWAYS), **POSES).tick()
+    at = bench(IdealSourceSensor(always=True), **POSES).tick()
     np.testing.assert_array_equal(at.output("covariance"), np.zeros(4))
-
-
-def test_noise_has_no_derivative():
-    hearing = IdealHearingParameters(bearing_noise_deg=1.0)
-    with pytest.raises(ValueError, match="set bearing_noise_deg and range_noise"):
-        IdealSourceSensor(hearing=hearing).ToAutoDiffXd()
 
 
 def test_gradient_of_the_measurement(bench, check_gradient):

@@ -300,7 +300,7 @@ def test_wrong_audio_is_refused():
 
 
 @pytest.mark.parametrize(
-    "fields", [{"low_hz": 2e4}, {"high_hz": 6e4}, {"method": "music"}]
+    "fields", [{"band_hz": (2e4, 1e4)}, {"band_hz": (300.0, 6e4)}, {"method": "music"}]
 )
 def test_bad_parameters(fields):
     with pytest.raises(ValidationError, match=next(iter(fields))):

@@ -24,9 +24,9 @@ QUESTIONS = """
 import contextlib, io, json
 
 import phonotaxis
-from analysis.comparison.plans import comparison_plans
+from analysis.sweeps.comparison_plans import comparison_plans
 from analysis.design.gain_search import search_gains
-from analysis.design.requirements import DesignRequirements, check_law
+from analysis.design.requirements import Requirements, check_law
 from analysis.laws.law_curves import law_curves
 from analysis.laws.law_curves_plots import plot_law_curves
 from analysis.laws.push_and_pull import DESIGNED_LAWS
@@ -55,9 +55,10 @@ scenario = load_scenario("default", [*settings, "hearing=ideal"])
 sheet = model_sheet(scenario)
 curves = law_curves(scenario, DESIGNED_LAWS)
 lines = plot_law_curves(curves).axes[0].lines
-designed = search_gains(load_scenario("default"), DesignRequirements())
+default = load_scenario("default")
+designed = search_gains(default, Requirements().within_goal(default))
 tuned = scenario.with_robot(laws=designed)
-checks = check_law(tuned, "gaussian", DesignRequirements())
+checks = check_law(tuned, "gaussian", Requirements())
 print(json.dumps({
     "listed": printed("laws", "--json")["laws"],
     "unknown": printed("simulate", "--law", "magic", "--json")["error"]["message"],

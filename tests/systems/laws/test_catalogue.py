@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydrake.autodiffutils import AutoDiffXd
 
 from systems.laws.catalogue import LAWS, law_title
 
@@ -56,15 +55,3 @@ def test_loop_gains_are_those_of_the_two_terms(name):
         moves = push(law, c, 0.3) - still
         twice = push(law, c, 0.3, **damper) - push(law, c, rest, **damper)
         assert twice == pytest.approx(2.0 * moves)
-
-
-@pytest.mark.parametrize("name", TUNED)
-def test_stiffest_is_the_steepest_slope_of_the_push(name):
-    law, tuning = TUNED[name]
-    gains = law.gains()
-    rest = tuning.spring_speed(gains)
-    slopes = [
-        push(law, AutoDiffXd(c, 1, 0), rest).derivatives() for c in DISTANCES.tolist()
-    ]
-    steepest = -min(float(slope[0]) for slope in slopes if len(slope))
-    assert tuning.stiffest(gains, LEAST) == pytest.approx(steepest, rel=0.02)

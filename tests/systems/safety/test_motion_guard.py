@@ -11,7 +11,7 @@ import pytest
 
 from diagrams import Scenario, load_scenario, simulate
 from systems import FreeSpaceMap, MotionGuard, WheelCommand
-from systems.base.parameters import OdometryParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import RunFacts
 from systems.framework.input_error import InputError
@@ -125,23 +125,18 @@ def test_what_it_changes_the_virtual_mass_moves_by(bench):
     np.testing.assert_allclose(state[:2], expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("fields", [{"margin_m": 0.002}, {"start_bubble_m": 3.3}])
-def test_a_margin_below_the_least_and_a_bubble_beyond_the_map_are_refused(fields):
-    with pytest.raises(ValueError, match=next(iter(fields))):
-        GuardParameters(**fields)
-
-
-def test_a_bubble_that_is_too_small_for_the_body_is_refused():
-    with pytest.raises(InputError) as error:
-        FreeSpaceMap(parameters=GuardParameters(start_bubble_m=0.5))
-    assert error.value.field == "start_bubble_m"
+def test_a_body_that_is_too_large_for_the_bubble_is_refused():
+    """The corners of a body 1.85 m wide are more than 0.92 m from the axle."""
+    with pytest.raises(InputError, match="two cells") as error:
+        FreeSpaceMap(robot=RobotParameters(width_m=1.85))
+    assert error.value.field == "guard"
 
 
 @pytest.mark.parametrize(
     ("overrides", "field"),
     [
         (["obstacle_sensing=ideal"], "obstacle_sensing"),
-        (["guard.start_bubble_m=0.5"], "guard.start_bubble_m"),
+        (["robot.width_m=1.85"], "guard"),
         (
             ["ultrasonic.sensors=[{axis_deg: 60}, {axis_deg: -60}]"],
             "ultrasonic.sensors",
@@ -153,7 +148,7 @@ def test_a_bubble_that_is_too_small_for_the_body_is_refused():
             "guard.place_error_m",
         ),
         (["guard.place_error_m=0"], "guard.place_error_m"),
-        (["odometry.pulses_per_revolution=30"], "guard.place_error_m"),
+        (["plant.pulses_per_revolution=30"], "guard.place_error_m"),
     ],
 )
 def test_a_guard_that_could_not_serve_is_refused(overrides, field):
@@ -162,7 +157,7 @@ def test_a_guard_that_could_not_serve_is_refused(overrides, field):
     assert error.value.field == field
 
 
-EXACT = OdometryParameters(rounding=False)
+EXACT = PlantParameters(pulses_per_revolution=None)
 BLIND = [0.03] * 3, [1.0] * 3, [0.0] * 3
 STILL = (0.0, 0.0)
 
@@ -177,7 +172,7 @@ def space_map(**given: Any) -> Any:
 def test_a_cell_is_known_for_the_way_that_wheel_errors_allow():
     """Of the bubble, 1 m: 0.02 s + 0.04 s (1 + s)/0.41 = 0.03, solved by hand."""
     known = GuardParameters(wheel_error=0.02, place_error_m=0.03)
-    state, numbers = space_map(parameters=known, odometry=EXACT)
+    state, numbers = space_map(parameters=known, plant=EXACT)
     b = 0.02 + 0.04 / 0.41
     lasts = (math.sqrt(b * b + 4.0 * 0.03 * 0.04 / 0.41) - b) / (2.0 * 0.04 / 0.41)
     for tick in range(100):
@@ -201,7 +196,7 @@ def test_the_rolled_way_is_the_mean_of_both_rims(motion, rolled):
 
     A way is counted as an arc's whose chord is given, and 5 % more at most.
     """
-    state, numbers = space_map(odometry=EXACT)
+    state, numbers = space_map(plant=EXACT)
     arc = 1.0 if motion[2] == 0.0 else 0.2 / math.sin(0.2)
     longer = arc if rolled == 0.1 else 1.0
     for tick in range(4):
@@ -230,7 +225,7 @@ def test_pulses_make_a_tick_count_half_a_pulse_more_and_a_reversal_its_command()
 def test_by_the_encoders_of_the_papers_robot_a_cell_is_known_for_14_m():
     """(q/L) (s + d) + q = 6 mm at d = 2 m, with pulses of q = 0.145 mm at the rim."""
     pulse = 0.06 * math.tau / 2600
-    error = PlaceError.of(GuardParameters(), RobotParameters(), OdometryParameters())
+    error = PlaceError.of(GuardParameters(), RobotParameters(), PlantParameters())
     expected = (0.006 - pulse) * 0.41 / pulse - 2.0
     assert lasting(2.0, error) == pytest.approx(expected)
     assert 14.0 < expected < 15.0

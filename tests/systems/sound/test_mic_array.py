@@ -124,18 +124,6 @@ def test_warmer_air_is_faster():
     np.testing.assert_allclose(np.exp(1j * phases[1]), expected, atol=1e-3)
 
 
-def test_skewed_channels_sample_later():
-    """A channel that samples 4 us later has 4 us more of the tone's phase."""
-    skew = (0.0, 4e-6, 8e-6)
-    sent = emission((2.0, 0.3))
-    plain = recorded(sent, parameters=quiet())
-    late = recorded(sent, parameters=quiet(channel_skew_s=skew))
-    difference = (
-        phase_and_amplitude(late.counts)[0] - phase_and_amplitude(plain.counts)[0]
-    )
-    np.testing.assert_allclose(difference, 2 * np.pi * TONE * np.array(skew), atol=5e-5)
-
-
 def with_errors(array, sent, errors):
     """Frame of a context whose numeric parameters are set, by their numbers."""
     context = array.CreateDefaultContext()
@@ -175,19 +163,6 @@ def test_errors_of_a_context_shift_what_its_microphones_hear():
     np.testing.assert_array_equal(
         plain, with_errors(MicArray(parameters=quiet()), emission(source), {})
     )
-
-
-def test_default_errors_come_from_the_seed():
-    tolerant = quiet(
-        position_tolerance_m=1e-3, delay_tolerance_s=1e-6, gain_tolerance_db=1.0
-    )
-    frames = [
-        with_errors(MicArray(parameters=tolerant, seed=seed), emission((3.0, 0.7)), {})
-        for seed in (1, 1, 2)
-    ]
-    np.testing.assert_array_equal(frames[0], frames[1])
-    levels = [phase_and_amplitude(frame)[1] for frame in frames]
-    assert np.abs(levels[0] / levels[2] - 1.0).min() > 1e-3
 
 
 def test_noise_level_refers_to_one_metre():
@@ -269,11 +244,6 @@ def test_a_pose_of_an_older_tick_is_no_start_of_a_frame():
     phases, _ = phase_and_amplitude(audio.counts)
     expected = np.exp(-2j * np.pi * TONE * (3.0 - 0.175) / 340.0)
     np.testing.assert_allclose(np.exp(1j * phases[1]), expected, atol=1e-3)
-
-
-def test_skew_of_another_number_of_channels_is_refused():
-    with pytest.raises(ValueError, match=r"microphones\.channel_skew_s.*3 microph"):
-        MicArray(parameters=MicArrayParameters(channel_skew_s=(0.0, 1e-6)))
 
 
 def test_sources_add_up():

@@ -14,9 +14,9 @@ from pydrake.common.value import Value
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.signals import FRAME_SAMPLES, TICK_S, Emission
 from systems.sound import reverberation
-from systems.sound.array_tolerances import draw_tolerances, real_array
 from systems.sound.mic_array import MicArray
 from systems.sound.parameters import HEIGHT_M, MicArrayParameters, RoomParameters
+from systems.sound.real_array import no_errors, real_array
 from systems.sound.reverberation import Reverberation, _place
 from systems.sound.room import room_images, room_impulse_responses
 
@@ -24,10 +24,7 @@ FS = 100_000
 C = 340.0
 TIME = 0.8
 ARRAY = real_array(
-    microphones_B(RobotParameters()),
-    MicArrayParameters(),
-    draw_tolerances(MicArrayParameters(), 3, np.random.default_rng(0)),
-    C,
+    microphones_B(RobotParameters()), MicArrayParameters(), no_errors(3), C
 )
 
 

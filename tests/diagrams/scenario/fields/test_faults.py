@@ -18,7 +18,7 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:
         "law: activ\n"
         "room: {reverberation_time: 0.3}\n"
         "obstacles: [{waypoint_m: [[3, 1]]}]\n"
-        "robots: {one: {tdoa: {low_h: 3}}, two: {law: guardet}}\n"
+        "robots: {one: {tdoa: {band_h: 3}}, two: {law: guardet}}\n"
     )
     with pytest.raises(InputError) as raised:
         load_scenario(path)
@@ -28,7 +28,7 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:
         "law": "active",
         "room.reverberation_time": "reverberation_time_s",
         "obstacles.0.waypoint_m": "waypoints_m",
-        "robots.one.tdoa.low_h": "low_hz",
+        "robots.one.tdoa.band_h": "band_hz",
         "robots.two.law": "guarded",
     }.items():
         assert f"did you mean {meant!r}?" in told.pop(field)

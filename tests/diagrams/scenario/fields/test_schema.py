@@ -53,7 +53,7 @@ def test_every_file_names_its_schema_and_keeps_it(path: Path) -> None:
         {"room": {"reverberation_time": 0.3}},
         {"law": "activ"},
         {"obstacles": [{"size_m": [0.1]}]},
-        {"robots": {"one": {"tdoa": {"low_hz": -1}}}},
+        {"robots": {"one": {"tdoa": {"band_hz": [-1, 300]}}}},
         {"name": "two\nlines"},
     ],
 )

@@ -82,14 +82,14 @@ def test_a4_counts_the_pulses_of_the_encoder_until_the_robot_stops():
             for each in facts(
                 "two_static_obstacles",
                 "robot.top_speed_m_s=0.72",
-                f"odometry.pulses_per_revolution={pulses}",
+                f"plant.pulses_per_revolution={pulses}",
             ).assumptions
             if "pulses" in each.text
         ]
         assert pulse.value == pytest.approx(q / 0.41 * (stopping + distance) + q)
         assert pulse.limit == 0.006
     with pytest.raises(InputError, match="encoder with more pulses"):
-        facts("two_static_obstacles", "odometry.pulses_per_revolution=100")
+        facts("two_static_obstacles", "plant.pulses_per_revolution=100")
 
 
 def test_sensors_on_the_axle_see_less_far_ahead():

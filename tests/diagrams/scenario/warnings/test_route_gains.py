@@ -17,7 +17,7 @@ from systems.laws.trajectory.impedance_adaptation import (
 )
 
 ADAPTIVE = "laws.trajectory_adaptive"
-FILTERED = "laws.trajectory_filtered"
+IMPEDANCE = "impedance"
 
 
 def all_warnings(law, *fields):
@@ -49,7 +49,7 @@ PENALTY = f"{ADAPTIVE}.penalty=3"
         ([SENSITIVITY, PENALTY], None),
         ([f"{ADAPTIVE}.rate=0"], None),
         ([f"{ADAPTIVE}.safety_filter=true"], None),
-        ([f"{ADAPTIVE}.block_distance_m=0.2"], None),
+        ([f"{IMPEDANCE}.block_distance_m=0.2"], None),
     ],
 )
 def test_adaptation_without_its_safety_term_is_told(fields, told):
@@ -66,7 +66,7 @@ def test_a_block_distance_within_the_body_is_told():
     """A TurtleBot3 Burger, 138 x 178 mm: its rear corners are farthest from P."""
     corners = [(x, y) for x in (-0.069, 0.069) for y in (-0.089, 0.089)]
     reach = max(np.hypot(x - 0.08, y) for x, y in corners)
-    field = "laws.trajectory_conventional.block_distance_m"
+    field = f"{IMPEDANCE}.block_distance_m"
     assert warnings("conventional", f"{field}={reach + 1e-6}") == []
     (warning,) = warnings("conventional", f"{field}={reach - 1e-6}")
     assert warning.startswith(f"{field}: is 0.1735")
@@ -77,21 +77,25 @@ def test_a_block_distance_within_the_body_is_told():
     ("law", "fields", "parts"),
     [
         # D T/M = 2, and K at D = 4 with motors of 50 ms.
-        ("filtered", [f"{FILTERED}.damping_n_s_m=80"], ["damping_n_s_m: is 80", "80,"]),
         (
             "filtered",
-            [f"{FILTERED}.stiffness_n_m=97"],
+            [f"{IMPEDANCE}.damping_n_s_m=80"],
+            ["damping_n_s_m: is 80", "80,"],
+        ),
+        (
+            "filtered",
+            [f"{IMPEDANCE}.stiffness_n_m=97"],
             [".stiffness_n_m: is 97 N/m", "from 96.4 on"],
         ),
         (
             "filtered",
-            [f"{FILTERED}.contact_stiffness_n_m=94"],
+            [f"{IMPEDANCE}.contact_stiffness_n_m=94"],
             ["contact_stiffness_n_m: and stiffness_n_m together are 97", "96.4"],
         ),
         # 4 + 7 * 10 < 80 < 4 + 8 * 10.
         (
             "filtered",
-            [f"{FILTERED}.contact_damping_n_s_m=10"],
+            [f"{IMPEDANCE}.contact_damping_n_s_m=10"],
             ["more than 7 contacts"],
         ),
         (
@@ -104,7 +108,7 @@ def test_a_block_distance_within_the_body_is_told():
             "adaptive",
             [
                 f"{ADAPTIVE}.rate=1e4",
-                f"{ADAPTIVE}.contact_stiffness_n_m=1.5",
+                f"{IMPEDANCE}.contact_stiffness_n_m=1.5",
             ],
             ["6.4e+03", "0.5 m"],
         ),
@@ -112,7 +116,7 @@ def test_a_block_distance_within_the_body_is_told():
 )
 def test_a_bound_that_is_passed_is_named(law, fields, parts):
     (warning,) = warnings(law, *fields)
-    assert warning.startswith(f"laws.trajectory_{law}")
+    assert warning.startswith(ADAPTIVE if law == "adaptive" else IMPEDANCE)
     for part in parts:
         assert part in warning
 
@@ -136,7 +140,7 @@ def test_what_is_warned_of_leaves_all_that_is_stable():
     own = load_scenario(
         "unknown_block",
         ["law=trajectory_adaptive", f"{ADAPTIVE}.rate=5000"],
-    ).router.laws.trajectory_adaptive
+    ).router.gains
     loop = PointLoop(own, motor_lag_s=0.05)
     targets = swinging_target(1.0, 60.0, 0.025)
     assert np.abs(run_point(loop, targets).gains[:, 1]).max() > 80.0
@@ -145,13 +149,13 @@ def test_what_is_warned_of_leaves_all_that_is_stable():
 
 
 def test_each_robot_is_named():
-    field = f"robots.second.{FILTERED}.damping_n_s_m"
+    field = f"robots.second.{IMPEDANCE}.damping_n_s_m"
     (warning,) = warnings_of(load_scenario("robots_2", [f"{field}=90"]))
     assert str(warning).startswith(f"{field}: is 90")
 
 
 def test_the_command_tells_it_before_it_runs(capsys, tmp_path):
-    field = f"{FILTERED}.damping_n_s_m"
+    field = f"{IMPEDANCE}.damping_n_s_m"
     words = ["simulate", "unknown_block", "--set", f"{field}=90", "--set"]
     phonotaxis.main([*words, "duration_s=0.1", "--out", str(tmp_path / "out")])
     assert capsys.readouterr().err.startswith(f"phonotaxis: {field}: is 90")

@@ -1,1 +1,0 @@
-"""Exports runs to other programs, as CSV, Parquet or MCAP files with ROS 2 messages."""

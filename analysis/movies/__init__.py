@@ -1,1 +1,0 @@
-"""Makes a movie of a run from above, with the sound at the robot's microphones."""

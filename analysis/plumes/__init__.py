@@ -1,1 +1,0 @@
-"""Shows searches in pictures and replays: plumes, phases and sensor readings."""

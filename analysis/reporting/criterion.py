@@ -1,0 +1,148 @@
+"""Criteria and verdicts on numbers: pass, fail, or not applicable, with a text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+#: Unit of a number that is 1 for true and 0 for false.
+YES_OR_NO = "yes or no"
+
+Judgement = Literal["pass", "fail", "not applicable"]
+
+#: A number, or a text with the reason why the number does not exist.
+Reading = float | str
+
+Data = TypeVar("Data")
+
+
+@dataclass(frozen=True)
+class Criterion(Generic[Data]):
+    """A criterion compares a number in the data of a section with a threshold."""
+
+    name: str
+    unit: str
+    sense: Literal["at least", "above", "at most", "below"]
+    limit: float
+    good: str
+    """What follows if the number meets the threshold; a clause."""
+    bad: str
+    """What follows if the number does not meet the threshold; a clause."""
+    source: str
+    """Where the threshold comes from."""
+    read: Callable[[Data], Reading]
+    """Takes the number from the data of the section. NaN means that there is no such
+    number."""
+
+    @property
+    def threshold(self) -> str:
+        """The threshold as text, with its sign and unit."""
+        if self.unit == YES_OR_NO:
+            return "yes"
+        sign = {"at least": "\u2265", "above": ">", "at most": "\u2264", "below": "<"}
+        return f"{sign[self.sense]} {self.limit:.4g} {self.unit}".rstrip()
+
+    def met_by(self, value: float) -> bool:
+        """Returns whether a number meets the threshold; the number may be infinite."""
+        return {
+            "at least": value >= self.limit,
+            "above": value > self.limit,
+            "at most": value <= self.limit,
+            "below": value < self.limit,
+        }[self.sense]
+
+    def judge(self, data: Data) -> Verdict:
+        """Compares the number in the data of a section with the threshold."""
+        value = self.read(data)
+        if isinstance(value, str):
+            return self.without_number(value)
+        if math.isnan(value):
+            return self.without_number("there is no such number")
+        met = self.met_by(value)
+        return self._verdict(
+            float(value), "pass" if met else "fail", self.good if met else self.bad
+        )
+
+    def without_number(self, reason: str) -> Verdict:
+        """Returns the verdict if there is no number, for a reason (a clause)."""
+        return self._verdict(None, "not applicable", reason)
+
+    def _verdict(self, value: float | None, verdict: Judgement, text: str) -> Verdict:
+        return Verdict(
+            self.name, value, self.unit, self.threshold, verdict, text, self.source
+        )
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict on one number."""
+
+    name: str
+    value: float | None
+    """The number, or None if it does not exist."""
+    unit: str
+    threshold: str
+    verdict: Judgement
+    text: str
+    """The verdict in plain words."""
+    source: str
+    """Where the threshold comes from."""
+
+
+@dataclass(frozen=True)
+class VerdictRow:
+    """The verdicts of all laws on one criterion."""
+
+    name: str
+    unit: str
+    threshold: str
+    values: dict[str, float | None]
+    verdicts: dict[str, Judgement]
+    text: str
+    """The verdicts in plain words. Laws with the same text share one sentence."""
+
+
+def shown_value(value: float | None, unit: str) -> float | str | None:
+    """Returns the value of a verdict as a table shows it: "yes", "no", or the value."""
+    if value is None or unit != YES_OR_NO:
+        return value
+    return "yes" if value else "no"
+
+
+def compare_verdicts(
+    by_law: Mapping[str, Sequence[Verdict]],
+) -> tuple[VerdictRow, ...]:
+    """Puts the verdicts of several laws side by side, in the order of the first law."""
+    laws = list(by_law)
+    rows = []
+    for first in by_law[laws[0]]:
+        found = {
+            law: next(v for v in verdicts if v.name == first.name)
+            for law, verdicts in by_law.items()
+        }
+        rows.append(
+            VerdictRow(
+                first.name,
+                first.unit,
+                first.threshold,
+                {law: verdict.value for law, verdict in found.items()},
+                {law: verdict.verdict for law, verdict in found.items()},
+                _together(found),
+            )
+        )
+    return tuple(rows)
+
+
+def _together(found: dict[str, Verdict]) -> str:
+    """Joins the texts of all laws. Laws with the same text share one sentence."""
+    groups: dict[str, list[str]] = {}
+    for law, verdict in found.items():
+        groups.setdefault(verdict.text, []).append(law)
+    if len(found) == 1:
+        return f"{next(iter(groups))}."
+    if len(groups) == 1:
+        subject = "All" if len(found) > 2 else " and ".join(found)
+        return f"{subject}: {next(iter(groups))}."
+    return " ".join(f"{' and '.join(laws)}: {text}." for text, laws in groups.items())

@@ -1,0 +1,172 @@
+"""Writes contents of reports as HTML, as pages, and as text for a terminal.
+
+Pages come from one template, ``page.html.j2``, which escapes all texts. A page needs no
+network connection and no fonts of its own. Its only script allows scrolling with the
+keyboard through wide tables and figures.
+"""
+
+from __future__ import annotations
+
+import html as escaping
+import re
+import textwrap
+from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from analysis.reporting.section import (
+    ZERO,
+    Bullets,
+    Cell,
+    Column,
+    Content,
+    Definitions,
+    Figure,
+    Files,
+    Formula,
+    Judged,
+    Links,
+    Note,
+    Picture,
+    Section,
+    Table,
+    number,
+)
+from analysis.reporting.svg import figure_svg, formula_svg
+
+_HERE = Path(__file__).parent
+#: CSS variables with the colors of pages, in light mode and in dark mode.
+COLOURS_CSS = (_HERE / "page_colours.css").read_text("utf-8")
+
+#: Style classes of cells that have a color, by the text of the cell.
+_COLOURS = {
+    "pass": "pass",
+    "fail": "fail",
+    "not applicable": "none",
+    "not computed": "none",
+}
+#: Width of the text in a terminal.
+_COLUMNS = 88
+
+
+def html(content: Content, name: str = "", level: int = 2) -> Markup:
+    """Returns a paragraph, table, figure, section or other content as HTML.
+
+    ``name`` is the anchor of a section, whose heading has a ``level`` from 1 to 4. For
+    a figure or a formula, ``name`` is the beginning of all identifiers in its SVG. Each
+    of these names may occur once on a page.
+    """
+    return Markup(_template().show(content, name, level))
+
+
+def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) -> str:
+    """Returns a whole HTML document.
+
+    Args:
+        title: Title of the browser window, and heading of the page.
+        contents: Pairs of anchor and title, one pair for each section.
+        parts: Sections of the page in HTML.
+
+    Returns:
+        HTML with an embedded style sheet. The page loads no other files, apart from its
+        pictures.
+    """
+    return f"{_template().page(title, list(contents), list(map(Markup, parts)))}\n"
+
+
+def text(content: Content) -> str:
+    """Returns content as plain text for a terminal; figures have only a caption."""
+    match content:
+        case Section():
+            title = f"{content.title}\n{'-' * len(content.title)}"
+            lines = "\n\n".join([title, *map(text, content.contents)])
+        case Table():
+            lines = _table_text(content)
+        case Bullets():
+            lines = "\n".join(_wrapped(f"- {each}", "  ") for each in content.texts)
+        case Definitions() | Files():
+            lines = "\n".join(_wrapped(f"{a}: {b}", "  ") for a, b in content.rows)
+        case Links():
+            lines = ", ".join(title for _, title in content.targets)
+        case Note() | Formula():
+            lines = _wrapped(content.text)
+        case Figure() | Picture():
+            lines = _wrapped(f"Figure: {content.caption}")
+        case Markup():
+            lines = content.striptags()
+        case _:
+            lines = _wrapped(content)
+    return lines
+
+
+def _wrapped(line: str, indent: str = "") -> str:
+    return textwrap.fill(line, _COLUMNS, subsequent_indent=indent)
+
+
+def _table_text(table: Table) -> str:
+    heads, rows = table.heads, list(table.rows)
+    whole = [row for row in rows if len(row) == len(heads)]
+    columns = [
+        _column_text(head, [row[k] for row in whole]) for k, head in enumerate(heads)
+    ]
+    head, *lines = ["  ".join(words).rstrip() for words in zip(*columns, strict=True)]
+    body = iter(lines)
+    return "\n".join(
+        [
+            *([table.caption] if table.caption else []),
+            *([head] if head else []),
+            *(next(body) if len(row) == len(heads) else str(row[0]) for row in rows),
+        ]
+    )
+
+
+def _column_text(head: Column, cells: Sequence[Cell]) -> list[str]:
+    """Returns a heading and cells of equal width: texts at the left, numbers right."""
+    words = [head.heading, *(_cell_text(cell, head.digits) for cell in cells)]
+    width = max(map(len, words))
+    left = any(isinstance(cell, str) and cell != ZERO for cell in cells)
+    return [word.ljust(width) if left else word.rjust(width) for word in words]
+
+
+def _cell_text(cell: Cell, digits: int) -> str:
+    if isinstance(cell, Judged):
+        verdict = {"not applicable": "n/a"}.get(cell.verdict, cell.verdict)
+        return f"{_cell_text(cell.value, digits)}  {verdict:>4}"
+    if isinstance(cell, str):
+        return cell
+    return number(cell, digits).replace("\u2212", "-")
+
+
+@cache
+def _template() -> Any:
+    environment = Environment(
+        loader=FileSystemLoader(_HERE),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.filters |= {
+        "kind": lambda item: type(item).__name__,
+        "inline": _inline,
+        "number": number,
+        "colour": lambda word: _COLOURS.get(word.lower(), ""),
+        "drawing": lambda item, name: figure_svg(item.draw(), name, item.caption),
+        "formula": lambda item, name: formula_svg(item.tex, name, item.text),
+    }
+    environment.globals |= {
+        "ZERO": ZERO,
+        "CSS": Markup(COLOURS_CSS + (_HERE / "html_page.css").read_text("utf-8")),
+        "SCRIPT": Markup((_HERE / "page.js").read_text("utf-8")),
+    }
+    return environment.get_template("page.html.j2").module
+
+
+def _inline(line: str) -> Markup:
+    """Escapes a text; text between backquotes becomes code."""
+    plain = escaping.escape(line, quote=False)
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", plain))

@@ -1,0 +1,331 @@
+"""Picture of a block diagram that shows the names of all ports and all wires.
+
+The module does not use Graphviz, because its Python packages need system libraries that
+are not installed on every machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+from pydrake.systems.framework import Diagram
+
+from analysis.views.wires import Wire, blocks, wires
+from systems.framework.block import STAGES, Stage, part_of
+
+#: Fill color of the blocks of each stage.
+FILLS: dict[Stage, str] = {
+    "world": "#E8EEF4",
+    "hearing": "#FBE3D6",
+    "obstacle sensing": "#FCEFC9",
+    "control": "#DDF1E7",
+    "robot": "#DCEAF7",
+}
+#: Colors of the wires, dark enough for a white page. All wires from one block have
+#: the same color.
+WIRE_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#AA4499",
+    "#B07D00",
+    "#332288",
+    "#000000",
+    "#117733",
+    "#CC3311",
+    "#2B8CBE",
+    "#7A5195",
+    "#6B6B6B",
+)
+#: Sizes of the elements of the picture, px.
+MARGIN, HEADER, ROW, TRACK, GAP, CHARACTER = 24, 42, 20, 9, 36, 6.7
+
+
+@dataclass
+class _Box:
+    """A block and its place in the picture."""
+
+    name: str
+    kind: str
+    stage: Stage
+    lower: bool
+    """Whether the block is in the lower row of the picture."""
+    inputs: list[str]
+    outputs: list[str]
+    column: int = 0
+    x: float = 0.0
+    y: float = 0.0
+
+    @property
+    def width(self) -> float:
+        sides = max(map(len, self.inputs), default=0), max(map(len, self.outputs))
+        longest = max(sum(sides) + 5, 1.2 * len(self.name) + 2, len(self.kind) + 2)
+        return CHARACTER * longest
+
+    @property
+    def height(self) -> float:
+        return HEADER + ROW * max(len(self.inputs), len(self.outputs)) + 6.0
+
+    def port(self, name: str, *, output: bool) -> tuple[float, float]:
+        """Returns the point (x, y) at which the wire of a port ends, px."""
+        index = (self.outputs if output else self.inputs).index(name)
+        x = self.x + (self.width if output else 0.0)
+        return x, self.y + HEADER + ROW * (index + 0.5)
+
+
+@dataclass
+class _Layout:
+    """The boxes and wires of the picture, with their places.
+
+    A direct wire joins neighboring columns. All other wires go along the bus, a set of
+    horizontal lines between the two rows of boxes.
+    """
+
+    boxes: dict[str, _Box]
+    direct: list[Wire]
+    bus: dict[tuple[str, str], list[Wire]]
+    width: float = 0.0
+    height: float = 0.0
+    bus_y: dict[tuple[str, str], float] = field(default_factory=dict)
+    track_x: dict[tuple[int, tuple[str, str]], float] = field(default_factory=dict)
+
+
+def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
+    """Returns a picture of the block diagram as SVG text.
+
+    The signals go from left to right. Wires to a neighboring column are drawn directly.
+    All other wires go along the bus, a set of horizontal lines between the two rows of
+    blocks. The name of an output port is gray if no input port reads it. Logs are left
+    out.
+
+    Args:
+        diagram: The diagram to draw.
+        flat: Whether a nested diagram is replaced by the blocks that it contains.
+
+    Returns:
+        The text of one SVG element, with a newline at the end.
+    """
+    connections = wires(diagram, flat=flat)
+    layout = _arrange(blocks(diagram, flat=flat), connections)
+    width, height = f"{layout.width:.0f}", f"{layout.height:.0f}"
+    head = (
+        # An SVG element without a width fills the window or page that shows it.
+        '<svg xmlns="http://www.w3.org/2000/svg" '
+        f'viewBox="0 0 {width} {height}" font-family="Helvetica, Arial, sans-serif">'
+    )
+    parts = [head, '<rect width="100%" height="100%" fill="white"/>']
+    colours = dict(zip(layout.boxes, cycle(WIRE_COLOURS), strict=False))
+    parts += [_direct(layout, w, colours[w.source]) for w in layout.direct]
+    for key, along in layout.bus.items():
+        parts += [_along_bus(layout, key, wire, colours[key[0]]) for wire in along]
+    read = {(w.source, w.output) for w in connections}
+    parts += [_drawn(box, read) for box in layout.boxes.values()]
+    return "\n".join([*parts, "</svg>", ""])
+
+
+def write_block_diagram(
+    diagram: Diagram, path: str | Path, *, flat: bool = True
+) -> None:
+    """Writes the block diagram as an SVG file.
+
+    Args:
+        diagram: The diagram to draw.
+        path: Path of the SVG file.
+        flat: Whether a nested diagram is replaced by the blocks that it contains.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    Path(path).write_text(block_svg(diagram, flat=flat), encoding="utf-8")
+
+
+def _class_name(block: Any) -> str:
+    """Returns the class name of a block, without the scalar type of a template."""
+    return type(block).__name__.split("_\N{MATHEMATICAL BOLD SCRIPT CAPITAL T}")[0]
+
+
+def _box(block: Any) -> _Box:
+    stage: Stage = getattr(block, "stage", "control")
+    if isinstance(block, Diagram):
+        stage = "robot" if block.HasOutputPort("pose_WB") else "world"
+    elif type(block).__module__.startswith("pydrake."):  # it joins ports
+        stage = "world"
+    return _Box(
+        block.get_name(),
+        _class_name(block),
+        stage,
+        part_of(block) == "obstacles" or stage == "obstacle sensing",
+        [block.get_input_port(k).get_name() for k in range(block.num_input_ports())],
+        [block.get_output_port(k).get_name() for k in range(block.num_output_ports())],
+    )
+
+
+def _arrange(systems: Sequence[Any], connections: Sequence[Wire]) -> _Layout:
+    boxes = {block.get_name(): _box(block) for block in systems}
+    _set_columns(boxes, connections)
+    direct: list[Wire] = []
+    bus: dict[tuple[str, str], list[Wire]] = {}
+    for wire in connections:
+        step = boxes[wire.target].column - boxes[wire.source].column
+        lower = [boxes[n].lower for n in (wire.source, wire.target)]
+        if step == 1 and (lower[0] == lower[1] or lower[0]):
+            direct.append(wire)
+        else:
+            bus.setdefault((wire.source, wire.output), []).append(wire)
+    layout = _Layout(boxes, direct, bus)
+    _set_places(layout)
+    return layout
+
+
+def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
+    """Assigns each box to a column of the picture.
+
+    The first column is on the left. A box comes after all boxes whose outputs it reads.
+    Boxes then move to the right, up to the boxes that read their outputs. Wires that
+    close a loop, or that go back to an earlier stage, do not count.
+    """
+    names = list(boxes)
+    forward: dict[str, set[str]] = {name: set() for name in boxes}
+    # In each loop, the wires against the order of building count as going back.
+    against = sorted(
+        connections, key=lambda w: names.index(w.source) > names.index(w.target)
+    )
+    for wire in against:
+        ranks = [STAGES.index(boxes[n].stage) for n in (wire.source, wire.target)]
+        back = ranks[0] > ranks[1] or _reaches(forward, wire.target, wire.source)
+        if not back:
+            forward[wire.source].add(wire.target)
+    for _ in boxes:
+        for name, readers in forward.items():
+            for reader in readers:
+                box = boxes[reader]
+                box.column = max(box.column, boxes[name].column + 1)
+    for _ in boxes:
+        for name, readers in forward.items():
+            if readers and boxes[name].inputs:
+                boxes[name].column = min(boxes[r].column for r in readers) - 1
+
+
+def _reaches(forward: dict[str, set[str]], start: str, goal: str) -> bool:
+    if start == goal:
+        return True
+    return any(_reaches(forward, after, goal) for after in forward[start])
+
+
+def _set_places(layout: _Layout) -> None:
+    boxes = layout.boxes.values()
+    upper = [box for box in boxes if not box.lower]
+    lower = [box for box in boxes if box.lower]
+    _set_tracks(layout)
+    top = MARGIN + 30.0
+    below = _stack(upper, top)
+    for index, key in enumerate(layout.bus):
+        layout.bus_y[key] = below + GAP / 2.0 + TRACK * index
+    floor = below + GAP + TRACK * len(layout.bus)
+    layout.height = _stack(lower, floor) + MARGIN
+
+
+def _stack(boxes: list[_Box], top: float) -> float:
+    """Places boxes below each other in their columns. Returns the lowest edge, px."""
+    edges: dict[int, float] = {}
+    for box in boxes:
+        box.y = edges.get(box.column, top)
+        edges[box.column] = box.y + box.height + GAP
+    return max((edge - GAP for edge in edges.values()), default=top)
+
+
+def _set_tracks(layout: _Layout) -> None:
+    """Sets the x positions of columns and of the vertical parts of bus wires."""
+    gaps: dict[int, list[tuple[str, str]]] = {}
+    for key, along in layout.bus.items():
+        columns = {layout.boxes[key[0]].column + 1}
+        columns |= {layout.boxes[wire.target].column for wire in along}
+        for column in columns:
+            gaps.setdefault(column, []).append(key)
+    x = float(MARGIN)
+    last = max(box.column for box in layout.boxes.values())
+    for column in range(last + 2):
+        keys = gaps.get(column, [])
+        for index, key in enumerate(keys):
+            layout.track_x[column, key] = x + GAP / 2.0 + TRACK * index
+        x += (GAP if column else 0.0) + TRACK * len(keys)
+        members = [b for b in layout.boxes.values() if b.column == column]
+        for box in members:
+            box.x = x
+        x += max((box.width for box in members), default=0.0)
+    layout.width = x + MARGIN
+
+
+def _direct(layout: _Layout, wire: Wire, colour: str) -> str:
+    x0, y0 = layout.boxes[wire.source].port(wire.output, output=True)
+    x1, y1 = layout.boxes[wire.target].port(wire.input, output=False)
+    bend = max(20.0, 0.5 * (x1 - x0))
+    path = (
+        f"M{x0:.1f},{y0:.1f} C{x0 + bend:.1f},{y0:.1f} "
+        f"{x1 - bend:.1f},{y1:.1f} {x1:.1f},{y1:.1f}"
+    )
+    return _wire(wire, path, (x1, y1), colour)
+
+
+def _along_bus(layout: _Layout, key: tuple[str, str], wire: Wire, colour: str) -> str:
+    source, target = layout.boxes[wire.source], layout.boxes[wire.target]
+    x0, y0 = source.port(wire.output, output=True)
+    x1, y1 = target.port(wire.input, output=False)
+    leave = layout.track_x[source.column + 1, key]
+    arrive = layout.track_x[target.column, key]
+    y = layout.bus_y[key]
+    path = f"M{x0:.1f},{y0:.1f} H{leave:.1f} V{y:.1f} H{arrive:.1f} V{y1:.1f} H{x1:.1f}"
+    return _wire(wire, path, (x1, y1), colour)
+
+
+def _wire(wire: Wire, path: str, end: tuple[float, float], colour: str) -> str:
+    name = f"{wire.source}.{wire.output} to {wire.target}.{wire.input}"
+    return (
+        f'<g class="wire"><title>{escape(name)}</title>'
+        f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="1.5" '
+        'stroke-linejoin="round"/>'
+        f'<path d="M{end[0]:.1f},{end[1]:.1f} l-8,-4 v8 z" fill="{colour}"/></g>'
+    )
+
+
+def _drawn(box: _Box, read: set[tuple[str, str]]) -> str:
+    fill = FILLS[box.stage]
+    middle = box.x + box.width / 2.0
+    title = escape(box.name.replace("_", " "))
+    frame = f'x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" stroke="#777777"'
+    parts = [
+        f'<g class="block"><rect {frame} height="{box.height:.1f}" fill="white"/>',
+        f'<rect {frame} height="{HEADER - 4}" fill="{fill}"/>',
+        _text(middle, box.y + 16, title, 13, "middle", "black", bold=True),
+        _text(middle, box.y + 31, escape(box.kind), 11, "middle", "#444444"),
+    ]
+    for name in box.inputs:
+        x, y = box.port(name, output=False)
+        parts.append(_text(x + 6, y + 4, escape(name), 12, "start", "black"))
+    for name in box.outputs:
+        x, y = box.port(name, output=True)
+        colour = "black" if (box.name, name) in read else "#6B6B6B"
+        parts.append(_text(x - 6, y + 4, escape(name), 12, "end", colour))
+    return "".join([*parts, "</g>"])
+
+
+def _text(
+    x: float,
+    y: float,
+    text: str,
+    size: int,
+    anchor: str,
+    colour: str,
+    *,
+    bold: bool = False,
+) -> str:
+    weight = ' font-weight="bold"' if bold else ""
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}" '
+        f'fill="{colour}"{weight}>{text}</text>'
+    )

@@ -1,0 +1,110 @@
+"""Draws the curves of a run over time."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from analysis.reporting.notebook_figure import NotebookFigure
+from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.views.bursts import heard_bursts
+from analysis.views.curves import Curve, Panel, panels
+from analysis.views.framing import picture_title
+from diagrams import RunResult
+
+#: Width of the picture, and height of a panel, inch.
+WIDTH_IN, PANEL_IN = 8.0, 1.55
+#: Largest number of characters in one line beside an axis.
+LONGEST_LINE = 13
+
+
+def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> Figure:
+    """Draws measured, estimated and commanded quantities over time.
+
+    Bursts of the source are shaded.
+
+    Args:
+        result: Result of a run, for one robot.
+        clearance: (n,) distance from the robot to the nearest body at each tick
+            (control period), m (``analysis.runs.proximity``). With None, the picture
+            has no panel of the clearance.
+
+    Returns:
+        Picture with one panel per quantity. If the robot has a safety guard, one panel
+        shows the actions of the guard. Another panel shows the distance that the robot
+        has to spare.
+
+    Raises:
+        InputError: ``clearance`` does not have one value per tick.
+    """
+    shown, bursts = panels(result, clearance), heard_bursts(result)
+    size = WIDTH_IN, 1.0 + PANEL_IN * len(shown)
+    figure = NotebookFigure(figsize=size, layout="constrained")
+    all_axes = np.atleast_1d(figure.subplots(len(shown), sharex=True))
+    for axes, panel in zip(all_axes, shown, strict=True):
+        for start, end in bursts:
+            axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
+            # Yellow is hard to see on white. The line at the bottom is easy to see.
+            axes.axvspan(start, end, ymax=0.025, color=COLOURS["sounding"], linewidth=0)
+        _draw(axes, panel)
+    hears = not result.scenario.only.has_goal
+    all_axes[-1].set(
+        xlabel="time (s)" + (", shaded while the source sounds" if hears else ""),
+        xlim=(0.0, max(result.simulated_s, 1e-3)),
+    )
+    figure.suptitle(picture_title(result), fontsize=11)
+    figure.align_ylabels(list(all_axes))
+    return figure
+
+
+def _draw(axes: Axes, panel: Panel) -> None:
+    for shade in panel.shades:
+        (low, high), spans = shade.between, shade.spans
+        axes.broken_barh(
+            [(start, end - start) for start, end in spans],
+            (low, high - low),
+            facecolor=shade.colour,
+            alpha=shade.alpha,
+            linewidth=0.0,
+            label=shade.label,
+        )
+    for curve in panel.curves:
+        axes.plot(curve.t, curve.y, **_style(curve))
+    for count, time in enumerate(panel.instants):
+        label = None if count else "new route"
+        axes.axvline(time, color="black", ls=":", lw=1.0, label=label)
+    if panel.rows:
+        axes.set_yticks(*zip(*panel.rows, strict=True))
+    unit = panel.unit.replace(" ", "\N{NO-BREAK SPACE}")  # stays on one line
+    title = panel._replace(unit=unit).title
+    axes.set_ylabel(textwrap.fill(title, LONGEST_LINE, break_long_words=False))
+    axes.set_ylim(*panel.limits)
+    draw_grid(axes, "y")
+    axes.legend(
+        loc="upper left",
+        bbox_to_anchor=(1.005, 1.03),
+        fontsize=8,
+        frameon=False,
+        handlelength=1.5,
+    )
+
+
+def _style(curve: Curve) -> dict[str, Any]:
+    style: dict[str, Any] = {"color": curve.colour, "label": curve.label}
+    if curve.style == "dots":
+        return {
+            **style,
+            "ls": "none",
+            "marker": ".",
+            "ms": 2 * curve.width,
+            "zorder": 3,
+        }
+    if curve.style == "mark":
+        return {**style, "ls": "none", "marker": "v"}
+    lines = {"line": {}, "dashes": {"ls": "--"}, "steps": {"drawstyle": "steps-post"}}
+    return {**style, "lw": curve.width, **lines[curve.style]}

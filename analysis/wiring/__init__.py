@@ -1,1 +1,0 @@
-"""Block diagrams as wires and as pictures."""
