@@ -27,9 +27,9 @@ from analysis.arrays.voting.source_listener import (
     TrackedSources,
     hear_sources,
 )
-from analysis.hearing.synthetic_speech import speech_like
 from analysis.recordings.heard_sources import HeardSources, heard_sources
 from studies.support.figures import Figure, bounds_table
+from studies.support.synthetic_speech import speech_like
 from studies.support.talker_peers import (
     OPEN_PEERS,
     PEERS,

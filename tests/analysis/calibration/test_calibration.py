@@ -13,7 +13,7 @@ from analysis.arrays.array_budget import ArrayBudget
 from analysis.arrays.wave_fronts import wave_front
 from analysis.calibration.calibration import calibrate_array
 from analysis.calibration.calibration_misfit import calibration_misfit
-from analysis.calibration.measured_sound import MeasuredSound
+from analysis.calibration.calibration_sounds import MeasuredSound
 from analysis.calibration.observability import (
     calibration_gains,
     gain_ratios,

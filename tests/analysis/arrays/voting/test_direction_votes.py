@@ -9,7 +9,7 @@ import pytest
 
 from analysis.arrays.voting.direction_votes import VotePlan, cast_votes, join_votes
 from analysis.arrays.voting.vote_peaks import gather_sources
-from analysis.hearing.synthetic_speech import speech_like
+from studies.support.synthetic_speech import speech_like
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 16_000, 343.0
