@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.arrays.voting.phase_plane import PhasePlane
+from analysis.arrays.voting.single_waves import PhasePlane
 from studies.support.talker_trials import TALKER_ARRAYS
 from systems.sound.array_shape import ArrayShape
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.stats import binomtest, chi2
 
-from analysis.hearing.estimation_errors import consistency, rms_ratio, stated_ratio
+from studies.support.estimation_errors import consistency, rms_ratio, stated_ratio
 
 
 @given(k=st.integers(1, 500), scale=st.floats(1e-3, 1e3))

@@ -9,12 +9,8 @@ import numpy as np
 import pytest
 from scipy import fft
 
-from analysis.hearing.free_field import (
-    Loudspeaker,
-    frame_estimator,
-    run_cell,
-    total_consistency,
-)
+from analysis.hearing.single_frames import Loudspeaker, frame_estimator
+from studies.support.free_field_trials import run_cell, total_consistency
 from systems.base.robot import RobotParameters
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_fix import RANGED, SourceFix
@@ -30,20 +26,6 @@ def trials(estimate, **changes):
         "shape": SHAPE, "snr_db": 20.0, "c": C, "trials": 40, "seed": 1, **changes
     }  # fmt: skip
     return run_cell(LOUDSPEAKER, {"it": estimate}, 2.0, 30.0, **settings)["it"]
-
-
-def test_pressure_is_the_sound_delayed_and_weakened():
-    """Against a delay by the Fourier transform of the whole sound."""
-    p_AS = np.array([1.2, 0.7])
-    begin = 0.43217
-    heard = LOUDSPEAKER.pressure(begin, p_AS, SHAPE.p_AM, C)
-    spectrum = fft.rfft(LOUDSPEAKER.samples.astype(float))
-    frequency = fft.rfftfreq(len(LOUDSPEAKER.samples), 1e-5)
-    for channel, p in zip(heard, SHAPE.p_AM, strict=True):
-        distance = math.hypot(*(p_AS - p))
-        turned = spectrum * np.exp(2j * np.pi * frequency * (begin - distance / C))
-        exact = fft.irfft(turned, len(LOUDSPEAKER.samples))[:2500] / distance
-        np.testing.assert_allclose(channel, exact, atol=1e-4 * exact.std())
 
 
 def test_frames_have_the_level_and_noise_asked_for():

@@ -1,4 +1,9 @@
-"""Checks whether delays fit a source position, as given or with two channels exchanged.
+"""Checks whether delays fit the size of the array, and the order of its channels.
+
+Sound takes at most the straight travel time from one microphone to another. The delays
+of all pairs can be much shorter in only one case. In this case, the source is straight
+ahead of a row, or straight above a plane. It is also far away, because the wave fronts
+must be nearly flat.
 
 The delays cannot reveal the following exchanges:
 
@@ -14,6 +19,7 @@ The delays cannot reveal the following exchanges:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +55,28 @@ _WRONG, _RIGHT, _ALIKE, _HOPELESS = 0.35, 0.6, 0.1, 0.1
 # - _LEAST_SPREAD: in standard deviations of the channel gains.
 _LEAST_SPREAD_DB, _LEAST_SPREAD = 3.0, 1.5
 
+#: If delays do not fit the array, the search covers delays up to these path lengths, m.
+REACHES_M = (0.3, 3.0)
+
+# Least share of the frames that agree on delays of any size.
+_LEAST_SHARE = 0.2
+
+# Limits of delays, as a share of the longest possible delay:
+# - _IMPOSSIBLE: if half of the frames exceed this share, the delays are too long.
+# - _NOTHING: if the share _MOST of the frames stays below this, the delays are too
+#   short. They may also be those of a source straight above the array.
+# - _MOST: share of the frames for _NOTHING.
+# For comparison, positions in inches give a share of 0.025, and positions in cm 0.01.
+_IMPOSSIBLE, _NOTHING = 1.5, 0.03
+_MOST = 0.75
+
+# Least distance of a pair as a share of the aperture. The delays of shorter pairs are
+# too short to compare.
+_LONG = 0.3
+
+# Possible error of a delay, samples.
+_SAMPLES = 1.0
+
 
 @dataclass(frozen=True)
 class FrameDelays:
@@ -60,7 +88,7 @@ class FrameDelays:
     """(f, n) levels of the channels, in any unit."""
     shape: ArrayShape
     """The n microphones."""
-    metres_per_sample: float
+    meters_per_sample: float
     """Speed of sound divided by the sample rate, m per sample."""
     position_std_m: float = 0.0
     """Standard deviation of the microphone positions, root mean square, m."""
@@ -71,7 +99,7 @@ class FrameDelays:
     def tolerance_m(self) -> float:
         """Largest error of delays that fit a source position, as a distance, m."""
         across = _FIT_SHARE * self.shape.aperture_m
-        return max(_FIT_SAMPLES * self.metres_per_sample, across, self.misplaced_m)
+        return max(_FIT_SAMPLES * self.meters_per_sample, across, self.misplaced_m)
 
     @property
     def misplaced_m(self) -> float:
@@ -81,21 +109,17 @@ class FrameDelays:
     def agreeing(
         self, tolerance_m: float = np.inf
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Returns range differences and levels of the frames in which all pairs agree.
+        """Returns the frames in which all pairs agree on the delays.
 
-        Args:
-            tolerance_m: Largest root-mean-square disagreement between the pairs, m.
-                Values above ``self.tolerance_m`` have no effect.
-
-        Returns:
-            differences: (k, n - 1) distance of the source from microphones 1 ... n - 1
-                minus its distance from microphone 0, m, in k of the f frames.
-            levels: (k, n) levels of the channels in these frames.
+        The results are the (k, n - 1) differences of the distances of the source from
+        microphones 1 ... n - 1 and from microphone 0, m, and the (k, n) levels. The
+        root-mean-square disagreement of the pairs is below ``tolerance_m``, or below
+        ``self.tolerance_m`` if this is smaller.
         """
         i, j = self.shape.pairs.T
         identity = np.eye(self.shape.count)
         to_pairs = (identity[j] - identity[i])[:, 1:]
-        d = self.lags * self.metres_per_sample
+        d = self.lags * self.meters_per_sample
         differences = d @ np.linalg.pinv(to_pairs).T
         errors = np.sqrt(np.mean((d - differences @ to_pairs.T) ** 2, axis=1))
         agree = errors < min(self.tolerance_m, tolerance_m)
@@ -105,13 +129,9 @@ class FrameDelays:
 def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
     """Finds the exchanges of two channels that make the delays fit a source position.
 
-    Args:
-        delays: Delays of all pairs of microphones in some frames.
-
-    Returns:
-        Pairs of channel numbers, from 0. If there are several pairs, one of them is the
-        exchange. Empty if the delays fit as they are, if no exchange helps, or if the
-        pairs agree in too few frames.
+    If there are several pairs of channel numbers, one of them is the exchange. The list
+    is empty if the delays fit as they are, if no exchange helps, or if the pairs agree
+    in too few frames.
     """
     (d, levels), shape = delays.agreeing(), delays.shape
     if len(d) < _LEAST_FRAMES or _fitting(d, levels, delays)[0] > _WRONG:
@@ -142,14 +162,9 @@ def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
 
 
 def misfit(delays: FrameDelays) -> float | None:
-    """Returns the share of frames that fit no source position, if nearly all fit none.
+    """Returns the share of the agreeing frames that fit no source position.
 
-    Args:
-        delays: Delays of all pairs of microphones in some frames.
-
-    Returns:
-        Share of the agreeing frames that fit no source position, more than 0.9. None if
-        more than 10 % of them fit, or if too few frames agree.
+    It is None if more than 10 % of these frames fit, or if too few frames agree.
     """
     d, levels = delays.agreeing()
     if len(d) < 2 * _LEAST_FRAMES:
@@ -159,32 +174,19 @@ def misfit(delays: FrameDelays) -> float | None:
 
 
 def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
-    """Returns an array with two of its rows exchanged.
-
-    Args:
-        rows: (n, ...) array, which stays as it is.
-        i: Number of the first row to exchange, from 0.
-        j: Number of the second row to exchange, from 0.
-
-    Returns:
-        (n, ...) copy with the two rows exchanged.
-    """
+    """Returns a copy of an array with the rows i and j exchanged."""
     order = np.arange(len(rows))
     order[[i, j]] = j, i
     return rows[order]
 
 
 def _fitting(
-    differences: NDArray[np.float64],
-    levels: NDArray[np.float64],
-    delays: FrameDelays,
+    differences: NDArray[np.float64], levels: NDArray[np.float64], delays: FrameDelays
 ) -> tuple[float, float]:
-    """Computes how many frames fit a source position outside the array, and how well.
+    """Returns the share of frames that fit a position outside the array, and the error.
 
-    Returns:
-        share: Share of the frames that fit, 0 to 1.
-        error: Root-mean-square error of the frames that fit, m. Infinite if no frame
-            fits.
+    The error is the root mean square over these frames, m, or infinite if there are
+    none.
     """
     shape, tolerance = delays.shape, delays.tolerance_m
     gain_std_db = delays.gain_std_db
@@ -210,21 +212,14 @@ def levels_contradict(
     shape: ArrayShape,
     gain_std_db: float = 0.0,
 ) -> bool:
-    """Returns whether the measured levels contradict a near source position.
+    """Returns whether the (n,) measured levels contradict a near source position.
 
     The level of sound from a near source falls as 1/R with the distance R. The check
     rejects wrong near positions. For example, if two neighbors in a row are exchanged,
-    the delays can be those of a source very near to the array.
-
-    Args:
-        levels: (n,) root-mean-square levels of the channels, in any unit.
-        fix: Estimated source position, with or without a range.
-        shape: The n microphones.
-        gain_std_db: Standard deviation of the channel gains, dB.
-
-    Returns:
-        True if the levels vary by less than half of what the law 1/R requires. False if
-        the position has no range, or if the expected levels are too similar to compare.
+    the delays can be those of a source very near to the array. Levels contradict a
+    position if they vary by less than half of what the law 1/R requires. They never
+    contradict a position without a range, or one for which the law requires nearly
+    equal levels.
     """
     if not fix.range_valid:
         return False
@@ -235,3 +230,43 @@ def levels_contradict(
     expected -= expected.mean()
     measured = 20.0 * np.log10(np.maximum(levels, 1e-300))
     return bool(measured @ expected < 0.5 * (expected @ expected))
+
+
+class DelayScale(NamedTuple):
+    """Ratio of measured delays to the longest delays that the array allows."""
+
+    kind: Literal["beyond", "nothing"]
+    share: float
+    """Delay divided by the longest delay that the array allows. If ``kind`` is
+    ``beyond``, it is the median of all frames. If ``kind`` is ``nothing``, three
+    quarters of the frames have a smaller value."""
+    least_range_m: float
+    """Least distance of the source, m, if the array really has the stated size."""
+
+
+def delay_scale(delays: FrameDelays) -> DelayScale | None:
+    """Checks whether delays are too long or too short for the size of the array.
+
+    The result is None if the delays match this size, or if the pairs agree in too few
+    frames.
+    """
+    shape, error = delays.shape, _SAMPLES * delays.meters_per_sample
+    d, _ = delays.agreeing(error)
+    if len(d) < max(_LEAST_FRAMES, _LEAST_SHARE * len(delays.lags)):
+        return None
+    later = np.hstack((np.zeros((len(d), 1)), d))
+    i, j = shape.pairs.T
+    paths = np.abs(later[:, j] - later[:, i])
+    certain = paths - error - delays.misplaced_m
+    over = float(np.median((certain / shape.distances_m).max(axis=1)))
+    if over > _IMPOSSIBLE:
+        return DelayScale("beyond", over, 0.0)
+    long = shape.distances_m > _LONG * shape.aperture_m
+    shares = (paths / shape.distances_m)[:, long].max(axis=1)
+    share = float(np.quantile(shares, _MOST))
+    if share > _NOTHING:
+        return None
+    # At the edge of the aperture a, a wave front from the distance R differs from a
+    # plane by a^2 / (8 R). As a share of the aperture, this is a / (8 R).
+    flat = max(share, 0.25 * delays.meters_per_sample / shape.aperture_m)
+    return DelayScale("nothing", share, shape.aperture_m / (8.0 * flat))

@@ -1,18 +1,24 @@
-"""Where a sound was made: at a stated, uncertain position, or at an unknown one."""
+"""The unknowns of a calibration: the array, and the positions of the sounds."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from analysis.arrays.array_budget import ArrayBudget
 from analysis.arrays.far_field import locate_far_source
-from analysis.calibration.measured_sound import MeasuredSound
-from analysis.calibration.wave_fronts import WaveFront
+from analysis.arrays.wave_fronts import WaveFront, wave_front
+from analysis.calibration.calibration_sounds import MeasuredSound
+from systems.framework.input_error import InputError
 from systems.hearing.multilateration import locate_source
 from systems.sound.array_shape import ArrayShape
+
+# A direction whose variance is below this share of the largest is taken as exact.
+_EXACT = 1e-14
 
 # An unknown source is assumed to be rarely nearer than this many apertures. This weak
 # assumption hardly affects the estimate. It keeps an unobservable range finite.
@@ -27,14 +33,88 @@ _ANY_DIRECTION = 10.0
 
 
 @dataclass(frozen=True)
+class ArrayUnknowns:
+    """The unknowns of an array: microphone positions, speed of sound, channel delays.
+
+    For n microphones in d dimensions, the full vector holds n d coordinates, the speed
+    of sound, and n delays. A delay that all channels share has no effect. The n delays
+    therefore add up to 0. The m unknowns z are deviations from the stated values, in
+    stated standard deviations.
+    """
+
+    places: NDArray[np.float64]
+    """(n, d) stated microphone positions, m."""
+    c: float
+    """Stated speed of sound, m/s."""
+    budget: ArrayBudget
+    """Stated standard deviations of positions, speed of sound and delays."""
+
+    @cached_property
+    def origin(self) -> NDArray[np.float64]:
+        """(d,) centroid of the microphones, m. Source positions are relative to it."""
+        return np.asarray(self.places.mean(axis=0))
+
+    @cached_property
+    def scale(self) -> NDArray[np.float64]:
+        """(n d + 1 + n, m) change of the full vector per standard deviation of each z.
+
+        Raises ``InputError`` if all uncertainties are stated as 0.
+        """
+        count = len(self.places)
+        variances, axes = np.linalg.eigh(self.budget.of_places)
+        kept = variances > _EXACT * max(float(variances[-1]), 1e-30)
+        of_places = axes[:, kept] * np.sqrt(variances[kept])
+        apart = np.linalg.svd(np.ones((1, count)))[2][1:].T * self.budget.delay_std
+        scale = block_diag(of_places, self.budget.speed_std, apart)
+        uncertain = np.any(scale != 0.0, axis=0)
+        if not uncertain.any():
+            raise InputError(
+                "position_std_m",
+                "is 0, as are all other uncertainties; state how uncertain the "
+                "geometry is, for example 'position_std_m: 0.02'",
+            )
+        return np.compress(uncertain, scale, axis=1)
+
+    @cached_property
+    def prior_covariance(self) -> NDArray[np.float64]:
+        """(n d + 1 + n, n d + 1 + n) covariance of the full vector, as stated."""
+        return np.asarray(self.scale @ self.scale.T)
+
+    def values(
+        self, z: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+        """Converts z to (n, d) positions, speed of sound and (n,) channel delays."""
+        stated = (self.places.ravel(), [self.c], np.zeros(len(self.places)))
+        whole = np.concatenate(stated) + self.scale @ z
+        size = self.places.size
+        places = whole[:size].reshape(self.places.shape)
+        return places, float(whole[size]), whole[size + 1 :]
+
+    def front(
+        self, z: NDArray[np.float64], h: NDArray[np.float64], w: float
+    ) -> tuple[WaveFront, NDArray[np.float64]]:
+        """Computes the delays of a source at h / w relative to ``origin``.
+
+        The delays include those of the channels. The second result is their (n - 1, m)
+        slopes along z, s.
+        """
+        places, c, late = self.values(z)
+        front = wave_front(places - self.origin, max(c, 0.1 * self.c), h, w)
+        own = np.eye(len(places))
+        slopes = np.hstack(
+            (front.by_places, front.by_speed[:, np.newaxis], own[1:] - own[0])
+        )
+        heard = front.delays + late[1:] - late[0]
+        return replace(front, delays=heard), slopes @ self.scale
+
+
+@dataclass(frozen=True)
 class SoundPlace:
-    """The position of a sound's source, with its d unknowns and their prior.
+    """The position h / w of a sound's source, with its d unknowns and their prior.
 
-    The position is h / w. The unknowns depend on whether the position was stated:
-
-    - If stated, they are the d coordinates over their standard deviation.
-    - If not stated, they are d - 1 changes of direction, in rad, and the inverse range
-      over its standard deviation.
+    If the position was stated, the unknowns are its coordinates over their standard
+    deviation. Otherwise, they are d - 1 changes of direction, in rad, and the inverse
+    range over its standard deviation.
     """
 
     h: NDArray[np.float64]
@@ -52,15 +132,7 @@ class SoundPlace:
 
     @classmethod
     def stated_at(cls, position: NDArray[np.float64], std: float) -> SoundPlace:
-        """Makes a ``SoundPlace`` from a stated position.
-
-        Args:
-            position: (d,) position relative to the frame's origin, m.
-            std: Standard deviation of each coordinate, m.
-
-        Returns:
-            The place at the stated position.
-        """
+        """Makes a ``SoundPlace`` from a (d,) stated position from the origin, m."""
         return cls(
             h=position.copy(),
             w=1.0,
@@ -74,17 +146,7 @@ class SoundPlace:
     def heard(
         cls, sound: MeasuredSound, shape: ArrayShape, c: float, budget: ArrayBudget
     ) -> SoundPlace:
-        """Makes the initial ``SoundPlace`` of a sound whose position is not stated.
-
-        Args:
-            sound: The measured delays.
-            shape: The array as stated.
-            c: Stated speed of sound, m/s.
-            budget: Uncertainties of the array and of the speed of sound.
-
-        Returns:
-            The place as located by the array as stated.
-        """
+        """Locates a sound whose position is not stated, with the array as stated."""
         far = locate_far_source(sound.tau, sound.covariance, shape, c)
         whole = sound.covariance + budget.delay_covariance(far.p_AS, 0.0, shape, c)
         fix = locate_source(sound.tau, whole, shape, c)

@@ -7,12 +7,12 @@ import pytest
 from scipy.special import polygamma
 
 from analysis.arrays.voting.direction_votes import VotePlan, cast_votes
-from analysis.arrays.voting.steady_sound import (
+from analysis.recordings.heard_sources import (
     is_steady,
     level_scatter_db,
     steered_only,
 )
-from analysis.hearing.synthetic_speech import speech_like
+from studies.support.synthetic_speech import speech_like
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 16_000, 343.0

@@ -9,34 +9,26 @@ therefore takes little more time than the estimate.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from analysis.hearing.cramer_rao import (
-    LocalizationBound,
-    SlopeEnergy,
-    polar_point,
-    position_bound,
-)
-from analysis.hearing.estimation_errors import (
+from analysis.hearing.cramer_rao import LocalizationBound, polar_point, position_bound
+from analysis.hearing.single_frames import Estimator, Loudspeaker
+from analysis.reporting.intervals import Estimate
+from studies.support.estimation_errors import (
     Consistency,
     consistency,
     rms_ratio,
     stated_ratio,
 )
-from analysis.reporting.intervals import Estimate
-from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S, Emission
-from systems.hearing.localise import Localiser
-from systems.hearing.parameters import TDOAParameters
+from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S
 from systems.hearing.source_fix import SourceFix
 from systems.sound.adc import convert
 from systems.sound.array_shape import ArrayShape
-from systems.sound.parameters import EDGE_S, MicArrayParameters, SoundParameters
-from systems.sound.propagation import propagate
-from systems.sound.waveforms import make_waveform
+from systems.sound.parameters import MicArrayParameters
 
 #: Ratio of the converter's full scale to the largest sample.
 _HEADROOM = 1.2
@@ -47,99 +39,6 @@ _OUTLIER = 8.0
 #: Least time between the loudspeaker's first sample and a frame, s. Sound may travel
 #: for at most this time.
 _LEAD_S = 0.1
-
-Estimator = Callable[[NDArray[np.float32]], SourceFix | None]
-
-
-def frame_estimator(
-    parameters: TDOAParameters, shape: ArrayShape, c: float, *, limited: bool = True
-) -> Estimator:
-    """Makes a function that locates the source in a single frame.
-
-    The function does what ``TDOAEstimator`` does in the first frame that it receives.
-
-    Args:
-        parameters: Settings of the estimator.
-        shape: The array of n microphones.
-        c: Speed of sound, m/s.
-        limited: Whether to reject unreliable estimates, as in ``Localiser``.
-
-    Returns:
-        A function from an (n, samples) frame to a position estimate. The function
-        returns None if the frame has no detectable sound.
-    """
-    localiser = Localiser(parameters, shape, c, limited=limited)
-    return lambda frame: localiser.localise(frame, localiser.blank())[0]
-
-
-@dataclass(frozen=True)
-class Loudspeaker:
-    """A continuous sound for all trials, with the energy of its slope."""
-
-    samples: NDArray[np.float32]
-    """(n,) sound pressure at 1 m, Pa."""
-    energy: SlopeEnergy
-    level_pa: float
-    """RMS of the samples, Pa at 1 m."""
-
-    @classmethod
-    def of(cls, kind: str, seed: int, seconds: float = 2.0) -> Loudspeaker:
-        """Makes a chirp or a band noise of 0.5-8 kHz.
-
-        Args:
-            kind: ``chirp`` or ``band_noise``.
-            seed: Seed of the noise.
-            seconds: Length of the sound, s.
-
-        Returns:
-            The sound at 100 kHz, its slope energy and its level.
-        """
-        sound = SoundParameters.model_validate(
-            {"kind": kind, "on_s": seconds, "period_s": seconds}
-        )
-        samples = make_waveform(sound, seed)
-        edge = round(EDGE_S * SAMPLE_RATE_HZ)
-        level = float(np.sqrt(np.mean(samples[edge:-edge] ** 2, dtype=float)))
-        return cls(samples, SlopeEnergy.of(samples, SAMPLE_RATE_HZ), level)
-
-    @property
-    def seconds(self) -> float:
-        """Length of the sound, s."""
-        return len(self.samples) / SAMPLE_RATE_HZ
-
-    def pressure(
-        self,
-        begin: ArrayLike,
-        p_AS: NDArray[np.float64],
-        p_AM: NDArray[np.float64],
-        c: float,
-    ) -> NDArray[np.float32]:
-        """Computes the sound pressure at microphones at rest for one frame.
-
-        Args:
-            begin: Time of the frame's first sample, s. Either (n,), or one time for all
-                channels.
-            p_AS: (2,) position of the source, m.
-            p_AM: (n, 2) positions of the microphones, m.
-            c: Speed of sound, m/s.
-
-        Returns:
-            (n, samples) sound pressure, Pa.
-        """
-        emission = Emission(
-            samples=self.samples,
-            start_time=0.0,
-            sample_rate_hz=float(SAMPLE_RATE_HZ),
-            knot_times=np.array([0.0, self.seconds]),
-            p_WS=np.tile(p_AS, (2, 1)),
-            v_WS=np.zeros((2, 2)),
-            level_pa=self.level_pa,
-            sounding=True,
-        )
-        begins = np.broadcast_to(begin, len(p_AM))
-        times = np.stack((begins, begins + TICK_S), axis=1)
-        p_WM = np.repeat(p_AM[:, None, :], 2, axis=1)
-        return propagate(emission, times, p_WM, np.zeros(p_WM.shape), FRAME_SAMPLES, c)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,10 @@
-"""Fits a plane wave to the phases of one frequency at the microphones.
+"""Finds bins with one wave, and fits a plane wave to their phases.
+
+A bin is one frequency at one time. If only one wave reaches an array, the covariance of
+the channels over a few frames has the rank 1. Its nonzero eigenvalues are equal to
+those of the matrix of products between the frames. This matrix is smaller if an array
+has more microphones than there are frames. It can be computed for all groups of frames
+at once.
 
 The slowness of a wave is its direction divided by its speed. In this module, it is
 relative to that of sound, so the slowness of a sound wave has the length 1.
@@ -13,6 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
+
+#: Number of frames in a covariance.
+GROUP_FRAMES = 4
 
 # Least ratio of the narrowest to the widest extent of the short pairs. Only then do the
 # short pairs span the array.
@@ -93,15 +102,7 @@ class PhasePlane:
 
     @classmethod
     def of(cls, shape: ArrayShape, c: float) -> PhasePlane:
-        """Makes the fit for an array from the shortest pairs that span the array.
-
-        Args:
-            shape: The microphones.
-            c: Speed of sound, m/s.
-
-        Returns:
-            The fit for the array.
-        """
+        """Makes the fit for an array from the shortest pairs that span the array."""
         i, j = shape.pairs.T
         paths = (shape.p_AM[j] - shape.p_AM[i]) @ shape.span.T
         for longest in np.sort(shape.distances_m):
@@ -130,15 +131,10 @@ class PhasePlane:
     def fit(
         self, pattern: NDArray[np.complex128], frequency_hz: NDArray[np.float64]
     ) -> PlaneFits:
-        """Fits a plane wave to each of k patterns of amplitudes at the microphones.
+        """Fits a plane wave to each of (k, n) complex amplitudes at the n microphones.
 
-        Args:
-            pattern: (k, n) complex amplitudes at n microphones. A common factor of all
-                amplitudes of a pattern has no effect.
-            frequency_hz: (k,) frequency of each pattern, up to ``highest_hz``, Hz.
-
-        Returns:
-            Directions of the patterns to which a plane wave fits.
+        A common factor of the n amplitudes has no effect. The (k,) frequencies are at
+        most ``highest_hz``.
         """
         i, j = self.shape.pairs.T
         phase = np.angle(pattern[:, j] * pattern[:, i].conj())
@@ -151,7 +147,8 @@ class PhasePlane:
                 phase[wrapped], number[wrapped, 0]
             )
         # The phases of long pairs are unwrapped with the slowness from the short pairs.
-        left = _wrapped(phase - number * (slowness @ self.paths.T))
+        left = phase - number * (slowness @ self.paths.T)
+        left -= 2.0 * np.pi * np.rint(left / (2.0 * np.pi))
         turn = left @ self.refine.T / number
         slowness += turn
         left -= number * (turn @ self.paths.T)
@@ -173,9 +170,8 @@ class PhasePlane:
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Finds the guessed direction that fits the phases of all pairs best.
 
-        Returns:
-            slowness: (k, r) best guess for each pattern.
-            clear: (k,) True if no clearly different guess fits nearly as well.
+        The results are the (k, r) best guesses, and whether no clearly different guess
+        fits nearly as well.
         """
         slowness = np.empty((len(phase), self.guesses.shape[1]))
         clear = np.empty(len(phase), dtype=bool)
@@ -196,15 +192,10 @@ class PhasePlane:
     def _directions(
         self, slowness: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Converts measured slownesses to directions.
+        """Converts measured slownesses to directions, and returns their lengths.
 
-        A slowness is the direction of a wave divided by its speed, relative to that of
-        sound.
-
-        Returns:
-            u: (k, d) directions. They are unit vectors if the component perpendicular
-                to the array can be computed.
-            length: (k,) lengths of the measured slownesses.
+        The directions are unit vectors if the component perpendicular to the array can
+        be computed.
         """
         length = np.linalg.norm(slowness, axis=1)
         u = slowness @ self.shape.span
@@ -228,5 +219,61 @@ def _guesses(shape: ArrayShape, wavelength_m: float) -> NDArray[np.float64]:
     return np.asarray(grid[(length <= 1.0) & (length >= least)])
 
 
-def _wrapped(phase: NDArray[np.float64]) -> NDArray[np.float64]:
-    return phase - 2.0 * np.pi * np.rint(phase / (2.0 * np.pi))
+def _products(spectra: NDArray[np.complex64]) -> list[NDArray[np.complex64]]:
+    """Returns products of each frame with the frame m later, for m = 0, 1, 2, 3.
+
+    Each product is summed over the channels and has the shape (frames - m, bins).
+    """
+    frames = len(spectra)
+    return [
+        np.einsum("fnb,fnb->fb", spectra[: frames - m], spectra[m:].conj())
+        for m in range(GROUP_FRAMES)
+    ]
+
+
+def _running(values: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """Returns the sums of ``size`` consecutive rows, starting at each row."""
+    count = len(values) - size + 1
+    return np.sum([values[k : k + count] for k in range(size)], axis=0)
+
+
+def group_powers(spectra: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Computes the (g, b) power of each group of frames, summed over the channels.
+
+    Group k consists of the frames k ... k + ``GROUP_FRAMES`` - 1 of the (f, n, b)
+    spectra.
+    """
+    power = np.einsum("fnb->fb", spectra.real**2 + spectra.imag**2)
+    return _running(power, GROUP_FRAMES)
+
+
+def find_rank_one(
+    spectra: NDArray[np.complex64], candidates: NDArray[np.bool_], least_ratio: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.complex128]]:
+    """Finds those of the (g, b) candidate bins that contain only one wave.
+
+    A bin is one frequency in one group of frames. The results are the (k,) numbers of
+    the groups and of the frequencies of these bins, and their (k, n) dominant
+    eigenvectors, with any length and phase.
+    """
+    products = _products(spectra)
+    power = _running(products[0].real, GROUP_FRAMES)
+    # Sum of the squared eigenvalues.
+    squares = _running(np.abs(products[0]) ** 2, GROUP_FRAMES)
+    for m in range(1, GROUP_FRAMES):
+        squares += 2.0 * _running(np.abs(products[m]) ** 2, GROUP_FRAMES - m)
+    # Least sum of squares at this ratio, as a share of the squared sum of the
+    # eigenvalues.
+    rest = GROUP_FRAMES - 1
+    least = (1.0 + rest / least_ratio**2) / (1.0 + rest / least_ratio) ** 2
+    group, bins = np.nonzero(candidates & (squares >= least * power**2) & (power > 0.0))
+    if not len(group):
+        return group, bins, np.empty((0, spectra.shape[1]), dtype=np.complex128)
+    frames = group[:, np.newaxis] + np.arange(GROUP_FRAMES)
+    snapshots = spectra[frames, :, bins[:, np.newaxis]].astype(np.complex128)
+    gram = snapshots @ snapshots.conj().transpose(0, 2, 1)
+    values, vectors = np.linalg.eigh(gram)
+    found = values[:, -1] >= least_ratio * values[:, -2]
+    first = vectors[found, :, -1].conj()
+    pattern = np.einsum("kf,kfn->kn", first, snapshots[found])
+    return group[found], bins[found], pattern

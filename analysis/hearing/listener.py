@@ -37,11 +37,7 @@ class Heard:
     ranges: NDArray[np.float64]
     """(l,) ranges from the frames with a valid range, m."""
     positions: NDArray[np.float64]
-    """(l, 2) estimated positions from the frames with a valid range, m.
-
-    The origin is the microphones' centroid, and the axes are those of the robot frame
-    B.
-    """
+    """(l, 2) positions like p_AS, estimated from the frames with a valid range, m."""
     bound: LocalizationBound
     """Bound due to noise and rounding, averaged over all frames."""
 
@@ -51,14 +47,8 @@ class Listener:
 
     Drake never frees blocks that are written in Python. One diagram therefore serves
     all measurements. For each relative position, the robot is moved, and the source
-    stays.
-
-    Args:
-        scenario: Scenario with a continuously sounding source at rest, and a robot that
-            no force moves.
-
-    Raises:
-        ValueError: The sound cannot be played.
+    stays. The source of the scenario sounds continuously at rest, and no force moves
+    the robot.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -79,21 +69,12 @@ class Listener:
         *,
         session: int = 0,
     ) -> Heard:
-        """Takes measurements of the source at one relative position.
+        """Takes one measurement from each of ``trials`` frames (25 ms of audio).
 
-        Each frame (25 ms of audio) gives one measurement.
-
-        Args:
-            distance: Distance of the source from the microphones' centroid, m.
-            bearing: Bearing of the source, rad.
-            trials: Number of frames.
-            tolerances: Largest errors of the array and of the speed of sound. They are
-                redrawn for every frame.
-            session: Number of the session. Sessions run at different times. Each
-                session therefore has its own noise and errors.
-
-        Returns:
-            The estimates, with their bound.
+        The source is at a distance in m and a bearing in rad from the microphones'
+        centroid. The errors of the array and of the speed of sound are redrawn within
+        their tolerances for every frame. Sessions run at different times. Each session
+        therefore has its own noise and errors.
         """
         p_AS = distance * np.array([math.cos(bearing), math.sin(bearing)])
         start = session * (trials + 4 * _LEAD)

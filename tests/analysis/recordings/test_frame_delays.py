@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from hypothesis import given, strategies as st
 
-from analysis.recordings.channel_order import (
+from analysis.recordings.frame_delays import (
     FrameDelays,
     exchanged_channels,
     levels_contradict,

@@ -31,19 +31,10 @@ class WaveFront:
 def wave_front(
     p: NDArray[np.float64], c: float, h: NDArray[np.float64], w: float
 ) -> WaveFront:
-    """Computes the delays of sound from a source at h / w.
+    """Computes the delays of sound from a source at h / w to (n, d) positions p.
 
     For a microphone at m, the path from the source is longer than the path to the
     origin by D = (|h - w m| - |h|) / w. The code uses a form of D that allows w = 0.
-
-    Args:
-        p: (n, d) microphone positions, m.
-        c: Speed of sound, m/s.
-        h: (d,) position in m, or unit vector to the source, in the microphones' frame.
-        w: 1 if h is a position, or the inverse range, 1/m.
-
-    Returns:
-        The delays and their slopes.
     """
     count, dimension = p.shape
     to_source = h - w * p
