@@ -9,6 +9,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from typing import TypeVar
 
 Result = TypeVar("Result")
@@ -22,19 +23,23 @@ def run_jobs(
     Args:
         jobs: Functions without arguments that can be pickled.
         workers: Number of processes.
-        jobs_a_worker: Number of jobs after which a process is replaced.
+        jobs_a_worker: Mean number of jobs after which a process is replaced.
 
     Yields:
         Results of the jobs, in the order of the jobs.
     """
-    with ProcessPoolExecutor(
-        workers, max_tasks_per_child=jobs_a_worker, initializer=_end_at_interrupt
-    ) as pool:
-        try:
-            for each in [pool.submit(job) for job in jobs]:
-                yield each.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    # The option max_tasks_per_child of the executor can hang, at least in Python 3.11
+    # to 3.14: https://github.com/python/cpython/issues/115634
+    size = workers * jobs_a_worker
+    for start in range(0, len(jobs), size):
+        with ProcessPoolExecutor(
+            workers, mp_context=get_context("spawn"), initializer=_end_at_interrupt
+        ) as pool:
+            try:
+                for each in [pool.submit(job) for job in jobs[start : start + size]]:
+                    yield each.result()
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _end_at_interrupt() -> None:
