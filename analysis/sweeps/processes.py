@@ -90,15 +90,6 @@ class WorkerProcess:
         outcome: Outcome = message
         return outcome
 
-    def run(self, task: Task) -> Outcome:
-        """Runs one task to its end; raises the same errors as ``receive``."""
-        if not self.ready:
-            self.receive()
-        self.give(task)
-        outcome = self.receive()
-        assert outcome is not None
-        return outcome
-
     def close(self) -> None:
         """Ends the process and its child at once."""
         self.connection.close()
@@ -127,7 +118,25 @@ def run_locally(
     Raises:
         WorkerError: A worker process cannot be started.
     """
-    pool = _Pool(tasks)
+    idle: deque[WorkerProcess] = deque()
+    try:
+        yield from run_in_workers(tasks, pulse, workers, idle)
+    finally:
+        close_workers(idle)
+
+
+def run_in_workers(
+    tasks: Iterator[Task],
+    pulse: Callable[[], None],
+    workers: int,
+    idle: deque[WorkerProcess],
+) -> Generator[Outcome]:
+    """Does the work of ``run_locally``, with the workers in ``idle`` first.
+
+    Workers that have no tasks left are appended to ``idle``, which several threads may
+    share.
+    """
+    pool = _Pool(tasks, idle)
     try:
         for _ in range(workers):
             pool.start()
@@ -135,12 +144,20 @@ def run_locally(
             yield from pool.step()
             pulse()
     finally:
-        pool.close()
+        close_workers(deque(pool.busy.values()))
+
+
+def close_workers(workers: deque[WorkerProcess]) -> None:
+    """Ends all worker processes in ``workers``, and empties ``workers``."""
+    with contextlib.suppress(IndexError):
+        while True:
+            workers.pop().close()
 
 
 class _Pool:
-    def __init__(self, tasks: Iterator[Task]) -> None:
+    def __init__(self, tasks: Iterator[Task], idle: deque[WorkerProcess]) -> None:
         self.busy: dict[Connection, WorkerProcess] = {}
+        self._idle = idle
         self._tasks = tasks
         self._first: deque[Task] = deque()
         self._again: dict[int, int] = {}
@@ -149,12 +166,16 @@ class _Pool:
         return self._first.popleft() if self._first else next(self._tasks, None)
 
     def start(self) -> None:
-        """Starts a worker for the next task, if there is one."""
+        """Takes or starts a worker for the next task, if there is one."""
         task = self._next()
-        if task is not None:
-            self._first.appendleft(task)
+        if task is None:
+            return
+        try:
+            worker = self._idle.pop()
+        except IndexError:
             worker = WorkerProcess(task)
-            self.busy[worker.connection] = worker
+        worker.give(task)
+        self.busy[worker.connection] = worker
 
     def step(self) -> Iterator[Outcome]:
         for connection in wait(list(self.busy), PULSE_S):
@@ -167,7 +188,7 @@ class _Pool:
             while len(worker.tasks) < AHEAD and (task := self._next()) is not None:
                 worker.give(task)
             if not worker.tasks:
-                self._dismiss(worker)
+                self._idle.append(self.busy.pop(worker.connection))
             if outcome is not None:
                 yield outcome
 
@@ -179,7 +200,7 @@ class _Pool:
         worker.
         """
         task, *others = worker.tasks
-        self._dismiss(worker)
+        self.busy.pop(worker.connection).close()
         self._first.extendleft(reversed(others))
         tried = self._again.pop(task.point.index, 1)
         if tried < ATTEMPTS:
@@ -188,11 +209,3 @@ class _Pool:
         else:
             yield lost_outcome(task, f"its worker process ended {ATTEMPTS} times")
         self.start()
-
-    def _dismiss(self, worker: WorkerProcess) -> None:
-        del self.busy[worker.connection]
-        worker.close()
-
-    def close(self) -> None:
-        for worker in list(self.busy.values()):
-            self._dismiss(worker)
