@@ -26,7 +26,7 @@ from analysis.sweeps.processes import (
     WorkerError,
     WorkerProcess,
     close_workers,
-    run_in_workers,
+    run_locally,
 )
 from systems.framework.input_error import InputError
 
@@ -223,7 +223,7 @@ def _outcome(future: Any, task: Task) -> Outcome:
 
 def _run_remotely(task: Task) -> Outcome:
     """Runs a task, in a thread of a Dask worker."""
-    (outcome,) = run_in_workers(iter([task]), lambda: None, 1, _idle)
+    (outcome,) = run_locally(iter([task]), lambda: None, workers=1, idle=_idle)
     return outcome
 
 

@@ -99,7 +99,11 @@ class WorkerProcess:
 
 
 def run_locally(
-    tasks: Iterator[Task], pulse: Callable[[], None], *, workers: int
+    tasks: Iterator[Task],
+    pulse: Callable[[], None],
+    *,
+    workers: int,
+    idle: deque[WorkerProcess] | None = None,
 ) -> Generator[Outcome]:
     """Runs the tasks of a parameter sweep in local processes.
 
@@ -111,6 +115,8 @@ def run_locally(
         pulse: Function that is called a few times per second. If it raises an
             exception, the work ends.
         workers: Number of processes.
+        idle: Processes that are used first. The function returns its processes to this
+            queue, which several threads may share. None means that the processes end.
 
     Yields:
         Results of the runs, in the order in which the runs end.
@@ -118,25 +124,7 @@ def run_locally(
     Raises:
         WorkerError: A worker process cannot be started.
     """
-    idle: deque[WorkerProcess] = deque()
-    try:
-        yield from run_in_workers(tasks, pulse, workers, idle)
-    finally:
-        close_workers(idle)
-
-
-def run_in_workers(
-    tasks: Iterator[Task],
-    pulse: Callable[[], None],
-    workers: int,
-    idle: deque[WorkerProcess],
-) -> Generator[Outcome]:
-    """Does the work of ``run_locally``, with the workers in ``idle`` first.
-
-    Workers that have no tasks left are appended to ``idle``, which several threads may
-    share.
-    """
-    pool = _Pool(tasks, idle)
+    pool = _Pool(tasks, deque() if idle is None else idle)
     try:
         for _ in range(workers):
             pool.start()
@@ -145,10 +133,12 @@ def run_in_workers(
             pulse()
     finally:
         close_workers(deque(pool.busy.values()))
+        if idle is None:
+            close_workers(pool.idle)
 
 
 def close_workers(workers: deque[WorkerProcess]) -> None:
-    """Ends all worker processes in ``workers``, and empties ``workers``."""
+    """Ends the processes in a queue, and empties the queue."""
     with contextlib.suppress(IndexError):
         while True:
             workers.pop().close()
@@ -157,7 +147,7 @@ def close_workers(workers: deque[WorkerProcess]) -> None:
 class _Pool:
     def __init__(self, tasks: Iterator[Task], idle: deque[WorkerProcess]) -> None:
         self.busy: dict[Connection, WorkerProcess] = {}
-        self._idle = idle
+        self.idle = idle
         self._tasks = tasks
         self._first: deque[Task] = deque()
         self._again: dict[int, int] = {}
@@ -171,7 +161,7 @@ class _Pool:
         if task is None:
             return
         try:
-            worker = self._idle.pop()
+            worker = self.idle.pop()
         except IndexError:
             worker = WorkerProcess(task)
         worker.give(task)
@@ -188,7 +178,7 @@ class _Pool:
             while len(worker.tasks) < AHEAD and (task := self._next()) is not None:
                 worker.give(task)
             if not worker.tasks:
-                self._idle.append(self.busy.pop(worker.connection))
+                self.idle.append(self.busy.pop(worker.connection))
             if outcome is not None:
                 yield outcome
 
