@@ -28,8 +28,8 @@ def run_jobs(
     Yields:
         Results of the jobs, in the order of the jobs.
     """
-    # The option max_tasks_per_child of the executor can hang, at least in Python 3.11
-    # to 3.14: https://github.com/python/cpython/issues/115634
+    # The executor's own option max_tasks_per_child can hang in Python 3.11 and in later
+    # versions without this fix: https://github.com/python/cpython/issues/115634
     size = workers * jobs_a_worker
     for start in range(0, len(jobs), size):
         with ProcessPoolExecutor(
