@@ -9,18 +9,18 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
-from analysis.certificates.disturbance_bounds import disturbance_bounds, source_bound
-from analysis.laws.radial_law import radial_law
-from analysis.models.point_mass import point_mass
-from analysis.nonlinear.contact_oscillation import contact_oscillation
-from analysis.nonlinear.equilibrium_maps import gap_map
-from analysis.nonlinear.phase_portrait import phase_portrait
-from analysis.nonlinear.velocity_passivity import (
+from analysis.certificates.velocity_passivity import (
     energy_balance,
     velocity_term_passivity,
 )
-from analysis.nonlinear.velocity_terms import velocity_term_analysis
+from analysis.laws.radial_law import radial_law
+from analysis.models.point_mass import point_mass
 from diagrams import Scenario, load_scenario
+from studies.nonlinear.contact_oscillation import contact_oscillation
+from studies.nonlinear.equilibrium_maps import gap_map
+from studies.nonlinear.phase_portrait import phase_portrait
+from studies.nonlinear.velocity_terms import velocity_term_analysis
+from studies.proofs.disturbance_bounds import disturbance_bounds, source_bound
 from studies.support.trap_stiffness import trap_stiffness
 from studies.tables import Table
 

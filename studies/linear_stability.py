@@ -15,7 +15,6 @@ from analysis.linear.contact_mode import contact_limits
 from analysis.linear.delay_margin import DELAY_PLACES, DelayedLoop
 from analysis.linear.delayed_run import check_delay_margin
 from analysis.linear.loop_margins import LoopMargins, all_margins, loop_margins
-from analysis.linear.sampled_stability import check_conditions
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import find_equilibria, follow_equilibrium
 from analysis.models.linearisation import check_gradient, compare_routes
@@ -23,6 +22,7 @@ from analysis.models.open_loops import DIRECTIONS, BreakPoint, target_loop
 from analysis.models.operating_points import OperatingPoint, moving_equilibrium
 from diagrams import load_scenario
 from diagrams.scenario.scenario import Scenario
+from studies.linear.sampled_stability import check_conditions
 from studies.tables import Table
 from systems.framework.signals import TICK_S
 
@@ -244,9 +244,10 @@ def tables(duration_s: float = 300.0) -> Iterator[Table]:
 
 def draw(directory: Path) -> None:
     """The page's pictures."""
-    from analysis.linear.burst_gaps import gap_chart
-    from analysis.linear.linear_plots import plot_equilibria, plot_nyquist
     from analysis.stability.chart_plots import plot_contact_limits, plot_gap_chart
+
+    from analysis.linear.linear_plots import plot_equilibria, plot_nyquist
+    from studies.linear.burst_gaps import gap_chart
 
     directory.mkdir(parents=True, exist_ok=True)
     scenario = Scenario(law="active")

@@ -13,13 +13,13 @@ from analysis.linear.delay_margin import delay_margin
 from analysis.linear.delayed_run import check_delay_margin
 from analysis.linear.loop_margins import loop_margins
 from analysis.linear.loop_uncertainty import following_poles
-from analysis.linear.root_locus import root_loci
-from analysis.linear.sampled_stability import check_conditions, gain_delay_chart
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linearisation import compare_routes, continuous_model
 from analysis.models.open_loops import open_loop
 from diagrams.scenario.scenario import Scenario
+from studies.linear.root_locus import root_loci
+from studies.linear.sampled_stability import check_conditions, gain_delay_chart
 from systems.framework.input_error import InputError
 from tests.block_forces import block_force
 

@@ -7,17 +7,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from analysis.linear import linear_plots
-from analysis.linear.burst_gaps import GapChart
 from analysis.linear.contact_mode import contact_limits
 from analysis.linear.delayed_run import check_delay_margin
 from analysis.linear.gang_of_four import gang_of_four
 from analysis.linear.loop_margins import all_margins
-from analysis.linear.root_locus import root_loci
-from analysis.linear.sampled_stability import gain_chart, poles_against_period
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import find_equilibria, follow_equilibrium
 from analysis.stability import chart_plots
 from diagrams.scenario.scenario import Scenario
+from studies.linear.burst_gaps import GapChart
+from studies.linear.root_locus import root_loci
+from studies.linear.sampled_stability import gain_chart, poles_against_period
 
 
 @pytest.fixture(scope="module")

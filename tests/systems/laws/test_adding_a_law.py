@@ -31,7 +31,7 @@ from analysis.laws.law_curves import law_curves
 from analysis.laws.law_curves_plots import plot_law_curves
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from analysis.laws.radial_law import radial_law
-from analysis.linear.root_locus import root_loci
+from studies.linear.root_locus import root_loci
 from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import analyse_law
 from analysis.stability.model_sheet import model_sheet

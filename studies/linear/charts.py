@@ -1,4 +1,4 @@
-"""Figures of sampling and latency: stability charts, root loci, and contact limits."""
+"""Figures of sampled loops: stability charts, root loci, and silences of the sound."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
-from analysis.linear.burst_gaps import GapChart
-from analysis.linear.contact_mode import ContactLimits
-from analysis.linear.delayed_run import DelayCheck
 from analysis.linear.linear_plots import panels
-from analysis.linear.root_locus import RootLocus
-from analysis.linear.sampled_stability import PolesAgainstPeriod, StabilityChart
 from analysis.reporting.palette import COLOURS
+from studies.linear.burst_gaps import GapChart
+from studies.linear.root_locus import RootLocus
+from studies.linear.sampled_stability import PolesAgainstPeriod, StabilityChart
 
 _LINES = ("#0072B2", "#D55E00", "#009E73", "#A8498A", "#7A5200")
 #: Marker of the values in the scenario.
@@ -112,41 +110,6 @@ def plot_gap_chart(chart: GapChart) -> Figure:
     return figure
 
 
-def plot_contact_limits(limits: ContactLimits) -> Figure:
-    """Plots the largest stable K_0 and k_ref over the motor lag, for each latency."""
-    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
-    panels = (
-        ("K_0 (N/m)", limits.stiffness_n_m, limits.stiffness_today_n_m),
-        (
-            "k_ref (N/m)",
-            limits.reference_stiffness_n_m,
-            limits.reference_stiffness_today_n_m,
-        ),
-    )
-    for axes, (name, values, today) in zip(figure.subplots(1, 2), panels, strict=True):
-        for k, ticks in enumerate(limits.latency_ticks):
-            axes.loglog(
-                limits.motor_lags_s,
-                np.maximum(values[:, k], 1e-2),
-                "o-",
-                markersize=3,
-                color=_LINES[k % len(_LINES)],
-                label=f"{ticks * limits.tick_s * 1e3:.0f} ms",
-            )
-        axes.plot(limits.today[0], today, "*", markersize=14, **_CURRENT)
-        axes.annotate(
-            "current",
-            (limits.today[0], today),
-            textcoords="offset points",
-            xytext=(8, 4),
-        )
-        axes.set_xlabel("motor lag (s)")
-        axes.set_ylabel(f"largest stable {name}")
-        axes.grid(visible=True, which="both", linewidth=0.3)
-        axes.legend(title="latency of echoes", fontsize=8, title_fontsize=8)
-    return figure
-
-
 def plot_root_loci(loci: Sequence[RootLocus]) -> Figure:
     """Plots poles in the s plane for 0.05 to 20 times the current gain."""
     figure, cells = panels(len(loci), columns=2, size=(4.8, 3.8))
@@ -171,19 +134,3 @@ def _root_locus(figure: Figure, axes: Axes, locus: RootLocus) -> None:
     axes.set_title(f"{locus.parameter}\n({locus.loop})", fontsize=9)
     axes.legend(fontsize=8, loc="upper left")
     figure.colorbar(dots, ax=axes)
-
-
-def plot_delay_check(check: DelayCheck) -> Figure:
-    """Plots the simulated offsets for 0.95 and 1.05 times the delay margin."""
-    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-    runs = (("0.95", check.below), ("1.05", check.above))
-    for axes, (share, run) in zip(figure.subplots(1, 2), runs, strict=True):
-        axes.plot(run.time_s, 1e6 * run.offset_m, color=_LINES[0], linewidth=0.7)
-        axes.set_title(
-            f"{share} of {check.margin.delay_s * 1e3:.1f} ms at the "
-            f"{check.margin.at}: growth {run.growth_per_s:+.4f} 1/s",
-            fontsize=9,
-        )
-        axes.set_xlabel("time (s)")
-        axes.set_ylabel("offset of P (um)")
-    return figure

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from analysis.linear.burst_cycle import burst_cycle
-from analysis.linear.burst_gaps import gap_chart
 from analysis.linear.contact_mode import contact_model, largest_contact_stiffness
-from analysis.linear.root_locus import root_loci
-from analysis.linear.sampled_stability import (
+from analysis.models.equilibria import follow_equilibrium
+from diagrams.scenario.scenario import Scenario
+from studies.linear.burst_gaps import gap_chart
+from studies.linear.root_locus import root_loci
+from studies.linear.sampled_stability import (
     check_conditions,
     gain_chart,
     gain_delay_chart,
     poles_against_period,
 )
-from analysis.models.equilibria import follow_equilibrium
-from diagrams.scenario.scenario import Scenario
 
 M, K, D, T, LAG = 3.94, 2.0, 1.0, 0.025, 0.05
 

@@ -1,6 +1,6 @@
 """Sum-of-squares programs that find and prove a region of attraction.
 
-``analysis.certificates.sos_region`` uses the programs. The candidate Lyapunov function
+``studies.proofs.sos_region`` uses the programs. The candidate Lyapunov function
 is V = y' P y, with the scaled state y. The stiffness h of the model has a bounded
 error. For both signs of the error, the programs require a multiplier sigma such that
 
@@ -25,14 +25,14 @@ from pydrake.solvers import (
 from pydrake.symbolic import Expression, Monomial, Polynomial as SymbolicPolynomial
 from scipy.linalg import solve_continuous_lyapunov
 
-from analysis.certificates.exact_polynomials import (
+from studies.proofs.exact_polynomials import (
     Exponents,
     Polynomial,
     gram_polynomial,
     is_positive_definite,
     match_gram,
 )
-from analysis.certificates.lag_model import LagModel
+from studies.proofs.lag_model import LagModel
 from systems.framework.input_error import InputError
 
 # Factors that shrink the largest region of the linear model. The first region uses the

@@ -7,9 +7,9 @@ import pytest
 from pydrake.solvers import ClarabelSolver
 from scipy.linalg import expm
 
-from analysis.certificates.lag_model import lag_model
-from analysis.certificates.sos_program import feasibility, is_proved, solve
-from analysis.certificates.sos_region import sos_region
+from studies.proofs.lag_model import lag_model
+from studies.proofs.sos_program import feasibility, is_proved, solve
+from studies.proofs.sos_region import sos_region
 
 pytestmark = pytest.mark.drake
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
 
-from analysis.laws.head_on import HeadOn
 from analysis.linear.contact_mode import motion_chain
 from analysis.models.linear_models import LinearModel
-from analysis.nonlinear.velocity_terms import Variant, sensed_speeds
+from studies.nonlinear.head_on import HeadOn
+from studies.nonlinear.velocity_terms import Variant, sensed_speeds
 
 #: Number of phases of a cycle at which the law is evaluated.
 _PHASES = 64

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.certificates.exact_polynomials import Exponents, Polynomial
-from analysis.laws.head_on import HeadOn, head_on
 from diagrams import Scenario
+from studies.nonlinear.head_on import HeadOn, head_on
+from studies.proofs.exact_polynomials import Exponents, Polynomial
 
 # Degree of the polynomial h, and largest error of h as a share of h(0).
 _DEGREE, _TOLERANCE = 4, 0.01

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from analysis.certificates.exact_polynomials import (
+from studies.proofs.exact_polynomials import (
     Polynomial,
     gram_polynomial,
     is_positive_definite,

@@ -14,21 +14,21 @@ from analysis.certificates.certificate_plots import (
     plot_energy_certificate,
 )
 from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.disturbance_bounds import disturbance_bounds
 from analysis.certificates.energy_certificate import certify_energy
-from analysis.nonlinear.contact_oscillation import contact_oscillation
-from analysis.nonlinear.equilibrium_maps import gap_map
-from analysis.nonlinear.nonlinear_plots import (
+from analysis.certificates.velocity_passivity import energy_balance
+from studies.nonlinear.contact_oscillation import contact_oscillation
+from studies.nonlinear.equilibrium_maps import gap_map
+from studies.nonlinear.phase_portrait import phase_portrait
+from studies.nonlinear.plots import (
     plot_contact_oscillation,
     plot_equilibrium_maps,
     plot_phase_portrait,
     plot_ratio_map,
     plot_velocity_terms,
 )
-from analysis.nonlinear.phase_portrait import phase_portrait
-from analysis.nonlinear.stiffness_ratio import stiffness_ratio_map
-from analysis.nonlinear.velocity_passivity import energy_balance
-from analysis.nonlinear.velocity_terms import velocity_term_analysis
+from studies.nonlinear.stiffness_ratio import stiffness_ratio_map
+from studies.nonlinear.velocity_terms import velocity_term_analysis
+from studies.proofs.disturbance_bounds import disturbance_bounds
 
 
 def curves(axes):

@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analysis.nonlinear.contact_oscillation import ContactOscillation
-from analysis.nonlinear.equilibrium_maps import BOX_X_M, EquilibriumMap
-from analysis.nonlinear.phase_portrait import PhasePortrait
-from analysis.nonlinear.stiffness_ratio import RatioMap
-from analysis.nonlinear.velocity_terms import VelocityTermAnalysis
 from analysis.reporting.palette import COLOURS
+from studies.nonlinear.contact_oscillation import ContactOscillation
+from studies.nonlinear.equilibrium_maps import BOX_X_M, EquilibriumMap
+from studies.nonlinear.phase_portrait import PhasePortrait
+from studies.nonlinear.stiffness_ratio import RatioMap
+from studies.nonlinear.velocity_terms import VelocityTermAnalysis
 
 _STYLES = {"printed": (COLOURS["robot"], "-"), "closing": (COLOURS["source"], "--")}
 

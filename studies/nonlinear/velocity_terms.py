@@ -17,8 +17,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.laws.head_on import HeadOn, head_on
 from diagrams import Scenario
+from studies.nonlinear.head_on import HeadOn, head_on
 from systems.laws.impedance_controller import obstacle_speed
 
 Variant = Literal["printed", "closing"]

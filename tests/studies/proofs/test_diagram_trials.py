@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.diagram_trials import _mechanism, _pose, try_diagram
 from analysis.certificates.energy_certificate import certify_energy
 from diagrams.running.stop_rules import Collision
+from studies.proofs.diagram_trials import _mechanism, _pose, try_diagram
 
 
 def test_runs_begin_where_and_as_fast_as_they_should(two_boxes):

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import iv, modstruve
 
-from analysis.laws.head_on import head_on
-from analysis.nonlinear.velocity_terms import velocity_term_analysis
+from studies.nonlinear.head_on import head_on
+from studies.nonlinear.velocity_terms import velocity_term_analysis
 
 TO_GO = 1.7
 

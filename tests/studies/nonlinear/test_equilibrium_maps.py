@@ -9,13 +9,13 @@ import pytest
 
 from analysis.models.equilibria import find_equilibria
 from analysis.models.point_mass import point_mass
-from analysis.nonlinear.equilibrium_maps import (
+from studies.nonlinear.equilibrium_maps import (
     boxes_scenario,
     gap_map,
     local_minima,
     offset_map,
 )
-from analysis.nonlinear.stiffness_ratio import stiffness_ratio_map
+from studies.nonlinear.stiffness_ratio import stiffness_ratio_map
 from studies.support.trap_stiffness import trap_stiffness
 
 

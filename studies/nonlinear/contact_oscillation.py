@@ -1,7 +1,7 @@
 """Oscillation before an obstacle: harmonic balance compared with simulation.
 
 In the simulation, the robot has exact sensors and drives head-on towards a wide box.
-``analysis.nonlinear.harmonic_balance`` computes the prediction.
+``studies.nonlinear.harmonic_balance`` computes the prediction.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.laws.head_on import HeadOn, head_on
 from analysis.models.ideal_scenarios import changed, ideal_scenario
-from analysis.nonlinear.harmonic_balance import (
+from diagrams import Scenario, simulate
+from studies.nonlinear.harmonic_balance import (
     OscillationPrediction,
     predict_oscillation,
 )
-from analysis.nonlinear.velocity_terms import VARIANTS, Variant
-from diagrams import Scenario, simulate
+from studies.nonlinear.head_on import HeadOn, head_on
+from studies.nonlinear.velocity_terms import VARIANTS, Variant
 
 #: Depth and width of the box, m. P never moves as far sideways as the box is wide.
 _BOX_M = (0.1, 1.0)

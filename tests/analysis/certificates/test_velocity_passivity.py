@@ -7,7 +7,7 @@ import pytest
 from pydrake.symbolic import Expression, Variable, exp
 from scipy.optimize import minimize_scalar
 
-from analysis.nonlinear.velocity_passivity import (
+from analysis.certificates.velocity_passivity import (
     energy_balance,
     velocity_term_passivity,
 )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.laws.head_on import head_on
-from analysis.nonlinear.phase_portrait import (
+from studies.nonlinear.head_on import head_on
+from studies.nonlinear.phase_portrait import (
     certified_speeds,
     head_on_model,
     phase_portrait,

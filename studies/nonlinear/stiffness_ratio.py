@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.laws.head_on import head_on
 from diagrams import Scenario
+from studies.nonlinear.head_on import head_on
 from systems.laws.active import active_force
 
 #: Spacing of the distances at which push and pull are compared, m.

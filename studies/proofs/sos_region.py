@@ -15,7 +15,7 @@ region therefore never collide. The conditions for both signs of e are:
 
 The solver Clarabel alternately finds P and the multipliers sigma. The solver CSDP
 repeats the last step. Rational arithmetic then checks the result exactly
-(``analysis.certificates.exact_polynomials``). The solver SCS is not used, because its
+(``studies.proofs.exact_polynomials``). The solver SCS is not used, because its
 tolerance is too large for a proof.
 """
 
@@ -28,8 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.solvers import ClarabelSolver, CsdpSolver
 
-from analysis.certificates.lag_model import LagModel, lag_model
-from analysis.certificates.sos_program import (
+from diagrams import Scenario
+from studies.nonlinear.phase_portrait import certified_speeds, head_on_model
+from studies.proofs.lag_model import LagModel, lag_model
+from studies.proofs.sos_program import (
     box,
     feasibility,
     find_multipliers,
@@ -38,8 +40,6 @@ from analysis.certificates.sos_program import (
     larger_region,
     solve,
 )
-from analysis.nonlinear.phase_portrait import certified_speeds, head_on_model
-from diagrams import Scenario
 
 #: Number of alternations between finding P and finding multipliers.
 _ROUNDS = 6

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from analysis.certificates.disturbance_bounds import (
+from analysis.models.point_mass import point_mass
+from studies.proofs.disturbance_bounds import (
     _certified_time,
     _peak_gain,
     disturbance_bounds,
     encounter_contact_time,
     source_bound,
 )
-from analysis.models.point_mass import point_mass
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.laws.head_on import HeadOn, head_on
 from analysis.models.point_mass import PointMass, VelocityTermModel
 from diagrams import Scenario
+from studies.nonlinear.head_on import HeadOn, head_on
 
 #: First: half width of the obstacle's face, m. Second: depth of the obstacle, m.
 _FACE_M = (4.0, 0.1)
