@@ -202,12 +202,10 @@ def run(options: argparse.Namespace) -> Iterator[Table]:
 
 def _draw(rows: Sequence[CertificateRow], directory: Path) -> None:
     """Map, phase plane and region of each law."""
-    from analysis.certificates.certificate_plots import (
-        plot_energy_certificate,
-        plot_sos_region,
-    )
+    from analysis.certificates.certificate_plots import plot_energy_certificate
     from studies.nonlinear.phase_portrait import phase_portrait
     from studies.nonlinear.plots import plot_phase_portrait
+    from studies.proofs.plots import plot_sos_region
 
     directory.mkdir(parents=True, exist_ok=True)
     for row in rows:

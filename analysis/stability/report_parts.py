@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from analysis.reporting.section import Bullets
+from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.gain_parts import RECOMMENDED_GAINS
 from analysis.stability.law_analysis import Part
 from analysis.stability.linear_parts import LINEAR_MODELS, OPERATING_POINTS, STEP
 from analysis.stability.margin_parts import MARGINS
-from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.robustness_parts import CONTACT_ROBUSTNESS, ROBUSTNESS
 from analysis.stability.route_parts import (
     ADAPTATION,

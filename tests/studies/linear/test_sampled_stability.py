@@ -143,10 +143,29 @@ def test_contact_locus_starts_from_the_slopes_of_the_law():
         np.testing.assert_allclose(found, np.sort_complex(model.s_poles), rtol=1e-6)
 
 
-def test_approaching_obstacles_damp():
-    """D_0 on the change over a tick acts as on a velocity half a tick ago."""
-    damped = contact_model(Scenario(), 12.0, approach_damping_n_s_m=0.8).growth_per_s
-    as_velocity = contact_model(Scenario(), 12.0, damping_n_s_m=1.8).growth_per_s
-    plain = contact_model(Scenario(), 12.0).growth_per_s
-    # The damper acts on the true motion, behind the motors' lag.
-    assert plain - damped == pytest.approx(plain - as_velocity, rel=0.2)
+def with_tick(tick_s: float) -> Scenario:
+    rates = {"microphones": {"frame_s": tick_s}, "ultrasonic": {"period_s": tick_s}}
+    return Scenario.model_validate({"law": "none", "tick_s": tick_s} | rates)
+
+
+@pytest.mark.parametrize("tick_s", [0.0125, 0.05])
+def test_conditions_and_delays_count_in_ticks(tick_s):
+    assert all(check.mismatches == 0 for check in check_conditions(500, tick_s=tick_s))
+    chart = gain_delay_chart(
+        with_tick(tick_s), delays_s=[0.0, 0.1], stiffnesses_n_m=[K, 4.0]
+    )
+    np.testing.assert_allclose(chart.x, [0.0, 0.1])
+    # p'' = -(K/M) p(t - 0.1 s) - (D/M) p' with the lag: its rightmost root.
+    s = -0.1 + 0.7j
+    for _ in range(50):
+        left = M * s * s * (1 + LAG * s) + D * s + K * np.exp(-0.1 * s)
+        slope = M * (2 * s + 3 * LAG * s * s) + D - 0.1 * K * np.exp(-0.1 * s)
+        s -= left / slope
+    assert chart.growth_per_s[0, 1] == pytest.approx(s.real, abs=2e-3)
+
+
+@pytest.mark.parametrize("tick_s", [0.0125, 0.05])
+def test_root_loci_pass_through_the_poles_at_other_ticks(tick_s):
+    """The poles are those of the difference equation at the scenario's gains."""
+    today = root_loci(with_tick(tick_s))[0].poles_today
+    assert today.real.max() == pytest.approx(growth(K, D, period=tick_s), abs=1e-6)

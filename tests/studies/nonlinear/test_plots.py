@@ -7,15 +7,6 @@ import re
 import numpy as np
 import pytest
 
-from analysis.certificates.certificate_plots import (
-    plot_certificate_trials,
-    plot_disturbance_bounds,
-    plot_energy_balance,
-    plot_energy_certificate,
-)
-from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.energy_certificate import certify_energy
-from analysis.certificates.velocity_passivity import energy_balance
 from studies.nonlinear.contact_oscillation import contact_oscillation
 from studies.nonlinear.equilibrium_maps import gap_map
 from studies.nonlinear.phase_portrait import phase_portrait
@@ -28,7 +19,6 @@ from studies.nonlinear.plots import (
 )
 from studies.nonlinear.stiffness_ratio import stiffness_ratio_map
 from studies.nonlinear.velocity_terms import velocity_term_analysis
-from studies.proofs.disturbance_bounds import disturbance_bounds
 
 
 def curves(axes):
@@ -38,36 +28,6 @@ def curves(axes):
         for line in axes.get_lines()
         if not str(line.get_label()).startswith("_")
     }
-
-
-@pytest.fixture(scope="module")
-def certificate(two_boxes):
-    return certify_energy(two_boxes("active"), cell_m=0.05)
-
-
-def test_map_of_certified_speeds(certificate):
-    axes = plot_energy_certificate(certificate).axes[0]
-    shown = axes.collections[0].get_array()
-    assert shown is not None
-    np.testing.assert_allclose(
-        np.ma.filled(shown, np.nan).ravel(), certificate.largest_speed().T.ravel()
-    )
-    assert f"{100 * certificate.rest_share:.1f} %" in axes.get_title()
-
-
-def test_starts_by_outcome(certificate):
-    trials = try_certificate(certificate, starts=40, duration_s=10.0)
-    axes = plot_certificate_trials(trials).axes[0]
-    counts = {label.split(":")[0]: len(data) for label, data in curves(axes).items()}
-    assert counts["certified"] == 40
-    assert counts["collides"] == trials.outside_collisions
-    assert counts["not certified, safe"] == 40 - trials.outside_collisions
-
-
-def test_energies_of_a_run(two_boxes):
-    balance = energy_balance(two_boxes("conventional"), duration_s=5.0)
-    found = curves(plot_energy_balance(balance).axes[0])
-    np.testing.assert_allclose(found["V"][:, 1], balance.energies_j)
 
 
 def test_velocity_terms(two_boxes):
@@ -101,14 +61,6 @@ def test_phase_portrait(two_boxes):
     assert places == pytest.approx(sorted(portrait.contact.equilibria_m))
 
 
-def test_disturbance_bounds(two_boxes):
-    bounds = disturbance_bounds(two_boxes("conventional"), runs=4)
-    source, obstacle = plot_disturbance_bounds(bounds).axes
-    assert len(curves(source)["simulated"]) == 6
-    certified = [row.certified_s for row in bounds.obstacle]
-    np.testing.assert_allclose(curves(obstacle)["certified"][:, 1], certified)
-
-
 def test_maps(two_boxes):
     scenario = two_boxes("active")
     found = gap_map(scenario, (0.5, 2.0))
@@ -119,10 +71,9 @@ def test_maps(two_boxes):
     assert any(np.allclose(data[:, 1], ratios.outer_m) for data in drawn.values())
 
 
-def test_axes_state_units(two_boxes, certificate):
+def test_axes_state_units(two_boxes):
     scenario = two_boxes("active")
     for figure in (
-        plot_energy_certificate(certificate),
         plot_phase_portrait(phase_portrait(scenario, points=5)),
         plot_velocity_terms(velocity_term_analysis(scenario)),
         plot_ratio_map(stiffness_ratio_map(scenario, (2.0, 4.0))),

@@ -80,7 +80,7 @@ print(json.dumps({
 def add_law(tree: Path) -> None:
     """Ours by links, but for the room of the laws: that is a copy with one more."""
     tree.mkdir()
-    for name in ("analysis", "phonotaxis", "tools"):
+    for name in ("analysis", "phonotaxis", "studies", "tools"):
         (tree / name).symlink_to(ROOT / name)
     own = {"laws", "__pycache__", "scenario.schema.json"}
     for package in ("systems", "diagrams"):

@@ -13,11 +13,7 @@ from analysis.linear.gang_of_four import gang_of_four
 from analysis.linear.loop_margins import all_margins
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import find_equilibria, follow_equilibrium
-from analysis.stability import chart_plots
 from diagrams.scenario.scenario import Scenario
-from studies.linear.burst_gaps import GapChart
-from studies.linear.root_locus import root_loci
-from studies.linear.sampled_stability import gain_chart, poles_against_period
 
 
 @pytest.fixture(scope="module")
@@ -65,41 +61,17 @@ def test_gang_of_four_has_four_panels(point):
     assert len(drawn(linear_plots.plot_gang_of_four(gang_of_four(point))).axes) == 4
 
 
-def test_charts_mark_todays_design(scenario):
-    chart = gain_chart(
-        scenario, stiffnesses_n_m=[1.0, 2.0, 30.0], dampings_n_s_m=[0.5, 1.0, 2.0]
-    )
-    texts = drawn(chart_plots.plot_chart(chart)).axes[0].texts
-    assert [text.get_text() for text in texts] == ["current"]
-    limits = drawn(chart_plots.plot_contact_limits(contact_limits(scenario)))
-    assert len(limits.axes) == 2
-    periods = poles_against_period(scenario, periods_s=[0.01, 0.025, 0.5])
-    assert drawn(chart_plots.plot_poles_against_period(periods))
-
-
-def test_gap_chart_has_a_line_for_each_hold():
-    chart = GapChart(
-        on_s=0.5,
-        gaps_s=np.array([0.0, 1.5, 3.0]),
-        holds=("world", "robot"),
-        multiplier=np.array([[0.9, 0.8, 0.7], [0.9, 1.02, 1.5]]),
-        today=(1.5, "world"),
-    )
-    figure = drawn(chart_plots.plot_gap_chart(chart))
-    labels = figure.axes[0].get_legend_handles_labels()[1]
-    assert labels == ["hold: world", "hold: robot", "current"]
-
-
-def test_root_loci_have_a_panel_each(scenario):
-    loci = root_loci(scenario)
-    figure = drawn(chart_plots.plot_root_loci(loci))
-    titles = [axes.get_title() for axes in figure.axes[: len(loci)]]
-    assert titles == [f"{locus.parameter}\n({locus.loop})" for locus in loci]
+def test_contact_limits_mark_the_scenario(scenario):
+    limits = contact_limits(scenario)
+    for axes in drawn(linear_plots.plot_contact_limits(limits)).axes:
+        (text,) = axes.texts
+        assert text.get_text() == "current"
+        assert text.xy[0] == limits.today[0]
 
 
 def test_delay_check_shows_both_runs(point):
     check = check_delay_margin(point, "wheels", duration_s=20.0)
-    figure = drawn(chart_plots.plot_delay_check(check))
+    figure = drawn(linear_plots.plot_delay_check(check))
     assert [axes.get_title()[:4] for axes in figure.axes] == ["0.95", "1.05"]
 
 
