@@ -180,11 +180,11 @@ def gaps() -> Table:
     return Table("gaps", head, rows())
 
 
-def _stretch(held: tuple[float, ...]) -> str:
+def _stretch(held: tuple[float, ...], digits: int = 1) -> str:
     if not held:
         return "none"
     ends = sorted({min(held), max(held)})
-    return "-".join(f"{end:.1f}" for end in ends) + " m"
+    return "-".join(f"{end:.{digits}f}" for end in ends) + " m"
 
 
 def offsets() -> Table:
@@ -197,14 +197,11 @@ def offsets() -> Table:
         for law in NAMES:
             held = offset_map(scenario_of(law), sensing="exact nearest").jams
             cones = offset_map(scenario_of(law), sensing="cones")
-            yield [law, *map(_fine, (held, cones.jams, cones.collisions))]
+            stretches = (held, cones.jams, cones.collisions)
+            yield [law, *(_stretch(each, digits=2) for each in stretches)]
 
     head = ("held at offsets of", "exact nearest point", "cones", "cones: hits it at")
     return Table("offsets", head, rows())
-
-
-def _fine(values: tuple[float, ...]) -> str:
-    return ", ".join(f"{value:.2f}" for value in values) + " m" if values else "none"
 
 
 def stiffness_ratios() -> Table:

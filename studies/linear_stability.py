@@ -23,7 +23,7 @@ from analysis.models.operating_points import OperatingPoint, moving_equilibrium
 from diagrams import load_scenario
 from diagrams.scenario.scenario import Scenario
 from studies.linear.burst_gaps import gap_chart
-from studies.linear.root_locus import root_loci
+from studies.linear.root_locus import RootLocus, root_loci
 from studies.linear.sampled_stability import check_conditions, poles_against_period
 from studies.tables import Table
 from systems.framework.signals import TICK_S
@@ -163,8 +163,19 @@ def limit_rows() -> Iterator[Sequence[str]]:
     for law in LAWS:
         for locus in root_loci(Scenario(law=law)):
             if law == "none" or locus.loop == "contact":
-                limit = "any" if locus.limit is None else f"{locus.limit:.3g}"
-                yield law, f"`{locus.parameter}`", locus.loop, f"{locus.today:g}", limit
+                yield (
+                    law,
+                    f"`{locus.parameter}`",
+                    locus.loop,
+                    f"{locus.today:.3g}",
+                    _limit(locus),
+                )
+
+
+def _limit(locus: RootLocus) -> str:
+    if (locus.poles_today.real >= 0.0).any():
+        return "unstable now"
+    return "any" if locus.limit is None else f"{locus.limit:.3g}"
 
 
 def silence_rows() -> Iterator[Sequence[str]]:
@@ -172,7 +183,9 @@ def silence_rows() -> Iterator[Sequence[str]]:
     for law in ("none", "active"):
         chart = gap_chart(Scenario(law=law))
         for hold in chart.holds:
-            yield law, hold, f"{chart.longest_stable_s(hold):g}"
+            longest = chart.longest_stable_s(hold)
+            more = " or more" if longest == chart.gaps_s[-1] else ""
+            yield law, hold, f"{longest:g}{more}"
 
 
 def _steps() -> Iterator[Sequence[str]]:
@@ -261,7 +274,11 @@ def tables(duration_s: float = 300.0) -> Iterator[Table]:
         ("law", "parameter", "loop", "current", "stable up to"),
         limit_rows(),
     )
-    yield Table("bursts", ("law", "hold", "largest multiplier", "simulated"), _bursts())
+    yield Table(
+        "bursts",
+        ("law", "hold", "direction", "largest multiplier", "simulated"),
+        _bursts(),
+    )
     yield Table(
         "silences", ("law", "hold", "stable up to a silence of (s)"), silence_rows()
     )
