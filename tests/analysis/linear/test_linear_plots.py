@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 
 from analysis.linear import linear_plots
 from analysis.linear.contact_mode import contact_limits
@@ -65,6 +66,7 @@ def test_contact_limits_mark_the_scenario(scenario):
     limits = contact_limits(scenario)
     for axes in drawn(linear_plots.plot_contact_limits(limits)).axes:
         (text,) = axes.texts
+        assert isinstance(text, Annotation)
         assert text.get_text() == "current"
         assert text.xy[0] == limits.today[0]
 
