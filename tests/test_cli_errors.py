@@ -65,7 +65,7 @@ def fail(*_args, **_options):
         (["accuracy"], "analysis.hearing.localization.prepare_localization"),
         (["locate", "heard.wav"], "analysis.recordings.locate.located"),
         (["scenarios"], "diagrams.library_scenarios"),
-        (["compare", "wall"], "analysis.comparison.compare.prepare_comparison"),
+        (["compare", "wall"], "analysis.sweeps.batch.prepare_comparison"),
     ],
 )
 def test_a_bug_is_no_bad_input(capsys, tmp_path, monkeypatch, words, place):

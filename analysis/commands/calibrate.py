@@ -44,6 +44,7 @@ def _prepare(options: Namespace, take: Take) -> Job[CalibrationRun]:
     from analysis.calibration.calibration_text import (
         calibration_document,
         calibration_text,
+        write_calibration,
     )
 
     def summary(run: CalibrationRun) -> dict[str, Any]:
@@ -52,8 +53,6 @@ def _prepare(options: Namespace, take: Take) -> Job[CalibrationRun]:
 
     def write(run: CalibrationRun, document: dict[str, Any]) -> None:
         if place is not None:
-            from analysis.calibration.calibrated_geometry import write_calibration
-
             write_calibration(document, place.directory)
 
     return Job(

@@ -14,7 +14,7 @@ from analysis.commands.progress import Progress
 if TYPE_CHECKING:
     from analysis.listening.live_hearing import HeardStream
     from analysis.listening.sound_stream import SoundStream
-    from analysis.listening.step_views import Teller
+    from analysis.listening.step_views import TextLines
 
 # Longest time until Python switches threads, s; a tenth of Python's default.
 _SWITCH_S = 5e-4
@@ -107,7 +107,7 @@ def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
     )
 
 
-def _teller(*, as_json: bool) -> Teller:
+def _teller(*, as_json: bool) -> TextLines:
     from analysis.listening.step_views import JsonLines, Screen, TextLines
 
     if as_json:

@@ -27,7 +27,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
     from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
-    from analysis.recordings.array_match import recorded_samples
+    from analysis.recordings.prepared_recording import recorded_samples
 
     given = options.geometry
     geometry = load_geometry(Path(given)) if given else ROBOT_ARRAY

@@ -17,15 +17,9 @@ Result = TypeVar("Result")
 def run_jobs(
     jobs: Sequence[Callable[[], Result]], workers: int, *, jobs_a_worker: int
 ) -> Iterator[Result]:
-    """Runs jobs in worker processes.
+    """Runs picklable jobs in worker processes. Yields the results in order.
 
-    Args:
-        jobs: Functions without arguments that can be pickled.
-        workers: Number of processes.
-        jobs_a_worker: Number of jobs after which a process is replaced.
-
-    Yields:
-        Results of the jobs, in the order of the jobs.
+    Each process is replaced after ``jobs_a_worker`` jobs.
     """
     with ProcessPoolExecutor(
         workers, max_tasks_per_child=jobs_a_worker, initializer=_end_at_interrupt

@@ -36,17 +36,7 @@ class Study:
     """Data objects of earlier parts, by key. A part without a result has no entry."""
 
     def need(self, key: str) -> Any:
-        """Returns the data object of an earlier part.
-
-        Args:
-            key: Key of the earlier part.
-
-        Returns:
-            The data object.
-
-        Raises:
-            InputError: The earlier part has no result.
-        """
+        """Returns the data of an earlier part; InputError if the part has no result."""
         if key not in self.found:
             raise InputError(
                 f"{key}",

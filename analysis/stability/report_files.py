@@ -26,15 +26,8 @@ def stability_document(
 
     The document of one law has its results as keys at the top level. The document of
     several laws has the key ``laws`` with one document per law, and the key
-    ``comparison`` with the verdicts side by side.
-
-    Args:
-        analyses: One analysis per law, all of the same scenario.
-        out: The result directory, whose name is written into the document. None if no
-            files are written.
-
-    Returns:
-        Plain values that can be written as JSON.
+    ``comparison`` with the verdicts side by side. ``out`` is the result directory,
+    whose name is written into the document, or None if no files are written.
     """
     first = analyses[0].scenario
     common = {

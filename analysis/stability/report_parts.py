@@ -66,11 +66,7 @@ _NOT_FOR_SEARCHES = (
 def parts_for(scenarios: Sequence[Scenario]) -> tuple[Part[Any], ...]:
     """Returns the parts of a stability report that suit the robot of the scenarios.
 
-    Args:
-        scenarios: One scenario per law. All scenarios have the same robot.
-
-    Returns:
-        The parts, in the order of the report.
+    There is one scenario per law, and all have the same robot.
     """
     robot = scenarios[0].only
     if robot.searches is not None:

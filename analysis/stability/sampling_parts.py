@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.design.requirements import REQUIRED
 from analysis.laws.radial_law import radial_law
 from analysis.linear.burst_cycle import (
     HOLDS,
@@ -107,10 +108,6 @@ def _sampled_document(data: SampledLoop) -> dict[str, Any]:
 
 
 def _show_sampled(data: SampledLoop) -> list[Content]:
-    rows: list[list[Cell]] = [
-        [m.at, m.direction, m.delay_s, m.delay_s / data.period_s, m.frequency_rad_s]
-        for m in data.margins
-    ]
     contents: list[Content] = [
         (
             "A delay margin is the delay that may be added before the loop oscillates, "
@@ -119,22 +116,28 @@ def _show_sampled(data: SampledLoop) -> list[Content]:
             "estimate later than the tracker assumes; a delay at the wheels makes a "
             "command later."
         ),
-        Table(["late at", "motion", Column("delay", "s"), "ticks", "rad/s"], rows),
+        Table.of(
+            data.margins,
+            {
+                "late at": "at",
+                "motion": "direction",
+                Column("delay", "s"): "delay_s",
+                "ticks": lambda margin: margin.delay_s / data.period_s,
+                "rad/s": "frequency_rad_s",
+            },
+        ),
     ]
     check = data.check
     if check:
         contents += [
-            Table(
-                [
-                    "share of the margin",
-                    Column("delay", "s"),
-                    Column("growth", "1/s"),
-                    "rad/s",
-                ],
-                [
-                    [share, run.delay_s, run.growth_per_s, run.frequency_rad_s]
-                    for share, run in (("0.95", check.below), ("1.05", check.above))
-                ],
+            Table.of(
+                [("0.95", check.below), ("1.05", check.above)],
+                {
+                    "share of the margin": lambda run: run[0],
+                    Column("delay", "s"): lambda run: run[1].delay_s,
+                    Column("growth", "1/s"): lambda run: run[1].growth_per_s,
+                    "rad/s": lambda run: run[1].frequency_rad_s,
+                },
                 "Simulation of the diagram with that delay at the sensor, for "
                 f"{check.below.duration_s:g} s after a small kick",
             ),
@@ -154,7 +157,7 @@ DELAY_MARGINS = Part[SampledLoop](
     _show_sampled,
     criteria=(
         Criterion(
-            "least delay margin", "s", "at least", 0.1,
+            "least delay margin", "s", "at least", REQUIRED.delay_margin_s,
             "it tolerates more added delay than the threshold",
             "less added delay than the threshold makes it oscillate",
             "set by this project; exact margin of the sampled loop",
@@ -255,15 +258,10 @@ class ContactMode:
 def contact_growth(scenario: Scenario, ticks: int) -> float | None:
     """Returns the growth rate of the motion in front of an obstacle, 1/s.
 
-    The spring to the obstacle has the largest stiffness of the law.
-
-    Args:
-        scenario: The scenario with the law.
-        ticks: Age of the measured position of the obstacle, in control periods.
-
-    Returns:
-        The growth rate in 1/s, negative if the motion decays. If the law does not push
-        away from obstacles, None.
+    The spring to the obstacle has the largest stiffness of the law, and the measured
+    position of the obstacle is some control periods (``ticks``) old. The result is
+    negative if the motion decays. If the law does not push away from obstacles, it is
+    None.
     """
     stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:

@@ -7,7 +7,8 @@ differ, in size and in sign.
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace as Made
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,6 +39,8 @@ from analysis.stability.sampling_parts import (
 from diagrams.scenario.scenario import Scenario
 
 T = 0.025
+#: Stands in for any class.
+Made: Any = SimpleNamespace
 #: (phase deg, gain dB, M_s, alpha) of three cuts: no extreme is first or last.
 CUTS = ((50.0, 9.0, 1.5, 0.9), (20.0, 30.0, 4.0, 0.3), (80.0, 2.0, 1.1, 1.4),
         (60.0, 12.0, 2.5, 0.7))  # fmt: skip
@@ -101,7 +104,7 @@ CYCLES = Made(
 )  # fmt: skip
 
 #: Part, made-up data; and by the criterion's name: value, and whether it passes.
-EXPECTED = [
+EXPECTED: list[tuple[Any, Any, dict[str, tuple[float, str]]]] = [
     (OPERATING_POINTS, points(), {
         "growth at rest": (-0.2, "pass"),
         "damping ratio at rest": (0.28, "fail"),
