@@ -275,7 +275,7 @@ def stability(
             commas. ``all`` means all laws that avoid obstacles, or all laws for routes.
             An empty list means the law of the scenario.
         robot: Name of the robot to analyze. None means the first robot.
-        full: Whether to include the parts that take minutes.
+        full: Whether to check by longer simulations, and by more of them.
         progress: Function that is called with the name of each part before its
             computation.
 
@@ -300,7 +300,7 @@ def stability(
     scenarios = chosen_laws(alone, _names(laws))
     for each in scenarios:
         make_controller(each)
-    work = parts_for(scenarios, full=full)
+    work = parts_for(scenarios)
     step = progress or (lambda title: None)
     analyses = [analyse_law(each, work, full=full, step=step) for each in scenarios]
     return StabilityResult(analyses, stability_document(analyses, None))

@@ -40,7 +40,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--full",
         action="store_true",
-        help="all parts, including those that take minutes",
+        help="check by longer simulations, and by more of them",
     )
     take_output(parser)
 
@@ -72,7 +72,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
         logging.getLogger("phonotaxis").warning("%s", note)
     for each in scenarios:
         make_controller(each)
-    work = parts_for(scenarios, full=options.full)
+    work = parts_for(scenarios)
 
     def run(progress: Progress) -> list[LawAnalysis]:
         analyses = [
