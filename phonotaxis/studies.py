@@ -16,8 +16,9 @@ from systems.framework.input_error import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.comparison.laws_in_pairs import Comparison, Pair
     from analysis.stability.law_analysis import LawAnalysis
+    from analysis.sweeps.batch import Batch, PreparedBatch, Summary
+    from analysis.sweeps.pairs import Pair
 
 __all__ = [
     "ComparisonResult",
@@ -33,45 +34,71 @@ __all__ = [
 class SweepResult:
     """Results of a sweep: many runs in one table."""
 
-    plan: SweepPlan
-    table: pd.DataFrame
-    """Table with one row per run: fields, ending and metrics (docs/compare.md)."""
+    batch: Batch
     summary: dict[str, Any]
     """JSON document of ``phonotaxis sweep``."""
-    out: Path
-    """Directory of the results, which contains ``report.html``."""
+
+    @property
+    def plan(self) -> SweepPlan:
+        """Plan of the sweep."""
+        return self._only.plan
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """Table with one row per run: fields, ending and metrics (docs/compare.md)."""
+        return self._only.rows
+
+    @property
+    def out(self) -> Path:
+        """Directory of the results, which contains ``report.html``."""
+        return self.batch.out
+
+    @property
+    def _only(self) -> Summary:
+        (only,) = self.batch.summaries.values()
+        return only
 
     def __repr__(self) -> str:
         return f"<SweepResult {self.plan.name}: {len(self.table)} runs in {self.out}>"
 
     def __str__(self) -> str:
         """Tables of the results, for a terminal."""
-        from analysis.sweeps.summary import sweep_text
+        from analysis.sweeps.report import batch_text
 
-        return sweep_text(self.plan, self.table)
+        return batch_text(self.batch, self.summary)
 
 
 @dataclass(frozen=True, repr=False)
 class ComparisonResult:
     """Results of a comparison of laws on the same layouts."""
 
-    comparisons: dict[str, Comparison]
-    """Cells and pairs of each scenario, by the scenario's name."""
-    pooled: list[Pair]
-    """Pairs of laws over all scenarios together."""
+    batch: Batch
     summary: dict[str, Any]
-    """The JSON document of ``phonotaxis compare``."""
-    out: Path
-    """Directory of the results."""
+    """JSON document of ``phonotaxis compare``."""
+
+    @property
+    def scenarios(self) -> dict[str, Summary]:
+        """Runs, cells and pairs of each scenario, by the scenario's name."""
+        return self.batch.summaries
+
+    @property
+    def pooled(self) -> list[Pair]:
+        """Pairs of values of a field, over all scenarios together."""
+        return self.batch.pooled
+
+    @property
+    def out(self) -> Path:
+        """Directory of the results, which contains ``report.html``."""
+        return self.batch.out
 
     def __repr__(self) -> str:
-        return f"<ComparisonResult {', '.join(self.comparisons)} in {self.out}>"
+        return f"<ComparisonResult {', '.join(self.scenarios)} in {self.out}>"
 
     def __str__(self) -> str:
         """Tables of the results, for a terminal."""
-        from analysis.comparison.report_text import compare_text
+        from analysis.sweeps.report import batch_text
 
-        return compare_text(self.summary, self.comparisons, self.pooled)
+        return batch_text(self.batch, self.summary)
 
 
 @dataclass(frozen=True, repr=False)
@@ -142,21 +169,13 @@ def sweep(
             and the remedy.
         RunError: Every run failed.
     """
-    from analysis.sweeps.one_run import require_runs
-    from analysis.sweeps.page import write_sweep
-    from analysis.sweeps.summary import sweep_summary
-    from analysis.sweeps.sweep import prepare_sweep
+    from analysis.sweeps.batch import prepare_batch
 
     plan = plan if isinstance(plan, SweepPlan) else load_sweep(plan)
-    prepared = prepare_sweep(
+    prepared = prepare_batch(
         plan, out, workers=workers, scheduler=scheduler, resume=resume
     )
-    table = prepared.run(progress)
-    directory = prepared.store.out
-    summary = sweep_summary(plan, prepared.points, table, directory)
-    write_sweep(plan, prepared.points, table, summary)
-    require_runs([table], directory)
-    return SweepResult(plan, table, summary, directory)
+    return SweepResult(*_done(prepared, progress))
 
 
 def compare(
@@ -201,9 +220,8 @@ def compare(
             remedy.
         RunError: Every run failed.
     """
-    from analysis.comparison.compare import prepare_comparison
-    from analysis.comparison.plans import EXPERIMENTS, comparison_plan
-    from analysis.comparison.report import compare_summary, write_comparison
+    from analysis.sweeps.batch import prepare_comparison
+    from analysis.sweeps.comparison_plans import EXPERIMENTS, comparison_plan
 
     chosen = None if laws is None else _names(laws)
     plans = {
@@ -220,10 +238,21 @@ def compare(
     if len(plans) < len(scenarios):
         raise InputError("scenarios", "a name is listed twice; remove one")
     prepared = prepare_comparison(plans, out, workers=workers, resume=resume)
-    comparisons, pooled = prepared.run(progress)
-    summary = compare_summary(prepared, comparisons, pooled)
-    write_comparison(prepared, comparisons, pooled, summary)
-    return ComparisonResult(comparisons, pooled, summary, prepared.out)
+    return ComparisonResult(*_done(prepared, progress))
+
+
+def _done(
+    prepared: PreparedBatch, progress: Callable[[int], None] | None
+) -> tuple[Batch, dict[str, Any]]:
+    """Runs a batch, and writes its files."""
+    from analysis.sweeps.page import write_batch
+    from analysis.sweeps.report import batch_document
+
+    batch = prepared.run(progress)
+    document = batch_document(batch)
+    write_batch(batch, document)
+    batch.require_runs()
+    return batch, document
 
 
 def stability(

@@ -146,13 +146,13 @@ def _energy_row(row: CertificateRow) -> tuple[object, ...]:
 
 def _diagram_row(row: CertificateRow) -> tuple[object, ...]:
     found = row.diagram
-    low, high = found.interval
+    rate = found.collision_rate
     counts = [found.mechanisms.count(name) for name in ("ahead", "beside", "behind")]
     return (
         f"`{row.law}`",
         len(found.causes),
         found.collisions,
-        f"{found.collisions / len(found.causes):.3f} ({low:.3f}-{high:.3f})",
+        f"{rate.value:.3f} ({rate.low:.3f}-{rate.high:.3f})",
         *counts,
     )
 

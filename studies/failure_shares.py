@@ -47,7 +47,7 @@ def failure_table(summary: dict[str, Any]) -> Table:
             continue
         shares = [_share(counts, name, runs) for name in names]
         failed = f"{100.0 * failures / runs:.1f} %"
-        rows.append([cell["scenario"], cell["law"], failed, *shares])
+        rows.append([cell["scenario"], cell["fields"]["law"], failed, *shares])
     return Table("failures", ["scenario", "law", "failures", *names], rows)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from analysis.reporting.intervals import Estimate
 from studies.tables import Table
 
 #: Bounds within which both count as equivalent.
@@ -23,8 +24,8 @@ _CLEARANCE = "minimum_obstacle_clearance_m"
 def equivalent(summary: dict[str, Any]) -> bool:
     """Whether all pairs together differ less than the bounds, intervals included."""
     pair = _pooled(summary)
-    clearance = pair["metrics"][_CLEARANCE]
-    rates = (pair["success"], pair["collision"])
+    clearance = pair["metrics"][_CLEARANCE]["difference"]
+    rates = (pair["success"]["difference"], pair["collision"]["difference"])
     return all(r["low"] > -RATE and r["high"] < RATE for r in rates) and (
         clearance["low"] > -CLEARANCE_M and clearance["high"] < CLEARANCE_M
     )
@@ -47,18 +48,16 @@ def hearing_table(summary: dict[str, Any]) -> Table:
     pairs = [pair for pair in summary["pairs"] if pair["field"] == "hearing"]
     rows = [_row(summary, pair) for pair in pairs]
     pair = _pooled(summary)
-    clearance = pair["metrics"][_CLEARANCE]
+    clearance = Estimate(**pair["metrics"][_CLEARANCE]["difference"])
     rates = (
-        f"{100.0 * rate['difference']:+z.1f} points "
-        f"({100.0 * rate['low']:+z.1f}, {100.0 * rate['high']:+z.1f})"
-        for rate in (pair["success"], pair["collision"])
+        Estimate(**pair[name]["difference"]).text("+.1f", unit=" points", factor=100.0)
+        for name in ("success", "collision")
     )
-    bounds = ", ".join(f"{100.0 * clearance[end]:+z.2f}" for end in ("low", "high"))
     rows.append(
         (
-            f"all {pair['success']['pairs']} pairs, audio less ideal",
+            f"all {pair['success']['difference']['n']} pairs, audio less ideal",
             *rates,
-            f"{100.0 * clearance['difference']:+z.2f} cm ({bounds})",
+            clearance.text("+.2f", unit=" cm", factor=100.0),
             _apart(pair),
         )
     )
@@ -75,18 +74,16 @@ def _row(summary: dict[str, Any], pair: dict[str, Any]) -> tuple[str, ...]:
             cell
             for cell in summary["cells"]
             if cell["scenario"] == pair["scenario"]
-            and {"law": cell["law"], **cell["fields"]}
-            == {**pair["fields"], "hearing": hearing}
+            and cell["fields"] == {**pair["fields"], "hearing": hearing}
         )
         for hearing in (pair["first"], pair["second"])
     )
     rates = (
-        f"{100.0 * audio[name]['estimate']:.1f} % / "
-        f"{100.0 * ideal[name]['estimate']:.1f} %"
+        f"{100.0 * audio[name]['value']:.1f} % / {100.0 * ideal[name]['value']:.1f} %"
         for name in ("success", "collision")
     )
     clearances = " / ".join(
-        f"{100.0 * cell['metrics'][_CLEARANCE]['median']:z.1f}"
+        f"{100.0 * cell['metrics'][_CLEARANCE]['value']:z.1f}"
         for cell in (audio, ideal)
     )
     law = pair["fields"]["law"]
@@ -95,7 +92,7 @@ def _row(summary: dict[str, Any], pair: dict[str, Any]) -> tuple[str, ...]:
 
 def _apart(pair: dict[str, Any]) -> str:
     rate = pair["success"]
-    return f"{rate['only_first']} + {rate['only_second']} of {rate['pairs']}"
+    return f"{rate['only_first']} + {rate['only_second']} of {rate['difference']['n']}"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from analysis.recordings.locate import hear
 from analysis.recordings.locate_result import LocateResult
-from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.intervals import estimate_rate
 from studies.support.drawn_recordings import (
     RATE,
     SHORT_COUNT,
@@ -207,10 +207,9 @@ def _row(
 def _within(deviations: NDArray[np.float64], limit: float) -> str:
     if not deviations.size:
         return "-"
-    inside = int(np.sum(np.abs(deviations) < limit))
-    low, high = wilson_interval(inside, deviations.size)
-    share = inside / deviations.size
-    return f"{100 * share:.0f} % ({100 * low:.0f}-{100 * high:.0f})"
+    inside = estimate_rate(int(np.sum(np.abs(deviations) < limit)), deviations.size)
+    share, low, high = (100.0 * x for x in (inside.value, *inside.ends))
+    return f"{share:.0f} % ({low:.0f}-{high:.0f})"
 
 
 def _middle(values: Sequence[float], form: str) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.intervals import estimate_rate
 from analysis.sweeps.store import load_results
 from diagrams.running.stop_rules import SUCCESSFUL
 from studies.tables import Table
@@ -59,8 +59,7 @@ def _row(runs: pd.DataFrame) -> list[str]:
 
 
 def _share(part: int, count: int) -> str:
-    low, high = (100.0 * each for each in wilson_interval(part, count))
-    return f"{100.0 * part / count:.1f} % ({low:.1f}, {high:.1f})"
+    return estimate_rate(part, count).text(".1f", unit=" %", factor=100.0)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

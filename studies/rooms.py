@@ -71,12 +71,12 @@ def table_rows(layouts: int, figures: list[Figure]) -> Iterator[Sequence[str]]:
         for kind in SOUNDS:
             found = run_task(task, kind, layouts)
             plain = run_task(task, kind, layouts, precedence=False)
-            share, (low, high) = found.located.mean(), found.located_interval
+            rate = found.located_rate
             row = (
                 f"{task.reverberation_time_s:g} s",
                 f"to {task.largest_range_m:g} m",
                 kind.replace("_", " "),
-                f"{share:.3f} ({low:.3f}-{high:.3f})",
+                f"{rate.value:.3f} ({rate.low:.3f}-{rate.high:.3f})",
                 f"{task.share:g}",
                 f"{found.heard.mean():.3f}",
                 f"{np.nanmedian(np.abs(found.bearing_errors_deg)):.2f} deg",
@@ -84,7 +84,7 @@ def table_rows(layouts: int, figures: list[Figure]) -> Iterator[Sequence[str]]:
                 f"{plain.located.mean():.3f}",
             )
             yield row
-            figures.append(Figure(", ".join(row[:3]), float(share), ">=", task.share))
+            figures.append(Figure(", ".join(row[:3]), rate.value, ">=", task.share))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -11,8 +11,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from analysis.comparison.plans import library_layouts
-from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.intervals import estimate_rate
+from analysis.sweeps.comparison_plans import library_layouts
 from analysis.sweeps.plan import load_sweep
 from diagrams import simulate
 from studies.tables import Table
@@ -97,10 +97,9 @@ def outcomes_cell(causes: Counter[str], runs: int) -> str:
     Returns:
         Collisions, % with the 95 % interval, then goals reached, %.
     """
-    hits = wilson_interval(causes["collision"], runs)
-    low, high = 100.0 * hits.low, 100.0 * hits.high
+    hits = estimate_rate(causes["collision"], runs)
+    share, low, high = (100.0 * each for each in (hits.value, *hits.ends))
     reached = 100.0 * causes["reached"] / runs
-    share = 100.0 * causes["collision"] / runs
     return f"{share:.1f} ({low:.1f} to {high:.1f}); {reached:.1f} %"
 
 

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.comparison.plans import library_layouts
-from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.intervals import Estimate, estimate_rate
 from analysis.runs.metric_table import ARMS_M
+from analysis.sweeps.comparison_plans import library_layouts
 from studies.support.bearing_trials import FAN_M, BearingTrial, hear_once
 from studies.support.listening_methods import (
     PlaneEstimator,
@@ -92,8 +92,8 @@ ODOR_ROWS: Sequence[tuple[str, _Changes, _Changes]] = (
 )
 
 
-def _percent(share: tuple[float, float, float]) -> str:
-    value, low, high = (100.0 * each for each in share)
+def _percent(share: Estimate) -> str:
+    value, low, high = (100.0 * each for each in (share.value, *share.ends))
     return f"{value:.1f} ({low:.1f} to {high:.1f})"
 
 
@@ -181,7 +181,7 @@ def sound_table(runs: int = 200) -> Table:
 def _arms(table: pd.DataFrame, prefix: str) -> str:
     near = table[f"{prefix}minimum_distance_m"] < ARMS_M
     count, runs = int(near.sum()), len(table)
-    return _percent((count / runs, *wilson_interval(count, runs)))
+    return _percent(estimate_rate(count, runs))
 
 
 def mission_table(runs: int = 100) -> Table:
@@ -295,7 +295,7 @@ def bearings_table(count: int = 100) -> Table:
                 tasks = [(trial, how) for trial in trials]
                 found = list(pool.map(_trial, tasks, chunksize=4))
                 good = sum(off <= 10.0 for off, _ in found)
-                cells.append(_percent((good / count, *wilson_interval(good, count))))
+                cells.append(_percent(estimate_rate(good, count)))
                 if number == 0:
                     ambiguous = sum(each for _, each in found)
             text.append([name, *cells, f"{100.0 * ambiguous / count:.0f}"])

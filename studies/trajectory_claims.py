@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from analysis.comparison.paired_statistics import paired_median, paired_rate
-from analysis.comparison.plans import library_layouts
 from analysis.reporting.intervals import (
-    median_interval,
-    wilson_interval,
-    with_interval,
+    estimate_median,
+    estimate_rate,
 )
 from analysis.runs.metric_table import run_metrics
+from analysis.sweeps.comparison_plans import library_layouts
+from analysis.sweeps.pairs import paired_median, paired_rate
 from analysis.sweeps.plan import load_sweep
 from diagrams import Scenario, simulate
 from studies.tables import Table
@@ -153,21 +152,12 @@ def _ran(scenario: Scenario) -> Ran:
 
 
 def _rate(hits: int, runs: int) -> str:
-    interval = wilson_interval(hits, runs)
-    return with_interval(hits / runs, interval.low, interval.high, ".1f", factor=100.0)
+    return estimate_rate(hits, runs).text(".1f", factor=100.0)
 
 
 def _median(values: Sequence[float], form: str) -> str:
     kept = np.asarray(values)[np.isfinite(values)]
-    if not len(kept):
-        return "-"
-    ends = median_interval(kept)
-    # Adding zero makes -0 into 0.
-    median, low, high = (
-        round(float(value), int(form[1])) + 0.0
-        for value in (np.median(kept), ends.low, ends.high)
-    )
-    return with_interval(median, low, high, form)
+    return estimate_median(kept).text(form)
 
 
 def claims_table(scenario: str, found: Mapping[str, Sequence[Ran]]) -> Table:
@@ -227,13 +217,7 @@ def pairs_table(found: Mapping[str, Mapping[str, list[Ran]]]) -> Table:
                 [r.figure("yaw_ripple_rad_s", np.mean) for r in one],
                 [r.figure("yaw_ripple_rad_s", np.mean) for r in other],
             )
-            change = "-"
-            if ripple.difference is not None:
-                assert ripple.low is not None
-                assert ripple.high is not None
-                change = with_interval(
-                    ripple.difference, ripple.low, ripple.high, "+.4f"
-                )
+            change = "-" if ripple is None else ripple.difference.text("+.4f")
             rows.append(
                 [
                     f"{first} / {second}",

@@ -25,12 +25,12 @@ def test_compare_prints_one_document(capsys, tmp_path):
     status, printed, complaint = call(capsys, *words)
     assert (status, complaint) == (0, "")
     document = json.loads(printed)
-    assert [(c["law"], c["runs"]) for c in document["cells"]] == [
+    assert [(c["fields"]["law"], c["runs"]) for c in document["cells"]] == [
         ("none", 1),
         ("active", 1),
     ]
     metrics = document["cells"][0]["metrics"]["minimum_clearance_m"]
-    assert metrics["low"] <= metrics["median"] <= metrics["high"]
+    assert metrics["low"] <= metrics["value"] <= metrics["high"]
     assert [(p["first"], p["second"]) for p in document["pairs"]] == [
         ("none", "active")
     ]

@@ -58,13 +58,15 @@ def test_json_document_page_and_reproduction(capsys, tmp_path):
         clearance = results["minimum_clearance_m"][results["cell"] == number]
         assert cell["causes"] == {"completed": 2}
         assert cell["success"] == {
-            "estimate": 1.0,
+            "value": 1.0,
             "low": pytest.approx(0.3424, abs=1e-4),  # 2 / (2 + 1.96^2)
             "high": pytest.approx(1.0),
+            "n": 2,
+            "level": 0.95,
         }
-        assert cell["metrics"]["minimum_clearance_m"]["median"] == np.median(clearance)
+        assert cell["metrics"]["minimum_clearance_m"]["value"] == np.median(clearance)
     page = (out / "report.html").read_text("utf-8")
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 1
     assert "http" not in page.replace("http://www.w3.org", "")
 
     status, printed, complaint = call(capsys, *words)

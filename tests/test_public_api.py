@@ -227,7 +227,7 @@ def test_a_comparison_counts_the_runs_with_warnings(tmp_path: Path):
     )
     counted = [{"field": FIELD, "runs": 2, "message": MESSAGE}]
     assert [cell["warnings"] for cell in found.summary["cells"]] == [[], counted]
-    line = f"Warning in 2 of 2 runs of guarded: {FIELD}: {MESSAGE}"
+    line = f"Warning in 2 of 4 runs: {FIELD}: {MESSAGE}"
     assert line in str(found).splitlines()
     assert line in shown(found.out / "report.html")
 
@@ -254,10 +254,10 @@ def test_a_comparison_gives_rates_and_pairs(tmp_path: Path):
         out=tmp_path / "laws",
         workers=1,
     )
-    (comparison,) = found.comparisons.values()
-    assert [cell.label for cell in comparison.cells] == ["none", "active"]
+    (comparison,) = found.scenarios.values()
+    assert [cell.label for cell in comparison.cells] == ["law none", "law active"]
     assert (comparison.pairs[0].first, comparison.pairs[0].second) == ("none", "active")
-    assert "success %" in str(found)
+    assert "success (%)" in str(found)
     assert (found.out / "summary.json").is_file()
     with pytest.raises(phonotaxis.InputError, match="is listed twice"):
         phonotaxis.compare("wall", "wall", out=tmp_path / "twice")

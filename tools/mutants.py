@@ -50,10 +50,9 @@ MODULES = (
     "analysis/stability/*_parts.py",
     "studies/support/claim_judges.py",
     "studies/claims.py",
-    "analysis/comparison/laws_in_pairs.py",
-    "analysis/comparison/cells.py",
-    "analysis/comparison/mechanisms.py",
-    "analysis/comparison/paired_statistics.py",
+    "analysis/sweeps/cells.py",
+    "analysis/sweeps/mechanisms.py",
+    "analysis/sweeps/pairs.py",
 )
 #: Operators whose mutants do not run, or mean the same.
 LEFT_OUT = ("NoOp", "Variable", "RemoveDecorator", "ExceptionReplacer")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from analysis.certificates.certificate_trials import BATCH, draw_starts
 from analysis.certificates.energy_certificate import EnergyCertificate
 from analysis.models.diagram_state import set_discrete_state
 from analysis.models.ideal_scenarios import frozen_scenario, require_rolling
-from analysis.reporting.intervals import Interval, wilson_interval
+from analysis.reporting.intervals import Estimate, estimate_rate
 from analysis.views.scene import touching_point
 from diagrams import (
     Scenario,
@@ -57,17 +57,16 @@ class DiagramTrials:
         return self.causes.count("collision")
 
     @property
-    def interval(self) -> Interval:
-        """95 % interval of the collision rate."""
-        return wilson_interval(self.collisions, len(self.causes))
+    def collision_rate(self) -> Estimate:
+        """Share of the runs that ended in a collision."""
+        return estimate_rate(self.collisions, len(self.causes))
 
     def to_dict(self) -> dict[str, Any]:
         """Converts the result to plain values for the JSON document."""
-        rate = {"estimate": self.collisions / len(self.causes)}
         return {
             "runs": len(self.causes),
             "collisions": self.collisions,
-            "collision_rate": rate | self.interval._asdict(),
+            "collision_rate": asdict(self.collision_rate),
             "causes": dict(Counter(self.causes)),
             "mechanisms": dict(Counter(m for m in self.mechanisms if m)),
             "skipped": self.skipped,

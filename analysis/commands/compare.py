@@ -10,7 +10,7 @@ from analysis.commands.command import Command, Job, Take
 from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
-    from analysis.comparison.laws_in_pairs import Comparison, Pair
+    from analysis.sweeps.batch import Batch
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -59,10 +59,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
     take_output(parser)
 
 
-def _prepare(
-    options: Namespace, take: Take
-) -> Job[tuple[dict[str, Comparison], list[Pair]]]:
-    from analysis.comparison.plans import comparison_plans
+def _prepare(options: Namespace, take: Take) -> Job[Batch]:
+    from analysis.sweeps.comparison_plans import comparison_plans
     from analysis.sweeps.options import check_options
 
     check_options(options.out, workers=options.workers, resume=options.resume)
@@ -79,23 +77,13 @@ def _prepare(
         plan.check()
     say(f"comparing laws in {', '.join(plans)}")
 
-    from analysis.comparison.compare import prepare_comparison
-    from analysis.comparison.report import compare_summary, write_comparison
-    from analysis.comparison.report_text import compare_text
+    from analysis.commands.batch_job import batch_job
+    from analysis.sweeps.batch import prepare_comparison
 
     prepared = prepare_comparison(
         plans, options.out, workers=options.workers, resume=options.resume
     )
-    return Job(
-        run=prepared.run,
-        summary=lambda found: compare_summary(prepared, *found),
-        text=lambda found, summary: compare_text(summary, *found),
-        out=prepared.out,
-        write=lambda found, summary: write_comparison(prepared, *found, summary),
-        total=prepared.runs,
-        unit="runs",
-        kept=lambda: prepared.done,
-    )
+    return batch_job(prepared)
 
 
 COMMAND = Command(

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from analysis.commands.arguments import take_output
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from analysis.sweeps.batch import Batch
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -32,7 +32,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     take_output(parser)
 
 
-def _prepare(options: Namespace, take: Take) -> Job[pd.DataFrame]:
+def _prepare(options: Namespace, take: Take) -> Job[Batch]:
     from analysis.sweeps.options import check_options
     from analysis.sweeps.plan import load_sweep
 
@@ -46,35 +46,17 @@ def _prepare(options: Namespace, take: Take) -> Job[pd.DataFrame]:
     plan.check()
     say(f"sweeping {options.sweep}")
 
-    from analysis.sweeps.one_run import require_runs
-    from analysis.sweeps.page import write_sweep
-    from analysis.sweeps.summary import sweep_summary, sweep_text
-    from analysis.sweeps.sweep import prepare_sweep
+    from analysis.commands.batch_job import batch_job
+    from analysis.sweeps.batch import prepare_batch
 
-    sweep = prepare_sweep(
+    prepared = prepare_batch(
         plan,
         options.out,
         workers=options.workers,
         scheduler=options.scheduler,
         resume=options.resume,
     )
-    points, out = sweep.points, sweep.store.out
-
-    def write(results: pd.DataFrame, summary: dict[str, Any]) -> None:
-        write_sweep(plan, points, results, summary)
-        require_runs([results], out)
-
-    return Job(
-        run=sweep.run,
-        summary=lambda results: sweep_summary(plan, points, results, out),
-        text=lambda results, _: sweep_text(plan, results),
-        out=out,
-        write=write,
-        where="\nresults in {out}, report in {out}/report.html",
-        total=len(points),
-        unit="runs",
-        kept=lambda: len(sweep.store.done),
-    )
+    return batch_job(prepared)
 
 
 COMMAND = Command(

@@ -48,11 +48,14 @@ def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> Estimate:
 
     errors = np.asarray(errors, dtype=float)
     if errors.size == 0:
-        return Estimate(math.inf, 0.0, math.inf)
+        return Estimate(math.inf, 0.0, math.inf, 0)
     square = float(np.mean(errors**2) / np.mean(np.square(stds)))
     low, high = chi2.interval(CONFIDENCE, errors.size) / np.array(errors.size)
     return Estimate(
-        math.sqrt(square), math.sqrt(square / high), math.sqrt(square / low)
+        math.sqrt(square),
+        math.sqrt(square / high),
+        math.sqrt(square / low),
+        errors.size,
     )
 
 

@@ -1,135 +1,140 @@
-"""Confidence intervals of rates and of sample statistics."""
+"""Rates, medians and means of samples, with confidence intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+import math
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+#: Confidence level of the intervals in all reports.
+LEVEL = 0.95
 
 
-class Interval(NamedTuple):
-    """A confidence interval."""
-
-    low: float
-    high: float
-
-
-class Estimate(NamedTuple):
-    """An estimated value with its 95 % confidence interval; NaN without data."""
+@dataclass(frozen=True)
+class Estimate:
+    """A number that is estimated from samples, with its confidence interval."""
 
     value: float
     low: float
+    """Lower end of the interval."""
     high: float
+    """Upper end of the interval."""
+    n: int
+    """Number of samples. Without samples, the other numbers are NaN."""
+    level: float = LEVEL
+    """Confidence level of the interval, between 0 and 1."""
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Both ends of the interval."""
+        return self.low, self.high
+
+    def text(self, form: str, *, unit: str = "", factor: float = 1.0) -> str:
+        """Writes the value and its interval for readers.
+
+        Args:
+            form: Format of all three numbers, for Python's function ``format``. Zeros
+                never have a minus sign.
+            unit: Unit after the value, with a leading space.
+            factor: Factor that multiplies all three numbers before they are written.
+
+        Returns:
+            Text in the form '12.5 % (3.1, 22.0)'; a dash without samples.
+        """
+        if self.n == 0:
+            return "-"
+        form = form.replace(".", "z.")
+        value, low, high = (factor * x for x in (self.value, self.low, self.high))
+        return f"{value:{form}}{unit} ({low:{form}}, {high:{form}})"
 
 
-def with_interval(
-    value: float,
-    low: float,
-    high: float,
-    form: str,
-    *,
-    unit: str = "",
-    factor: float = 1.0,
-) -> str:
-    """Writes a value and its confidence interval for readers.
+def nothing(level: float = LEVEL) -> Estimate:
+    """The estimate without any sample."""
+    return Estimate(math.nan, math.nan, math.nan, 0, level)
+
+
+def estimate_rate(count: int, n: int, *, level: float = LEVEL) -> Estimate:
+    """Estimates a probability from a number of events.
+
+    The interval is Wilson's score interval, without continuity correction. Reference:
+    Wilson (1927).
 
     Args:
-        value: Estimated value.
-        low: Lower end of the interval.
-        high: Upper end of the interval.
-        form: Format of all three numbers, for Python's function ``format``. Zeros never
-            have a minus sign.
-        unit: Unit after the value, with a leading space.
-        factor: Factor that multiplies all three numbers before they are written.
+        count: Number of samples with the event.
+        n: Number of all samples.
+        level: Confidence level of the interval.
 
     Returns:
-        Text in the form '12.5 % (3.1, 22.0)'.
-    """
-    value, low, high = (factor * each for each in (value, low, high))
-    form = form.replace(".", "z.")
-    return f"{value:{form}}{unit} ({low:{form}}, {high:{form}})"
-
-
-def wilson_interval(successes: int, runs: int, *, confidence: float = 0.95) -> Interval:
-    """Computes Wilson's score interval of a probability, without continuity correction.
-
-    Reference: Wilson (1927).
-
-    Args:
-        successes: Number of successful runs.
-        runs: Number of all runs, at least one.
-        confidence: Probability that an interval of this kind contains the true value.
-
-    Returns:
-        Both ends of the interval, from 0 to 1.
+        The share of the event and its interval, from 0 to 1.
     """
     from scipy.stats import binomtest
 
-    result = binomtest(successes, runs).proportion_ci(confidence, method="wilson")
-    return Interval(float(result.low), float(result.high))
+    if n == 0:
+        return nothing(level)
+    ends = binomtest(count, n).proportion_ci(level, method="wilson")
+    return Estimate(count / n, float(ends.low), float(ends.high), n, level)
 
 
-def bootstrap_interval(
-    values: ArrayLike,
-    statistic: Callable[..., NDArray[np.float64]] = np.median,
-    *,
-    seed: int,
-    confidence: float = 0.95,
-    resamples: int = 2000,
-) -> Interval:
-    """Computes the percentile bootstrap interval of a statistic.
+def estimate_mean(
+    values: ArrayLike, *, seed: int, level: float = LEVEL, resamples: int = 2000
+) -> Estimate:
+    """Estimates a mean, with a percentile bootstrap interval.
 
     Reference: Efron (1979).
 
     Args:
-        values: (n,) independent samples, n >= 1.
-        statistic: Function of samples with an argument ``axis``, for example
-            ``np.median``.
+        values: (n,) independent samples.
         seed: Seed of the resampling.
-        confidence: Probability that an interval of this kind contains the true value.
+        level: Confidence level of the interval.
         resamples: Number of resampled sets.
 
     Returns:
-        Both ends of the interval, in the unit of the statistic.
+        The mean and its interval, in the unit of the samples.
     """
     from scipy.stats import bootstrap
 
-    # scipy rejects a single sample. Two equal samples have the same interval.
-    samples = np.resize(np.asarray(values, dtype=float), max(np.size(values), 2))
+    samples = np.asarray(values, dtype=float)
+    if not len(samples):
+        return nothing(level)
     found = bootstrap(
-        (samples,),
-        statistic,
+        # scipy rejects a single sample. Two equal samples have the same interval.
+        (np.resize(samples, max(len(samples), 2)),),
+        np.mean,
         n_resamples=resamples,
-        confidence_level=confidence,
+        confidence_level=level,
         method="percentile",
         rng=seed,
     )
-    return Interval(*map(float, found.confidence_interval))
+    low, high = map(float, found.confidence_interval)
+    return Estimate(float(np.mean(samples)), low, high, len(samples), level)
 
 
-def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
-    """Computes a confidence interval of a median from order statistics.
+def estimate_median(values: ArrayLike, *, level: float = LEVEL) -> Estimate:
+    """Estimates a median, with a confidence interval from order statistics.
 
     The interval is valid for any distribution of the samples. The number of samples
     below the true median has a binomial distribution. This distribution determines
-    which two of the sorted samples bound the interval. At 95 % confidence, this needs
+    which two of the sorted samples bound the interval. At a level of 95 %, this needs
     at least six samples. With fewer samples, the interval extends from the least to the
     greatest sample.
 
     Args:
-        values: (n,) independent samples, n >= 1.
-        confidence: Least probability that an interval of this kind contains the true
-            median.
+        values: (n,) independent samples.
+        level: Least confidence level of the interval.
 
     Returns:
-        Both ends of the interval. Each end is one of the samples.
+        The median and its interval, in the unit of the samples. Each end of the
+        interval is one of the samples.
     """
     # scipy's quantile_test gives the same interval, but takes 15 times as long.
     from scipy.stats import binom
 
     ordered = np.sort(np.asarray(values, dtype=float))
-    below = int(binom.ppf(0.5 * (1.0 - confidence), len(ordered), 0.5))
+    if not len(ordered):
+        return nothing(level)
+    below = int(binom.ppf(0.5 * (1.0 - level), len(ordered), 0.5))
     rank = max(below - 1, 0)
-    return Interval(float(ordered[rank]), float(ordered[-1 - rank]))
+    ends = float(ordered[rank]), float(ordered[-1 - rank])
+    return Estimate(float(np.median(ordered)), *ends, len(ordered), level)

@@ -1,8 +1,10 @@
-"""The HTML page of a sweep: endings of the runs, heat maps, marginals and failures."""
+"""The HTML page of a batch: endings, estimates, maps, pairs, and runs to repeat."""
 
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -12,21 +14,37 @@ import pandas as pd
 from analysis.reporting.html_page import (
     definitions,
     figure_html,
+    file_links,
     heading,
     note,
     paragraph,
+    picture,
     section,
     table,
 )
 from analysis.reporting.plain_values import write_json
 from analysis.reporting.render import page
-from analysis.reporting.section import Cell
-from analysis.runs.run_table import warning_counts
-from analysis.sweeps.estimates import by_cell, cell_label, ended, figure_table
+from analysis.reporting.section import Cell as TableCell
+from analysis.sweeps.batch import MOST_CELLS, REPORT, SUMMARY, Batch, Summary
+from analysis.sweeps.cells import LEAST_RUNS, by_cell, cell_label
+from analysis.sweeps.examples import picture_files, write_examples
 from analysis.sweeps.one_run import FAILED
-from analysis.sweeps.plan import SweepPlan, SweepPoint
-from analysis.sweeps.plots import grid_axes, plot_heat_maps, plot_line, plot_marginal
-from analysis.sweeps.sweep import reproducing_command
+from analysis.sweeps.plan import SweepPlan
+from analysis.sweeps.plots import (
+    grid_axes,
+    plot_cells,
+    plot_heat_maps,
+    plot_line,
+    plot_marginal,
+)
+from analysis.sweeps.report import (
+    counts_text,
+    estimate_rows,
+    pair_rows,
+    robot_rows,
+    run_command,
+    warning_lines,
+)
 from diagrams.running.stop_rules import SUCCESSFUL
 
 #: Limits that keep a page readable.
@@ -34,110 +52,134 @@ from diagrams.running.stop_rules import SUCCESSFUL
 #: MOST_ERRORS: number of commands for runs that raised an error.
 #: MOST_OTHERS: number of commands for runs with any other cause of failure.
 MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
-#: If there are more cells than this, the tables of cells are at the end of the page.
-MOST_CELLS = 24
 
 
-def write_sweep(
-    plan: SweepPlan,
-    points: list[SweepPoint],
-    results: pd.DataFrame,
-    summary: dict[str, Any],
-) -> None:
-    """Writes the summary and the HTML page of a parameter sweep into its directory.
-
-    The files are ``summary.json`` and ``report.html``.
+def write_batch(batch: Batch, document: dict[str, Any]) -> None:
+    """Writes the JSON document, the page and the examples into the batch's directory.
 
     Args:
-        plan: Plan of the sweep.
-        points: All runs of the plan.
-        results: Results of the sweep, from ``load_results``.
-        summary: JSON document from ``sweep_summary``. It names the directory, which
-            must exist.
+        batch: Results of the batch.
+        document: JSON document from ``batch_document``.
     """
-    out = Path(summary["out"])
-    write_json(summary, out / "summary.json")
-    (out / "report.html").write_text(
-        sweep_page(plan, points, results, summary), "utf-8"
-    )
+    write_json(document, batch.out / SUMMARY)
+    write_examples(batch)
+    (batch.out / REPORT).write_text(batch_page(batch, document), "utf-8")
 
 
-def sweep_page(
-    plan: SweepPlan,
-    points: list[SweepPoint],
-    results: pd.DataFrame,
-    summary: dict[str, Any],
-) -> str:
-    """Makes the HTML page of a parameter sweep.
+def batch_page(batch: Batch, document: dict[str, Any]) -> str:
+    """Makes the HTML page of a batch.
+
+    The page of a single sweep has a section for each kind of result. The page of a
+    comparison has a section for each scenario. The page shows the pictures and replays
+    that exist in the directory of the batch.
 
     Args:
-        plan: Plan of the sweep.
-        points: All runs of the plan.
-        results: Results of the sweep, from ``load_results``.
-        summary: JSON document from ``sweep_summary``.
+        batch: Results of the batch.
+        document: JSON document from ``batch_document``.
 
     Returns:
         HTML.
     """
-    cells = {"How the runs ended": [_causes(plan, results), _figures(plan, results)]}
-    few = len(plan.cells()) <= MOST_CELLS
-    parts = {
-        "Summary": _about(plan, results, summary),
-        **(cells if few else {}),
-        "Over the grid": _maps(plan, results),
-        "Over the draws": _marginals(plan, results),
-        "Example runs": _commands(points, results, Path(summary["out"])),
-        **({} if few else cells),
-    }
-    shown = {title: inner for title, inner in parts.items() if inner}
-    contents = [(_anchor(title), title) for title in shown]
+    parts = {"Summary": _about(batch, document)}
+    for k, (name, each) in enumerate(batch.summaries.items()):
+        own = _scenario(batch, each, document, f"s{k}")
+        if len(batch.summaries) == 1:
+            parts |= own
+        else:
+            parts[name] = [
+                *_warnings(each),
+                definitions(_plan_rows(each.plan, each.rows)),
+                *(
+                    x
+                    for title, inner in own.items()
+                    for x in (heading(3, title), *inner)
+                ),
+            ]
+    if batch.pooled and len(batch.summaries) > 1:
+        parts["All together"] = [_table(pair_rows(batch.pooled), _PAIRS)]
+    anchors = {title: f"part{k}" for k, title in enumerate(parts)}
     return page(
-        f"Sweep {plan.name}: {plan.scenario}",
-        contents,
-        [section(_anchor(title), title, inner) for title, inner in shown.items()],
+        batch.title,
+        [(anchors[title], title) for title in parts],
+        [section(anchors[title], title, inner) for title, inner in parts.items()],
     )
 
 
-def _anchor(title: str) -> str:
-    return title.lower().replace(" ", "-")
+_PAIRS = "Pairs of runs on the same layouts; differences, first less second"
 
 
-def _about(
-    plan: SweepPlan, results: pd.DataFrame, summary: dict[str, Any]
-) -> list[str]:
-    causes = results["cause"].value_counts()
+def _scenario(
+    batch: Batch, summary: Summary, document: dict[str, Any], prefix: str
+) -> dict[str, list[str]]:
+    """Parts of the page about one scenario, by title, without empty parts.
+
+    The prefix distinguishes its figures from those of other scenarios.
+    """
+    plan, rows = summary.plan, summary.rows
+    few = plan.cell_count <= MOST_CELLS
+    cells = {"How the runs ended": _endings(summary)}
+    parts = {
+        **(cells if few else {}),
+        "Over the grid": _maps(plan, rows, prefix),
+        "In pairs": [_table(pair_rows(summary.pairs), _PAIRS)] if summary.pairs else [],
+        "Example runs": [
+            *_examples(batch, summary, document),
+            *_commands(batch, summary),
+        ],
+        # The page of several scenarios would become too long.
+        "Over the draws": _marginals(plan, rows) if len(batch.summaries) == 1 else [],
+        **({} if few else cells),
+    }
+    return {title: inner for title, inner in parts.items() if inner}
+
+
+def _about(batch: Batch, document: dict[str, Any]) -> list[str]:
+    plan = next(iter(batch.summaries.values())).plan
     draws = "all cells have equal" if plan.pair else "each cell has its own"
+    count = sum(len(each.cells) for each in batch.summaries.values())
     rows = [
-        ("Scenario", plan.scenario),
-        ("Runs", f"{len(results)}: {plan.runs} in each of {len(plan.cells())} cells"),
-        ("Ended", ", ".join(f"{count} {cause}" for cause, count in causes.items())),
+        ("Scenario", ", ".join(batch.summaries)),
+        ("Runs", f"{document['runs']}: {plan.runs} in each of {count} cells"),
         ("Seed", f"{plan.seed}; {draws} draws"),
-        ("Set", _listed(plan.set)),
-        ("Grid", _listed({key: list(v) for key, v in plan.grid.items()})),
-        (
-            "Draw",
-            _listed({k: d.model_dump(exclude_none=True) for k, d in plan.draw.items()}),
-        ),
-        ("Drawn again", f"{int((results['redraws'] > 0).sum())} runs"),
-        ("Simulated", f"{summary['timing']['simulated_s'] / 3600.0:.2f} h"),
-        ("Versions", ", ".join(f"{k} {v}" for k, v in summary["versions"].items())),
     ]
-    warnings = [
-        note(
-            f"Warning in {each.runs} of {len(results)} runs: `{each.field}`: "
-            f"{each.message}"
-        )
-        for each in warning_counts(results)
+    parts = []
+    if len(batch.summaries) == 1:
+        (only,) = batch.summaries.values()
+        rows += _plan_rows(only.plan, only.rows)
+        parts += _warnings(only)
+    hours = document["timing"]["simulated_s"] / 3600.0
+    versions = document["versions"].items()
+    rows += [
+        ("Simulated", f"{hours:.2f} h"),
+        ("Versions", ", ".join(f"{name} {version}" for name, version in versions)),
     ]
     return [
-        *warnings,
+        *parts,
         definitions(rows),
         paragraph(
-            "Brackets and bars are 95 % intervals: Wilson's for shares of runs, order "
-            "statistics for medians. Runs that raised an error count as errors only; "
-            "no other number includes them."
+            "Brackets and bars are 95 % intervals: Wilson's for rates, order "
+            "statistics for medians. A run that raised an error counts as a run "
+            "without success and without collision. docs/metrics.md states which runs "
+            "the average of each metric includes."
         ),
+        file_links([("summary.json", "the numbers of this page, for programs")]),
     ]
+
+
+def _plan_rows(plan: SweepPlan, rows: pd.DataFrame) -> list[tuple[str, str]]:
+    causes = rows["cause"].value_counts()
+    draws = {key: d.model_dump(exclude_none=True) for key, d in plan.draw.items()}
+    return [
+        ("Ended", ", ".join(f"{count} {cause}" for cause, count in causes.items())),
+        ("Set", _listed(plan.set)),
+        ("Grid", _listed({key: list(v) for key, v in plan.grid.items()})),
+        ("Draw", _listed(draws)),
+        ("Drawn again", f"{int((rows['redraws'] > 0).sum())} runs"),
+    ]
+
+
+def _warnings(summary: Summary) -> list[str]:
+    return [note(text) for text in warning_lines(summary)]
 
 
 def _listed(fields: dict[str, Any]) -> str:
@@ -145,31 +187,64 @@ def _listed(fields: dict[str, Any]) -> str:
     return "; ".join(pairs) or "nothing"
 
 
-def _causes(plan: SweepPlan, results: pd.DataFrame) -> str:
-    order = results["cause"].value_counts().index
+def _table(rows: Sequence[Sequence[str]], caption: str) -> str:
+    """A table of texts, in whose numbers and intervals no line breaks."""
+
+    def whole(text: str) -> str:
+        text = re.sub(r"(^|[ (e])-(?=\d)", "\\1\u2212", text)
+        return text.replace(", ", ",\u00a0")
+
+    body = [[row[0], *map(whole, row[1:])] for row in rows[1:]]
+    return table(rows[0], body, caption=caption)
+
+
+def _endings(summary: Summary) -> list[str]:
+    order = summary.rows["cause"].value_counts().index
     good = [cause for cause in SUCCESSFUL if cause in order]
     causes = [*good, *(cause for cause in order if cause not in good)]
-    warned = ["with warnings"] if warning_counts(results) else []
-    rows: list[list[Cell]] = []
-    for fields, runs in zip(plan.cells(), by_cell(plan, results), strict=True):
+    warned = ["with warnings"] if any(c.warnings for c in summary.cells) else []
+    rows: list[list[TableCell]] = []
+    for cell, runs in zip(
+        summary.cells, by_cell(summary.plan, summary.rows), strict=True
+    ):
         counts = [int((runs["cause"] == cause).sum()) for cause in causes]
         counts += [int((runs["warnings"] != "[]").sum()) for _ in warned]
-        rows.append([cell_label(fields), len(runs), *counts])
-    return table(["cell", "runs", *causes, *warned], rows, caption="Runs by cause")
+        rows.append([cell.label, cell.runs, *counts])
+    parts = [
+        table(["cell", "runs", *causes, *warned], rows, caption="Runs by cause"),
+        _table(estimate_rows(summary), "Rates and metrics with 95 % intervals"),
+    ]
+    if robots := robot_rows(summary):
+        parts.append(_table(robots, "Metrics of each robot with 95 % intervals"))
+    if any(cell.mechanisms for cell in summary.cells):
+        why = [
+            (
+                cell.label,
+                counts_text(
+                    {n: k for n, k in cell.causes.items() if n.startswith("collision")}
+                )
+                or "-",
+                counts_text(cell.mechanisms) or "-",
+            )
+            for cell in summary.cells
+        ]
+        head = ["cell", "collisions, by fault", "why runs failed"]
+        parts.append(table(head, why, caption="Failures"))
+    return parts
 
 
-def _figures(plan: SweepPlan, results: pd.DataFrame) -> str:
-    titles, rows = figure_table(plan, results)
-    return table(["cell", *titles], rows, caption="Metrics with 95 % intervals")
-
-
-def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
+def _maps(plan: SweepPlan, results: pd.DataFrame, prefix: str) -> list[str]:
     axes = grid_axes(plan)
     if not axes:
         return []
     if len(axes) == 1 and len(plan.grid) == 1:
+        if any(isinstance(value, str) for value in plan.grid[axes[0]]):
+            caption = f"Every metric for each `{axes[0]}`."
+            return [figure_html(plot_cells(plan, results), f"{prefix}cells", caption)]
         caption = f"Every metric over `{axes[0]}`."
-        return [figure_html(plot_line(plan, results, axes[0]), "line", caption)]
+        return [
+            figure_html(plot_line(plan, results, axes[0]), f"{prefix}line", caption)
+        ]
     (x, y), others = _map_axes(plan)
     cases = [
         dict(zip(others, values, strict=True))
@@ -178,7 +253,7 @@ def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
     maps = [
         figure_html(
             plot_heat_maps(plan, results, x, y, rest),
-            f"map{k}",
+            f"{prefix}map{k}",
             f"Every metric over `{x}` and `{y}`; lighter means more: "
             f"{cell_label(rest)}.",
             scale=True,
@@ -206,32 +281,59 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
         )
         for k, (key, drawn) in enumerate(plan.draw.items())
         # A list of boxes is no number and is never drawn twice. It has no marginal.
-        if drawn.boxes is None and not ended(results).empty
+        # Fewer runs than those of two bins show no dependence.
+        if drawn.boxes is None and len(results) >= 2 * LEAST_RUNS
     ]
 
 
-def _commands(points: list[SweepPoint], results: pd.DataFrame, out: Path) -> list[str]:
+def _examples(batch: Batch, summary: Summary, document: dict[str, Any]) -> list[str]:
+    """Picture, commands and existing replays of the examples of a scenario."""
+    file = picture_files(batch)[summary.name]
+    cells = [
+        (cell, own)
+        for cell, own in zip(
+            summary.cells,
+            (x for x in document["cells"] if x["scenario"] == summary.name),
+            strict=True,
+        )
+        if own["examples"]
+    ]
+    if not cells:
+        return []
+    caption = "Worst, typical and best run of every cell, from above, in W."
+    lines, replays = [], []
+    for cell, own in cells:
+        for example in own["examples"]:
+            who = f"{cell.label}, {example['kind']}"
+            lines.append((who, f"{example['cause']}: `{example['command']}`"))
+            replay = str(Path(example["scenario_file"]).with_suffix(".html"))
+            if (batch.out / replay).is_file():
+                replays.append((replay, f"{who}, to watch"))
+    shown = [picture(file, caption)] if (batch.out / file).is_file() else []
+    links = [file_links(replays)] if replays else []
+    return [*shown, definitions(lines), *links]
+
+
+def _commands(batch: Batch, summary: Summary) -> list[str]:
     """Commands that repeat the first failed runs of each cause, errors first."""
     parts = [paragraph("Each command repeats one run and makes its replay.")]
-    causes = [c for c in results["cause"].value_counts().index if c not in SUCCESSFUL]
+    rows = summary.rows
+    causes = [c for c in rows["cause"].value_counts().index if c not in SUCCESSFUL]
     for cause in sorted(causes, key=lambda cause: cause != FAILED):
-        runs = results[results["cause"] == cause]
+        runs = rows[rows["cause"] == cause]
         caption = f"{cause}: {len(runs)} runs"
         most = MOST_ERRORS if cause == FAILED else MOST_OTHERS
         if len(runs) > most:
             caption += f", of which the first {most}"
-        parts.append(heading(3, caption))
-        parts.append(
-            definitions(
-                (f"Run {row['index']}", f"{_remark(row)}`{_command(row, points, out)}`")
-                for row in runs.head(most).to_dict("records")
+        lines = [
+            (
+                f"Run {row['index']}",
+                f"{_remark(row)}`{run_command(batch, summary.name, row)}`",
             )
-        )
+            for row in runs.head(most).to_dict("records")
+        ]
+        parts += [heading(3, caption), definitions(lines)]
     return parts if causes else []
-
-
-def _command(row: dict[str, Any], points: list[SweepPoint], out: Path) -> str:
-    return reproducing_command(out, points[row["index"]], row["engine"])
 
 
 def _remark(row: dict[str, Any]) -> str:

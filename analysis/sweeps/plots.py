@@ -1,4 +1,4 @@
-"""Pictures of a sweep: heat maps over the grid, and marginals over drawn fields."""
+"""Pictures of a sweep: quantities over the cells, the grid, and the drawn fields."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from matplotlib.ticker import PercentFormatter
 
 from analysis.reporting.intervals import Estimate
 from analysis.reporting.palette import draw_grid, luminance
-from analysis.sweeps.estimates import (
+from analysis.sweeps.cells import (
     Quantity,
     by_cell,
     cell_label,
-    ended,
     marginal,
     quantities,
     short,
@@ -54,7 +53,7 @@ def plot_heat_maps(
         Picture with one panel for each quantity. Lighter cells have larger values.
         Cells without an estimate are hatched.
     """
-    runs, cells = by_cell(plan, ended(results)), plan.cells()
+    runs, cells = by_cell(plan, results), plan.cells()
     chosen = [
         [
             runs[cells.index({**rest, x: x_value, y: y_value})]
@@ -91,7 +90,7 @@ def _panels(
     results: pd.DataFrame, height_in: float
 ) -> tuple[Figure, list[tuple[Axes, Quantity]]]:
     """Makes a panel for each quantity, two per row; each row has the given height."""
-    shown = quantities(results)
+    shown = quantities(results, pictures=True)
     rows = math.ceil(len(shown) / 2)
     figure = Figure(figsize=(WIDTH_IN, height_in * rows), layout="constrained")
     all_axes = list(figure.subplots(rows, 2).flat)
@@ -113,7 +112,7 @@ def _heat_map(
         vmin=limits[0],
         vmax=limits[1],
     )
-    axes.set_title(quantity.title, fontsize=10)
+    axes.set_title(quantity.label, fontsize=10)
     bar = axes.figure.colorbar(image, ax=axes, pad=0.02)
     bar.ax.tick_params(labelsize=8)
     if quantity.rate:
@@ -148,6 +147,34 @@ def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
     axis.set_label_text(path, fontsize=9)
 
 
+def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
+    """Draws each quantity of each cell, with 95 % intervals.
+
+    Args:
+        plan: Plan of the parameter sweep.
+        results: Results of the sweep, from ``load_results``.
+
+    Returns:
+        Picture with one panel for each quantity, and one row for each cell.
+    """
+    labels = [cell_label(fields) for fields in plan.cells()]
+    places = np.arange(len(labels), dtype=float)
+    figure, panels = _panels(results, 0.9 + 0.32 * len(labels))
+    for k, (axes, quantity) in enumerate(panels):
+        estimates = [quantity.estimate(runs) for runs in by_cell(plan, results)]
+        if quantity.rate:
+            values = [each.value for each in estimates]
+            axes.barh(places, values, color=COLOURS[0], alpha=0.4, height=0.6)
+            axes.set_xlim(0.0, 1.0)
+            axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+        _errorbars(axes, places, estimates, COLOURS[0], "", across=True)
+        axes.set_yticks(places, labels if k % 2 == 0 else [""] * len(labels))
+        axes.set_ylim(len(labels) - 0.5, -0.5)
+        axes.set_title(quantity.label, fontsize=10)
+        draw_grid(axes, "x")
+    return figure
+
+
 def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
     """Draws each quantity over the only field of the grid, with 95 % intervals.
 
@@ -161,7 +188,7 @@ def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
     """
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
-        estimates = [quantity.estimate(runs) for runs in by_cell(plan, ended(results))]
+        estimates = [quantity.estimate(runs) for runs in by_cell(plan, results)]
         places = np.arange(len(estimates), dtype=float)
         _errorbars(axes, places, estimates, COLOURS[0], "")
         _frame(axes, quantity)
@@ -184,7 +211,7 @@ def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
     Returns:
         Picture with one panel for each quantity.
     """
-    runs = ended(results)
+    runs = results
     split = next(
         (path for path in grid_axes(plan) if len(plan.grid[path]) <= len(COLOURS)), None
     )
@@ -223,14 +250,20 @@ def _errorbars(
     estimates: Sequence[Estimate],
     colour: str,
     label: str,
+    *,
+    across: bool = False,
 ) -> None:
-    value, low, high = np.array(estimates).T
+    """Draws estimates as a curve, or across the axes as one point per row."""
+    value, low, high = np.array([(each.value, *each.ends) for each in estimates]).T
+    spread = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
     axes.errorbar(
-        places,
-        value,
-        yerr=[np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)],
+        value if across else places,
+        places if across else value,
+        xerr=spread if across else None,
+        yerr=None if across else spread,
         color=colour,
         label=label,
+        linestyle="none" if across else "-",
         marker="o",
         markersize=4,
         capsize=3,
@@ -239,7 +272,7 @@ def _errorbars(
 
 
 def _frame(axes: Axes, quantity: Quantity) -> None:
-    axes.set_title(quantity.title, fontsize=10)
+    axes.set_title(quantity.label, fontsize=10)
     draw_grid(axes)
     if quantity.rate:
         axes.set_ylim(-0.03, 1.03)

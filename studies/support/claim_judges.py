@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from analysis.reporting.intervals import wilson_interval, with_interval
+from analysis.reporting.intervals import Estimate, estimate_rate
 
 #: From a summary to our figure and the verdict.
 Judge = Callable[[dict[str, Any]], tuple[str, str]]
@@ -27,7 +27,7 @@ def _cell(summary: dict[str, Any], scenario: str, law: str) -> dict[str, Any]:
     return next(
         cell
         for cell in summary["cells"]
-        if (cell["scenario"], cell["law"], cell["fields"]) == (scenario, law, {})
+        if (cell["scenario"], cell["fields"]) == (scenario, {"law": law})
     )
 
 
@@ -42,28 +42,32 @@ def _pair(
     )
 
 
-def _percent(rate: dict[str, float]) -> str:
-    figures = rate["estimate"], rate["low"], rate["high"]
-    return with_interval(*figures, ".1f", unit=" %", factor=100.0)
+def _percent(rate: dict[str, Any]) -> str:
+    return _shown(Estimate(**rate))
+
+
+def _shown(rate: Estimate) -> str:
+    return rate.text(".1f", unit=" %", factor=100.0)
 
 
 def _difference(
     pair: dict[str, Any], form: str, unit: str = "", factor: float = 1.0
 ) -> str:
-    figures = pair["difference"], pair["low"], pair["high"]
-    return with_interval(*figures, form, unit=unit, factor=factor)
+    return Estimate(**pair["difference"]).text(form, unit=unit, factor=factor)
 
 
 def _both(median: dict[str, Any], name: str, unit: str) -> str:
     return (
         f"{name} {median['first']:.2f} {unit} (conventional) and "
         f"{median['second']:.2f} {unit} (active); "
-        f"{_difference(median, '+.2f', f' {unit}')} in {median['pairs']} pairs"
+        f"{_difference(median, '+.2f', f' {unit}')} in "
+        f"{median['difference']['n']} pairs"
     )
 
 
-def _sign(interval: dict[str, Any]) -> int:
+def _sign(pair: dict[str, Any]) -> int:
     """+1 or -1 where the whole interval lies on that side of zero, else 0."""
+    interval = pair["difference"]
     return int(interval["low"] > 0.0) - int(interval["high"] < 0.0)
 
 
@@ -89,7 +93,7 @@ def follows(summary: dict[str, Any]) -> tuple[str, str]:
     error = cell["metrics"]["following_error_rms_m"]
     figure = (
         f"follows to the end in {_percent(cell['success'])}; median rms distance from "
-        f"the follow point {error['median']:.2f} m"
+        f"the follow point {error['value']:.2f} m"
     )
     holds = cell["success"]["low"] >= 1.0 - TOLERANCE
     return figure, "holds" if holds else "does not hold"
@@ -189,8 +193,10 @@ def _on_floors(
             figures.append(f"{floor} no slip")
             continue
         first, *_ = medians = [metrics[name] for name in names]
-        lengths = ("first", "second", "difference", "low", "high")
-        cm = {**first, **{key: 100.0 * first[key] for key in lengths}}
+        difference = dict(first["difference"])
+        difference |= {x: 100.0 * difference[x] for x in ("value", "low", "high")}
+        cm = {x: 100.0 * first[x] for x in ("first", "second")}
+        cm |= {"difference": difference}
         figures.append(_both(cm, floor, "cm"))
         signs |= {_sign(median) for median in medians}
     figure = f"{text}: {'; '.join(figures)}"
@@ -217,16 +223,15 @@ def jams(summary: dict[str, Any]) -> tuple[str, str]:
     for law in ("conventional", "active"):
         cell = _cell(summary, STATIC, law)
         count, runs = cell["mechanisms"].get("jam", 0), cell["runs"]
-        low, high = wilson_interval(count, runs)
-        rates[law] = {"estimate": count / runs, "low": low, "high": high}
+        rates[law] = estimate_rate(count, runs)
     conventional, active = rates.values()
     figure = (
         "stuck, or out of time before the goal: conventional "
-        f"{_percent(conventional)}, active {_percent(active)} of all layouts"
+        f"{_shown(conventional)}, active {_shown(active)} of all layouts"
     )
-    if conventional["low"] > active["high"]:
+    if conventional.low > active.high:
         return figure, "holds"
-    reverse = active["low"] > conventional["high"]
+    reverse = active.low > conventional.high
     return figure, "the reverse holds" if reverse else "not shown"
 
 
@@ -245,7 +250,7 @@ def blind(summary: dict[str, Any]) -> tuple[str, str]:
     total = 0
     for scenario in (ONE, TWO):
         cell = _cell(summary, scenario, "active")
-        total += round(cell["collision"]["estimate"] * cell["runs"])
+        total += round(cell["collision"]["value"] * cell["runs"])
         for name in counts:
             counts[name] += cell["mechanisms"].get(name, 0)
     never, out = (100.0 * counts[name] / max(total, 1) for name in counts)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.intervals import estimate_rate
 from analysis.reporting.palette import COLOURS, draw_grid
 from studies.support.detection import DetectionPoint, FalseAlarms
 
@@ -59,7 +59,7 @@ def _curve(
     axes: Axes, name: str, points: Sequence[DetectionPoint], colour: str
 ) -> None:
     levels = [point.snr_db for point in points]
-    ends = np.array([wilson_interval(point.heard, point.trials) for point in points])
+    ends = np.array([estimate_rate(each.heard, each.trials).ends for each in points])
     axes.fill_between(levels, *ends.T, color=colour, alpha=0.2, linewidth=0)
     heard = [point.heard / point.trials for point in points]
     wrong = [point.wrong / point.trials for point in points]
@@ -76,7 +76,7 @@ def _false_alarms(
 ) -> None:
     found = [alarm for alarm in alarms if alarm.count]
     shares = np.array([alarm.count / alarm.frames for alarm in found])
-    ends = np.array([wilson_interval(alarm.count, alarm.frames) for alarm in found])
+    ends = np.array([estimate_rate(each.count, each.frames).ends for each in found])
     axes.errorbar(
         [alarm.rate for alarm in found],
         shares,
@@ -89,7 +89,7 @@ def _false_alarms(
     silent = [alarm for alarm in alarms if not alarm.count]
     axes.plot(
         [alarm.rate for alarm in silent],
-        [wilson_interval(0, alarm.frames)[1] for alarm in silent],
+        [estimate_rate(0, alarm.frames).high for alarm in silent],
         "v",
         color=COLOURS["robot"],
         label="none heard: below",

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reporting.intervals import Interval, wilson_interval
+from analysis.reporting.intervals import Estimate, estimate_rate
 from diagrams.scenario.bodies import microphones_W
 from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise, tick_generator
@@ -86,9 +86,9 @@ class RoomResult:
         )
 
     @property
-    def located_interval(self) -> Interval:
-        """Wilson's 95 % interval of the share that is located."""
-        return wilson_interval(int(self.located.sum()), len(self.layouts))
+    def located_rate(self) -> Estimate:
+        """Share that is located, with Wilson's 95 % interval."""
+        return estimate_rate(int(self.located.sum()), len(self.layouts))
 
 
 def draw_layouts(

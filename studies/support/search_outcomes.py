@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.intervals import Estimate, estimate_rate
 from analysis.sweeps.one_run import Task, results_table, run_task
 from analysis.sweeps.plan import load_sweep
 
@@ -43,14 +43,14 @@ class SearchOutcomes:
     """Straight way over the way that was gone, of the runs that found."""
 
     @property
-    def share(self) -> tuple[float, float, float]:
-        """Share within the steps, and its 95 % interval of Wilson."""
-        return (self.within / self.runs, *wilson_interval(self.within, self.runs))
+    def share(self) -> Estimate:
+        """Share within the steps."""
+        return estimate_rate(self.within, self.runs)
 
     @property
-    def found_share(self) -> tuple[float, float, float]:
-        """Share that found at all, and its 95 % interval of Wilson."""
-        return (self.found / self.runs, *wilson_interval(self.found, self.runs))
+    def found_share(self) -> Estimate:
+        """Share that found at all."""
+        return estimate_rate(self.found, self.runs)
 
 
 def search_runs(

@@ -60,7 +60,6 @@ def _load() -> None:
         "analysis.recordings.locate_text",
         "analysis.runs.run_report",
         "analysis.stability.report_parts",
-        "analysis.comparison.report",
         "analysis.sweeps.dask_cluster",
         "analysis.sweeps.page",
         "control",

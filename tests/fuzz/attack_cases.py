@@ -495,9 +495,7 @@ def _name(draw: random.Random) -> Made:
         return ("simulate", "scene.yaml", "--out", "new", *option, *plots), {
             "scene.yaml": text
         }
-    name = draw.choice(
-        ["summary.json", "report.html", "rates", "rates.png", "examples", "x" * 250]
-    )
+    name = draw.choice(["summary.json", "report.html", "examples", "x" * 250])
     # A third dot, as in ...yaml, makes a scenario that is called like a folder.
     file = f"{draw.choice([name, name.upper(), '..'])}.yaml"
     words = ("compare", file, "--laws", "none", "--runs", "1", "--workers", "1")

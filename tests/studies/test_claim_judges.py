@@ -32,11 +32,11 @@ ICY = {"plant.friction": 0.1}
 
 
 def rate(low: float, high: float) -> dict[str, float]:
-    return {"estimate": 0.25 * low + 0.75 * high, "low": low, "high": high}
+    return {"value": 0.25 * low + 0.75 * high, "low": low, "high": high, "n": 200}
 
 
 def cell(scenario: str, law: str, **rest: Any) -> dict[str, Any]:
-    return {"scenario": scenario, "law": law, "fields": {}, "runs": 200, **rest}
+    return {"scenario": scenario, "fields": {"law": law}, "runs": 200, **rest}
 
 
 def pair(scenario: str, second: str = "active", **rest: Any) -> dict[str, Any]:
@@ -44,10 +44,12 @@ def pair(scenario: str, second: str = "active", **rest: Any) -> dict[str, Any]:
     return {"scenario": scenario, **laws, "fields": {}, **rest}
 
 
-def median(ends: tuple[float, float], **rest: float) -> dict[str, float]:
+def median(
+    ends: tuple[float, float], *, value: float = -0.25, **rest: float
+) -> dict[str, Any]:
     low, high = ends
-    middle = {"first": 1.25, "second": 1.5, "difference": -0.25, "pairs": 40}
-    return {**middle, "low": low, "high": high, **rest}
+    difference = {"value": value, "low": low, "high": high, "n": 40}
+    return {"first": 1.25, "second": 1.5, "difference": difference, **rest}
 
 
 def cells(*entries: dict[str, Any]) -> dict[str, Any]:
@@ -63,12 +65,12 @@ def pairs(*entries: dict[str, Any]) -> dict[str, Any]:
     [(0.96, "holds"), (0.95, "holds"), (0.949, "does not hold")],
 )
 def test_following_is_to_succeed_in_95_percent(low, verdict):
-    error = {"following_error_rms_m": {"median": 0.625}}
+    error = {"following_error_rms_m": {"value": 0.625}}
     sure = {"metrics": error, "success": rate(1.0, 1.0)}
     summary = cells(
         cell(STATIC, "active", **sure),
         cell(FREE, "conventional", **sure),
-        cell(FREE, "active", **sure) | {"fields": ICY},
+        cell(FREE, "active", **sure) | {"fields": {"law": "active", **ICY}},
         cell(FREE, "active", metrics=error, success=rate(low, 0.98)),
     )
     figure, judged = follows(summary)
@@ -109,7 +111,7 @@ def test_free_of_collisions_is_at_most_5_percent(low, high, verdict):
     ],
 )
 def test_an_interval_that_ends_at_zero_shows_nothing(low, high, verdict):
-    rates = {"difference": 0.125, "low": low, "high": high}
+    rates = {"difference": {"value": 0.125, "low": low, "high": high, "n": 200}}
     counts = {"only_first": 31, "only_second": 6}
     summary = {
         "cells": [
@@ -286,7 +288,7 @@ def test_jams_have_wilsons_interval():
 def test_vibration_is_jerk_or_reversals_and_neither_against_it(jerk, turns, verdict):
     metrics = {
         "jerk_rms_m_s3": median(jerk),
-        "turn_reversals_per_s": median(turns, difference=0.125),
+        "turn_reversals_per_s": median(turns, value=0.125),
     }
     other = {"jerk_rms_m_s3": median(SAME), "turn_reversals_per_s": median(SAME)}
     summary = pairs(pair(STATIC, encounters=other), pair(ONE, encounters=metrics))
@@ -297,7 +299,7 @@ def test_vibration_is_jerk_or_reversals_and_neither_against_it(jerk, turns, verd
 
 
 def hits(scenario: str, collisions: int, **mechanisms: int) -> dict[str, Any]:
-    estimate = {"estimate": collisions / 200, "low": 0.0, "high": 1.0}
+    estimate = {"value": collisions / 200, "low": 0.0, "high": 1.0, "n": 200}
     names = {name.replace("_", " "): count for name, count in mechanisms.items()}
     return cell(scenario, "active", collision=estimate, mechanisms=names)
 

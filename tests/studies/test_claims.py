@@ -14,6 +14,7 @@ from studies.claims import CLAIMS
 from studies.failure_shares import failure_table
 from tests.results import RESULTS, comparison, documented, headings, numbers
 
+STATIC_CONVENTIONAL = "two_static_obstacles", {"law": "conventional"}
 LAWS, FOLLOWING, SLIP, WIDTH = map(comparison, ("laws", "following", "slip", "width"))
 
 
@@ -39,7 +40,7 @@ def test_documented_tables_are_those_of_the_comparisons(
 def test_committed_result_has_a_thousand_runs_a_cell():
     cells = LAWS["cells"] + FOLLOWING["cells"]
     assert all(cell["runs"] >= 1000 for cell in cells)
-    assert {cell["law"] for cell in LAWS["cells"]} == {
+    assert {cell["fields"]["law"] for cell in LAWS["cells"]} == {
         "conventional",
         "active",
         "conventional2017",
@@ -55,9 +56,9 @@ def test_what_the_width_costs():
             (found,) = (
                 c
                 for c in WIDTH["cells"]
-                if (c["law"], c["fields"]["robot.width_m"]) == (law, width)
+                if c["fields"] == {"law": law, "robot.width_m": width}
             )
-            rates = [100 * found[name]["estimate"] for name in ("success", "collision")]
+            rates = [100 * found[name]["value"] for name in ("success", "collision")]
             assert numbers(cell) == pytest.approx(rates, abs=0.5)
 
 
@@ -66,18 +67,24 @@ def test_what_came_into_the_goal_is_in_no_jam():
     claim = next(c for c in CLAIMS if "conventional jams" in c.text)
     swinging = copy.deepcopy(LAWS)
     for cell in swinging["cells"]:
-        if (cell["scenario"], cell["law"]) == ("two_static_obstacles", "conventional"):
+        if (cell["scenario"], cell["fields"]["law"]) == (
+            "two_static_obstacles",
+            "conventional",
+        ):
             cell["mechanisms"] |= {"swings": 300, "held off": 200}
     assert claim.judge(swinging) == claim.judge(LAWS)
     stuck = copy.deepcopy(LAWS)
     for cell in stuck["cells"]:
-        if (cell["scenario"], cell["law"]) == ("two_static_obstacles", "conventional"):
+        if (cell["scenario"], cell["fields"]["law"]) == (
+            "two_static_obstacles",
+            "conventional",
+        ):
             cell["mechanisms"] |= {"jam": 500}
     assert claim.judge(stuck)[1] == "holds"
 
 
 def test_failures_table_has_the_mechanisms_that_occur():
-    cell = {"scenario": "here", "law": "active", "runs": 200}
+    cell = {"scenario": "here", "fields": {"law": "active"}, "runs": 200}
     summary = {"cells": [{**cell, "mechanisms": {"swings": 20, "jam": 1}}]}
     assert str(failure_table(summary)).splitlines() == [
         "| scenario | law | failures | jam | swings |",
@@ -88,7 +95,7 @@ def test_failures_table_has_the_mechanisms_that_occur():
 
 def test_mechanisms_account_for_all_failures():
     for cell in LAWS["cells"]:
-        failed = cell["runs"] - round(cell["success"]["estimate"] * cell["runs"])
+        failed = cell["runs"] - round(cell["success"]["value"] * cell["runs"])
         assert sum(cell["mechanisms"].values()) == failed
 
 
@@ -97,7 +104,7 @@ def changed(**pair: Any) -> dict[str, Any]:
     summary = copy.deepcopy(LAWS)
     for entry in summary["pairs"]:
         if (entry["first"], entry["second"]) == ("conventional", "active"):
-            entry["collision"] |= pair
+            entry["collision"]["difference"] |= pair
     return summary
 
 
@@ -114,15 +121,19 @@ def test_verdict_is_that_of_the_interval(low, high, verdict):
     assert claim.judge(changed(low=low, high=high))[1] == verdict
 
 
+def interval(value: float) -> dict[str, float]:
+    """A number with an interval of 0.1 to both sides."""
+    return {"value": value, "low": value - 0.1, "high": value + 0.1, "n": 100}
+
+
 def rates_only(scenario: str, rates: dict[str, float]) -> dict[str, Any]:
     """A summary of 100 runs a law, with collision rates and nothing else."""
     names = list(rates)
     cells = [
         {
             "scenario": scenario,
-            "law": law,
-            "fields": {},
-            "collision": {"estimate": rate, "low": rate - 0.1, "high": rate + 0.1},
+            "fields": {"law": law},
+            "collision": interval(rate),
         }
         for law, rate in rates.items()
     ]
@@ -133,9 +144,7 @@ def rates_only(scenario: str, rates: dict[str, float]) -> dict[str, Any]:
             "second": second,
             "fields": {},
             "collision": {
-                "difference": rates[first] - rates[second],
-                "low": rates[first] - rates[second] - 0.1,
-                "high": rates[first] - rates[second] + 0.1,
+                "difference": interval(rates[first] - rates[second]),
                 "only_first": 10 * names.index(first),
                 "only_second": 10 * names.index(second),
             },
@@ -176,7 +185,10 @@ def slippery(**floors: dict[str, tuple[float, float]]) -> dict[str, Any]:
                 if pair["fields"] == {"plant.friction": frictions[floor]}:
                     slip["first"] = 0.05
                     for name, (low, high) in metrics.items():
-                        pair["encounters"][name] |= {"low": low, "high": high}
+                        pair["encounters"][name]["difference"] |= {
+                            "low": low,
+                            "high": high,
+                        }
     return summary
 
 

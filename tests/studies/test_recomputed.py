@@ -10,7 +10,7 @@ import pytest
 
 from analysis.certificates.certificate_trials import try_certificate
 from analysis.certificates.energy_certificate import certify_energy
-from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.intervals import estimate_rate
 from diagrams import load_scenario
 from studies import certificates, laws_before_obstacles, library_runs, linear_stability
 from tests.results import assert_same_rows, documented, numbers
@@ -99,7 +99,7 @@ def test_certificates():
 
 def test_documented_rates_follow_from_their_counts():
     for _, runs, hits, rate, *places in documented("certificates", "full diagram"):
-        low, high = wilson_interval(int(hits), int(runs))
+        low, high = estimate_rate(int(hits), int(runs)).ends
         share = int(hits) / int(runs)
         assert [share, low, high] == pytest.approx(
             list(map(abs, numbers(rate))), abs=6e-4

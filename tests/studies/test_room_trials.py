@@ -67,7 +67,7 @@ def test_a_result_counts_what_is_within_both_limits():
     )
     np.testing.assert_array_equal(result.located, [1, 1, 0, 0, 0, 0])
     np.testing.assert_array_equal(result.heard, [1, 1, 1, 1, 0, 1])
-    assert result.located_interval == pytest.approx((0.0968, 0.7000), abs=5e-5)
+    assert result.located_rate.ends == pytest.approx((0.0968, 0.7000), abs=5e-5)
 
 
 @pytest.mark.parametrize(

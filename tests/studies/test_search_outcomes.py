@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
-from analysis.comparison.plans import library_layouts
+from analysis.sweeps.comparison_plans import library_layouts
 from studies.support.search_outcomes import search_outcomes, search_runs
 
 
@@ -24,7 +24,8 @@ def test_only_finds_within_the_steps_count():
     assert found.causes == {"lost": 1, "false find": 1}
     assert (found.median_steps, found.median_time_s) == (10.0, 200.0)
     exact = binomtest(2, 5).proportion_ci(method="wilson")
-    assert found.share == pytest.approx((0.4, exact.low, exact.high))
+    ends = exact.low, exact.high
+    assert (found.share.value, *found.share.ends) == pytest.approx((0.4, *ends))
 
 
 def test_of_several_robots_all_have_to_find():

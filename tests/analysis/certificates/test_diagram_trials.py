@@ -49,8 +49,8 @@ def test_rate_counts_and_skips(two_boxes):
     found = trials.to_dict()
     assert sum(found["causes"].values()) == found["runs"] == 8
     assert sum(found["mechanisms"].values()) == found["collisions"]
-    low, high = trials.interval
-    assert low <= found["collisions"] / 8 <= high
+    rate = trials.collision_rate
+    assert rate.low <= rate.value == found["collisions"] / 8 <= rate.high
     again = try_diagram(certificate, starts=8)
     assert again.causes == trials.causes
 

@@ -1,23 +1,21 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.sweeps.estimates import (
-    QUANTITIES,
-    Quantity,
-    cell_label,
-    ended,
-    marginal,
-    shown,
-)
-from analysis.sweeps.page import sweep_page
+from analysis.sweeps.batch import Batch, summarise
+from analysis.sweeps.cells import Quantity, cell_label, marginal
+from analysis.sweeps.page import batch_page
 from analysis.sweeps.plan import SweepPlan
-from analysis.sweeps.summary import sweep_summary, sweep_text
+from analysis.sweeps.report import batch_document, batch_text
 
-SUCCESS, COLLISION, CLEARANCE, *_ = QUANTITIES
+SUCCESS, COLLISION = Quantity("success"), Quantity("collision")
+CLEARANCE = Quantity("minimum_clearance_m")
 SPEED, X = "source.speed_m_s", "obstacles.0.waypoints_m"
 PLACES = [[[2.0, 1.0]], [[3.0, 1.0]]]
 BOXES = {"count": [1, 2], "x_m": [2.0, 3.0], "y_m": [1.0, 2.0], "side_m": [0.1, 0.2]}
@@ -67,31 +65,53 @@ def made_up(**changes):
     return plan, points, table
 
 
-def test_rates_count_runs_that_ended():
+def batch(plan, points, table, out) -> Batch:
+    """A batch whose runs are done."""
+    done: Any = SimpleNamespace(points=points, store=SimpleNamespace(out=out))
+    summary = summarise(plan, table.assign(warnings="[]"), "default")
+    return Batch("Sweep", out, {"default": done}, {"default": summary}, [])
+
+
+def test_an_error_is_a_run_without_success_and_without_collision():
     _, _, table = made_up()
-    runs = ended(table)
-    assert len(runs) == 239
-    value, low, high = COLLISION.estimate(runs)
-    assert value == 30 / 239
-    reference = stats.binomtest(30, 239).proportion_ci(method="wilson")
-    assert (low, high) == pytest.approx((reference.low, reference.high))
-    assert SUCCESS.estimate(runs).value == 209 / 239
+    rate = COLLISION.estimate(table)
+    assert (rate.value, rate.n) == (30 / 240, 240)
+    reference = stats.binomtest(30, 240).proportion_ci(method="wilson")
+    assert rate.ends == pytest.approx((reference.low, reference.high))
+    assert SUCCESS.estimate(table).value == 209 / 240
 
 
 def test_medians_leave_out_missing_values():
     values = [3.0, np.nan, 1.0, 2.0]
     runs = pd.DataFrame({"cause": "reached", "time": values})
-    estimate = Quantity("time", "time", metric="time").estimate(runs)
-    assert estimate == (2.0, 1.0, 3.0)
-    assert np.isnan(Quantity("x", "x", metric="x").estimate(runs)).all()
-    assert np.isnan(SUCCESS.estimate(runs.iloc[:0])).all()
-    assert shown(SUCCESS, SUCCESS.estimate(runs)) == "100 % (51 to 100)"
-    assert shown(SUCCESS, SUCCESS.estimate(runs.iloc[:0])) == "-"
+    estimate = Quantity("time").estimate(runs)
+    assert (estimate.value, *estimate.ends, estimate.n) == (2.0, 1.0, 3.0, 3)
+    assert Quantity("x").estimate(runs).n == 0
+    assert SUCCESS.estimate(runs.iloc[:0]).n == 0
+    assert SUCCESS.text(SUCCESS.estimate(runs)) == "100 (51, 100)"
+    assert SUCCESS.text(SUCCESS.estimate(runs.iloc[:0])) == "-"
+
+
+def test_a_metric_counts_the_runs_of_its_record():
+    """Jerk is of successful runs and clearance is of all, in whatever batch."""
+    runs = pd.DataFrame(
+        {
+            "cause": ["reached", "collision", "completed", "stuck", "failed"],
+            "jerk_rms_m_s3": [1.0, 9.0, 2.0, 8.0, np.nan],
+            "near.jerk_rms_m_s3": [1.0, 9.0, 2.0, 8.0, np.nan],
+            "minimum_clearance_m": [0.3, -0.1, 0.5, 0.1, np.nan],
+        }
+    )
+    for name in ("jerk_rms_m_s3", "near.jerk_rms_m_s3"):
+        estimate = Quantity(name).estimate(runs)
+        assert (estimate.value, estimate.n) == (1.5, 2)
+    estimate = CLEARANCE.estimate(runs)
+    assert (estimate.value, estimate.n) == (0.2, 4)
 
 
 def test_marginal_of_a_number_follows_it():
     plan, _, table = made_up()
-    found = marginal(plan, SPEED, ended(table), CLEARANCE)
+    found = marginal(plan, SPEED, table, CLEARANCE)
     assert len(found.places) == 8
     medians = [estimate.value for estimate in found.estimates]
     np.testing.assert_allclose(medians, 2.0 * found.places)
@@ -100,10 +120,10 @@ def test_marginal_of_a_number_follows_it():
 
 def test_marginal_of_a_choice_has_its_values():
     plan, _, table = made_up()
-    found = marginal(plan, X, ended(table), SUCCESS)
+    found = marginal(plan, X, table, SUCCESS)
     assert found.labels == ("[[2.0, 1.0]]", "[[3.0, 1.0]]")
     for label, estimate in zip(found.labels, found.estimates, strict=True):
-        runs = table[(table[X] == label) & (table["cause"] != "failed")]
+        runs = table[table[X] == label]
         assert estimate.value == (runs["cause"] == "completed").mean()
 
 
@@ -116,21 +136,22 @@ def test_labels_are_short():
 
 def test_summary_counts_and_names_failures(tmp_path):
     plan, points, table = made_up()
-    summary = sweep_summary(plan, points, table, tmp_path)
+    found = batch(plan, points, table, tmp_path)
+    summary = batch_document(found)
     assert (summary["runs"], summary["failed"]) == (240, 1)
     causes = [cell["causes"] for cell in summary["cells"]]
     assert causes == [
         {"completed": 39, "failed": 1},
         {"completed": 40},
         {"completed": 40},
-        *[{"completed": 30, "collision": 10}] * 3,
+        *[{"completed": 30, "collision (robot)": 10}] * 3,
     ]
     (failure,) = summary["failures"]
     assert failure["seed"] == points[0].seed
     assert f"--seed {points[0].seed}" in failure["command"]
     metrics = summary["cells"][0]["metrics"]
     assert set(metrics) == {"minimum_clearance_m", "simulated_s"}
-    assert "1 of 240 runs failed" in sweep_text(plan, table)
+    assert "1 of 240 runs failed" in batch_text(found, summary)
 
 
 @pytest.mark.parametrize(
@@ -147,8 +168,8 @@ def test_summary_counts_and_names_failures(tmp_path):
 )  # fmt: skip
 def test_page_has_a_figure_for_each_field(tmp_path, changes, figures):
     plan, points, table = made_up(**changes)
-    summary = sweep_summary(plan, points, table, tmp_path)
-    page = sweep_page(plan, points, table, summary)
+    found = batch(plan, points, table, tmp_path)
+    page = batch_page(found, batch_document(found))
     assert page.count("<figure") == figures
     assert "ValueError: &lt;broken&gt;" in page
     assert "<broken>" not in page

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.sweeps.estimates import quantities
+from analysis.sweeps.batch import summarise
 from analysis.sweeps.plan import SweepPlan
+from analysis.sweeps.report import robot_rows
 from analysis.sweeps.sweep import run_sweep
 from diagrams import load_scenario, simulate
 
@@ -35,9 +36,10 @@ def test_rows_and_pages_have_each_robots_own(tmp_path):
         "far",
         "near",
     )
-    titles = [quantity.title for quantity in quantities(table)]
-    assert "near: least clearance, median (m)" in titles
-    assert len(titles) == 2 + 2 * 2, "two rates, and two figures of each robot"
+    head, near, far = robot_rows(summarise(plan, table, "two_followers"))
+    assert (near[1], far[1]) == ("near", "far")
+    assert head[2:4] == ["least clearance (m)", "least clearance from obstacles (m)"]
+    assert near[2] == far[2], "each touches the other"
     whole = simulate(load_scenario(tmp_path / "out" / "scenario.yaml"))
     touched = whole.robots["far"].collision
     assert touched is not None

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.comparison.compare import prepare_comparison
-from analysis.comparison.plans import comparison_plan
 from analysis.run_error import RunError
+from analysis.sweeps.batch import prepare_comparison
+from analysis.sweeps.comparison_plans import comparison_plan
 from analysis.sweeps.options import MOST_WORKERS
+from analysis.sweeps.page import write_batch
 from analysis.sweeps.plan import MOST_RUNS, SweepPlan
+from analysis.sweeps.report import batch_document
 from analysis.sweeps.sweep import prepare_sweep
 from systems.framework.input_error import InputError
 
@@ -125,8 +127,11 @@ def test_a_comparison_of_which_nothing_ran_says_so(tmp_path, monkeypatch):
         )
     }
     prepared = prepare_comparison(plans, tmp_path / "out", workers=1)
+    batch = prepared.run()
+    write_batch(batch, batch_document(batch))
+    assert "InputError" in (tmp_path / "out" / "report.html").read_text("utf-8")
     with pytest.raises(RunError, match="all 1 runs failed, the first one by Inp"):
-        prepared.run()
+        batch.require_runs()
     assert (tmp_path / "out" / "x" / "runs.parquet").is_file()
 
 

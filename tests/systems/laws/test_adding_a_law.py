@@ -24,7 +24,7 @@ QUESTIONS = """
 import contextlib, io, json
 
 import phonotaxis
-from analysis.comparison.plans import comparison_plans
+from analysis.sweeps.comparison_plans import comparison_plans
 from analysis.design.gain_search import search_gains
 from analysis.design.requirements import Requirements, check_law
 from analysis.laws.law_curves import law_curves

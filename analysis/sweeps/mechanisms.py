@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from analysis.runs.run_table import column
+from analysis.sweeps.run_rows import column
 from diagrams.running.stop_rules import SUCCESSFUL
 
 #: A body was out of sight if the time from its last echo to the contact is at least

@@ -9,7 +9,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.comparison.laws_in_pairs import Comparison, compare_runs, pooled_pairs
+from analysis.sweeps.batch import Summary, summarise
+from analysis.sweeps.pairs import pooled_pairs
 from analysis.sweeps.plan import SweepPlan
 
 #: Cause and clearance of each law's runs, layout by layout.
@@ -51,17 +52,17 @@ def table() -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def comparison() -> Comparison:
+def comparison() -> Summary:
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
-    return compare_runs(plan, table(), "here")
+    return summarise(plan, table(), "here")
 
 
 def test_rates_of_each_law(comparison):
     conventional, active = comparison.cells
-    assert conventional.success.estimate == pytest.approx(2 / 5)
-    assert conventional.collision.estimate == pytest.approx(2 / 5)
-    assert active.success.estimate == pytest.approx(3 / 5)
-    assert active.collision.estimate == pytest.approx(1 / 5)
+    assert conventional.success.value == pytest.approx(2 / 5)
+    assert conventional.collision.value == pytest.approx(2 / 5)
+    assert active.success.value == pytest.approx(3 / 5)
+    assert active.collision.value == pytest.approx(1 / 5)
     # Wilson's interval of 2 in 5, worked out from its formula.
     z, n, p = 1.959964, 5, 0.4
     centre = (p + z * z / (2 * n)) / (1 + z * z / n)
@@ -81,17 +82,16 @@ def test_causes_say_whose_fault(comparison):
 
 def test_clearance_is_of_all_runs_and_jerk_of_successful_ones(comparison):
     conventional, active = (cell.metrics for cell in comparison.cells)
-    assert conventional["minimum_obstacle_clearance_m"].median == pytest.approx(0.1)
-    assert conventional["minimum_obstacle_clearance_m"].runs == 5
-    assert conventional["jerk_rms_m_s3"].median == pytest.approx((3.0 + 5.0) / 2)
-    assert conventional["jerk_rms_m_s3"].runs == 2
-    assert active["minimum_obstacle_clearance_m"].runs == 4
+    assert conventional["minimum_obstacle_clearance_m"].value == pytest.approx(0.1)
+    assert conventional["minimum_obstacle_clearance_m"].n == 5
+    assert conventional["jerk_rms_m_s3"].value == pytest.approx((3.0 + 5.0) / 2)
+    assert conventional["jerk_rms_m_s3"].n == 2
+    assert active["minimum_obstacle_clearance_m"].n == 4
     assert "sparc" not in active
 
 
 def test_spl_is_the_mean_of_its_terms(comparison):
-    assert comparison.cells[0].spl is not None
-    assert comparison.cells[0].spl.estimate == pytest.approx(0.8 * 2 / 5)
+    assert comparison.cells[0].metrics["spl"].value == pytest.approx(0.8 * 2 / 5)
 
 
 def test_pairs_are_of_the_same_layout(comparison):
@@ -100,10 +100,10 @@ def test_pairs_are_of_the_same_layout(comparison):
     assert (pair.success.only_first, pair.success.only_second) == (1, 2)
     assert (pair.collision.only_first, pair.collision.only_second) == (1, 0)
     jerk = pair.metrics["jerk_rms_m_s3"]
-    assert (jerk.pairs, jerk.difference) == (1, -1.0)
+    assert (jerk.difference.n, jerk.difference.value) == (1, -1.0)
     clearance = pair.metrics["minimum_obstacle_clearance_m"]
-    assert clearance.pairs == 4
-    assert clearance.difference == pytest.approx((-0.05 - 0.05) / 2)
+    assert clearance.difference.n == 4
+    assert clearance.difference.value == pytest.approx((-0.05 - 0.05) / 2)
 
 
 def test_examples_are_ordered_by_success_then_by_clearance(comparison):
@@ -118,19 +118,19 @@ def test_examples_are_ordered_by_success_then_by_clearance(comparison):
 def test_pooled_pairs_are_those_of_all_experiments():
     """The same table twice: counts double, rates and medians stay."""
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
-    (once,) = compare_runs(plan, table(), "here").pairs
+    (once,) = summarise(plan, table(), "here").pairs
     (twice,) = pooled_pairs([(plan, table()), (plan, table())])
-    assert twice.success.pairs == 2 * once.success.pairs
+    assert twice.success.difference.n == 2 * once.success.difference.n
     assert twice.success.only_second == 2 * once.success.only_second
-    assert twice.success.difference == once.success.difference
+    assert twice.success.difference.value == once.success.difference.value
     name = "minimum_obstacle_clearance_m"
-    assert twice.metrics[name].difference == once.metrics[name].difference
-    assert twice.metrics[name].pairs == 8
+    assert twice.metrics[name].difference.value == once.metrics[name].difference.value
+    assert twice.metrics[name].difference.n == 8
 
 
 def test_one_experiment_pooled_is_itself():
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
-    pairs = compare_runs(plan, table(), "here").pairs
+    pairs = summarise(plan, table(), "here").pairs
     expected = [replace(pair, scenario="all", fields={}) for pair in pairs]
     assert pooled_pairs([(plan, table())]) == expected
 
@@ -147,7 +147,7 @@ def test_pairs_differ_in_one_field_alone():
             "collision_fault": None,
         }
     )
-    pairs = compare_runs(plan, rows, "here").pairs
+    pairs = summarise(plan, rows, "here").pairs
     assert [(p.field, p.first, p.second, p.fields) for p in pairs] == [
         ("hearing", "audio", "ideal", {"law": "none"}),
         ("law", "none", "active", {"hearing": "audio"}),
@@ -174,7 +174,7 @@ def test_pooled_pairs_join_cells_that_differ_in_the_same_values():
     assert set(found) == {"law", "hearing"}
     for field, first, second in (("law", 0, 2), ("hearing", 2, 0)):
         pair = found[field]
-        assert (pair.scenario, pair.fields, pair.success.pairs) == ("all", {}, 4)
+        assert (pair.scenario, pair.fields, pair.success.difference.n) == ("all", {}, 4)
         assert (pair.success.only_first, pair.success.only_second) == (first, second)
         assert (pair.collision.only_first, pair.collision.only_second) == (
             second,
@@ -202,7 +202,7 @@ def test_mechanisms_go_by_the_tick_of_the_runs(plan, swept, out_of_sight):
         **swept,
     )
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5, **plan)
-    for cell in compare_runs(plan, rows, "here").cells:
+    for cell in summarise(plan, rows, "here").cells:
         assert cell.mechanisms.get("out of sight", 0) == out_of_sight
 
 
@@ -215,8 +215,8 @@ def test_encounters_are_of_layouts_on_which_both_pushed():
         for run, cell in zip(rows["run"], rows["cell"], strict=True)
     ]
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
-    (pair,) = compare_runs(plan, rows, "here").pairs
-    assert pair.metrics["jerk_rms_m_s3"].pairs == 3
-    assert pair.encounters["jerk_rms_m_s3"].pairs == 1
+    (pair,) = summarise(plan, rows, "here").pairs
+    assert pair.metrics["jerk_rms_m_s3"].difference.n == 3
+    assert pair.encounters["jerk_rms_m_s3"].difference.n == 1
     assert pair.encounters["jerk_rms_m_s3"].first == 1.0 + 3
     assert "minimum_clearance_m" not in pair.encounters

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
-from zlib import crc32
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.runs.metric_table import Metric
+from analysis.runs.metric_table import METRICS
 from diagrams.running.stop_rules import SUCCESSFUL
+
+_OF_ROBOTS: dict[str, Any] = {"mean": np.mean, "least": np.min, "greatest": np.max}
 
 
 def successes(rows: pd.DataFrame) -> NDArray[np.bool_]:
@@ -25,41 +28,36 @@ def collisions(rows: pd.DataFrame) -> NDArray[np.bool_]:
     return (rows["cause"] == "collision").to_numpy()
 
 
-def counted(rows: pd.DataFrame, metric: Metric) -> NDArray[np.bool_]:
-    """(n,) whether an average of the metric includes each run."""
-    if metric.of == "successes":
-        return successes(rows)
-    return np.ones(len(rows), dtype=bool)
-
-
 def column(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
-    """Returns one metric of each run.
-
-    Args:
-        rows: Table of n runs.
-        name: Name of the metric's column. The table may lack this column.
-
-    Returns:
-        (n,) values in the unit of the metric. The value is NaN for a run without this
-        metric.
-    """
+    """(n,) one metric of each run; NaN for a run without this metric."""
     if name not in rows:
         return np.full(len(rows), np.nan)
     return rows[name].to_numpy(dtype=float)
 
 
-def bootstrap_seed(seed: int, name: str) -> int:
-    """Returns the random seed for the bootstrap of a metric.
+def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
+    """Adds the metrics of all robots together to the results of a parameter sweep.
+
+    ``Metric.robots`` states how the values of several robots become one value of their
+    run. If one robot has no value of a metric in a run, the value for all robots is
+    NaN.
 
     Args:
-        seed: Seed of the sweep.
-        name: Name of the metric.
+        table: Results of the sweep, from ``analysis.sweeps.store.load_results``.
+        robots: Names of the robots. With one robot, the table already has the metrics.
 
     Returns:
-        Seed of 32 bits. Each metric has its own seed, so that the samples of the
-        metrics are independent.
+        The table with the added columns. With one robot, the table is unchanged.
     """
-    return crc32(json.dumps([seed, name]).encode())
+    if len(robots) < 2:
+        return table
+    pooled = {}
+    for name, metric in METRICS.items():
+        columns = [f"{robot}.{name}" for robot in robots]
+        if all(each in table for each in columns):
+            values = [column(table, each) for each in columns]
+            pooled[name] = _OF_ROBOTS[metric.robots](values, axis=0)
+    return table.assign(**pooled)
 
 
 @dataclass(frozen=True)

@@ -9,24 +9,23 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.comparison.cells import LawCell, make_cell
+from analysis.sweeps.cells import Cell, make_cell
 
 NAN = math.nan
 
 
-def summarised(fields: dict[str, Any] | None = None, **columns: Any) -> LawCell:
+def summarised(fields: dict[str, Any] | None = None, **columns: Any) -> Cell:
     table = {"index": [10 * k for k in range(len(columns["cause"]))], **columns}
     rows = pd.DataFrame({"collision_fault": None, **table})
     return make_cell("here", fields or {"law": "active"}, rows, 1)
 
 
-def test_fields_beside_the_law_set_a_cell_apart():
+def test_fields_of_the_grid_set_a_cell_apart():
     # As a plan's file has them: no string of the code itself.
     fields = json.loads('{"robot.width_m": 0.41, "law": "none", "hearing": "ideal"}')
     cell = summarised(fields, cause=["reached"])
-    assert (cell.scenario, cell.law, cell.runs) == ("here", "none", 1)
-    assert cell.fields == {"robot.width_m": 0.41, "hearing": "ideal"}
-    assert cell.label == "none, 0.41, ideal"
+    assert (cell.scenario, cell.fields, cell.runs) == ("here", fields, 1)
+    assert cell.label == "width_m 0.41, law none, hearing ideal"
 
 
 def test_figures_of_successes_leave_out_runs_that_failed_or_have_none():
@@ -42,23 +41,22 @@ def test_figures_of_successes_leave_out_runs_that_failed_or_have_none():
     assert set(metrics) == {"jerk_rms_m_s3", "sparc", "minimum_clearance_m"}
     jerk = metrics["jerk_rms_m_s3"]
     # A quarter of the resamples has the lower value twice, a quarter the higher.
-    assert (jerk.median, jerk.low, jerk.high, jerk.runs) == (3.5, 2.0, 5.0, 2)
+    assert (jerk.value, jerk.low, jerk.high, jerk.n) == (3.5, 2.0, 5.0, 2)
     sparc = metrics["sparc"]
-    assert (sparc.median, sparc.low, sparc.high, sparc.runs) == (-2.0, -2.0, -2.0, 1)
+    assert (sparc.value, sparc.low, sparc.high, sparc.n) == (-2.0, -2.0, -2.0, 1)
     clearance = metrics["minimum_clearance_m"]
-    assert clearance.median == pytest.approx(0.15)
+    assert clearance.value == pytest.approx(0.15)
     # The lowest is drawn three or four times of four in 13 of 256 resamples.
-    assert (clearance.low, clearance.high, clearance.runs) == (-0.1, 0.3, 4)
+    assert (clearance.low, clearance.high, clearance.n) == (-0.1, 0.3, 4)
 
 
 def test_spl_leaves_out_runs_without_a_shortest_way():
     cell = summarised(cause=["reached"] * 3, spl=[0.5, NAN, 1.0])
-    assert cell.spl is not None
     # Two values: each end is drawn twice in a quarter of the resamples.
-    spl = cell.spl
-    assert (spl.estimate, spl.low, spl.high) == (0.75, 0.5, 1.0)
-    assert summarised(cause=["reached"]).spl is None
-    assert summarised(cause=["reached"], spl=[NAN]).spl is None
+    spl = cell.metrics["spl"]
+    assert (spl.value, spl.low, spl.high, spl.n) == (0.75, 0.5, 1.0, 2)
+    assert "spl" not in summarised(cause=["reached"]).metrics
+    assert "spl" not in summarised(cause=["reached"], spl=[NAN]).metrics
 
 
 def test_causes_are_counted_in_the_order_of_their_names():
@@ -92,7 +90,7 @@ def test_rates_of_a_cell_are_of_all_its_runs():
     """1 of 4: Wilson's interval 0.0456 to 0.6994 (z = 1.96, from its formula)."""
     cell = summarised(cause=["completed", "collision", "failed", "lost"])
     for rate in (cell.success, cell.collision):
-        assert (rate.estimate, rate.low, rate.high) == pytest.approx(
+        assert (rate.value, rate.low, rate.high) == pytest.approx(
             (0.25, 0.0456, 0.6994), abs=5e-5
         )
 

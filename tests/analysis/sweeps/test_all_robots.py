@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.comparison.all_robots import with_all_robots
-from analysis.comparison.laws_in_pairs import compare_runs
-from analysis.comparison.plans import comparison_plan
+from analysis.sweeps.batch import summarise
+from analysis.sweeps.comparison_plans import comparison_plan
 from analysis.sweeps.one_run import Task, results_table, run_task
+from analysis.sweeps.run_rows import with_all_robots
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import ROUTE_LAWS
 
@@ -45,13 +45,13 @@ def test_two_robots_are_compared():
         for point in plan.points()
     ]
     table = results_table(run_task(task).row for task in tasks)
-    comparison = compare_runs(plan, table, "robots_2")
+    comparison = summarise(plan, table, "robots_2")
     _, filtered = comparison.cells
     assert filtered.causes == {"reached": 3}
     each = [f"{name}.minimum_obstacle_clearance_m" for name in ("first", "second")]
     rows = table[table["law"] == laws[1]]
     least = np.median(rows[each].min(axis=1))
-    assert filtered.metrics["minimum_obstacle_clearance_m"].median == least > 0.0
+    assert filtered.metrics["minimum_obstacle_clearance_m"].value == least > 0.0
     assert len(comparison.pairs) == 1
     # What sees bodies, not echoes, has nothing to say of mechanisms.
     assert not any(cell.mechanisms for cell in comparison.cells)

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import html
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from analysis.comparison import report
-from analysis.comparison.cells import EXAMPLES, ExampleRun, LawCell, Mean
-from analysis.comparison.compare import prepare_comparison
-from analysis.comparison.laws_in_pairs import Comparison
-from analysis.comparison.plans import (
+from analysis.sweeps.batch import prepare_comparison
+from analysis.sweeps.comparison_plans import (
     EXPERIMENTS,
     comparison_plan,
     comparison_plans,
     library_layouts,
 )
-from analysis.comparison.report import compare_summary, write_comparison
-from analysis.comparison.report_text import compare_text
+from analysis.sweeps.page import write_batch
 from analysis.sweeps.plan import SweepPlan, load_sweep
+from analysis.sweeps.report import batch_document, batch_text
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 
@@ -171,24 +167,24 @@ def test_a_comparison_from_end_to_end(tmp_path):
     }
     prepared = prepare_comparison(plans, tmp_path / "out", workers=1)
     seen: list[int] = []
-    comparisons, pooled = prepared.run(seen.append)
+    batch = prepared.run(seen.append)
     assert seen[-1] == prepared.runs == 4
-    summary = compare_summary(prepared, comparisons, pooled)
-    write_comparison(prepared, comparisons, pooled, summary)
+    summary = batch_document(batch)
+    write_batch(batch, summary)
     assert summary == json.loads((tmp_path / "out" / "summary.json").read_text())
     page = html.unescape((tmp_path / "out" / "report.html").read_text())
     cells = summary["cells"]
-    assert [(c["scenario"], c["law"], c["runs"]) for c in cells] == [
-        ("two_static_obstacles", "none", 2),
-        ("two_static_obstacles", "active", 2),
+    assert [(c["scenario"], c["fields"], c["runs"]) for c in cells] == [
+        ("two_static_obstacles", {"law": "none"}, 2),
+        ("two_static_obstacles", {"law": "active"}, 2),
     ]
     for cell in cells:
         for rate in ("success", "collision"):
-            assert cell[rate]["low"] <= cell[rate]["estimate"] <= cell[rate]["high"]
+            assert cell[rate]["low"] <= cell[rate]["value"] <= cell[rate]["high"]
         for example in cell["examples"]:
             again = load_scenario(tmp_path / "out" / example["scenario_file"])
             assert simulate(again).cause == example["cause"]
-            text = compare_text(summary, comparisons, pooled)
+            text = batch_text(batch, summary)
             assert example["command"] in text
             assert example["command"] in page
             replay = Path(example["scenario_file"]).with_suffix(".html")
@@ -196,12 +192,11 @@ def test_a_comparison_from_end_to_end(tmp_path):
             assert (tmp_path / "out" / replay).exists() == (str(replay) in page)
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "summary.json",
-        "rates.png",
         "report.html",
-        "two_static_obstacles.png",
         "two_static_obstacles",
         "examples",
     }
+    assert (tmp_path / "out" / "examples" / "two_static_obstacles.png").is_file()
 
 
 def called(names: list[str]) -> dict[str, SweepPlan]:
@@ -216,16 +211,16 @@ def called(names: list[str]) -> dict[str, SweepPlan]:
 @pytest.mark.slow
 def test_scenarios_that_are_called_like_results(tmp_path):
     """No run and no file is lost."""
-    names, out = ["summary.json", "rates"], tmp_path / "out"
+    names, out = ["summary.json", "examples"], tmp_path / "out"
     prepared = prepare_comparison(called(names), out, workers=1)
-    comparisons, pooled = prepared.run()
-    summary = compare_summary(prepared, comparisons, pooled)
-    write_comparison(prepared, comparisons, pooled, summary)
+    batch = prepared.run()
+    summary = batch_document(batch)
+    write_batch(batch, summary)
     assert summary == json.loads((out / "summary.json").read_text())
     assert [cell["scenario"] for cell in summary["cells"]] == names
     assert {path.name for path in out.iterdir()} == {
-        *("summary.json", "report.html", "rates.png", "examples"),
-        *("summary.json-2", "summary.json-2.png", "rates-2", "rates-2.png"),
+        *("summary.json", "report.html", "examples"),
+        *("summary.json-2", "examples-2"),
     }
     again = prepare_comparison(called(names), out, workers=1, resume=True)
     assert again.done == again.runs == 2
@@ -233,29 +228,13 @@ def test_scenarios_that_are_called_like_results(tmp_path):
 
 
 def test_no_scenario_gets_the_folder_of_another_or_one_outside(tmp_path):
-    names = ["summary.json", "rates.png", "rates", "examples", "..", "A", "a", "a.png"]
+    names = ["summary.json", "report.html", "examples", "..", "A", "a"]
     out = tmp_path / "all" / "out"
     prepared = prepare_comparison(called([*names, "x" * 240, "c:1"]), out, workers=1)
     for sweep in prepared.sweeps.values():
         sweep.store.close()
     assert [path.name for path in (tmp_path / "all").iterdir()] == ["out"]
     assert {path.name for path in out.iterdir()} == {
-        *("summary.json-2", "rates.png-2", "rates-2", "examples-2", "unnamed", "A"),
-        *("a-2", "a.png-2", "x" * 200, "c-1"),
+        *("summary.json-2", "report.html-2", "examples-2", "unnamed", "A"),
+        *("a-2", "x" * 200, "c-1"),
     }
-
-
-def test_examples_of_laws_whose_names_are_alike_have_files_of_their_own():
-    runs = tuple(ExampleRun(kind, index, "goal") for index, kind in enumerate(EXAMPLES))
-    one = Mean(0.0, 0.0, 0.0)
-    cells = [
-        LawCell("s", law, {}, 3, {}, {}, one, one, None, {}, examples)
-        for law, examples in (
-            ("a.py:f", runs),
-            ("a.py-f", tuple(replace(run, index=run.index + 3) for run in runs)),
-        )
-    ]
-    files = report._example_files({"s": Comparison(cells, [])})
-    assert len(set(files.values())) == 6
-    assert files["s", 0, "worst"] == "examples/s-a.py-f-worst.yaml"
-    assert files["s", 3, "worst"] == "examples/s-a.py-f-worst-2.yaml"

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from analysis.comparison.plans import comparison_plan
+from analysis.sweeps.comparison_plans import comparison_plan
 from diagrams import Scenario, load_scenario
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners
 

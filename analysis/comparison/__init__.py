@@ -1,1 +1,0 @@
-"""Comparisons of laws on the same layouts."""

@@ -1,0 +1,310 @@
+"""Cells of a sweep: rates and averages of all runs with the same values of the grid."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.reporting.intervals import (
+    Estimate,
+    estimate_mean,
+    estimate_median,
+    estimate_rate,
+)
+from analysis.runs.metric_table import METRICS, metric_label
+from analysis.sweeps.mechanisms import failure_mechanisms
+from analysis.sweeps.plan import SweepPlan
+from analysis.sweeps.run_rows import (
+    WarningCount,
+    collisions,
+    column,
+    successes,
+    warning_counts,
+)
+
+ExampleKind = Literal["worst", "typical", "best"]
+EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
+#: MOST_BINS: greatest number of bins of a drawn number.
+#: LEAST_RUNS: least number of runs per bin, if there is more than one bin.
+MOST_BINS, LEAST_RUNS = 8, 20
+#: Columns that are averaged like metrics.
+_TIMES = ("collision_time_s", "simulated_s")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A rate or an average that is estimated from runs."""
+
+    name: str
+    """``success``, ``collision``, or the column of a metric."""
+    seed: int = 0
+    """Seed of the sweep, for bootstrap intervals."""
+
+    @property
+    def rate(self) -> bool:
+        """Whether the quantity is a rate, between 0 and 1."""
+        return self.name in ("success", "collision")
+
+    @property
+    def label(self) -> str:
+        """Title with the unit in brackets."""
+        return f"{self.name} (%)" if self.rate else metric_label(self.name)
+
+    def estimate(self, runs: pd.DataFrame) -> Estimate:
+        """Estimates the quantity.
+
+        A rate is the share of all runs. A run that raised an error counts as a run
+        without success and without collision. ``METRICS`` defines which runs an average
+        of a metric includes.
+        """
+        if self.rate:
+            hits = successes if self.name == "success" else collisions
+            return estimate_rate(int(np.sum(hits(runs))), len(runs))
+        metric = METRICS.get(self.name.rpartition(".")[2])
+        values = column(runs, self.name)
+        if metric and metric.of == "successes":
+            values = values[successes(runs)]
+        values = values[np.isfinite(values)]
+        if metric and metric.average == "mean":
+            # Each metric has its own seed, so that the samples are independent.
+            seed = crc32(json.dumps([self.seed, self.name]).encode())
+            return estimate_mean(values, seed=seed)
+        return estimate_median(values)
+
+    def text(self, estimate: Estimate, sign: str = "") -> str:
+        """Writes an estimate with its interval; rates are in percent.
+
+        Args:
+            estimate: The estimate.
+            sign: ``+`` to write the sign of positive numbers, too.
+        """
+        if self.rate:
+            return estimate.text(f"{sign}.0f", factor=100.0)
+        metric = METRICS.get(self.name.rpartition(".")[2])
+        return estimate.text(f"{sign}.{metric.digits if metric else 3}f")
+
+
+def quantities(
+    rows: pd.DataFrame, *, pictures: bool = False, robot: str = "", seed: int = 0
+) -> list[Quantity]:
+    """Returns the rates and metrics that pages show, without those that no run has.
+
+    Args:
+        rows: Results of the sweep.
+        pictures: Whether to return only the metrics that pictures show.
+        robot: Name of a robot, for its own metrics without rates. The default are the
+            rates and the metrics of all robots together.
+        seed: Seed of the sweep.
+    """
+    prefix = f"{robot}." if robot else ""
+    names = [
+        f"{prefix}{name}"
+        for name, metric in METRICS.items()
+        if metric.shown == "picture" or (metric.shown and not pictures)
+    ]
+    metrics = [Quantity(name, seed) for name in names]
+    rates = [] if robot else [Quantity("success"), Quantity("collision")]
+    return rates + [each for each in metrics if each.estimate(rows).n]
+
+
+@dataclass(frozen=True)
+class ExampleRun:
+    """A run of a cell that the report shows as an example."""
+
+    kind: ExampleKind
+    """Position among the cell's runs, ordered by success and then by clearance."""
+    index: int
+    """Number of the run in the sweep."""
+    cause: str
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Summary of all runs of one scenario with the same values of the grid."""
+
+    scenario: str
+    fields: dict[str, Any]
+    """Values of the fields of the grid, by dotted path."""
+    runs: int
+    causes: dict[str, int]
+    """Number of runs by cause of their end. The cause of a collision states in
+    brackets who was at fault."""
+    mechanisms: dict[str, int]
+    """Number of failed runs by mechanism; see ``failure_mechanisms``. It is empty for
+    several robots, and for a robot without range sensors."""
+    success: Estimate
+    collision: Estimate
+    metrics: dict[str, Estimate]
+    """Average of each metric, by column of the results."""
+    examples: tuple[ExampleRun, ...]
+    warnings: list[WarningCount]
+
+    @property
+    def label(self) -> str:
+        """Short text that distinguishes the cell from the others of its scenario."""
+        return cell_label(self.fields)
+
+
+def make_cell(
+    scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int = 0
+) -> Cell:
+    """Summarizes one cell of a sweep.
+
+    Args:
+        scenario: Name of the scenario.
+        fields: Values of the grid's fields, by dotted path.
+        rows: Results of the cell's runs, with the control period ``tick_s``, s.
+        seed: Seed of the sweep.
+    """
+    metrics = {
+        name: estimate
+        for name in rows.columns
+        if name in _TIMES or name.rpartition(".")[2] in METRICS
+        if (estimate := Quantity(name, seed).estimate(rows)).n
+    }
+    return Cell(
+        scenario=scenario,
+        fields=fields,
+        runs=len(rows),
+        causes=_causes(rows),
+        mechanisms=_mechanisms(rows),
+        success=Quantity("success").estimate(rows),
+        collision=Quantity("collision").estimate(rows),
+        metrics=metrics,
+        examples=_examples(rows),
+        warnings=warning_counts(rows),
+    )
+
+
+def _examples(rows: pd.DataFrame) -> tuple[ExampleRun, ...]:
+    """Worst, typical and best run, ordered by success and then by clearance."""
+    clearance = column(rows, "minimum_clearance_m")
+    order = np.lexsort((clearance, successes(rows)))
+    # A run that raised an error has no clearance and cannot be shown.
+    order = order[np.isfinite(clearance[order])]
+    if len(order) == 0:
+        return ()
+    chosen = order[0], order[len(order) // 2], order[-1]
+    return tuple(
+        ExampleRun(kind, int(rows["index"].iloc[k]), str(rows["cause"].iloc[k]))
+        for kind, k in zip(EXAMPLES, chosen, strict=True)
+    )
+
+
+def _causes(rows: pd.DataFrame) -> dict[str, int]:
+    fault = rows["collision_fault"]
+    names = rows["cause"].where(
+        rows["cause"] != "collision", "collision (" + fault.astype(str) + ")"
+    )
+    counts = names.value_counts()
+    return {str(name): int(count) for name, count in sorted(counts.items())}
+
+
+def _mechanisms(rows: pd.DataFrame) -> dict[str, int]:
+    """Counts the failure mechanisms, most frequent first."""
+    several = any(str(name).endswith(".cause") for name in rows.columns)
+    if several or "contact_warning_s" not in rows:
+        return {}
+    counts = failure_mechanisms(rows).value_counts()
+    return {str(name): int(count) for name, count in counts.items()}
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """Estimates of a quantity as a function of one drawn field."""
+
+    path: str
+    places: NDArray[np.float64]
+    """Median of the field in each bin; for choices, their indices from 0."""
+    labels: tuple[str, ...]
+    """Names of the choices; empty if the field is a number."""
+    estimates: tuple[Estimate, ...]
+    """Estimate of the quantity in each bin."""
+
+
+def marginal(
+    plan: SweepPlan, key: str, runs: pd.DataFrame, quantity: Quantity
+) -> Marginal:
+    """Estimates a quantity as a function of one randomly drawn field.
+
+    The runs are sorted into bins by the value of the field. If the field is a number,
+    the bins have about the same number of runs. Otherwise, each possible value has a
+    bin.
+
+    Args:
+        plan: Plan of the parameter sweep.
+        key: Key of ``plan.draw``. If the key lists several paths, the first path
+            represents all of them.
+        runs: Results of the sweep.
+        quantity: Quantity to estimate.
+
+    Returns:
+        One estimate for each bin.
+    """
+    path = key.partition(",")[0].strip()
+    values = runs[path]
+    if not plan.draw[key].numeric:
+        names = sorted(set(values), key=str)
+        return Marginal(
+            path,
+            np.arange(len(names), dtype=float),
+            tuple(short(name) for name in names),
+            tuple(quantity.estimate(runs[values == name]) for name in names),
+        )
+    count = int(np.clip(len(runs) // LEAST_RUNS, 1, MOST_BINS))
+    parts = np.array_split(np.argsort(values.to_numpy(), kind="stable"), count)
+    groups = [runs.iloc[part] for part in parts if len(part)]
+    return Marginal(
+        path,
+        np.array([float(group[path].median()) for group in groups]),
+        (),
+        tuple(quantity.estimate(group) for group in groups),
+    )
+
+
+def by_cell(plan: SweepPlan, results: pd.DataFrame) -> list[pd.DataFrame]:
+    """Splits the runs of a sweep by the cells of its grid, as in ``plan.cells()``."""
+    return [results[results["cell"] == k] for k in range(plan.cell_count)]
+
+
+def cell_label(fields: dict[str, Any]) -> str:
+    """Describes a cell of a grid, which is one combination of values, in a short text.
+
+    Args:
+        fields: Values of the grid's fields in this cell, by dotted path.
+
+    Returns:
+        Last part of each path with its value, or ``all runs`` if there are no fields.
+    """
+    pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
+    return ", ".join(pairs) or "all runs"
+
+
+def short(value: Any, most: int = 24) -> str:
+    """Writes a value as short text.
+
+    Args:
+        value: Plain value. Values other than texts are written as JSON.
+        most: Greatest length of the result, at least 4 characters.
+
+    Returns:
+        The text. If the text is too long, three dots replace its end.
+    """
+    text = value if isinstance(value, str) else json.dumps(value)
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table for a terminal, with two spaces between the columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
