@@ -103,7 +103,7 @@ def test_help_of_every_command_loads_nothing_else(tmp_path):
     code = """
 import contextlib, io, sys
 import phonotaxis
-from analysis.commands.command_line import COMMANDS
+from phonotaxis.commands.command_line import COMMANDS
 for words in ([], *([name] for name in COMMANDS)):
     with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
         phonotaxis.main([*words, "--help"])

@@ -22,20 +22,18 @@ _ERROR_NAMES = {
 }
 
 
-def localization_summary(
+def localization_document(
     experiment: LocalizationExperiment,
     cells: Sequence[LocalizationCell],
-    out: Path | None,
 ) -> dict[str, Any]:
     """Builds the JSON document of the localization experiment.
 
     Args:
         experiment: The experiment.
         cells: Results, one per position of the source and estimator.
-        out: Name of the result directory in the document. None: no directory.
 
     Returns:
-        Plain values for JSON.
+        Plain values for JSON. ``out`` is None until the files have a directory.
     """
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.follower.microphones, scenario.sound_speed_m_s
@@ -57,7 +55,7 @@ def localization_summary(
             seed=scenario.seed,
         ),
         "versions": versions(),
-        "out": str(out) if out is not None else None,
+        "out": None,
     }
 
 
@@ -72,7 +70,7 @@ def write_localization(
     Args:
         experiment: The localization experiment.
         cells: Results, one per position of the source and estimator.
-        summary: The document from ``localization_summary``.
+        summary: The document from ``localization_document``.
         directory: Existing directory for the files.
     """
     from analysis.hearing.localization_plots import plot_localization

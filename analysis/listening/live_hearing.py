@@ -213,7 +213,7 @@ def _decibels(power: float) -> float:
     return max(_QUIET_DB, 10.0 * math.log10(max(power, 1e-30)))
 
 
-def listen(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStream:
+def listen_to(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStream:
     """Listens to the end of a stream.
 
     Args:
