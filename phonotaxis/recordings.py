@@ -110,7 +110,7 @@ def locate(
     geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None = None,
     *,
     sample_rate_hz: float | None = None,
-) -> LocatedSource:
+) -> LocateResult:
     """Locates the source of a recording in each short stretch of time.
 
     A warning of the logger ``phonotaxis``, and ``notes`` of the result, state each

@@ -210,9 +210,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(written, no_space)
-    monkeypatch.setattr(
-        "phonotaxis.loops.study_design", lambda *_a, **_k: None
-    )
+    monkeypatch.setattr("phonotaxis.loops.study_design", lambda *_a, **_k: None)
     monkeypatch.setattr("phonotaxis.loops.design_document", lambda *_: {})
     status, printed, complaint = call(capsys, *command)
     said = complaint or json.loads(printed)["error"]["message"]

@@ -110,8 +110,10 @@ for words in ([], *([name] for name in COMMANDS)):
 print(*COMMANDS, *(name.partition(".")[0] for name in sys.modules))
 """
     loaded = printed_by(code)
-    assert {"simulate", "laws", "analysis"} <= loaded
-    assert not {"systems", "diagrams", "numpy", "pydrake", "pydantic"} & loaded
+    assert {"simulate", "laws", "phonotaxis"} <= loaded
+    assert (
+        not {"analysis", "systems", "diagrams", "numpy", "pydrake", "pydantic"} & loaded
+    )
 
 
 @pytest.mark.parametrize("package", ["systems", "diagrams"])

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.calibration.calibrate import CalibrationRun
-from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.reporting.palette import SERIES_COLOURS, draw_grid
 
 
 def plot_calibration(run: CalibrationRun) -> Figure:
@@ -24,14 +24,15 @@ def plot_calibration(run: CalibrationRun) -> Figure:
     stds = np.sqrt(np.diag(calibration.of_places)).reshape(places.shape)
     figure = Figure(figsize=(6.0, 5.0), layout="constrained")
     axes = figure.subplots()
-    axes.plot(*stated[:, :2].T, "x", color=COLOURS[1], label="stated")
+    axes.plot(*stated[:, :2].T, "x", color=SERIES_COLOURS[1], label="stated")
     axes.errorbar(
-        *places[:, :2].T,
+        places[:, 0],
+        places[:, 1],
         xerr=stds[:, 0],
         yerr=stds[:, 1],
         fmt="o",
         markersize=4,
-        color=COLOURS[0],
+        color=SERIES_COLOURS[0],
         label="calibrated",
     )
     for k, place in enumerate(places):

@@ -15,7 +15,10 @@ from analysis.hearing.free_field import (
     total_consistency,
 )
 from analysis.hearing.localization import prepare_localization
-from analysis.hearing.localization_report import localization_document, localization_text
+from analysis.hearing.localization_report import (
+    localization_document,
+    localization_text,
+)
 from analysis.hearing.paper_tables import PAPER_CELLS
 from systems.base.robot import RobotParameters
 from systems.hearing.parameters import TDOAParameters

@@ -19,7 +19,10 @@ from analysis.hearing.localization import (
     prepare_localization,
 )
 from analysis.hearing.localization_plots import plot_localization
-from analysis.hearing.localization_report import localization_document, localization_text
+from analysis.hearing.localization_report import (
+    localization_document,
+    localization_text,
+)
 from analysis.hearing.paper_tables import PAPER_CELLS
 from analysis.hearing.sensitivity import PolarStd
 
