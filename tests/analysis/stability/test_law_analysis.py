@@ -83,7 +83,7 @@ def test_laws_are_chosen_once_each():
 
 def test_document_of_one_law_has_its_parts_at_the_top():
     analysis = analyse_law(load_scenario(), [MASS, REFUSED, SPREAD])
-    document = stability_document([analysis], None)
+    document = stability_document([analysis])
     assert document["law"] == "active"
     assert document["mass"] == 3.94
     assert document["refused"] == {"problem": "law: cannot; choose another"}
