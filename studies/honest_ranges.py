@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.recordings.locate import hear
-from analysis.recordings.locate_result import LocateResult
+from analysis.recordings.locate_result import LocatedSource
 from analysis.recordings.prepared_recording import RecordedSamples
 from analysis.recordings.recording_search import MAD_TO_STD
 from analysis.reporting.intervals import estimate_rate
@@ -101,13 +101,13 @@ def try_array(cell: Cell, drawn: DrawnArray, rng: np.random.Generator) -> Trial:
     except InputError as error:
         return Trial(cell, drawn, str(error), (), (), *(math.nan,) * 4, ())
     known = drawn.geometry.known
-    found = LocateResult(
+    found = LocatedSource(
         {},
         known.shape,
         heard.estimates,
         len(heard.search.stretches),
         largest_range_error=known.largest_range_error,
-    ).summary()
+    ).main_source()
     late: list[float] = []
     for sighting in heard.sightings:
         lag = np.append(0.0, sighting.tau - drawn.tau)

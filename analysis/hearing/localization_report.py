@@ -22,14 +22,13 @@ _ERROR_NAMES = {
 }
 
 
-def localization_summary(
+def localization_document(
     experiment: LocalizationExperiment,
     cells: Sequence[LocalizationCell],
-    out: Path | None,
 ) -> dict[str, Any]:
     """Builds the JSON document of the localization experiment.
 
-    ``out`` is the result directory that the document names, or None without one.
+    ``out`` is None until the files have a directory.
     """
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.follower.microphones, scenario.sound_speed_m_s
@@ -51,7 +50,7 @@ def localization_summary(
             seed=scenario.seed,
         ),
         "versions": versions(),
-        "out": str(out) if out is not None else None,
+        "out": None,
     }
 
 

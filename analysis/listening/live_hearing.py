@@ -201,7 +201,7 @@ class LiveHearing:
             self._name_fault(fault, self.heard.seconds)
 
 
-def listen(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStream:
+def listen_to(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStream:
     """Listens to the end of a stream, and calls ``tell`` for each step.
 
     The status in the result says how the stream ended. Raises ``InputError`` if the

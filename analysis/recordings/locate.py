@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from analysis.recordings.array_geometry import ArrayGeometry, KnownArray, make_geometry
+from analysis.recordings.array_geometry import ArrayGeometry, KnownArray
 from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.heard_sources import heard_sources
-from analysis.recordings.locate_result import LocateResult, SourceEstimate
+from analysis.recordings.locate_result import LocatedSource, SourceEstimate
 from analysis.recordings.prepared_recording import (
     LEAST_SIGHTINGS,
     SNAPSHOTS,
     RecordedSamples,
     prepared_recording,
-    recorded_samples,
 )
 from analysis.recordings.recording_search import RecordingSearch, Sighting
 from analysis.recordings.recording_spectra import (
@@ -55,37 +51,20 @@ class HeardRecording(NamedTuple):
     faults: list[ChannelFault]
 
 
-def locate(
-    recording: str | Path | ArrayLike,
-    geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None = None,
-    *,
-    sample_rate_hz: float | None = None,
-) -> LocateResult:
+def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource:
     """Locates the source of a recording in each short stretch of time.
 
     Args:
-        recording: WAV or FLAC file with one channel per microphone, at 8-192 kHz. Or
-            (n, samples) recorded samples, one row per microphone.
-        geometry: Geometry of the microphones, the path of a geometry file, or a list of
-            positions (x, y) or (x, y, z) in m. None: the robot's own array.
-        sample_rate_hz: Rate of recorded samples, Hz. None for a file, which states its
-            own rate.
+        recorded: Recording that matches the array.
+        geometry: Geometry of the microphones.
 
     Returns:
-        The estimates over time. Their standard deviations include the errors that the
-        geometry states. A range is reported if its standard deviation is at most the
-        share ``largest_range_error`` of the range.
+        The estimates over time.
 
     Raises:
         InputError: The recording cannot be used. The message states the cause and the
             remedy.
     """
-    geometry = make_geometry(geometry)
-    return located(recorded_samples(recording, geometry, sample_rate_hz), geometry)
-
-
-def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocateResult:
-    """Locates the source of a recording that has already been read."""
     heard = hear(recorded, geometry)
     known, spectra, search = geometry.known, heard.recording, heard.search
     shape = known.shape
@@ -111,7 +90,7 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocateResult:
         spectra.sample_rate_hz,
         (spectra.low_hz, spectra.high_hz),
     )
-    return LocateResult(
+    return LocatedSource(
         array,
         shape,
         heard.estimates,

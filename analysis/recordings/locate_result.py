@@ -91,7 +91,7 @@ class SourceEstimate:
 
 
 @dataclass(frozen=True, repr=False)
-class LocateResult:
+class LocatedSource:
     """Estimates for the stretches of a recording in which a source was heard."""
 
     array: dict[str, Any]
@@ -111,9 +111,9 @@ class LocateResult:
 
     def __repr__(self) -> str:
         heard = f"{len(self.estimates)} of {self.frames} stretches heard"
-        return f"<LocateResult {self.shape.count} microphones, {heard}>"
+        return f"<{type(self).__name__} {self.shape.count} microphones, {heard}>"
 
-    def summary(self) -> dict[str, Any]:
+    def main_source(self) -> dict[str, Any]:
         """Summarizes the main source by medians, and lists what could not be measured.
 
         The estimates of the main source are the following:
@@ -198,13 +198,13 @@ class LocateResult:
             }
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
         """Returns the JSON document that the command line writes."""
         return {
             "schema_version": 1,
             "array": self.array,
             "estimates": [asdict(estimate) for estimate in self.estimates],
-            "summary": self.summary(),
+            "summary": self.main_source(),
             "sources": [asdict(source) for source in self.heard.sources],
             "tracks": [asdict(track) for track in self.heard.tracks],
         }

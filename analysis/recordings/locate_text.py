@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from analysis.recordings.locate_result import LocateResult, SourceEstimate
+from analysis.recordings.locate_result import LocatedSource, SourceEstimate
 
 _WHY_NOTHING = (
     "; the recording is silent or noise, or the positions (in m) or the speed of "
@@ -19,7 +19,7 @@ _COLUMNS = (
 )
 
 
-def locate_text(result: LocateResult) -> str:
+def locate_text(result: LocatedSource) -> str:
     """Describes a result by a summary and one row per estimate."""
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
     if not result.estimates:
@@ -31,8 +31,8 @@ def locate_text(result: LocateResult) -> str:
     return "\n".join(lines)
 
 
-def _direction(result: LocateResult) -> list[str]:
-    summary = result.summary()
+def _direction(result: LocatedSource) -> list[str]:
+    summary = result.main_source()
     parts = []
     if summary["bearing_deg"] is not None:
         parts.append(
@@ -60,8 +60,8 @@ def _direction(result: LocateResult) -> list[str]:
     return lines
 
 
-def _range(result: LocateResult) -> str:
-    summary = result.summary()
+def _range(result: LocatedSource) -> str:
+    summary = result.main_source()
     ranges = [e.range_m for e in result.estimates if e.range_m is not None]
     if summary["range_m"] is None and ranges:
         return (
@@ -78,7 +78,7 @@ def _range(result: LocateResult) -> str:
     )
 
 
-def _sources(result: LocateResult) -> list[str]:
+def _sources(result: LocatedSource) -> list[str]:
     sources = result.heard.sources
     if result.heard.steady:
         return ["the sound is steady: the number of sources is unknown"]

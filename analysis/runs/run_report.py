@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from analysis.reporting.plain_values import plain
@@ -15,8 +14,11 @@ from diagrams.running.stop_rules import SUCCESSFUL
 from systems.search.search_ending import fault_names
 
 
-def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
-    """Returns the summary of a run in the directory ``out`` as a JSON document."""
+def run_document(result: RunResult) -> dict[str, Any]:
+    """Returns the summary of a run as a JSON document, from plain values.
+
+    The key ``out`` is None until the files of the run have a directory.
+    """
     document = {
         "schema_version": SCHEMA_VERSION,
         "scenario": result.full_scenario.name,
@@ -32,7 +34,7 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
             "real_time_factor": result.simulated_s / result.wall_s,
         },
         "versions": versions(),
-        "out": str(out) if out is not None else None,
+        "out": None,
     }
     if result.several:
         document["robots"] = {
@@ -58,7 +60,7 @@ def _outcome(result: RunResult) -> dict[str, Any]:
     return ended
 
 
-def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
+def run_text(result: RunResult, summary: dict[str, Any]) -> str:
     """Returns the summary of a run as text that fits on one screen."""
     return "\n".join(
         f"{name.split('.')[-1]:<21} {value}"

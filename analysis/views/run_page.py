@@ -40,7 +40,7 @@ def run_page(
     Args:
         result: Result of the run.
         rows: Rows of the summary, from ``summary_rows``.
-        summary: Summary as a dictionary, from ``run_summary``.
+        summary: Summary as a dictionary, from ``run_document``.
         directory: Directory of the run, which will contain the page. The page shows
             only pictures and files that are in this directory.
 

@@ -139,6 +139,20 @@ def test_recordings_of_known_places(capsys, nine, tmp_path):
     ] in (0, 2)
 
 
+def test_python_gives_what_the_command_prints(capsys, nine, tmp_path):
+    folder, _, _, entries = nine
+    words = [listing(folder, entries), folder / "array.yaml"]
+    status, printed, _ = call(capsys, "calibrate", words[0], "--geometry", words[1])
+    assert status == 0
+    found = phonotaxis.calibrate(*words)
+    assert str(found) == printed.rstrip("\n")
+    assert found.notes == ()
+    out = found.save(tmp_path / "out")
+    assert found.geometry == load_geometry(out / "array.yaml")
+    points = found.plot().axes[0].lines[0].get_xydata()
+    np.testing.assert_array_equal(points, SQUARE[:, :2])
+
+
 def test_a_wrong_position_is_named_on_the_terminal(capsys, nine):
     folder, _, _, entries = nine
     wrong = [dict(entry) for entry in entries]

@@ -19,7 +19,10 @@ from analysis.hearing.localization import (
     prepare_localization,
 )
 from analysis.hearing.localization_plots import plot_localization
-from analysis.hearing.localization_report import localization_summary, localization_text
+from analysis.hearing.localization_report import (
+    localization_document,
+    localization_text,
+)
 from analysis.hearing.paper_tables import PAPER_CELLS
 from analysis.hearing.sensitivity import PolarStd
 
@@ -39,7 +42,7 @@ def cells(experiment) -> list[LocalizationCell]:
 
 @pytest.fixture(scope="module")
 def summary(experiment, cells):
-    return localization_summary(experiment, cells, None)
+    return localization_document(experiment, cells)
 
 
 def test_every_place_has_every_estimator(cells):
