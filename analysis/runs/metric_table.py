@@ -14,7 +14,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.reporting.units import without_unit
 from analysis.runs.measured_run import (
     MOVING_M_S,
     Flags,
@@ -60,7 +59,9 @@ class Metric:
     """A number that describes a run, and how numbers of many runs are averaged."""
 
     name: str
-    """Name in JSON documents and in the tables of sweeps; it ends in the unit."""
+    """Name in JSON documents and in the tables of sweeps."""
+    unit: str
+    """Unit; empty for counts and ratios."""
     title: str
     """Name for readers, without the unit."""
     meaning: str
@@ -81,11 +82,6 @@ class Metric:
     shown: Literal["", "table", "picture"] = ""
     """Whether the pages of sweeps and comparisons show the metric: not at all, in
     tables, or in tables and pictures."""
-
-    @property
-    def unit(self) -> str:
-        """Unit; empty for counts and ratios."""
-        return without_unit(self.name)[1]
 
     @property
     def label(self) -> str:
@@ -298,6 +294,7 @@ def _first_reaction(
 _ALL = (
     Metric(
         "minimum_clearance_m",
+        "m",
         "least clearance",
         "smallest clearance to any body: an obstacle, another robot or the source. "
         "When a contact switch touches an odor source, the clearance can be as low as "
@@ -309,6 +306,7 @@ _ALL = (
     ),
     Metric(
         "minimum_obstacle_clearance_m",
+        "m",
         "least clearance from obstacles",
         "smallest clearance to any body except the source that the robot follows",
         lambda run: min(run.obstacle_clearances, default=None),
@@ -318,6 +316,7 @@ _ALL = (
     ),
     Metric(
         "path_length_m",
+        "m",
         "path length",
         "length of the path of the origin of B, in a search until the search ends",
         lambda run: run.path_length,
@@ -326,6 +325,7 @@ _ALL = (
     ),
     Metric(
         "final_distance_m",
+        "m",
         "distance at the end",
         "distance from P to the source at the end of the run. In a search, it is the "
         "distance from the origin of B to the source or the calling robot at the end "
@@ -336,12 +336,14 @@ _ALL = (
 _NEAR = (
     Metric(
         "clearance_p05_m",
+        "m",
         "5th percentile of the clearance",
         "5th percentile of the clearance to the nearest body, over all ticks",
         lambda run: quantile(run.clearance, 0.05) if len(run.bodies) else None,
     ),
     Metric(
         "minimum_time_to_contact_s",
+        "s",
         "least time to contact",
         "smallest predicted time until the robot touches another body, over all ticks. "
         "The prediction assumes that all bodies keep their present velocity and "
@@ -353,6 +355,7 @@ _NEAR = (
     ),
     Metric(
         "reaction_distance_m",
+        "m",
         "reaction distance",
         "distance from P to the nearest obstacle when the law first reacts to this "
         "obstacle. The law reacts if it pushes with at least 0.5 N, if the obstacle is "
@@ -366,6 +369,7 @@ _NEAR = (
 _CONTACT = (
     Metric(
         "contact_warning_s",
+        "s",
         "first echo before contact",
         "time from the first echo of the body to the contact; `null` if the body never "
         "caused an echo",
@@ -374,6 +378,7 @@ _CONTACT = (
     ),
     Metric(
         "contact_unseen_s",
+        "s",
         "last echo before contact",
         "time from the last echo of the body to the contact; `null` if the body never "
         "caused an echo",
@@ -382,6 +387,7 @@ _CONTACT = (
     ),
     Metric(
         "contact_push_n",
+        "N",
         "push at contact",
         "magnitude of the law's push at the last tick",
         _contact_push,
@@ -391,6 +397,7 @@ _CONTACT = (
 _GOAL = (
     Metric(
         "time_to_goal_s",
+        "s",
         "time to the goal",
         "time of the first tick at which P is in the goal, at any speed",
         lambda run: _first_time(run, run.in_goal),
@@ -401,6 +408,7 @@ _GOAL = (
     ),
     Metric(
         "settling_time_s",
+        "s",
         "settling time",
         "time of the first tick after which P stays in the goal until the run ends. If "
         "the source is at rest, P must also stay slower than 0.05 m/s, for at least "
@@ -412,6 +420,7 @@ _GOAL = (
     ),
     Metric(
         "shortest_path_m",
+        "m",
         "shortest path",
         "length of the shortest path from the start to the goal around all obstacles "
         "at rest; `null` for a moving source",
@@ -419,6 +428,7 @@ _GOAL = (
     ),
     Metric(
         "spl",
+        "",
         "success weighted by path length",
         "success weighted by path length (SPL, Anderson et al. 2018, arXiv "
         "1807.06757). If the outcome is `reached`, the value is `shortest_path_m` "
@@ -431,6 +441,7 @@ _GOAL = (
 _FOLLOWING = (
     Metric(
         "following_fraction",
+        "",
         "share of time in the following band",
         "fraction of the ticks after the first detection at which the magnitude of the "
         "following error is at most `stop.following_band_m`. For the outcome "
@@ -442,6 +453,7 @@ _FOLLOWING = (
     ),
     Metric(
         "following_error_rms_m",
+        "m",
         "rms following error",
         "RMS value of the following error",
         lambda run: rms(np.abs(run.following_error)[run.after_second_burst]),
@@ -451,6 +463,7 @@ _FOLLOWING = (
     ),
     Metric(
         "following_error_p95_m",
+        "m",
         "95th percentile of the following error",
         "95th percentile of the magnitude of the following error",
         lambda run: quantile(np.abs(run.following_error)[run.after_second_burst], 0.95),
@@ -459,6 +472,7 @@ _FOLLOWING = (
     ),
     Metric(
         "following_bearing_rms_deg",
+        "deg",
         "rms bearing of the source",
         "RMS value of the true bearing of the source",
         lambda run: rms(
@@ -469,6 +483,7 @@ _FOLLOWING = (
     ),
     Metric(
         "valid_target_fraction",
+        "",
         "share of time with a target",
         "fraction of all ticks at which the robot has a valid target",
         lambda run: share(run.target_valid),
@@ -478,6 +493,7 @@ _FOLLOWING = (
 _ROUTE = (
     Metric(
         "route_deviation_m",
+        "m",
         "median deviation from the route",
         "median distance of P from the path along which the target moved",
         lambda run: float(np.median(run.route_deviation)),
@@ -485,6 +501,7 @@ _ROUTE = (
     ),
     Metric(
         "route_deviation_max_m",
+        "m",
         "greatest deviation from the route",
         "greatest distance of P from the path along which the target moved",
         lambda run: float(np.max(run.route_deviation)),
@@ -494,6 +511,7 @@ _ROUTE = (
     ),
     Metric(
         "yaw_ripple_rad_s",
+        "rad/s",
         "yaw ripple",
         "RMS value of the difference between the yaw rate and its moving mean over "
         "1 s. The metric includes only the ticks at which a body is nearer than 1 m to "
@@ -504,6 +522,7 @@ _ROUTE = (
     ),
     Metric(
         "replans",
+        "",
         "new routes",
         "number of times that the planner computed a new route",
         lambda run: float(run.columns["replans"][-1]),
@@ -513,7 +532,7 @@ _ROUTE = (
 )
 
 
-def _gains(name: str, unit: str, symbol: str) -> tuple[Metric, ...]:
+def _gains(name: str, unit: str, ending: str, symbol: str) -> tuple[Metric, ...]:
     """Metrics of a gain that the law may adapt: its extremes and its last value."""
 
     def of(
@@ -522,24 +541,33 @@ def _gains(name: str, unit: str, symbol: str) -> tuple[Metric, ...]:
         read: Callable[[Floats], float],
     ) -> Metric:
         return Metric(
-            f"{which}_{name}_{unit}",
+            f"{which}_{name}_{ending}",
+            unit,
             f"{which} {name} {symbol}",
             f"{which} value of the {name} {symbol}, if the law adapts {symbol}",
             lambda run: float(read(run.columns[name])),
-            robots=robots,
+            robots=_OF_ROBOTS[which],
             paired=True,
         )
 
     return (
-        of("least", "least", np.min),
-        of("greatest", "greatest", np.max),
-        of("last", "mean", lambda values: values[-1]),
+        of("least", np.min),
+        of("greatest", np.max),
+        of("last", lambda values: values[-1]),
     )
 
 
+_OF_ROBOTS: dict[str, Literal["mean", "least", "greatest"]] = {
+    "least": "least",
+    "greatest": "greatest",
+    "last": "mean",
+}
+_STIFFNESS = _gains("stiffness", "N/m", "n_m", "K")
+_DAMPING = _gains("damping", "N s/m", "n_s_m", "D")
 _SEARCH = (
     Metric(
         "search_steps",
+        "",
         "steps",
         "number of moves that the robot began",
         lambda run: run.search_steps,
@@ -547,6 +575,7 @@ _SEARCH = (
     ),
     Metric(
         "search_time_s",
+        "s",
         "time of the search",
         "duration of the search. If the robot waits for a call, the search starts when "
         "the robot first listens to the sound of the caller.",
@@ -555,12 +584,14 @@ _SEARCH = (
     ),
     Metric(
         "step_length_m",
+        "m",
         "step length",
         "`path_length_m` divided by `search_steps`",
         lambda run: run.path_length / run.search_steps if run.search_steps else None,
     ),
     Metric(
         "path_efficiency",
+        "",
         "straight over driven",
         "decrease of the distance to the source during the search, divided by "
         "`path_length_m`",
@@ -569,6 +600,7 @@ _SEARCH = (
     ),
     Metric(
         "minimum_distance_m",
+        "m",
         "least distance",
         "smallest distance from the origin of B to the source or the calling robot. At "
         "less than 0.35 m from the calling robot, the arms of both robots can touch.",
@@ -577,6 +609,7 @@ _SEARCH = (
     ),
     Metric(
         "driving_fraction",
+        "",
         "share of time in motion",
         "fraction of the ticks at which the robot moves faster than 2 cm/s",
         _driving_fraction,
@@ -586,6 +619,7 @@ _SEARCH = (
 _SMOOTHNESS = (
     Metric(
         "jerk_rms_m_s3",
+        "m/s³",
         "rms jerk",
         "RMS value of the magnitude of the jerk",
         lambda run: rms(run.jerk),
@@ -595,6 +629,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "jerk_max_m_s3",
+        "m/s³",
         "greatest jerk",
         "maximum magnitude of the jerk",
         lambda run: float(np.max(run.jerk)) if len(run.jerk) else None,
@@ -604,6 +639,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "angular_jerk_rms_rad_s3",
+        "rad/s³",
         "rms angular jerk",
         "RMS value of the angular jerk",
         lambda run: rms(jerk(run.columns["omega_WB"], run.tick_s)),
@@ -612,6 +648,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "sparc",
+        "",
         "SPARC",
         "spectral arc length of the speed (Balasubramanian et al. 2012). The value is "
         "negative, and it is closer to 0 for smoother motion.",
@@ -622,6 +659,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "ldlj",
+        "",
         "LDLJ",
         "log dimensionless jerk of the speed (Balasubramanian et al. 2015). The value "
         "is larger for smoother motion.",
@@ -633,6 +671,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "turn_reversals_per_s",
+        "1/s",
         "turn reversals per second",
         "number of changes of the turning direction per second. The metric ignores yaw "
         "rates below 0.1 rad/s.",
@@ -642,6 +681,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "heading_change_rad_m",
+        "rad/m",
         "heading change per path length",
         "sum of the magnitudes of all heading changes, divided by the path length",
         _heading_change,
@@ -650,12 +690,14 @@ _SMOOTHNESS = (
     ),
     Metric(
         "mean_speed_m_s",
+        "m/s",
         "mean speed",
         "mean speed of the origin of B",
         lambda run: float(np.mean(run.speed)),
     ),
     Metric(
         "top_speed_m_s",
+        "m/s",
         "top speed",
         "maximum speed of the origin of B",
         lambda run: float(np.max(run.speed)),
@@ -663,6 +705,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "control_effort_rms_n",
+        "N",
         "rms control effort",
         "RMS value of the total force on the virtual mass: attraction plus repulsion",
         _control_effort,
@@ -671,6 +714,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "push_work_j",
+        "J",
         "work of the push",
         "net work of the push on the virtual mass. If the value is positive, the push "
         "added more energy to the motion than it removed.",
@@ -678,6 +722,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "wheel_variation_m_s2",
+        "m/s²",
         "variation of the wheel commands",
         "mean magnitude of the rate of change of the commanded speeds of the wheel "
         "rims",
@@ -687,6 +732,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "saturated_fraction",
+        "",
         "share of time at a speed limit",
         "fraction of the ticks at which the virtual mass or a wheel is at its speed "
         "limit",
@@ -697,6 +743,7 @@ _SMOOTHNESS = (
     ),
     Metric(
         "impossible_obstacle_speed_ticks",
+        "",
         "ticks with an impossible obstacle speed",
         "number of ticks at which the obstacle speed s that the law computed is more "
         "than twice the robot's top speed",
@@ -707,6 +754,7 @@ _SMOOTHNESS = (
 _ODOMETRY = (
     Metric(
         "odometry_error_rms_m",
+        "m",
         "rms odometry error",
         "RMS value of the distance between the true and the computed position. Without "
         "slip, this distance is below 1 mm.",
@@ -716,6 +764,7 @@ _ODOMETRY = (
     ),
     Metric(
         "odometry_error_final_m",
+        "m",
         "odometry error at the end",
         "final value of the distance between the true and the computed position",
         lambda run: float(run.odometry_error[-1]),
@@ -724,6 +773,7 @@ _ODOMETRY = (
     ),
     Metric(
         "odometry_heading_error_rms_deg",
+        "deg",
         "rms heading error of the odometry",
         "RMS value of the heading error",
         lambda run: rms(
@@ -734,6 +784,7 @@ _ODOMETRY = (
     ),
     Metric(
         "slip_way_m",
+        "m",
         "slip of the wheels",
         "distance by which the wheel rims slid over the floor in any direction, "
         "averaged over both wheels; `null` without `plant.friction`",
@@ -745,6 +796,7 @@ _ODOMETRY = (
 _HEARING = (
     Metric(
         "frames_with_sound",
+        "",
         "frames with sound",
         "number of frames with sound",
         lambda run: int(np.count_nonzero(run.frames_with_sound)),
@@ -752,6 +804,7 @@ _HEARING = (
     ),
     Metric(
         "frames_with_sound_heard",
+        "",
         "frames with sound that were heard",
         "number of frames with sound in which the robot detected the source",
         lambda run: int(np.count_nonzero(run.frames_with_sound & run.detections)),
@@ -759,6 +812,7 @@ _HEARING = (
     ),
     Metric(
         "detections",
+        "",
         "detections",
         "number of all detections",
         lambda run: int(np.count_nonzero(run.detections)),
@@ -766,6 +820,7 @@ _HEARING = (
     ),
     Metric(
         "detections_with_range",
+        "",
         "detections with a range",
         "number of detections that include a range",
         lambda run: int(np.count_nonzero(run.ranged_detections)),
@@ -773,12 +828,14 @@ _HEARING = (
     ),
     Metric(
         "source_error_median_m",
+        "m",
         "median position error of the source",
         "median of the position error, over the detections that include a range",
         lambda run: quantile(run.source_errors, 0.5),
     ),
     Metric(
         "source_error_p95_m",
+        "m",
         "95th percentile of the position error",
         "95th percentile of the position error, over the detections that include a "
         "range",
@@ -786,6 +843,7 @@ _HEARING = (
     ),
     Metric(
         "source_outlier_fraction",
+        "",
         "share of outliers",
         "fraction of the detections that have a position error above 0.5 m. Only "
         "detections that include a range count.",
@@ -801,16 +859,8 @@ GROUPS = (
     Group("goal", _drives, _GOAL),
     Group("following", _follows, _FOLLOWING),
     Group("route", lambda run: run.routed, _ROUTE),
-    Group(
-        "stiffness",
-        lambda run: run.routed and run.has("stiffness"),
-        _gains("stiffness", "n_m", "K"),
-    ),
-    Group(
-        "damping",
-        lambda run: run.routed and run.has("damping"),
-        _gains("damping", "n_s_m", "D"),
-    ),
+    Group("stiffness", lambda run: run.routed and run.has("stiffness"), _STIFFNESS),
+    Group("damping", lambda run: run.routed and run.has("damping"), _DAMPING),
     Group("search", lambda run: run.searches, _SEARCH),
     Group("smoothness", _drives, _SMOOTHNESS),
     Group("odometry", _drives, _ODOMETRY),
