@@ -546,22 +546,17 @@ def _gains(name: str, unit: str, ending: str, symbol: str) -> tuple[Metric, ...]
             f"{which} {name} {symbol}",
             f"{which} value of the {name} {symbol}, if the law adapts {symbol}",
             lambda run: float(read(run.columns[name])),
-            robots=_OF_ROBOTS[which],
+            robots=robots,
             paired=True,
         )
 
     return (
-        of("least", np.min),
-        of("greatest", np.max),
-        of("last", lambda values: values[-1]),
+        of("least", "least", np.min),
+        of("greatest", "greatest", np.max),
+        of("last", "mean", lambda values: values[-1]),
     )
 
 
-_OF_ROBOTS: dict[str, Literal["mean", "least", "greatest"]] = {
-    "least": "least",
-    "greatest": "greatest",
-    "last": "mean",
-}
 _STIFFNESS = _gains("stiffness", "N/m", "n_m", "K")
 _DAMPING = _gains("damping", "N s/m", "n_s_m", "D")
 _SEARCH = (
