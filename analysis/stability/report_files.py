@@ -8,12 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+
 from analysis.models.model_export import write_models
 from analysis.reporting.criterion import compare_verdicts
 from analysis.reporting.plain_values import plain
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.reporting.render import text
-from analysis.reporting.section import Drawing, Table, figures_of
+from analysis.reporting.section import Table, figures_of
 from analysis.stability.law_analysis import LawAnalysis
 from analysis.stability.report_page import stability_page, verdict_table
 from diagrams import write_scenario
@@ -70,7 +72,7 @@ def stability_text(analyses: Sequence[LawAnalysis]) -> str:
     return "\n".join(lines)
 
 
-def report_figures(analyses: Sequence[LawAnalysis]) -> dict[str, Drawing]:
+def report_figures(analyses: Sequence[LawAnalysis]) -> dict[str, Figure]:
     """Draws all figures of a report, by caption."""
     drawn = {}
     for each in analyses:
