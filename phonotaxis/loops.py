@@ -138,7 +138,7 @@ def stability(
             commas. ``all`` means all laws that avoid obstacles, or all laws for routes.
             An empty list means the law of the scenario.
         robot: Name of the robot to analyze. None means the first robot.
-        full: Whether to include the parts that take minutes.
+        full: Whether to check by longer simulations, and by more of them.
         progress: Function that is called with the name of each part before its
             computation.
 
@@ -165,14 +165,14 @@ def prepare_stability(
     Args:
         scenarios: Scenario of one robot, with each law.
         note: Note that names the robots that are left out; empty if there are none.
-        full: Whether to include the parts that take minutes.
+        full: Whether to check by longer simulations, and by more of them.
     """
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)
     for each in scenarios:
         check_files(each)
         make_controller(each)
-    work = report_parts.parts_for(scenarios, full=full)
+    work = report_parts.parts_for(scenarios)
 
     def run(step: Callable[[str], None]) -> StabilityResult:
         analyses = [analyse_law(each, work, full=full, step=step) for each in scenarios]

@@ -328,7 +328,7 @@ def test_stability_gives_findings_and_a_page(
 ):
     """The first parts alone: all of them take a minute."""
     monkeypatch.setattr(
-        report_parts, "parts_for", lambda _, full: report_parts.SOUND_PARTS[:2]
+        report_parts, "parts_for", lambda _: report_parts.SOUND_PARTS[:2]
     )
     told: list[str] = []
     for laws, names in (
@@ -350,7 +350,7 @@ def test_stability_warns_that_other_robots_are_left_out(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
     """As the command does."""
-    monkeypatch.setattr(report_parts, "parts_for", lambda _, full: [])
+    monkeypatch.setattr(report_parts, "parts_for", lambda _: [])
     found = phonotaxis.stability("robots_2")
     phonotaxis.stability("robots_2", robot="second")
     phonotaxis.stability("unknown_block")

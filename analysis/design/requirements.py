@@ -80,8 +80,7 @@ class Check:
 class Requirements:
     """Requirements on the attraction and on the gains of the laws.
 
-    The bounds of the loop and of the offset at rest are the thresholds of the stability
-    report.
+    The criteria of the stability report have the same thresholds.
     """
 
     damping_ratio: float = 0.4
@@ -137,6 +136,10 @@ class Requirements:
             yield field, Requirement(name, getattr(self, field), unit, at_least=True)
         peak = Requirement("sensitivity peak", self.sensitivity_peak, "1")
         yield "sensitivity_peak", peak
+
+
+#: Requirements of the stability report and of ``phonotaxis design``.
+REQUIRED = Requirements()
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.hearing.cramer_rao import polar_point
-from analysis.recordings.locate_result import LocatedSource
+from analysis.recordings.locate_result import LocatedSource, wrapped_deg
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS, draw_grid
 from analysis.reporting.plain_values import write_json
 
@@ -24,13 +24,7 @@ _WIDTH_IN, _PANEL_IN, _PLAN_IN = 9.0, 1.9, 3.6
 def write_locate(
     result: LocatedSource, document: dict[str, Any], directory: Path
 ) -> None:
-    """Writes ``locate.json`` and ``locate.png`` into a directory.
-
-    Args:
-        result: Estimates over time, for the plot.
-        document: Plain values, for the JSON file.
-        directory: Directory, which must exist.
-    """
+    """Writes ``locate.json`` and ``locate.png`` into an existing directory."""
     write_json(document, directory / "locate.json")
     plot_locate(result).savefig(directory / "locate.png", dpi=150)
 
@@ -39,12 +33,6 @@ def plot_locate(result: LocatedSource) -> Figure:
     """Plots the angles and the range over time, and a plan view.
 
     Error bars show one standard deviation.
-
-    Args:
-        result: Estimates over time.
-
-    Returns:
-        The figure.
     """
     known = [
         (name, label)
@@ -97,14 +85,16 @@ def _over_time(axes: Axes, result: LocatedSource, name: str) -> None:
     ]
     times, values, errors = np.array(rows).T
     summary = result.main_source()
-    centre, std = summary[name], summary[std_name]
-    if name == "bearing_deg" and centre is not None:
+    center, std = summary[name], summary[std_name]
+    if name == "bearing_deg" and center is not None:
         # A bearing near 180 deg must not jump from the top to the bottom of the plot.
         # The axis labels show the same wrapped bearings as the table.
-        middle = _middle_deg(result, centre)
+        middle = _middle_deg(result, center)
         values = middle + (values - middle + 180.0) % 360.0 - 180.0
-        centre = middle + (centre - middle + 180.0) % 360.0 - 180.0
-        axes.yaxis.set_major_formatter(lambda value, _: f"{_wrapped_deg(value):g}")
+        center = middle + (center - middle + 180.0) % 360.0 - 180.0
+        axes.yaxis.set_major_formatter(
+            lambda value, _: f"{wrapped_deg(round(value, 6)):g}"
+        )
         _tracks(axes, result, middle)
     axes.errorbar(
         times,
@@ -115,15 +105,14 @@ def _over_time(axes: Axes, result: LocatedSource, name: str) -> None:
         linewidth=0.8,
         color=COLOURS["estimate"],
     )
-    if centre is not None:
-        axes.axhline(centre, color=COLOURS["source"], linewidth=1.2)
-        ends = centre - std, centre + std
+    if center is not None:
+        axes.axhline(center, color=COLOURS["source"], linewidth=1.2)
+        ends = center - std, center + std
         axes.axhspan(*ends, color=COLOURS["source"], alpha=0.15, linewidth=0)
     draw_grid(axes)
 
 
 def _others(axes: Axes, result: LocatedSource, length: float) -> None:
-    """Draws the bearings of all sources except the main source."""
     main = result.main_source()["bearing_deg"]
     if main is None or len(result.heard.sources) < 2:
         return
@@ -158,20 +147,14 @@ def _tracks(axes: Axes, result: LocatedSource, middle: float) -> None:
         around = middle + (bearing - middle + 180.0) % 360.0 - 180.0
         steps = np.diff(around, prepend=around[0]), np.diff(t_s, prepend=t_s[0])
         around[(np.abs(steps[0]) > 180.0) | (steps[1] > _GAP_S)] = np.nan
-        colour = ROBOT_COLOURS[k % len(ROBOT_COLOURS)]
-        axes.plot(t_s, around, color=colour, label=f"{track.identity}")
+        color = ROBOT_COLOURS[k % len(ROBOT_COLOURS)]
+        axes.plot(t_s, around, color=color, label=f"{track.identity}")
     axes.legend(
         fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=8
     )
 
 
-def _wrapped_deg(angle: float) -> float:
-    """Returns an angle wrapped to (-180, 180], deg."""
-    return 180.0 - (180.0 - round(angle, 6)) % 360.0
-
-
 def _plan(axes: Axes, result: LocatedSource) -> None:
-    """Draws the microphones and bearings from above, in the frame of the geometry."""
     places = result.shape.p_AM[:, :2]
     ranges = [e.range_m for e in result.estimates if e.range_m is not None]
     size = max(1.6 * float(np.abs(places).max()), 1.15 * max(ranges, default=0.0))

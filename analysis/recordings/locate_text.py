@@ -20,16 +20,7 @@ _COLUMNS = (
 
 
 def locate_text(result: LocatedSource) -> str:
-    """Describes a result by a summary and one row per estimate.
-
-    The text does not contain the faults of the channels.
-
-    Args:
-        result: Estimates over time.
-
-    Returns:
-        The text, with several lines.
-    """
+    """Describes a result by a summary and one row per estimate."""
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
     if not result.estimates:
         return f"{heard}: nothing to locate{_WHY_NOTHING}"
@@ -88,10 +79,6 @@ def _range(result: LocatedSource) -> str:
 
 
 def _sources(result: LocatedSource) -> list[str]:
-    """Describes all sources if there are several.
-
-    For a steady sound, the text states that the number of sources is unknown.
-    """
     sources = result.heard.sources
     if result.heard.steady:
         return ["the sound is steady: the number of sources is unknown"]

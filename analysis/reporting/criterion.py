@@ -105,16 +105,7 @@ class VerdictRow:
 
 
 def shown_value(value: float | None, unit: str) -> float | str | None:
-    """Returns a value in the form in which a table shows it.
-
-    Args:
-        value: Value of a verdict, or None if it does not exist.
-        unit: Unit of the value.
-
-    Returns:
-        If the unit is ``YES_OR_NO``, the word "yes" or "no". Otherwise, the value. If
-        the value does not exist, None.
-    """
+    """Returns the value of a verdict as a table shows it: "yes", "no", or the value."""
     if value is None or unit != YES_OR_NO:
         return value
     return "yes" if value else "no"

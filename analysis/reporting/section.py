@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
@@ -85,6 +86,22 @@ class Table:
     caption: str = ""
     dense: bool = False
     """Whether to use small type, for matrices."""
+
+    @classmethod
+    def of(
+        cls,
+        objects: Iterable[Any],
+        columns: Mapping[Column | str, str | Callable[[Any], Cell]],
+        caption: str = "",
+    ) -> Table:
+        """Makes a table with one row per object.
+
+        Each column has the name of an attribute, which may be a dotted path, or a
+        function that takes the object and returns the cell.
+        """
+        cells = [attrgetter(x) if isinstance(x, str) else x for x in columns.values()]
+        rows = [[cell(each) for cell in cells] for each in objects]
+        return cls(list(columns), rows, caption)
 
     @property
     def heads(self) -> list[Column]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.design.requirements import REQUIRED
 from analysis.linear.linear_plots import plot_equilibria, plot_step
 from analysis.linear.step_response import Oscillation, StepCheck, check_step
 from analysis.models.equilibria import EquilibriumSearch, find_equilibria
@@ -134,12 +135,6 @@ def _point_document(point: OperatingPoint) -> dict[str, Any]:
 
 
 def _show_points(data: OperatingPoints) -> list[Content]:
-    columns: list[Column | str] = [
-        Column("x", "m"), Column("y", "m"), "kind", Column("from the source", "m"),
-        Column("offset", "m"), "nearest body", Column("clearance", "m"),
-        Column("slowest poles", "1/s"),
-    ]  # fmt: skip
-    rows = [_point_row(point) for point in data.search.points]
     return [
         data.search.statement,
         (
@@ -148,8 +143,8 @@ def _show_points(data: OperatingPoints) -> list[Content]:
             f"report is about the sink at ({data.at.p_WP[0]:.3f}, "
             f"{data.at.p_WP[1]:.3f}) m."
         ),
-        Table(columns, rows, "Equilibria at rest"),
-        Table(columns, [_point_row(data.moving)], "Following a moving source")
+        _point_table(data.search.points, "Equilibria at rest"),
+        _point_table([data.moving], "Following a moving source")
         if data.moving
         else Note(f"No moving equilibrium: {data.no_moving}."),
         Figure(
@@ -159,18 +154,27 @@ def _show_points(data: OperatingPoints) -> list[Content]:
     ]
 
 
-def _point_row(point: OperatingPoint) -> list[Cell]:
+def _point_table(points: Sequence[OperatingPoint], caption: str) -> Table:
+    return Table.of(
+        points,
+        {
+            Column("x", "m"): lambda point: round(float(point.p_WP[0]), 6),
+            Column("y", "m"): lambda point: round(float(point.p_WP[1]), 6),
+            "kind": lambda point: point.kind + " (continuum)" * point.continuum,
+            Column("from the source", "m"): "source_distance_m",
+            Column("offset", "m"): "offset_m",
+            "nearest body": "nearest_body",
+            Column("clearance", "m"): "clearance_m",
+            Column("slowest poles", "1/s"): _slowest_poles,
+        },
+        caption,
+    )
+
+
+def _slowest_poles(point: OperatingPoint) -> str:
     poles = sorted(point.eigenvalues, key=lambda pole: -pole.real)
     upper = [complex(pole) for pole in poles if pole.imag >= 0.0][:2]
-    return [
-        *(round(float(value), 6) for value in point.p_WP),
-        point.kind + (" (continuum)" if point.continuum else ""),
-        point.source_distance_m,
-        point.offset_m,
-        point.nearest_body,
-        point.clearance_m,
-        "; ".join(number(pole, 3) for pole in upper),
-    ]
+    return "; ".join(number(pole, 3) for pole in upper)
 
 
 def _linear_models(study: Study) -> LinearModels:
@@ -257,30 +261,27 @@ def _element(value: float) -> Cell:
 
 def _mode_table(modes: Sequence[Mode], caption: str) -> Table:
     moving = [m for m in modes if m.frequency_rad_s > _NEUTRAL_1_S]
-    rows: list[list[Cell]] = [
-        [
-            mode.eigenvalue,
-            mode.z,
-            mode.damping_ratio,
-            mode.frequency_rad_s,
-            mode.time_constant_s,
-            mode.settling_s,
-            ", ".join(_shares(mode)[:3]),
-        ]
-        for mode in moving[:_MODES]
-    ]
-    faster = len(moving) - len(rows)
     left = f"; left out: {len(modes) - len(moving)} neutral"
-    left += f" and {faster} faster ones" if faster else ""
-    columns: list[Column | str] = [
-        Column("pole", "1/s"), "z", "damping ratio", "rad/s",
-        Column("time constant", "s"), Column("to 2 %", "s"), "participation",
-    ]  # fmt: skip
-    return Table(columns, rows, caption + left)
+    if len(moving) > _MODES:
+        left += f" and {len(moving) - _MODES} faster ones"
+    return Table.of(
+        moving[:_MODES],
+        {
+            Column("pole", "1/s"): "eigenvalue",
+            "z": "z",
+            "damping ratio": "damping_ratio",
+            "rad/s": "frequency_rad_s",
+            Column("time constant", "s"): "time_constant_s",
+            Column("to 2 %", "s"): "settling_s",
+            "participation": _participation,
+        },
+        caption + left,
+    )
 
 
-def _shares(mode: Mode) -> list[str]:
-    return [f"{k} {100.0 * v:.0f} %" for k, v in mode.participation.items()]
+def _participation(mode: Mode) -> str:
+    shares = [f"{k} {100.0 * v:.0f} %" for k, v in mode.participation.items()]
+    return ", ".join(shares[:3])
 
 
 def _step_document(data: StepCheck) -> dict[str, Any]:
@@ -337,7 +338,7 @@ OPERATING_POINTS = Part[OperatingPoints](
             lambda data: data.at.eigenvalues.real.max(),
         ),
         Criterion(
-            "damping ratio at rest", "", "at least", 0.4,
+            "damping ratio at rest", "", "at least", REQUIRED.damping_ratio,
             "overshoots are small",
             "it overshoots and swings for several cycles",
             "usual: 0.4 to 0.8 (Astrom and Murray)",
@@ -351,7 +352,8 @@ OPERATING_POINTS = Part[OperatingPoints](
             lambda data: data.jams,
         ),
         Criterion(
-            "offset from the follow point at rest", "m", "at most", 0.1,
+            "offset from the follow point at rest", "m", "at most",
+            REQUIRED.rest_offset_m,
             "it rests at the follow distance",
             "obstacles, or the source's own body, push it off that distance",
             "set by this project",

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.design.requirements import REQUIRED
 from analysis.linear.gang_of_four import GangOfFour, gang_of_four
 from analysis.linear.linear_plots import (
     plot_bode,
@@ -78,15 +79,10 @@ class Margins:
     at: OperatingPoint
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
-        """Returns the stability margins of the implemented loop for one cut.
+        """Returns the stability margins of one cut, or None if there is no such loop.
 
-        Args:
-            at: Place of the cut: ``sensor``, ``actuator``, or ``wheels``.
-            direction: Direction of the motion: ``along`` the line to the source, or
-                ``across`` this line.
-
-        Returns:
-            The margins. If there is no such loop, None.
+        The cut is at the ``sensor``, at the ``actuator``, or at the ``wheels``. The
+        direction of the motion is ``along`` the line to the source, or ``across`` it.
         """
         for found in self.implemented:
             if (found.at, found.direction) == (at, direction):
@@ -101,17 +97,11 @@ class Margins:
 
 
 def least_damped(poles: NDArray[np.complex128]) -> complex:
-    """Returns the pole with the least damping ratio among all slow oscillations.
+    """Returns the pole with the least damping ratio among all slow oscillations, 1/s.
 
     If nothing oscillates slowly, the function returns the pole with the largest real
-    part.
-
-    Args:
-        poles: (n,) poles in the s plane, 1/s.
-
-    Returns:
-        The pole in the s plane, 1/s. Of a conjugate pair, it is the pole with the
-        positive imaginary part.
+    part. Of a conjugate pair, it returns the pole with the positive imaginary part.
+    ``poles`` has the shape (n,) and the unit 1/s (s plane).
     """
     slow = poles[np.abs(poles) < _SLOW_RAD_S]
     swinging = slow[np.abs(slow.imag) > 1e-6]
@@ -251,14 +241,14 @@ MARGINS = Part[Margins](
     _show,
     criteria=(
         Criterion(
-            "least phase margin", "deg", "at least", 45.0,
+            "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
             "every cut loop tolerates the usual extra phase lag or lead",
             "a small extra phase makes the loop oscillate",
             "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
             _worst(min, lambda margins: margins.phase_margin_deg),
         ),
         Criterion(
-            "least gain margin", "dB", "at least", 6.0,
+            "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
             "gains may double, or fall to half",
             "a gain that is off by less than a factor of two, up or down, makes it "
             "unstable",
@@ -266,14 +256,14 @@ MARGINS = Part[Margins](
             _worst(min, lambda margins: margins.gain_margin_db),
         ),
         Criterion(
-            "largest sensitivity peak", "", "at most", 2.0,
+            "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
             "disturbances are hardly amplified",
             "disturbances near the crossover are amplified more than twice",
             "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",
             _worst(max, lambda margins: margins.sensitivity_peak),
         ),
         Criterion(
-            "least disk margin", "", "at least", 2.0 / 3.0,
+            "least disk margin", "", "at least", REQUIRED.disk_margin,
             "gain and phase may change at once, by 6 dB and 37 deg",
             "a change of gain and phase at once makes the loop oscillate early",
             "alpha = 2/3: 6 dB in each direction (Seiler, Packard and Gahinet 2020)",

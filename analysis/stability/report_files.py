@@ -28,12 +28,6 @@ def stability_document(analyses: Sequence[LawAnalysis]) -> dict[str, Any]:
     several laws has the key ``laws`` with one document per law, and the key
     ``comparison`` with the verdicts side by side. The key ``out`` is None until the
     files of the report have a directory.
-
-    Args:
-        analyses: One analysis per law, all of the same scenario.
-
-    Returns:
-        Plain values that can be written as JSON.
     """
     first = analyses[0].scenario
     common = {

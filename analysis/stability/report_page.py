@@ -123,14 +123,18 @@ def _drawn(analysis: LawAnalysis, section: Section, anchor: str) -> Markup:
 
 
 def _verdicts(verdicts: Sequence[Verdict]) -> Section:
-    rows: list[list[Cell]] = [
-        [v.name, shown_value(v.value, v.unit), v.threshold, v.verdict, v.text, v.source]
-        for v in verdicts
-    ]
-    columns = [
-        "criterion", "value", "threshold", "verdict", "in plain words", "source",
-    ]  # fmt: skip
-    return Section("verdicts", "Verdicts", [Table(columns, rows)], fresh=True)
+    table = Table.of(
+        verdicts,
+        {
+            "criterion": "name",
+            "value": lambda verdict: shown_value(verdict.value, verdict.unit),
+            "threshold": "threshold",
+            "verdict": "verdict",
+            "in plain words": "text",
+            "source": "source",
+        },
+    )
+    return Section("verdicts", "Verdicts", [table], fresh=True)
 
 
 def _model(sheet: ModelSheet) -> Section:

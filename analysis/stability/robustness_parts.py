@@ -22,7 +22,7 @@ from analysis.linear.robustness import (
 )
 from analysis.reporting.criterion import Criterion
 from analysis.reporting.plain_values import pick
-from analysis.reporting.section import Cell, Column, Content, Figure, Table
+from analysis.reporting.section import Column, Content, Figure, Table
 from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
 
@@ -48,16 +48,8 @@ def loop_robustness(
     """Computes the poles of a sampled loop for uncertain parameters.
 
     Each uncertain parameter has an interval. All intervals together form a box.
-
-    Args:
-        scenario: The scenario with the control period and the seed.
-        poles: Function from parameter values to the poles of the loop, z plane.
-        parameters: The uncertain parameters with their intervals.
-        samples: Number of random points in the box.
-
-    Returns:
-        The poles at the random points, the worst case, and the sensitivity of the
-        slowest pole to each parameter.
+    ``poles`` takes parameter values and returns the poles of the loop in the z plane;
+    ``samples`` is the number of random points in the box.
     """
     return LoopRobustness(
         pole_cloud(
@@ -106,28 +98,7 @@ def _document(data: LoopRobustness) -> dict[str, Any]:
 def _show(data: LoopRobustness) -> list[Content]:
     cloud = data.cloud
     rate = cloud.worst_growth_per_s
-    boxes: list[list[Cell]] = [
-        [
-            f"{p.symbol}, `{p.name}`",
-            p.low,
-            p.nominal,
-            p.high,
-            p.unit.replace(" ", "\u00a0"),
-            cloud.worst_values[p.name],
-            p.reason,
-        ]
-        for p in cloud.parameters
-    ]
     nominal = cloud.nominal_damping_ratio
-    shares: list[list[Cell]] = [
-        [
-            row.parameter.symbol,
-            row.derivative,
-            row.parameter.unit.replace(" ", "\u00a0"),
-            row.per_interval,
-        ]
-        for row in sorted(data.sensitivities, key=lambda r: -abs(r.per_interval))
-    ]
     return [
         (
             f"The analysis takes {len(cloud.values)} random points within the ranges "
@@ -137,23 +108,31 @@ def _show(data: LoopRobustness) -> list[Content]:
             f"{abs(rate):.3g} 1/s and its damping ratio is "
             f"{cloud.worst_damping_ratio:.3f} (nominal {nominal:.3f})."
         ),
-        Table(
-            ["parameter", "least", "nominal", "most", "unit", "worst case", "why"],
-            boxes,
+        Table.of(
+            cloud.parameters,
+            {
+                "parameter": lambda p: f"{p.symbol}, `{p.name}`",
+                "least": "low",
+                "nominal": "nominal",
+                "most": "high",
+                "unit": lambda p: p.unit.replace(" ", "\u00a0"),
+                "worst case": lambda p: cloud.worst_values[p.name],
+                "why": "reason",
+            },
         ),
         Figure(
             lambda: plot_pole_cloud(cloud),
             "Poles within the ranges of all parameters, ln(z)/T of the sampled loop. "
             "Poles faster than 12 1/s are left out.",
         ),
-        Table(
-            [
-                "parameter",
-                Column("d(pole)/dp", "1/s per unit"),
-                "unit",
-                Column("over the interval", "1/s"),
-            ],
-            shares,
+        Table.of(
+            sorted(data.sensitivities, key=lambda row: -abs(row.per_interval)),
+            {
+                "parameter": "parameter.symbol",
+                Column("d(pole)/dp", "1/s per unit"): "derivative",
+                "unit": lambda row: row.parameter.unit.replace(" ", "\u00a0"),
+                Column("over the interval", "1/s"): "per_interval",
+            },
             "Sensitivity of the slowest pole",
         ),
         Figure(

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from analysis.design.requirements import REQUIRED
 from analysis.linear.loop_margins import LoopMargins
 from analysis.reporting.criterion import Criterion, Reading
 from analysis.reporting.plain_values import pick
@@ -63,49 +64,34 @@ def _frozen_document(data: Sequence[FrozenPoint]) -> list[dict[str, Any]]:
 
 
 def _show_frozen(data: Sequence[FrozenPoint]) -> list[Content]:
-    poles: list[list[Cell]] = [
-        [
-            point.at.name,
-            point.stiffness_n_m,
-            point.damping_n_s_m,
-            ", ".join(_poles_of(point)),
-            point.model.growth_per_s,
-            point.model.damping_ratio,
-        ]
-        for point in data
-    ]
-    margins: list[list[Cell]] = [
-        [
-            point.at.name,
-            axis,
-            each.gain_margin_db,
-            each.phase_margin_deg,
-            each.delay_margin_s,
-            each.sensitivity_peak,
-        ]
-        for point in data
-        for axis, each in point.margins.items()
-    ]
     return [
         ("The models describe the loop about P's target with constant gains: law, "
          "wheel command, plant and odometry as built, each linearized, over one tick. "
          "On the route the robot drives at the target's speed. In contact a wall at "
          "rest is across its path; K and D act along the path. The safety filter does "
          "not intervene, and no limit is reached."),
-        Table(
-            [
-                "place", Column("K", "N/m"), Column("D", "N s/m"),
-                Column("poles ln(z)/T", "rad/s"), Column("growth", "1/s"),
-                "damping ratio",
-            ],
-            poles,
+        Table.of(
+            data,
+            {
+                "place": "at.name",
+                Column("K", "N/m"): "stiffness_n_m",
+                Column("D", "N s/m"): "damping_n_s_m",
+                Column("poles ln(z)/T", "rad/s"): lambda at: ", ".join(_poles_of(at)),
+                Column("growth", "1/s"): "model.growth_per_s",
+                "damping ratio": "model.damping_ratio",
+            },
         ),
         Table(
             [
                 "place", "direction", Column("gain", "dB"), Column("phase", "deg"),
                 Column("delay", "s"), "M_s",
             ],
-            margins,
+            [
+                [point.at.name, axis, each.gain_margin_db, each.phase_margin_deg,
+                 each.delay_margin_s, each.sensitivity_peak]
+                for point in data
+                for axis, each in point.margins.items()
+            ],
             "Margins of the loop cut at the acceleration",
         ),
         Figure(lambda: plot_frozen_poles(data), "Poles with frozen gains."),
@@ -158,21 +144,21 @@ FROZEN_GAINS = Part[Sequence[FrozenPoint]](
             lambda data: min(point.model.damping_ratio for point in data),
         ),
         Criterion(
-            "least phase margin", "deg", "at least", 45.0,
+            "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
             "the loop tolerates the usual extra phase lag or lead",
             "a small extra phase makes the loop oscillate",
             "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
             _worst(min, lambda margins: margins.phase_margin_deg),
         ),
         Criterion(
-            "least gain margin", "dB", "at least", 6.0,
+            "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
             "gains may double, or fall to half",
             "a gain that is off by less than a factor of two makes it unstable",
             "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
             _worst(min, lambda margins: margins.gain_margin_db),
         ),
         Criterion(
-            "largest sensitivity peak", "", "at most", 2.0,
+            "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
             "disturbances are hardly amplified",
             "disturbances near the crossover are amplified more than twice",
             "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",

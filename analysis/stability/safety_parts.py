@@ -10,23 +10,12 @@ import math
 from typing import Any
 
 from analysis.reporting.plain_values import pick
-from analysis.reporting.section import Cell, Content, Table, number
+from analysis.reporting.section import Content, Table, number
 from analysis.stability.law_analysis import Part
-from diagrams.scenario.warnings.guarantees import Guarantees, guarantees
+from diagrams.scenario.warnings.guarantees import Assumption, Guarantees, guarantees
 
 
 def _show(data: Guarantees) -> list[Content]:
-    rows: list[list[Cell]] = [
-        [
-            each.name,
-            each.text,
-            _finite(each.value),
-            f"{'≥' if each.at_least else '≤'} {number(each.limit)} {each.unit}".strip(),
-            _finite(each.margin),
-            "holds" if each.holds else "broken",
-        ]
-        for each in data.assumptions
-    ]
     gap = 360.0 - data.seen_angle_deg
     return [
         f"The guard promises here: {data.promise}.",
@@ -36,13 +25,28 @@ def _show(data: Guarantees) -> list[Content]:
             f"They cover {number(data.seen_angle_deg)} deg of the full circle; "
             f"{number(gap)} deg are not covered."
         ),
-        Table(["assumption", "of", "value", "limit", "margin", ""], rows),
+        Table.of(
+            data.assumptions,
+            {
+                "assumption": "name",
+                "of": "text",
+                "value": lambda each: _finite(each.value),
+                "limit": _limit,
+                "margin": lambda each: _finite(each.margin),
+                "": lambda each: "holds" if each.holds else "broken",
+            },
+        ),
         "See docs/guard.md for theorems, assumptions and their tests.",
     ]
 
 
 def _finite(value: float) -> float | str:
     return value if math.isfinite(value) else "no limit"
+
+
+def _limit(each: Assumption) -> str:
+    sign = "≥" if each.at_least else "≤"
+    return f"{sign} {number(each.limit)} {each.unit}".strip()
 
 
 def _document(data: Guarantees) -> dict[str, Any]:

@@ -1,16 +1,16 @@
-"""Parts of the stability report: delay, bursts, sample period, and contact."""
+"""Parts of the stability report: delay, bursts, and contact."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.design.requirements import REQUIRED
 from analysis.laws.radial_law import radial_law
 from analysis.linear.burst_cycle import (
     HOLDS,
@@ -19,7 +19,6 @@ from analysis.linear.burst_cycle import (
     burst_cycle,
     simulate_burst_cycle,
 )
-from analysis.linear.burst_gaps import GapChart, gap_chart
 from analysis.linear.contact_mode import (
     ContactLimits,
     contact_limits,
@@ -27,29 +26,12 @@ from analysis.linear.contact_mode import (
 )
 from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
 from analysis.linear.delayed_run import DelayCheck, check_delay_margin
-from analysis.linear.root_locus import RootLocus, root_loci
-from analysis.linear.sampled_stability import (
-    ConditionCheck,
-    PolesAgainstPeriod,
-    StabilityChart,
-    check_conditions,
-    gain_chart,
-    gain_delay_chart,
-    poles_against_period,
-)
+from analysis.linear.linear_plots import plot_contact_limits, plot_delay_check
 from analysis.models.open_loops import DIRECTIONS
 from analysis.models.operating_points import OperatingPoint
 from analysis.reporting.criterion import Criterion, Reading
 from analysis.reporting.plain_values import pick
 from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
-from analysis.stability.chart_plots import (
-    plot_chart,
-    plot_contact_limits,
-    plot_delay_check,
-    plot_gap_chart,
-    plot_poles_against_period,
-    plot_root_loci,
-)
 from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
 
@@ -92,8 +74,6 @@ class BurstCycles:
     cycles: tuple[BurstCycle, ...]
     runs: tuple[BurstRun, ...]
     """One simulated run per entry of ``cycles``, in the same order."""
-    gaps: GapChart
-    """Largest multipliers over the duration of the silence."""
 
 
 def _sampled(study: Study) -> SampledLoop:
@@ -128,10 +108,6 @@ def _sampled_document(data: SampledLoop) -> dict[str, Any]:
 
 
 def _show_sampled(data: SampledLoop) -> list[Content]:
-    rows: list[list[Cell]] = [
-        [m.at, m.direction, m.delay_s, m.delay_s / data.period_s, m.frequency_rad_s]
-        for m in data.margins
-    ]
     contents: list[Content] = [
         (
             "A delay margin is the delay that may be added before the loop oscillates, "
@@ -140,22 +116,28 @@ def _show_sampled(data: SampledLoop) -> list[Content]:
             "estimate later than the tracker assumes; a delay at the wheels makes a "
             "command later."
         ),
-        Table(["late at", "motion", Column("delay", "s"), "ticks", "rad/s"], rows),
+        Table.of(
+            data.margins,
+            {
+                "late at": "at",
+                "motion": "direction",
+                Column("delay", "s"): "delay_s",
+                "ticks": lambda margin: margin.delay_s / data.period_s,
+                "rad/s": "frequency_rad_s",
+            },
+        ),
     ]
     check = data.check
     if check:
         contents += [
-            Table(
-                [
-                    "share of the margin",
-                    Column("delay", "s"),
-                    Column("growth", "1/s"),
-                    "rad/s",
-                ],
-                [
-                    [share, run.delay_s, run.growth_per_s, run.frequency_rad_s]
-                    for share, run in (("0.95", check.below), ("1.05", check.above))
-                ],
+            Table.of(
+                [("0.95", check.below), ("1.05", check.above)],
+                {
+                    "share of the margin": lambda run: run[0],
+                    Column("delay", "s"): lambda run: run[1].delay_s,
+                    Column("growth", "1/s"): lambda run: run[1].growth_per_s,
+                    "rad/s": lambda run: run[1].frequency_rad_s,
+                },
                 "Simulation of the diagram with that delay at the sensor, for "
                 f"{check.below.duration_s:g} s after a small kick",
             ),
@@ -175,7 +157,7 @@ DELAY_MARGINS = Part[SampledLoop](
     _show_sampled,
     criteria=(
         Criterion(
-            "least delay margin", "s", "at least", 0.1,
+            "least delay margin", "s", "at least", REQUIRED.delay_margin_s,
             "it tolerates more added delay than the threshold",
             "less added delay than the threshold makes it oscillate",
             "set by this project; exact margin of the sampled loop",
@@ -190,8 +172,7 @@ def _bursts(study: Study) -> BurstCycles:
     at: OperatingPoint = study.need("equilibria").at
     cycles = tuple(burst_cycle(study.scenario, hold, point=at) for hold in HOLDS)
     runs = tuple(simulate_burst_cycle(cycle, _CYCLES[study.full]) for cycle in cycles)
-    gaps = gap_chart(study.scenario, point=at)
-    return BurstCycles(study.scenario.follower.tracker.hold, cycles, runs, gaps)
+    return BurstCycles(study.scenario.follower.tracker.hold, cycles, runs)
 
 
 def _burst_document(data: BurstCycles) -> dict[str, Any]:
@@ -205,7 +186,6 @@ def _burst_document(data: BurstCycles) -> dict[str, Any]:
             }
             for cycle, run in zip(data.cycles, data.runs, strict=True)
         ],
-        "gaps": data.gaps,
     }
 
 
@@ -242,10 +222,6 @@ def _show_bursts(data: BurstCycles) -> list[Content]:
             "the motion along this line only."
         ),
         Table(["hold", "multipliers", "simulated, along", "stable"], rows),
-        Figure(
-            lambda: plot_gap_chart(data.gaps),
-            "Growth over the silence between bursts, for each way to hold the target.",
-        ),
     ]
 
 
@@ -267,96 +243,6 @@ BURST_CYCLE = Part[BurstCycles](
 )  # fmt: skip
 
 
-def _show_loci(data: Sequence[RootLocus]) -> list[Content]:
-    rows: list[list[Cell]] = [
-        [f"`{locus.parameter}`", locus.loop, locus.today, locus.limit] for locus in data
-    ]
-    return [
-        (
-            "The figures show the poles ln(z)/T of the sampled loop as one gain "
-            "varies, for the loop to the target and for the contact mode where the law "
-            "is stiffest."
-        ),
-        Table(["gain", "loop", "current", "stability ends at"], rows),
-        Figure(
-            lambda: plot_root_loci(data),
-            "Root loci with marks at the current poles.",
-            scale=True,
-        ),
-    ]
-
-
-ROOT_LOCI = Part[Sequence[RootLocus]](
-    "root_loci", "Root loci", lambda study: root_loci(study.scenario), _show_loci
-)
-
-
-@dataclass(frozen=True)
-class SamplingCharts:
-    """Stability over sample period, gains, and delay, with the scenario marked."""
-
-    conditions: tuple[ConditionCheck, ...]
-    """Closed-form stability conditions of the sampled double integrator."""
-    period: PolesAgainstPeriod
-    charts: tuple[StabilityChart, ...]
-
-
-def _sampling(study: Study) -> SamplingCharts:
-    scenario = study.scenario
-    return SamplingCharts(
-        check_conditions(seed=scenario.seed, tick_s=scenario.tick_s),
-        poles_against_period(scenario),
-        (gain_chart(scenario), gain_delay_chart(scenario)),
-    )
-
-
-def _sampling_document(data: SamplingCharts) -> dict[str, Any]:
-    return {
-        "conditions": data.conditions,
-        "longest_stable_period_s": data.period.longest_stable_s,
-        "charts": [
-            {**vars(chart), "stable_share": chart.stable_share} for chart in data.charts
-        ],
-    }
-
-
-def _show_sampling(data: SamplingCharts) -> list[Content]:
-    conditions: list[list[Cell]] = [
-        [c.scheme, c.condition, c.pairs, c.stable, c.mismatches]
-        for c in data.conditions
-    ]
-    return [
-        Table(
-            ["scheme", "stable exactly for", "pairs tried", "stable", "mismatches"],
-            conditions,
-            "Sampled double integrator: closed form against eigenvalues",
-        ),
-        (
-            "The loop to the target stays stable up to a sample period of "
-            f"{data.period.longest_stable_s:.3g} s; the current period is "
-            f"{data.period.today_s:g} s."
-        ),
-        Figure(
-            lambda: plot_poles_against_period(data.period),
-            "Poles over the sample period.",
-            scale=True,
-        ),
-        *(
-            Figure(partial(plot_chart, chart), f"Growth: {chart.title}.", scale=True)
-            for chart in data.charts
-        ),
-    ]
-
-
-SAMPLING = Part[SamplingCharts](
-    "sampling",
-    "Sample period, gains and delay",
-    _sampling,
-    _show_sampling,
-    document=_sampling_document,
-)
-
-
 @dataclass(frozen=True)
 class ContactMode:
     """Motion in front of an obstacle, where the law adds a spring to the attraction."""
@@ -372,15 +258,10 @@ class ContactMode:
 def contact_growth(scenario: Scenario, ticks: int) -> float | None:
     """Returns the growth rate of the motion in front of an obstacle, 1/s.
 
-    The spring to the obstacle has the largest stiffness of the law.
-
-    Args:
-        scenario: The scenario with the law.
-        ticks: Age of the measured position of the obstacle, in control periods.
-
-    Returns:
-        The growth rate in 1/s, negative if the motion decays. If the law does not push
-        away from obstacles, None.
+    The spring to the obstacle has the largest stiffness of the law, and the measured
+    position of the obstacle is some control periods (``ticks``) old. The result is
+    negative if the motion decays. If the law does not push away from obstacles, it is
+    None.
     """
     stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:

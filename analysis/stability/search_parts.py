@@ -22,25 +22,29 @@ def _heading_loop(study: Study) -> HeadingLoopMargins:
 
 def _show(data: HeadingLoopMargins) -> list[Content]:
     return [
-        ("A searching robot stops, decides on a heading, and turns to it while it "
-        "drives. The loop has a compass, a PID controller, pulse widths, motors and "
-        "the heading that the wheels produce; PID output and motor duties are held "
-        "over a tick. The loop is cut at the deviation of the heading. It is linear "
-        "for deviations within L and within all limits; with a larger deviation the "
-        "robot turns on the spot, more slowly than the linear loop would. Linear "
-        "models do not cover steps, phases and finds: docs/searches.md states how "
-        "often each occurs."),
-        Table(
-            [
-                Column("crossover", "rad/s"), Column("phase margin", "deg"),
-                Column("delay margin", "s"), Column("delay margin", "ticks"),
-                Column("gain margin", "dB"), Column("lost by sampling", "deg"),
-            ],
-            [[data.crossover_rad_s, data.phase_margin_deg, data.delay_margin_s,
-              data.delay_margin_ticks, data.gain_margin_db, data.phase_lost_deg]],
+        (
+            "A searching robot stops, decides on a heading, and turns to it while it "
+            "drives. The loop has a compass, a PID controller, pulse widths, motors "
+            "and the heading that the wheels produce; PID output and motor duties are "
+            "held over a tick. The loop is cut at the deviation of the heading. It is "
+            "linear for deviations within L and within all limits; with a larger "
+            "deviation the robot turns on the spot, more slowly than the linear loop "
+            "would. Linear models do not cover steps, phases and finds: "
+            "docs/searches.md states how often each occurs."
+        ),
+        Table.of(
+            [data],
+            {
+                Column("crossover", "rad/s"): "crossover_rad_s",
+                Column("phase margin", "deg"): "phase_margin_deg",
+                Column("delay margin", "s"): "delay_margin_s",
+                Column("delay margin", "ticks"): "delay_margin_ticks",
+                Column("gain margin", "dB"): "gain_margin_db",
+                Column("lost by sampling", "deg"): "phase_lost_deg",
+            },
             f"With a tick of {number(1e3 * data.tick_s)} ms",
         ),
-    ]  # fmt: skip
+    ]
 
 
 HEADING_LOOP = Part[HeadingLoopMargins](

@@ -58,6 +58,9 @@ def summarise(plan: SweepPlan, table: pd.DataFrame, name: str) -> Summary:
         plan: Plan of the sweep.
         table: Results of the sweep, from ``analysis.sweeps.store.load_results``.
         name: Name of the scenario.
+
+    Returns:
+        The runs, their cells and pairs.
     """
     scenario = scenario_from_mapping(plan.base)
     if "tick_s" not in table:  # else it is swept or drawn
@@ -115,6 +118,9 @@ class PreparedBatch:
         Args:
             progress: Function that is called a few times per second with the number of
                 finished runs. If it raises an exception, the batch ends.
+
+        Returns:
+            Results of all scenarios.
 
         Raises:
             StoreError: The disk is full or faulty.

@@ -84,6 +84,9 @@ class Quantity:
         Args:
             estimate: The estimate.
             sign: ``+`` to write the sign of positive numbers, too.
+
+        Returns:
+            Text in the form '82 (68, 91)'; a dash without runs.
         """
         if self.rate:
             return estimate.text(f"{sign}.0f", factor=100.0)
@@ -102,6 +105,9 @@ def quantities(
         robot: Name of a robot, for its own metrics without rates. The default are the
             rates and the metrics of all robots together.
         seed: Seed of the sweep.
+
+    Returns:
+        The rates, then the metrics in the order of ``METRICS``.
     """
     prefix = f"{robot}." if robot else ""
     names = [
@@ -162,6 +168,9 @@ def make_cell(
         fields: Values of the grid's fields, by dotted path.
         rows: Results of the cell's runs, with the control period ``tick_s``, s.
         seed: Seed of the sweep.
+
+    Returns:
+        Rates, averages, causes of the endings, and example runs.
     """
     metrics = {
         name: estimate

@@ -6,24 +6,15 @@ import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
 
 from analysis.reporting.file_names import distinct_names
-from analysis.reporting.palette import COLOURS
 from analysis.sweeps.batch import EXAMPLES, Batch, compares_laws
 from analysis.sweeps.cells import Cell, ExampleRun
-from analysis.views.scene import bounds, looks
-from analysis.views.trajectory_artists import (
-    draw_collision,
-    draw_obstacles,
-    draw_robot,
-    draw_room,
-    draw_sources,
-)
+from analysis.views.framing import bounds
+from analysis.views.picture import draw_scene
+from analysis.views.scene import make_scene
 from diagrams import RunResult, dump_scenario, simulate
-from systems.world.geometry import rectangle_corners
 
 #: Key of an example: name of the scenario, number of the run, and kind of the example.
 ExampleKey = tuple[str, int, str]
@@ -124,7 +115,7 @@ def plot_examples(rows: Sequence[tuple[Cell, Sequence[RunResult]]]) -> Figure:
         for panel in panels[len(runs) :]:
             panel.set_axis_off()
         for panel, example, result in zip(panels, cell.examples, runs, strict=False):
-            _example(panel, result)
+            draw_scene(panel, make_scene(result), ends_only=True)
             ending = f"{result.ending}, {result.simulated_s:.0f} s"
             panel.set_title(f"{cell.label}, {example.kind}: {ending}", fontsize=9)
             panel.set(aspect="equal", xlim=(x_low, x_high), ylim=(y_low, y_high))
@@ -133,18 +124,3 @@ def plot_examples(rows: Sequence[tuple[Cell, Sequence[RunResult]]]) -> Figure:
     for panel in grid[:, 0]:
         panel.set_ylabel("y in W (m)")
     return figure
-
-
-def _example(axes: Axes, result: RunResult) -> None:
-    end = result.simulated_s
-    draw_room(axes, result)
-    draw_obstacles(axes, result)
-    draw_sources(axes, result, [end])
-    for look in looks(result):
-        draw_robot(axes, look, [0.0, end])
-    draw_collision(axes, result, star=9.0)
-    for obstacle in result.scenario.obstacles:
-        path = obstacle.path()
-        if path.moves:
-            body = np.array([*path.pose(end), *obstacle.size_m])
-            axes.add_patch(Polygon(rectangle_corners(body), color=COLOURS["obstacle"]))

@@ -84,6 +84,9 @@ def pairs_of(plan: SweepPlan, rows: pd.DataFrame, scenario: str) -> list[Pair]:
         plan: Plan of the sweep.
         rows: Results of the sweep, sorted by layout in each cell.
         scenario: Name of the scenario.
+
+    Returns:
+        One comparison for each pair of cells.
     """
     return [_pair(scenario, each) for each in _neighbours(plan, rows)]
 

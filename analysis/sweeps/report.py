@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.reporting.plain_values import plain
-from analysis.reporting.provenance import versions
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.runs.metric_table import METRICS
 from analysis.sweeps.batch import Batch, Summary, compares_laws
 from analysis.sweeps.cells import Cell, Quantity, quantities, text_table
@@ -19,9 +19,6 @@ from analysis.sweeps.pairs import Pair, PairedMedian, PairedRate
 from analysis.sweeps.run_rows import warning_counts
 from analysis.sweeps.sweep import reproducing_command
 
-#: Version of the format of the JSON document.
-VERSION = 2
-
 
 def batch_document(batch: Batch) -> dict[str, Any]:
     """Makes the JSON document of a batch, from plain values."""
@@ -30,7 +27,7 @@ def batch_document(batch: Batch) -> dict[str, Any]:
     files = example_files(batch)
     document: dict[str, Any] = plain(
         {
-            "schema_version": VERSION,
+            "schema_version": SCHEMA_VERSION,
             "title": batch.title,
             "scenarios": list(batch.summaries),
             "seed": plan.seed,
@@ -89,6 +86,9 @@ def run_command(batch: Batch, scenario: str, row: Mapping[Any, Any]) -> str:
         batch: Results of the batch.
         scenario: Name of the run's scenario.
         row: Row of the run in the results.
+
+    Returns:
+        Command in one line, with quotes for the shell.
     """
     sweep = batch.sweeps[scenario]
     return reproducing_command(
@@ -102,6 +102,9 @@ def batch_text(batch: Batch, document: dict[str, Any]) -> str:
     Args:
         batch: Results of the batch.
         document: JSON document from ``batch_document``.
+
+    Returns:
+        Lines of text.
     """
     lines = ["Brackets are 95 % intervals.", ""]
     for name, each in batch.summaries.items():
@@ -162,6 +165,9 @@ def pair_rows(pairs: Sequence[Pair], *, pictures: bool = False) -> list[list[str
     Args:
         pairs: At least one pair.
         pictures: Whether to show only the metrics that pictures show.
+
+    Returns:
+        Rows of texts, all of the same length.
     """
     shown = [
         Quantity(name)

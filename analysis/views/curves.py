@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.palette import COLOURS
 from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
-from analysis.views.scene import heard_bursts
+from analysis.views.bursts import heard_bursts
 from diagrams import RunResult
 from diagrams.running.stop_rules import ODOR_WITHIN_M
 from diagrams.scenario.participants import OdorSearcher
@@ -104,6 +104,9 @@ def panels(result: RunResult, clearance: ArrayLike | None = None) -> list[Panel]
         clearance: (n,) distance from the robot to the nearest body at each tick
             (control period), m (``analysis.runs.proximity``). With None, there is no
             panel of the clearance.
+
+    Returns:
+        Panels in the order of the picture.
 
     Raises:
         InputError: ``clearance`` does not have one value per tick.

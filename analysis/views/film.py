@@ -1,33 +1,39 @@
-"""Draws the frames of a movie, with moving bodies on a constant background."""
+"""Draws the frames of a movie: the scene of a run at one time, from above."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
-from matplotlib.patches import Circle, Polygon, Wedge
+from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
 from numpy.typing import NDArray
 
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.views.framing import run_title, tick_at
 from analysis.views.picture import map_axes
 from analysis.views.scene import (
-    compose,
-    contact_point,
-    followed_sources,
-    logged_sensors,
-    looks,
-    moving_and_static,
-    run_title,
-    sensor_pose,
-    sound_bursts,
-    tick_at,
+    Box,
+    Cone,
+    Contact,
+    Estimate,
+    Goal,
+    Plume,
+    Rings,
+    RobotBody,
+    SourceBody,
+    Thing,
+    Touched,
+    Trail,
+    Walls,
+    make_scene,
 )
-from analysis.views.trajectory_artists import draw_room
 from diagrams import RunResult
-from diagrams.scenario.bodies import microphones_W, robot_rectangle
+from diagrams.scenario.bodies import microphones_W
 from systems.world.geometry import rectangle_corners
 
 #: Resolution of the frames, dots per inch. The frames are 8 inches wide.
@@ -36,6 +42,21 @@ DPI = 90
 #: ``RING_M_S``: growth of the radius, m/s; sound is about a hundred times faster.
 #: ``RING_M``: largest radius, m.
 RING_S, RING_M_S, RING_M = 0.15, 3.0, 1.5
+#: Kinds of shapes in the order of drawing.
+_ORDER = (
+    *(Walls, Plume, Goal, Box, Trail, SourceBody, Rings),
+    *(Cone, RobotBody, Estimate, Touched, Contact),
+)
+
+#: Kinds of shapes in the legend.
+_NAMED = RobotBody, SourceBody, Box, Estimate, Plume
+#: Markers of positions.
+_MARKS: dict[type, dict[str, Any]] = {
+    Plume: {"marker": "*", "ms": 11},
+    Goal: {"marker": "*", "ms": 11},
+    Estimate: {"marker": "x", "ms": 9, "mew": 2.2},
+    Contact: {"marker": "*", "ms": 19, "mew": 1.4, "mfc": "none"},
+}
 
 
 class RunFrames:
@@ -53,50 +74,35 @@ class RunFrames:
     """
 
     def __init__(self, result: RunResult) -> None:
-        self._result, self._looks = result, looks(result)
-        self._moving, static = moving_and_static(result.full_scenario)
+        self._result, scene = result, make_scene(result)
         figure, self._axes = map_axes(result)
         figure.set_dpi(DPI)
         self._canvas = FigureCanvasAgg(figure)
-        self._axes.grid(color="#E5E5E5", linewidth=0.6)
+        draw_grid(self._axes)
         self._axes.set_title(run_title(result), fontsize=11, wrap=True)
-        draw_room(self._axes, result)
-        for obstacle in static:
-            self._add_body([*obstacle.path().pose(0.0), *obstacle.size_m], "obstacle")
+        samples = [
+            Polygon(np.zeros((1, 2)), color=layer.colours[0], label=layer.label)
+            for layer in scene.layers
+            if isinstance(layer.things[0].shape, _NAMED)
+        ]
         figure.legend(
-            handles=self._legend(),
-            loc="lower center",
-            ncols=4,
-            fontsize=8.5,
-            frameon=False,
+            handles=samples, loc="lower center", ncols=4, fontsize=8.5, frameon=False
         )
         self._axes.set_autoscale_on(False)
+        things = sorted(
+            (thing for thing in scene.things if isinstance(thing.shape, _ORDER)),
+            key=lambda thing: _ORDER.index(type(thing.shape)),
+        )
+        fixed = Walls, Plume, Goal, Box
+        self._moving = [
+            each for each in things if each.moves or not isinstance(each.shape, fixed)
+        ]
+        for thing in things:
+            if thing not in self._moving:
+                for artist in self._artists(thing, 0.0):
+                    self._axes.add_artist(artist)
         self._canvas.draw()
         self._rest = self._canvas.copy_from_bbox(figure.bbox)
-
-    def _legend(self) -> list[Any]:
-        scenario = self._result.full_scenario
-        followed = followed_sources(scenario)
-        named = [(look.result.name, look.colour) for look in self._looks]
-        named += [
-            (name, COLOURS["source" if name in followed else "interferer"])
-            for name in scenario.sources
-        ]
-        if scenario.obstacles:
-            named.append(("obstacles", COLOURS["obstacle"]))
-        if "target_valid" in self._result.columns:
-            named.append(("estimates", self._looks[0].estimates))
-        return [
-            Polygon(np.zeros((1, 2)), closed=True, color=colour, label=name)
-            for name, colour in named
-        ]
-
-    def _add_body(self, rectangle: Any, role: str, **style: Any) -> Polygon:
-        corners = rectangle_corners(np.asarray(rectangle, dtype=float))
-        colour = COLOURS.get(role, role)
-        patch = Polygon(corners, color=colour, zorder=3.0, **style)
-        self._axes.add_patch(patch)
-        return patch
 
     def frames(self, frames_per_s: float) -> Iterator[NDArray[np.uint8]]:
         """Yields the frames of a movie. The last frame shows the end of the run.
@@ -114,9 +120,6 @@ class RunFrames:
     def frame(self, time: float) -> NDArray[np.uint8]:
         """Returns the frame at a time, s, in the format of ``frames``."""
         self._canvas.restore_region(self._rest)
-        for artist in self._artists(time):
-            self._axes.draw_artist(artist)
-            artist.remove()
         clock = self._axes.text(
             0.99,
             0.98,
@@ -125,99 +128,70 @@ class RunFrames:
             ha="right",
             va="top",
             fontsize=12,
-            zorder=20,
         )
-        self._axes.draw_artist(clock)
-        clock.remove()
+        artists = [a for thing in self._moving for a in self._artists(thing, time)]
+        for artist in (*artists, clock):
+            self._axes.draw_artist(artist)
+            artist.remove()
         return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
 
-    def _artists(self, time: float) -> list[Any]:
-        """Adds the moving objects to the axes, and returns them in drawing order."""
+    def _artists(self, thing: Thing, time: float) -> list[Any]:
+        """Adds a thing at a time, s, to the axes, and returns its artists."""
+        tick = tick_at(self._result, time)
+        if not thing.visible(tick):
+            return []
+        add, plot, colour = self._axes.add_patch, self._axes.plot, thing.colour
+        pose = thing.pose(tick)
+        x, y, theta = pose
+
+        def body(length: float, width: float, alpha: float | None = None) -> Artist:
+            corners = rectangle_corners(np.array([*pose, length, width]))
+            return add(Polygon(corners, color=colour, alpha=alpha))
+
         found: list[Any] = []
-        for obstacle in self._moving:
-            pose = obstacle.path().pose(time)
-            found.append(self._add_body([*pose, *obstacle.size_m], "obstacle"))
-        found += self._sources(time)
-        for look in self._looks:
-            found += self._robot(look.result, look.colour, look.estimates, time)
-        for own in self._result.robots.values():
-            if own.collision is not None and time >= own.collision.time:
-                body = own.surroundings.bodies[own.collision.object]
-                found.append(self._add_body(body.rectangle(own.collision.time), "hit"))
-                x, y = contact_point(own)
-                found += self._axes.plot(
-                    x, y, "*", mfc="none", mec="black", mew=1.4, ms=19
-                )
+        match thing.shape:
+            case Walls(corner, (wide, deep, _)):
+                walls = Rectangle(corner, wide, deep, fill=False, ec=colour, lw=4.0)
+                found = [add(walls)]
+            case Box(length, width) | Touched(length, width):
+                found = [body(length, width)]
+            case Trail(line):
+                way = thing.poses[: tick + 1, :2].T
+                found = plot(*way, line, color=colour, lw=1.6 if line == "-" else 1.0)
+            case SourceBody(length, width, is_body=True):
+                found = [body(length, width, 0.6)]
+            case SourceBody():
+                found = plot(x, y, "D", color=colour, ms=6)
+            case Rings(bursts):
+                found = [add(each) for each in circles((x, y), bursts, time, colour)]
+            case Cone(half_angle, reach, echo):
+                axis, half = math.degrees(theta), math.degrees(half_angle)
+                tint = to_rgb(COLOURS["echo" if echo[tick] else "empty"])
+                ends = axis - half, axis + half
+                found = [add(Wedge((x, y), reach[tick], *ends, fc=(*tint, 0.2)))]
+            case RobotBody(own, hears):
+                found = [body(own.length_m, own.width_m, 0.55)]
+                if hears:
+                    bar = microphones_W(pose, own).T
+                    found += plot(*bar, "-o", color=colour, ms=3.2, lw=2.0)
+            case mark:
+                found = plot(x, y, color=colour, ls="none", **_MARKS[type(mark)])
         return found
 
-    def _sources(self, time: float) -> list[Any]:
-        found: list[Any] = []
-        scenario = self._result.full_scenario
-        followed, sounds = followed_sources(scenario), scenario.sounds()
-        for name, source in scenario.sources.items():
-            role = "source" if name in followed else "interferer"
-            pose = source.path().pose(time)
-            if source.body:
-                size = source.length_m, source.width_m
-                found.append(self._add_body([*pose, *size], role, alpha=0.6))
-            else:
-                marker = self._axes.plot(*pose[:2], "D", color=COLOURS[role], ms=6)
-                found += marker
-            for start, end in sound_bursts(sounds[name], self._result.simulated_s):
-                if start <= time < end + RING_M / RING_M_S:
-                    since, lasts = time - start, end - start
-                    found += self._rings(pose[:2], since, lasts, COLOURS[role])
-        return found
 
-    def _rings(
-        self, center: tuple[float, float], since: float, lasts: float, color: str
-    ) -> list[Any]:
-        """Adds the rings of a burst, for the time since its start and its length, s."""
-        found = []
-        for left in np.arange(0.0, min(since, lasts), RING_S):
-            radius = RING_M_S * (since - left)
+def circles(
+    center: tuple[float, float],
+    bursts: list[tuple[float, float]],
+    time: float,
+    colour: str,
+) -> Iterator[Circle]:
+    """Yields the rings around a loudspeaker at a time, s.
+
+    The center is in W, m. Each burst has a start and an end, s.
+    """
+    for start, end in bursts:
+        for left in np.arange(0.0, min(time, end) - start, RING_S):
+            radius = RING_M_S * (time - start - left)
             if radius < RING_M:
-                circle = Circle(
-                    center,
-                    radius,
-                    fill=False,
-                    edgecolor=color,
-                    linewidth=1.8,
-                    alpha=1.0 - radius / RING_M,
-                )
-                found.append(self._axes.add_patch(circle))
-        return found
-
-    def _robot(
-        self, own: RunResult, colour: str, estimates: str, time: float
-    ) -> list[Any]:
-        tick, scenario = tick_at(own, time), own.scenario
-        pose = own.poses("WB")[tick]
-        found: list[Any] = []
-        for sensor in logged_sensors(own):
-            echo = own.columns[f"echo_{sensor + 1}"][tick] > 0.5
-            x, y, theta = compose(pose, sensor_pose(scenario, sensor))
-            half = scenario.sensing.ultrasonic.sensors[sensor].beam_half_angle_deg
-            axis = np.degrees(theta)
-            cone = Wedge(
-                (float(x), float(y)),
-                float(own.columns[f"range_{sensor + 1}"][tick]),
-                axis - half,
-                axis + half,
-                facecolor=(*to_rgb(COLOURS["echo" if echo else "empty"]), 0.2),
-            )
-            found.append(self._axes.add_patch(cone))
-        way = own.vector("p_WP")[:, : tick + 1]
-        found += self._axes.plot(*way, color=colour, linewidth=1.6)
-        found.append(
-            self._add_body(
-                robot_rectangle(pose, scenario.only.robot), colour, alpha=0.55
-            )
-        )
-        if scenario.only.kind != "router" and scenario.only.searches != "odor":
-            bar = microphones_W(pose, scenario.only.robot).T
-            found += self._axes.plot(*bar, "-o", color=colour, ms=3.2, lw=2.0)
-        if "target_valid" in own.columns and own.columns["target_valid"][tick] > 0.5:
-            x, y = own.vector("p_WS_estimated")[:, tick]
-            found += self._axes.plot(x, y, "x", color=estimates, ms=9, mew=2.2)
-        return found
+                fade = 1.0 - radius / RING_M
+                yield Circle(center, radius, fill=False, ec=colour, lw=1.8, alpha=fade)

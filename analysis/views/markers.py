@@ -1,8 +1,8 @@
-"""Converts bodies and walls to ROS 2 markers, each in the frame of its body."""
+"""Converts the bodies of a scene to ROS 2 markers, each in the frame of its body."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,55 +10,59 @@ from matplotlib.colors import to_rgb
 
 from analysis.reporting.palette import COLOURS
 from analysis.views.ros2_values import WORLD_FRAME, Message, pose, stamped, vector
-from diagrams import Scenario
+from analysis.views.scene import (
+    BODY_HEIGHT_M,
+    ROBOT_HEIGHT_M,
+    Box,
+    RobotBody,
+    SourceBody,
+    Thing,
+)
 from systems.sound.parameters import RoomParameters
 
 #: Constants of ``visualization_msgs/Marker``.
 _CUBE, _LINE_LIST, _ADD = 1, 5, 0
-#: Heights of the robots and of other bodies, m. The model contains no heights, so these
-#: values are only for the display.
-_ROBOT_M, _BODY_M = 0.16, 0.35
 #: Width of the edges of a room, m.
 _EDGE_M = 0.03
 
 
-def body_markers(scenario: Scenario, names: Mapping[str, str]) -> list[Message]:
+def body_markers(
+    bodies: Mapping[str, Thing], room: RoomParameters | None, names: Mapping[str, str]
+) -> list[Message]:
     """Returns markers of the robots, sources, obstacles and walls.
 
     Each marker moves with its frame.
 
     Args:
-        scenario: Scenario that contains the bodies.
-        names: Name of the frame of each robot, source and obstacle, by the name of the
-            body.
+        bodies: Robots, sources and obstacles, by name, from ``scene_bodies``.
+        room: Room with the walls, or None.
+        names: Name of the frame of each body, by the name of the body.
 
     Returns:
         One ``Marker`` message per body, and one for the walls.
     """
-    markers = [*_boxes(scenario, names)]
-    if scenario.room is not None:
-        markers.append(_edges(scenario.room))
+    markers = []
+    for name, body in bodies.items():
+        frame = names[name]
+        match body.shape:
+            case RobotBody(parameters=own):
+                size = own.length_m, own.width_m, ROBOT_HEIGHT_M
+                markers.append(_box(f"{frame}/base_link", "robots", size, "robot"))
+            case SourceBody(length, width, is_body=True):
+                size = length, width, BODY_HEIGHT_M
+                markers.append(_box(frame, "sources", size, "source"))
+            case Box() as size:
+                markers.append(_box(frame, "obstacles", size, "obstacle"))
+    if room is not None:
+        markers.append(_edges(room))
     return [{**marker, "id": number} for number, marker in enumerate(markers)]
 
 
-def _boxes(scenario: Scenario, names: Mapping[str, str]) -> Iterator[Message]:
-    for name, robot in scenario.robots.items():
-        size, frame = (robot.robot.length_m, robot.robot.width_m), names[name]
-        yield _box(f"{frame}/base_link", "robots", size, _ROBOT_M, "robot")
-    for name, source in scenario.sources.items():
-        if source.body:
-            size = source.length_m, source.width_m
-            yield _box(names[name], "sources", size, _BODY_M, "source")
-    for obstacle in scenario.obstacles:
-        frame = names[obstacle.name]
-        yield _box(frame, "obstacles", obstacle.size_m, _BODY_M, "obstacle")
-
-
 def _box(
-    frame: str, group: str, size: tuple[float, float], height: float, colour: str
+    frame: str, group: str, size: tuple[float, float, float], colour: str
 ) -> Message:
-    at = pose((0.0, 0.0, 0.0), 0.5 * height)
-    return _marker(frame, group, _CUBE, colour, at, vector(*size, height))
+    at = pose((0.0, 0.0, 0.0), 0.5 * size[2])
+    return _marker(frame, group, _CUBE, colour, at, vector(*size))
 
 
 def _edges(room: RoomParameters) -> Message:

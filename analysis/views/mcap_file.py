@@ -23,6 +23,7 @@ from analysis.views.ros2_values import (
     transform,
     vector,
 )
+from analysis.views.scene import scene_bodies, sensor_pose
 from diagrams import dump_scenario
 from diagrams.scenario.participants import HasRangeSensors, Robot
 from diagrams.scenario.warnings.warnings_of import warnings_of
@@ -98,32 +99,37 @@ def _write(writer: Any, run: RecordedRun) -> None:
         for topic, kind, message in entries:
             if kind not in schemas:
                 name = kind.replace("/", "/msg/")
-                text, _ = known.generate_msgdef(name, ros_version=2)
-                schemas[kind] = writer.register_msgdef(name, text)
+                definition, _ = known.generate_msgdef(name, ros_version=2)
+                schemas[kind] = writer.register_msgdef(name, definition)
             writer.write_message(topic, schemas[kind], message, time_ns, sequence=tick)
 
 
 def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
     """Yields the messages of each tick (control period)."""
     scenario = run.scenario
-    bodies = scenario.sources | {each.name: each for each in scenario.obstacles}
-    placed = {name: body.path().poses(run.time) for name, body in bodies.items()}
-    once = {each.name for each in scenario.obstacles if not each.path().moves}
-    names = _ros_names([*run.robots, *placed])
+    robots = {
+        name: np.column_stack([own[key] for key in _POSES["pose"]])
+        for name, own in run.robots.items()
+    }
+    bodies = scene_bodies(scenario, run.time, robots)
+    names = _ros_names(bodies)
     for tick, time in enumerate(run.time.tolist()):
         entries: list[_Entry] = []
         frames: list[Message] = []
         if tick == 0:
-            markers = {"markers": body_markers(scenario, names)}
+            markers = {"markers": body_markers(bodies, scenario.room, names)}
             entries.append(("/markers", "visualization_msgs/MarkerArray", markers))
         for name, own in run.robots.items():
             robot = scenario.robots[name]
             frames += _robot_frames(names[name], own, robot, tick, time)
             entries += _robot_entries(names[name], own, robot, tick, time)
-        for name, poses in placed.items():
-            at = poses[tick].tolist()
+        for name, body in bodies.items():
+            if name in robots:
+                continue
+            at = body.pose(tick).tolist()
             frames.append(transform(time, WORLD_FRAME, names[name], at))
-            if tick == 0 or name not in once:
+            # An obstacle at rest has a single pose.
+            if tick < len(body.poses):
                 topic, message = f"/{names[name]}/pose", stamped_pose(time, at)
                 entries.append((topic, "geometry_msgs/PoseStamped", message))
         entries.append(("/tf", "tf2_msgs/TFMessage", {"transforms": frames}))
@@ -168,11 +174,10 @@ def _robot_frames(
     yield transform(time, base, f"{name}/control_point", [ahead, 0.0, 0.0])
     if not isinstance(robot, HasRangeSensors):
         return
-    for k, sensor in enumerate(robot.ultrasonic.sensors, start=1):
-        if f"range_{k}" in own:
-            x, y = sensor.position_m
-            pose_BU = [ahead + x, y, math.radians(sensor.axis_deg)]
-            yield transform(time, base, f"{name}/sensor_{k}", pose_BU)
+    for k in range(robot.ultrasonic.count):
+        if f"range_{k + 1}" in own:
+            pose_BU = sensor_pose(robot, k).tolist()
+            yield transform(time, base, f"{name}/sensor_{k + 1}", pose_BU)
 
 
 def _robot_entries(

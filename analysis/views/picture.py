@@ -1,37 +1,58 @@
-"""Draws a run from above."""
+"""Draws the scene of a run from above."""
 
 from __future__ import annotations
 
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon, Rectangle, Wedge
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
-from analysis.reporting.body_labels import spread_labels
+from analysis.reporting.body_labels import BodyLabel, spread_labels
 from analysis.reporting.notebook_figure import NotebookFigure
-from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.reporting.palette import COLOURS, draw_grid, faintest
 from analysis.runs.known_space import known_space
+from analysis.views.framing import bounds, picture_times, picture_title, tick_at
 from analysis.views.plume_history import concentration_map, plume_history
-from analysis.views.scene import bounds, looks, picture_title
-from analysis.views.trajectory_artists import (
-    draw_collision,
-    draw_cones,
-    draw_estimates,
-    draw_known_space,
-    draw_obstacles,
-    draw_robot,
-    draw_room,
-    draw_sources,
-    times_apart,
+from analysis.views.scene import (
+    Box,
+    Cone,
+    Contact,
+    Estimate,
+    Goal,
+    KnownFloor,
+    Plume,
+    RobotBody,
+    Scene,
+    SourceBody,
+    Thing,
+    Touched,
+    Trail,
+    Walls,
+    make_scene,
 )
 from diagrams import RunResult
+from diagrams.scenario.bodies import microphones_W
+from systems.world.geometry import rectangle_corners
 
 #: Width of the pictures, inch.
 WIDTH_IN = 8.0
 #: Space around the map for labels, title and legend, inch.
 LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.5
+#: Least distance that a robot or a source moves between two drawn times, m. For
+#: obstacles, half of this distance applies.
+APART_M = 0.25
+#: Largest number of times at which the cones are drawn.
+CONE_INSTANTS = 4
 
 
 def plot_trajectory(result: RunResult) -> Figure:
@@ -58,23 +79,7 @@ def plot_trajectory(result: RunResult) -> Figure:
     figure, axes = map_axes(result)
     draw_grid(axes)
     axes.set_title(picture_title(result), fontsize=11)
-    for look in looks(result):
-        known = known_space(look.result, look.result.simulated_s)
-        if known is None:
-            draw_cones(axes, look.result, times_apart(look.result))
-        else:
-            # The map replaces the cones, which would hide the map.
-            draw_known_space(axes, look, known)
-    draw_room(axes, result)
-    draw_obstacles(axes, result)
-    if result.full_scenario.odor is not None:
-        _draw_odor(axes, result)
-    shown = looks(result)
-    draw_sources(axes, result, times_apart(shown[0].result))
-    for look in shown:
-        draw_estimates(axes, look)
-        draw_robot(axes, look, times_apart(look.result))
-    draw_collision(axes, result)
+    draw_scene(axes, make_scene(result))
     spread_labels(axes)
     handles, labels = axes.get_legend_handles_labels()
     shown_once = dict(zip(labels, handles, strict=True))
@@ -87,31 +92,6 @@ def plot_trajectory(result: RunResult) -> Figure:
         frameon=False,
     )
     return figure
-
-
-def _draw_odor(axes: Axes, result: RunResult) -> None:
-    """Draws the odor source, and its plume at the end of the run."""
-    odor = result.full_scenario.odor
-    assert odor is not None
-    last = None
-    for instant in plume_history(result.full_scenario, result.simulated_s):
-        last = instant
-    x = np.linspace(*axes.get_xlim(), 121)
-    y = np.linspace(*axes.get_ylim(), 81)
-    if last is not None:
-        dense = concentration_map(last.plume, x, y)
-        levels = [0.1, 0.3, 1.0, 3.0, 1e9]
-        tints = ["#F3E6EF", "#E7CCDF", "#D9AECB", "#C98BB5"]
-        axes.contourf(x, y, dense, levels=levels, colors=tints, zorder=0.5)
-        edge = COLOURS["odor"]
-        axes.contour(
-            x, y, dense, levels=levels[:1], colors=edge, linewidths=0.5, zorder=0.6
-        )
-        label = "odor at the end (0.1, 0.3, 1, 3 times C1)"
-        axes.scatter([], [], marker="s", s=40, color="#D9AECB", label=label)
-    place = odor.position_m
-    style: dict[str, Any] = {"color": COLOURS["odor"], "ms": 12, "ls": "none"}
-    axes.plot(*place, "*", label="source of odour", **style)
 
 
 def map_axes(result: RunResult) -> tuple[Figure, Axes]:
@@ -145,3 +125,317 @@ def map_axes(result: RunResult) -> tuple[Figure, Axes]:
     axes.yaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))
     axes.set(xlabel="x in W (m)", ylabel="y in W (m)")
     return figure, axes
+
+
+def draw_scene(axes: Axes, scene: Scene, *, ends_only: bool = False) -> None:
+    """Draws a run from above.
+
+    Args:
+        axes: Axes in the world frame W, m.
+        scene: Scene of the run.
+        ends_only: Whether robots are drawn only at the start and at the end of the run.
+            Then the picture shows neither what the robots sensed nor the odor.
+    """
+    painter = _Painter(axes, scene, ends_only)
+    for kind, draw in _DRAW.items():
+        for thing in scene.things:
+            if isinstance(thing.shape, kind) and not (ends_only and kind in _SENSED):
+                draw(painter, thing, thing.shape)
+
+
+@dataclass
+class _Painter:
+    """Draws the things of a scene, each at several times of the run."""
+
+    axes: Axes
+    scene: Scene
+    ends_only: bool
+
+    def __post_init__(self) -> None:
+        self.labelled: set[str] = set()
+        self.result = self.scene.result
+
+    @cached_property
+    def mapping(self) -> set[str]:
+        """Names of the robots with a map of the floor."""
+        shapes = [thing.shape for thing in self.scene.things]
+        return {each.own.name for each in shapes if isinstance(each, KnownFloor)}
+
+    def once(self, label: str) -> str | None:
+        """Returns a label for the first of several equal objects, and then None."""
+        if not label or label in self.labelled:
+            return None
+        self.labelled.add(label)
+        return label
+
+    def times_of(self, robot: Thing) -> list[float]:
+        """Returns the times at which the picture shows the outline of a robot, s.
+
+        Between two of these times, the robot moves by at least 0.25 m. The last time is
+        the end of the run, even if the robot has moved less.
+        """
+        end = self.result.simulated_s
+        if self.ends_only:
+            return [0.0, end]
+        kept = self.apart(robot, picture_times(self.result), APART_M)
+        if len(kept) > 1 and self._moved(robot, kept[-1], end) < APART_M:
+            kept.pop()
+        return [*kept, end] if end > kept[-1] else kept
+
+    def apart(self, thing: Thing, times: ArrayLike, least_m: float) -> list[float]:
+        """Selects times between which a thing moves by a least distance, m."""
+        kept: list[float] = []
+        for time in np.asarray(times, dtype=float).tolist():
+            if not kept or self._moved(thing, kept[-1], time) >= least_m:
+                kept.append(time)
+        return kept
+
+    def _moved(self, thing: Thing, first: float, second: float) -> float:
+        a, b = (thing.pose(tick_at(self.result, time)) for time in (first, second))
+        return math.dist(a[:2], b[:2])
+
+    def body(self, rectangle: ArrayLike, **style: Any) -> None:
+        self.axes.add_patch(Polygon(rectangle_corners(rectangle), **style))
+
+    def time(self, rectangle: ArrayLike, time: float, colour: str) -> None:
+        """Writes the time beside a body, on its right until all labels are apart."""
+        text = f"{round(time, 1):g} s"
+        self.axes.add_artist(BodyLabel(text, np.asarray(rectangle), colour))
+
+    def cones(self, thing: Thing, shape: Cone) -> None:
+        """Draws a cone at several times, up to the range readings."""
+        robot = thing.parent
+        if robot is None or robot.name in self.mapping:
+            return  # the map replaces the cones, which would hide the map
+        times = self.times_of(robot)
+        half = math.degrees(shape.half_angle)
+        for time in times[:: max(1, math.ceil(len(times) / CONE_INSTANTS))]:
+            tick = tick_at(self.result, time)
+            echo = bool(shape.echo[tick])
+            colour = to_rgb(COLOURS["echo" if echo else "empty"])
+            x, y, theta = thing.pose(tick)
+            axis = math.degrees(theta)
+            wedge = Wedge(
+                (x, y),
+                shape.reach[tick],
+                axis - half,
+                axis + half,
+                facecolor=(*colour, 0.2 if echo else 0.07),
+                edgecolor=colour,
+                linewidth=0.5,
+                label=self.once(
+                    "ultrasonic cone with an echo" if echo else "cone without an echo"
+                ),
+                zorder=1.5,
+            )
+            self.axes.add_patch(wedge)
+
+    def known_floor(self, thing: Thing, shape: KnownFloor) -> None:
+        """Draws the floor that a robot knew at the end, and the places of echoes."""
+        known = known_space(shape.own, shape.own.simulated_s)
+        if known is None:
+            return
+        free, echoed = known.free[-1], known.middles(known.hits[-1] > 0.0)
+        # The color is transparent, because other objects and floors overlap.
+        colour = to_rgba(thing.colour, 0.13)
+        layer = np.zeros((*free.T.shape, 4))
+        layer[free.T] = colour
+        limits = self.axes.axis()
+        self.axes.imshow(
+            layer,
+            origin="lower",
+            extent=known.extent,
+            interpolation="nearest",
+            zorder=0.3,
+        ).set_gid("seen free")
+        # ``imshow`` changes the limits of the axes. This call restores them.
+        self.axes.axis(limits)
+        square: dict[str, Any] = {"edgecolor": "none", "marker": "s", "s": 60}
+        self.axes.scatter([], [], facecolor=colour, label=thing.label, **square)
+        if len(echoed):
+            dots: dict[str, Any] = {"color": shape.echoes, "ms": 2.5, "zorder": 1.8}
+            self.axes.plot(*echoed.T, ".", label=shape.echoes_label, **dots)
+
+    def walls(self, thing: Thing, shape: Walls) -> None:
+        self.axes.add_patch(
+            Rectangle(
+                shape.corner,
+                *shape.size[:2],
+                gid="room",
+                fill=False,
+                edgecolor=thing.colour,
+                linewidth=4.0,
+                label=thing.label,
+                zorder=1.2,
+            )
+        )
+
+    def box(self, thing: Thing, shape: Box) -> None:
+        """Draws an obstacle at rest as a filled box, and a moving one as outlines."""
+        label, colour = self.once(thing.label), thing.colour
+        size = shape.length, shape.width
+        gid = f"obstacle {thing.name}"
+        if not thing.moves:
+            body = [*thing.pose(0), *size]
+            self.body(body, gid=gid, color=colour, label=label, zorder=3.5)
+            return
+        for time in self.apart(thing, picture_times(self.result), 0.5 * APART_M):
+            body = [*thing.pose(tick_at(self.result, time)), *size]
+            self.body(
+                body,
+                gid=f"{gid} at {time:g}",
+                fill=False,
+                edgecolor=colour,
+                linewidth=1.1,
+                label=label if time == 0.0 else None,
+                zorder=3.5,
+            )
+            self.time(body, time, colour)
+        if self.ends_only:
+            self.body([*thing.pose(len(thing.times) - 1), *size], color=colour)
+
+    def plume(self, thing: Thing, shape: Plume) -> None:
+        """Draws the odor source, and its plume at the end of the run."""
+        axes, colour = self.axes, thing.colour
+        history = plume_history(shape.scenario, self.result.simulated_s)
+        x = np.linspace(*axes.get_xlim(), 121)
+        y = np.linspace(*axes.get_ylim(), 81)
+        for last in deque(history, maxlen=1):
+            dense = concentration_map(last.plume, x, y)
+            levels = [0.1, 0.3, 1.0, 3.0, 1e9]
+            tints = ["#F3E6EF", "#E7CCDF", "#D9AECB", "#C98BB5"]
+            axes.contourf(x, y, dense, levels=levels, colors=tints, zorder=0.5)
+            edge: dict[str, Any] = {"colors": colour, "linewidths": 0.5, "zorder": 0.6}
+            axes.contour(x, y, dense, levels=levels[:1], **edge)
+            label = "odor at the end (0.1, 0.3, 1, 3 times C1)"
+            axes.scatter([], [], marker="s", s=40, color="#D9AECB", label=label)
+        style: dict[str, Any] = {"color": colour, "ms": 12, "ls": "none"}
+        axes.plot(*thing.poses[0, :2], "*", label=thing.label, **style)
+
+    def trail(self, thing: Thing, shape: Trail) -> None:
+        width, zorder = {"-": (1.8, 4), "--": (1.5, 3), ":": (1.2, 3.5)}[shape.line]
+        self.axes.plot(
+            *thing.poses[:, :2].T,
+            shape.line,
+            color=thing.colour,
+            linewidth=width,
+            label=thing.label,
+            zorder=zorder,
+        )
+
+    def source(self, thing: Thing, shape: SourceBody) -> None:
+        """Draws a source at both ends of its path, and dots with the times between."""
+        colour = thing.colour
+        if not shape.is_body:
+            style: dict[str, Any] = {"ls": "none", "ms": 6, "zorder": 4}
+            place, label = thing.poses[-1, :2], thing.label
+            self.axes.plot(*place, "D", color=colour, label=label, **style)
+            return
+        size = shape.length, shape.width
+        ends = (0, len(thing.poses) - 1) if thing.moves else (0,)
+        which = "first and last" if thing.moves else "at rest"
+        for index in ends:
+            self.body(
+                [*thing.poses[index], *size],
+                gid="source",
+                facecolor=(*to_rgb(colour), 0.6 if index else 0.25),
+                edgecolor=colour,
+                label=self.once(f"{thing.label.removeprefix('the ')}, {which}"),
+                zorder=2.5,
+            )
+        times = self.times_of(next(iter(self.scene.bodies.values())))
+        for time in self.apart(thing, times[-1:] if self.ends_only else times, APART_M):
+            pose = thing.pose(tick_at(self.result, time))
+            self.axes.plot(*pose[:2], "o", color=colour, markersize=4, zorder=4)
+            if thing.moves:
+                self.time([*pose, *size], time, colour)
+
+    def estimates(self, thing: Thing, shape: Estimate) -> None:
+        """Draws a cross for each new estimate. Early estimates are faint."""
+        fresh, colour = shape.fresh, thing.colour
+        if fresh is None or not fresh.any():
+            return
+        part = thing.times[fresh] / max(self.result.simulated_s, 1e-9)
+        least = faintest(colour)
+        colours = [(*to_rgb(colour), least + (1.0 - least) * p) for p in part]
+        cross: dict[str, Any] = {"marker": "x", "s": 16}
+        x, y = thing.poses[fresh, :2].T
+        self.axes.scatter(x, y, c=colours, linewidths=0.9, zorder=6, **cross)
+        # Without this empty plot, the sample in the legend would be as faint as the
+        # first estimate.
+        self.axes.scatter([], [], color=colour, label=thing.label, **cross)
+
+    def goal(self, thing: Thing, _: Goal) -> None:
+        style: dict[str, Any] = {"ms": 11, "ls": "none", "zorder": 5}
+        place, label = thing.poses[0, :2], thing.label
+        self.axes.plot(*place, "*", color=thing.colour, label=label, **style)
+
+    def robot(self, thing: Thing, shape: RobotBody) -> None:
+        """Draws the outline of a robot and its microphones at several times."""
+        own, colour = shape.parameters, thing.colour
+        for time in self.times_of(thing):
+            pose = thing.pose(tick_at(self.result, time))
+            rectangle = [*pose, own.length_m, own.width_m]
+            self.body(
+                rectangle,
+                gid=f"robot at {time:g}",
+                facecolor=(*to_rgb(colour), 0.10),
+                edgecolor=colour,
+                linewidth=1.0,
+                label=self.once(thing.label),
+                zorder=3,
+            )
+            if shape.hears:
+                bar: dict[str, Any] = {"ms": 3.2, "lw": 2.0, "zorder": 5}
+                microphones = microphones_W(pose, own).T
+                self.axes.plot(*microphones, "-o", color=colour, **bar)
+            self.time(rectangle, time, colour)
+
+    def hit(self, thing: Thing, shape: Touched) -> None:
+        """Draws the touched body where it was at the time of the collision."""
+        if thing.seen is None:
+            return
+        tick = int(np.argmax(thing.seen))
+        self.body(
+            [*thing.pose(tick), shape.length, shape.width],
+            gid="hit",
+            facecolor=thing.colour,
+            edgecolor="white",
+            linewidth=0.8,
+            label=thing.label,
+            zorder=8,
+        )
+
+    def contact(self, thing: Thing, _: Contact) -> None:
+        """Draws the outline of a star, which does not hide the bodies."""
+        small = self.ends_only
+        self.axes.plot(
+            *thing.poses[0, :2],
+            "*",
+            markerfacecolor="none",
+            markeredgecolor=thing.colour,
+            markeredgewidth=0.9 if small else 1.4,
+            markersize=9.0 if small else 19.0,
+            label=thing.label,
+            linestyle="none",
+            zorder=9,
+        )
+
+
+#: Kinds of shapes in the order of drawing, which is the order of the legend.
+_DRAW: dict[type, Callable[[_Painter, Thing, Any], None]] = {
+    Cone: _Painter.cones,
+    KnownFloor: _Painter.known_floor,
+    Walls: _Painter.walls,
+    Box: _Painter.box,
+    Plume: _Painter.plume,
+    Trail: _Painter.trail,
+    SourceBody: _Painter.source,
+    Estimate: _Painter.estimates,
+    Goal: _Painter.goal,
+    RobotBody: _Painter.robot,
+    Touched: _Painter.hit,
+    Contact: _Painter.contact,
+}
+#: Kinds of shapes that a picture of both ends of a run leaves out.
+_SENSED = Cone, KnownFloor, Plume, Estimate

@@ -127,7 +127,7 @@
     if (!ready) return;
     viewer.scene.updateMatrixWorld();
     for (const { path, label } of names) {
-      const p = where(path).add(screen(0, 0, 0.45)).project(viewer.camera);
+      const p = where(path).add(screen(0, 0, 0.6)).project(viewer.camera);
       const x = (p.x + 1) / 2 * pane.clientWidth, y = (1 - p.y) / 2 * pane.clientHeight;
       const inside = p.z < 1 && x > 0 && y > 12 && x < pane.clientWidth &&
         y < pane.clientHeight;

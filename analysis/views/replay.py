@@ -4,70 +4,86 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from numpy.typing import ArrayLike, NDArray
-from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.geometry import (
+    Box as Block,
+    Cylinder,
+    Meshcat,
+    MeshcatCone,
+    MeshcatParams,
+    Rgba,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from analysis.reporting.palette import COLOURS
-from analysis.runs.guarded_motion import guarded_motion
-from analysis.runs.known_space import has_known_space, known_space
-from analysis.runs.tracked_bodies import tracked_bodies
-from analysis.views import replay_scene
-from analysis.views.arrows import record_arrows, scale_m_n
+from analysis.runs.known_space import known_space
 from analysis.views.curves import page_charts
 from analysis.views.floor_layers import clipped, floor_layers
-from analysis.views.replay_layers import replay_layers
-from analysis.views.replay_page import ReplayFacts, replay_page
-from analysis.views.replay_scene import OBSTACLE_HEIGHT_M, upright
+from analysis.views.framing import floor_rectangle
+from analysis.views.meshes import Mesh, arrow, circle, rectangles, ribbon, star
+from analysis.views.overlays import Arrow, Ball, Bar, Circle, Disc, Frame, overlays
+from analysis.views.plume_history import plume_history
+from analysis.views.replay_page import replay_page
+from analysis.views.replay_stage import add_floor, set_stage
 from analysis.views.scene import (
-    Look,
-    call_time,
-    contact_point,
-    followed_sources,
+    BODY_HEIGHT_M,
+    ROBOT_HEIGHT_M,
+    Box,
+    Cone,
+    Contact,
+    Estimate,
+    Goal,
+    KnownFloor,
+    Plume,
+    Rings,
+    RobotBody,
+    Scene,
+    SourceBody,
+    Thing,
+    Touched,
+    Trail,
+    Walls,
     lightened,
-    logged_sensors,
-    looks,
-    moving_and_static,
-    run_title,
-    sound_bursts,
+    make_scene,
 )
-from analysis.views.search_replay import record_searches, record_switch
-from diagrams import RunResult, Scenario
+from diagrams import RunResult
 from diagrams.scenario.bodies import RecordedPath
-from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
-from systems.sound.parameters import SoundParameters
+from systems.base.robot import RobotParameters, microphones_B
+from systems.odor.odor_plume import PUFF_SIZE, PUFFS_BEGIN
+from systems.odor.parameters import CONTAINER_M
 
 #: Largest number of frames per second that Meshcat records.
 FRAMES_PER_S = 32.0
 #: Duration of one piece of a trail, s.
 TRAIL_PIECE_S = 0.5
+#: Radii of the rings of a source, m. While the source sounds, they appear in turn.
+RINGS_M = (0.28, 0.38, 0.48, 0.58, 0.68)
 #: Time for which each ring of a source is visible, s.
 RING_S = 0.0625
-#: Gains that the replay shows as bars on a robot. Each entry has the name of the gain,
-#: the distance of the bar to the left of the center line, m, and the key of its color.
-GAIN_BARS = (
-    ("stiffness", 0.05, "source"),
-    ("damping", 0.0, "robot"),
-    ("contact_stiffness", -0.05, "obstacle"),
-)
-#: Sizes of the bars. ``BAR_M``: initial height, m. ``MOST_HIGH``: largest ratio of the
-#: height to the initial height.
-BAR_M, MOST_HIGH = 0.15, 10.0
 #: Interval between two displays of the floor that a robot knows, s.
 KNOWN_PERIOD_S = 0.5
 #: Number of ticks (control periods) in which a map enters its first readings.
 FIRST_TICKS = 3
-#: Least probability of a tracked body that the replay shows.
-LEAST_EXISTS = 0.3
-#: Radii of the rings around tracked bodies, m.
-TRACKED_M = (0.1, 0.2, 0.4, 0.8)
 #: Largest number of cells of all displayed maps together.
 MOST_CELLS = 30_000_000
+#: Heights and sizes of the details of a robot, m.
+_MICROPHONE_HEIGHT_M, _SENSOR_HEIGHT_M, _WHEEL_WIDTH_M = 0.30, 0.14, 0.035
+#: Width of the body divided by the width of the microphone bar, which is wider.
+_BODY_WIDTH_FRACTION = 0.45
+#: Length of the cones, m. A cone of the full range, 3 m, would hide the scene.
+_CONE_M = 0.8
+#: Display of the plume. ``_PUFFS_S``: interval between two displays, s. ``_DISCS``:
+#: number of discs, from the source downwind. ``_APART_M``: difference between the
+#: distances of two discs from the source, m.
+_PUFFS_S, _DISCS, _APART_M = 0.5, 30, 0.15
 
 
 def write_replay(
@@ -99,18 +115,14 @@ def write_replay(
 
     For the guarded law, the scene also shows a ring around each body that the robot
     takes as moving. The radius of the ring is the uncertainty of the position. For a
-    search, the scene also shows the odor plume, and a lamp above each robot
-    (``analysis.views.search_replay``).
+    search, the scene also shows the container of the odor source, discs for puffs of
+    the plume, a lamp above each robot, and a white flash for each of its radio frames
+    that the operator's computer receives.
 
-    Around the scene, the page has:
-
-    - a clock with a slider
-    - a legend, with switches for its layers
-    - the warnings about the scenario
-    - curves over time, with a cursor that follows the clock
-
-    If the address ends with ``#t=2.5``, the replay begins at 2.5 s. The page needs a
-    browser with WebGL, but no network.
+    Around the scene, the page has a clock, a legend with switches for its layers, the
+    warnings about the scenario, and curves over time. If the address ends with
+    ``#t=2.5``, the replay begins at 2.5 s. The page needs a browser with WebGL, but no
+    network.
 
     Args:
         result: Result of the run.
@@ -122,35 +134,30 @@ def write_replay(
     Raises:
         OSError: The file cannot be written.
     """
+    scene = make_scene(result)
+    layers = [*scene.layers, *overlays(scene, frame_times(result))]
     with _quiet_drake():
         meshcat = Meshcat(MeshcatParams(host="localhost"))
-        _build_scene(meshcat, result)
+        add_floor(meshcat, result)
+        set_stage(meshcat)
         meshcat.StartRecording(FRAMES_PER_S, set_visualizations_while_recording=False)
-        record_run(meshcat, result)
+        record(meshcat, scene, [thing for layer in layers for thing in layer.things])
         meshcat.StopRecording()
         meshcat.PublishRecording()
         page = meshcat.StaticHtml()
         del meshcat
-    Path(path).write_text(replay_page(page, _facts(result, clearance or {})), "utf-8")
+    charts = page_charts(result, clearance or {})
+    Path(path).write_text(replay_page(page, scene, layers, charts), "utf-8")
 
 
-def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts:
-    scenario = result.full_scenario
-    paths = {name: robot_path(own, result) for name, own in result.robots.items()}
-    estimates = {name: estimate_path(path) for name, path in paths.items()}
-    sources = [(source_path(scenario, name), name) for name in scenario.sources]
-    obstacles = [(f"obstacles/{o.name}", o.name) for o in scenario.obstacles]
-    robots = [(path, name) for name, path in paths.items()]
-    return ReplayFacts(
-        run_title(result),
-        result.simulated_s,
-        replay_scene.shown_rectangle(result),
-        replay_layers(result, paths, estimates),
-        page_charts(result, clearance),
-        [*robots, *sources, *obstacles],
-        robots,
-        [str(each) for each in result.warnings],
-    )
+def record(meshcat: Meshcat, scene: Scene, things: Iterable[Thing]) -> None:
+    """Adds things to a replay, and records their motion.
+
+    Meshcat (Drake's 3D viewer) must already be recording.
+    """
+    recorder = _Recorder(meshcat, scene.result)
+    for thing in things:
+        recorder.draw(thing)
 
 
 @contextmanager
@@ -165,163 +172,18 @@ def _quiet_drake() -> Iterator[None]:
         logger.setLevel(level)
 
 
-def _build_scene(meshcat: Meshcat, result: RunResult) -> None:
-    scenario = result.full_scenario
-    replay_scene.add_floor(meshcat, result)
-    replay_scene.add_room(meshcat, scenario)
-    replay_scene.add_obstacles(meshcat, scenario)
-    followed = followed_sources(scenario)
-    for name, source in scenario.sources.items():
-        role = "source" if name in followed else "interferer"
-        replay_scene.add_source(meshcat, source, source_path(scenario, name), role)
-    for look in looks(result):
-        path = robot_path(look.result, result)
-        replay_scene.add_robot(meshcat, look, path, estimate_path(path))
-    replay_scene.set_stage(meshcat)
+def frame_times(result: RunResult) -> NDArray[np.float64]:
+    """Returns the times of the frames of a replay, s."""
+    return np.arange(0.0, result.simulated_s + 0.5 / FRAMES_PER_S, 1.0 / FRAMES_PER_S)
 
 
-def source_path(scenario: Scenario, name: str) -> str:
-    """Returns the path of a source in the scene tree of Meshcat (Drake's 3D viewer).
+def wheel_angles(
+    robot: RobotParameters, path: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Returns the (n,) angles of both wheels for rolling without slip, rad, by side.
 
-    Args:
-        scenario: Scenario that contains the source. If the scenario has only one
-            source, the path is ``source``.
-        name: Name of the source.
-
-    Returns:
-        Path without a leading slash.
+    The path consists of (n, 3) poses (x, y, theta) of the robot in W, m and rad.
     """
-    return f"sources/{name}" if len(scenario.sources) > 1 else "source"
-
-
-def robot_path(own: RunResult, result: RunResult) -> str:
-    """Returns the path of a robot in the scene tree of Meshcat (Drake's 3D viewer).
-
-    Args:
-        own: Result of the run, for this robot.
-        result: Result of the run, for all robots. If there is only one robot, the path
-            is ``robot``.
-
-    Returns:
-        Path without a leading slash.
-    """
-    return f"robots/{own.name}" if result.several else "robot"
-
-
-def estimate_path(robot: str) -> str:
-    """Returns the path of the ball at the source position that a robot estimates."""
-    return robot.replace("robot", "estimate", 1)
-
-
-def record_run(meshcat: Meshcat, result: RunResult) -> None:
-    """Records all motion of a run. The objects of the scene must already exist.
-
-    Args:
-        meshcat: Meshcat instance (Drake's 3D viewer) that is already recording.
-        result: Result of the run.
-    """
-    frames = np.arange(0.0, result.simulated_s + 0.5 / FRAMES_PER_S, 1.0 / FRAMES_PER_S)
-    scenario = result.full_scenario
-    sounds, m_per_n = scenario.sounds(), scale_m_n(result)
-    for look in looks(result):
-        own, path = look.result, robot_path(look.result, result)
-        _record_robot(meshcat, own, path, frames)
-        _record_estimate(meshcat, own, estimate_path(path))
-        p_WP = own.vector("p_WP").T
-        _record_trail(meshcat, own, f"trail/{path}", p_WP, look.colour)
-        if own.scenario.only.kind == "router":
-            _record_target(meshcat, own, path, frames, look.estimates)
-            _record_gains(meshcat, own, path, frames)
-        if own.name in sounds:
-            _record_rings(meshcat, result, path, _called_on(own, sounds[own.name]))
-        _record_known_space(meshcat, result, look, path)
-        _record_guard(meshcat, own, f"guard/{path}", frames)
-        _record_tracked_bodies(meshcat, own, f"tracked/{path}", frames)
-        record_arrows(meshcat, own, path, m_per_n)
-        _record_follow_distance(meshcat, own, path, frames)
-        _record_collision(meshcat, own, path)
-    paths = {name: robot_path(own, result) for name, own in result.robots.items()}
-    record_searches(meshcat, result, paths)
-    followed = followed_sources(scenario)
-    for name, source in scenario.sources.items():
-        role = "source" if name in followed else "interferer"
-        path = source_path(scenario, name)
-        poses = source.path().poses(result.time)
-        seen = frames if np.ptp(poses, axis=0).any() else frames[:1]
-        _record_path(meshcat, path, seen, _at_frames(result, poses, seen))
-        _record_rings(meshcat, result, path, sounds[name])
-        _record_trail(meshcat, result, f"trail/{path}", poses[:, :2], COLOURS[role])
-    for obstacle in moving_and_static(scenario)[0]:
-        path, height = f"obstacles/{obstacle.name}", 0.5 * OBSTACLE_HEIGHT_M
-        _record_path(meshcat, path, frames, obstacle.path().poses(frames), height)
-
-
-def _record_follow_distance(
-    meshcat: Meshcat, own: RunResult, path: str, frames: NDArray[np.float64]
-) -> None:
-    """Records a circle around the target, at the follow distance of P."""
-    if (
-        own.scenario.only.searches is not None
-        or not own.scenario.only.follow_distance_m
-    ):
-        return
-    ring, radius = f"follow/{path}", own.scenario.only.follow_distance_m
-    replay_scene.add_disc_edge(meshcat, ring, radius, "law")
-    seen = frames if own.target_moves else frames[:1]
-    _record_path(meshcat, ring, seen, _at_frames(own, own.poses("WS"), seen))
-
-
-def _record_collision(meshcat: Meshcat, own: RunResult, path: str) -> None:
-    """Shows a star and the touched object in red from the time of the collision on."""
-    if own.collision is None:
-        return
-    star, times = f"collision/{path}", (0.0, own.collision.time)
-    replay_scene.add_star(meshcat, star, contact_point(own))
-    record_switch(meshcat, star, times, (False, True))
-    hit = replay_scene.add_hit(meshcat, own.full_scenario, own.collision.object)
-    if hit is not None:
-        record_switch(meshcat, hit, times, (False, True))
-
-
-def _at_frames(
-    result: RunResult, values: NDArray[np.float64], frames: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(n, 3) poses at the ticks, interpolated to the times of the replay's frames."""
-    unwrapped = np.column_stack([values[:, :2], np.unwrap(values[:, 2])])
-    return RecordedPath(result.time, unwrapped).poses(frames)
-
-
-def _record_path(
-    meshcat: Meshcat,
-    path: str,
-    frames: NDArray[np.float64],
-    poses: NDArray[np.float64],
-    height: float = 0.0,
-) -> None:
-    for time, (x, y, theta) in zip(frames, poses, strict=True):
-        meshcat.SetTransform(path, upright(x, y, height, theta), float(time))
-
-
-def _record_robot(
-    meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
-) -> None:
-    poses = _at_frames(result, result.poses("WB"), frames)
-    _record_path(meshcat, path, frames, poses)
-    for side, angles in wheel_angles(result).items():
-        turned = np.interp(frames, result.time, angles)
-        for time, angle in zip(frames, turned, strict=True):
-            spin = upright(0.0, 0.0, 0.0, angle)
-            meshcat.SetTransform(f"{path}/{side}/wheel", spin, float(time))
-    for sensor in logged_sensors(result):
-        echo = result.columns[f"echo_{sensor + 1}"] > 0.5
-        cone = f"{path}/cone_{sensor + 1}"
-        record_switch(meshcat, f"{cone}/echo", result.time, echo)
-        record_switch(meshcat, f"{cone}/empty", result.time, ~echo)
-
-
-def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
-    """(n,) angles of both wheels for rolling without slip on the robot's path, rad."""
-    robot, path = result.scenario.only.robot, result.poses("WB")
     theta = np.unwrap(path[:, 2])
     between = 0.5 * (theta[1:] + theta[:-1])
     steps = np.diff(path[:, :2], axis=0)
@@ -333,129 +195,16 @@ def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def _called_on(own: RunResult, sound: SoundParameters) -> SoundParameters:
-    """Returns the sound of a robot's loudspeaker, delayed until the robot calls."""
-    if own.scenario.only.searches != "odor":
-        return sound
-    since = call_time(own)
-    start = own.simulated_s if since is None else since + sound.start_s
-    return sound.model_copy(update={"start_s": start})
-
-
-def _record_rings(
-    meshcat: Meshcat, result: RunResult, path: str, sound: SoundParameters
-) -> None:
-    bursts = sound_bursts(sound, result.simulated_s)
-    times = np.arange(0.0, result.simulated_s, RING_S / 2.0)
-    for number in range(len(replay_scene.RINGS)):
-        seen = [ring_at(time, bursts) == number for time in times]
-        record_switch(meshcat, f"{path}/ring_{number + 1}", times, seen)
-
-
 def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
-    """Returns which ring of a source is visible at a given time.
+    """Returns which ring of a source is visible at a time, s, as an index.
 
-    While the source sounds, its rings appear one after the other.
-
-    Args:
-        time: Time, s.
-        bursts: Start and end of each burst, s. The bursts do not overlap.
-
-    Returns:
-        Index into ``RINGS``. The value is None if the source is silent at this time.
+    While the source sounds, its rings appear one after the other. The value is None if
+    the source is silent. Each burst has a start and an end, s.
     """
     for start, end in bursts:
         if start <= time < end:
-            return math.floor((time - start) / RING_S) % len(replay_scene.RINGS)
+            return math.floor((time - start) / RING_S) % len(RINGS_M)
     return None
-
-
-def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
-    """Records the ball at the estimated source position.
-
-    The ball jumps when the robot hears an audio frame, and rests otherwise.
-    """
-    if "p_WS_estimated_x" not in result.columns:
-        return
-    valid = result.columns["target_valid"] > 0.5
-    record_switch(meshcat, path, result.time, valid)
-    height = replay_scene.SOURCE_HEIGHT_M + 0.12
-    places = result.vector("p_WS_estimated").T
-    for tick in np.flatnonzero(valid):
-        if tick and valid[tick - 1] and np.allclose(places[tick], places[tick - 1]):
-            continue
-        x, y = places[tick]
-        if tick and valid[tick - 1]:
-            # This keyframe keeps the ball at rest until the new estimate.
-            x_0, y_0 = places[tick - 1]
-            before = float(result.time[tick - 1])
-            meshcat.SetTransform(path, upright(x_0, y_0, height, 0.0), before)
-        time = float(result.time[tick])
-        meshcat.SetTransform(path, upright(x, y, height, 0.0), time)
-
-
-def _record_target(
-    meshcat: Meshcat,
-    result: RunResult,
-    path: str,
-    frames: NDArray[np.float64],
-    colour: str,
-) -> None:
-    """Records the ball at the target on the route, and the thin trail of the target."""
-    places = result.vector("target").T
-    flat = np.column_stack([places, np.zeros(len(places))])
-    height = replay_scene.SOURCE_HEIGHT_M
-    seen = _at_frames(result, flat, frames)
-    _record_path(meshcat, estimate_path(path), frames, seen, height)
-    trail = f"trail/target/{path}"
-    _record_trail(meshcat, result, trail, places, colour, thin=True)
-
-
-def _record_gains(
-    meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
-) -> None:
-    """Records one bar per adapted gain; the height is relative to the initial gain."""
-    for name, aside, colour in GAIN_BARS:
-        if name not in result.columns or result.columns[name][0] <= 0.0:
-            continue
-        bar = f"{path}/{name}"
-        replay_scene.add_gain_bar(meshcat, bar, aside, colour)
-        share = result.columns[name] / result.columns[name][0]
-        heights = np.interp(frames, result.time, np.clip(share, 0.0, MOST_HIGH))
-        for time, height in zip(frames, BAR_M * heights, strict=True):
-            meshcat.SetProperty(bar, "scale", [1.0, 1.0, height], float(time))
-
-
-def _record_known_space(
-    meshcat: Meshcat, result: RunResult, look: Look, path: str
-) -> None:
-    """Shows the floor that a robot knows to be free, and dots at echo positions."""
-    own = look.result
-    if not has_known_space(own):
-        return
-    known = known_space(own, known_times(own))
-    if known is None:
-        return
-    floor = replay_scene.floor_rectangle(result)
-    # The floors of several robots have different heights. Surfaces in one plane would
-    # flicker.
-    above = 0.0005 * [*result.robots].index(own.name)
-    dots = 0.25 * known.cell_m * np.array([1.0, -1.0, 1.0, -1.0])
-    for name, cells, colour, height, inset in (
-        ("free", known.free, lightened(look.seen, 0.2), 0.001, 0.0 * dots),
-        ("echoes", known.hits > 0.0, look.echoes, 0.006, dots),
-    ):
-        layers = floor_layers(known, cells, whole=name == "free")
-        for number, layer in enumerate(layers):
-            rectangles = clipped(layer.rectangles + inset, floor)
-            if not len(rectangles):
-                continue
-            part = f"known/{path}/{name}_{number}"
-            replay_scene.add_floor_part(
-                meshcat, part, rectangles, colour, height + above
-            )
-            states = [layer.begin <= k < layer.end for k in range(len(known.times))]
-            record_switch(meshcat, part, known.times, states)
 
 
 def known_times(result: RunResult) -> list[float]:
@@ -471,82 +220,329 @@ def known_times(result: RunResult) -> list[float]:
     return [first, *np.arange(period, end, period).tolist(), end]
 
 
-def _record_guard(
-    meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
-) -> None:
-    """Records the edge of the disc that the safety guard keeps free.
-
-    If the robot braked now, its axle would stop at the center of the disc.
-    """
-    motion = guarded_motion(result)
-    if motion is None:
-        return
-    rests = _at_frames(result, motion.resting_poses, frames)
-    _record_path(meshcat, path, frames, rests)
-    for name, colour, numbers in _EDGES:
-        edge = f"{path}/{name}"
-        replay_scene.add_disc_edge(meshcat, edge, motion.keep_m, colour)
-        seen = np.isin(motion.actions, numbers)
-        record_switch(meshcat, edge, result.time, seen)
-
-
-#: Edges of the guarded disc: name, key of the color, and actions of the guard for which
-#: the edge is visible.
-_EDGES = (
-    ("passed", "passed", (PASSED,)),
-    ("lessened", "lessened", (SLOWED, TURNED)),
-    ("braked", "hit", (BRAKED, HALTED)),
-)
-
-
-def _record_tracked_bodies(
-    meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
-) -> None:
-    """Records a ring around each body that the control law takes as moving.
-
-    The radius of the ring shows the uncertainty of the position.
-    """
-    tracked = tracked_bodies(result, frames)
-    if tracked is None:
-        return
-    for k in range(tracked.exists.shape[1]):
-        seen = tracked.exists[:, k] > LEAST_EXISTS
-        if not seen.any():
-            continue
-        for time, there, (x, y) in zip(
-            tracked.times, seen, tracked.places[:, k], strict=True
-        ):
-            if there:
-                place = upright(float(x), float(y), 0.0)
-                meshcat.SetTransform(f"{path}/{k}", place, float(time))
-        wide = np.minimum(tracked.spreads[:, k], TRACKED_M[-1])
-        for least, radius in pairwise((0.0, *TRACKED_M)):
-            ring = f"{path}/{k}/{radius:g}"
-            states = seen & (wide > least) & (wide <= radius)
-            if states.any():
-                replay_scene.add_disc_edge(meshcat, ring, radius, "tracked")
-                record_switch(meshcat, ring, tracked.times, states)
-
-
-def _record_trail(
-    meshcat: Meshcat,
-    result: RunResult,
-    path: str,
-    points: NDArray[np.float64],
-    colour: str,
+def _placed(
+    x: float,
+    y: float,
+    z: float,
+    yaw: float = 0.0,
     *,
-    thin: bool = False,
-) -> None:
-    """Adds the pieces of a trail, and records when each piece becomes visible.
+    roll: float = 0.0,
+    pitch: float = 0.0,
+) -> RigidTransform:
+    place: Any = np.array([x, y, z])  # Drake's type stubs reject arrays
+    return RigidTransform(RollPitchYaw(roll, pitch, yaw), place)
 
-    A piece becomes visible when the body has driven along the piece.
+
+class _Recorder:
+    """Adds things to the scene of Meshcat, and records their motion."""
+
+    def __init__(self, meshcat: Meshcat, result: RunResult) -> None:
+        self.meshcat, self.result = meshcat, result
+        self.frames = frame_times(result)
+
+    def draw(self, thing: Thing) -> None:
+        self._add(thing)
+        self._move(thing)
+        if thing.seen is not None:
+            self.switch(thing.path, thing.times, thing.seen)
+
+    def put(
+        self,
+        path: str,
+        shape: Any,
+        colour: str,
+        place: RigidTransform | None = None,
+        alpha: float = 1.0,
+    ) -> None:
+        """Adds an object at a pose in the frame of its parent in the scene tree."""
+        rgba = Rgba(*to_rgb(colour), alpha)
+        if isinstance(shape, Mesh):
+            vertices: Any = np.asfortranarray(shape.vertices)
+            faces: Any = np.asfortranarray(shape.faces)
+            self.meshcat.SetTriangleMesh(path, vertices, faces, rgba)
+        else:
+            self.meshcat.SetObject(path, shape, rgba)
+        if place is not None:
+            self.meshcat.SetTransform(path, place)
+
+    def switch(self, path: str, times: Iterable[float], states: Iterable[bool]) -> None:
+        """Records the visibility of an object each time that it changes.
+
+        The first state counts from 0 s on.
+        """
+        last: bool | None = None
+        for time, state in zip(times, states, strict=True):
+            if state != last:
+                at = 0.0 if last is None else float(time)
+                self.meshcat.SetProperty(
+                    path, "visible", value=bool(state), time_in_recording=at
+                )
+                last = state
+
+    def _move(self, thing: Thing) -> None:
+        poses, at_rest = thing.poses, len(thing.poses) == 1
+        if at_rest and not isinstance(thing.shape, Cone):
+            x, y, theta = poses[0]
+            if np.any(poses) or thing.height:
+                place = _placed(x, y, thing.height, theta)
+                self.meshcat.SetTransform(thing.path, place)
+        if not at_rest and not isinstance(thing.shape, Trail):
+            for time, (x, y, theta) in zip(*self._keys(thing), strict=True):
+                place = _placed(x, y, thing.height, theta)
+                self.meshcat.SetTransform(thing.path, place, float(time))
+        if thing.scale is not None:
+            for time, scale in zip(*self._at_frames(thing, thing.scale), strict=True):
+                if np.isfinite(scale).all():
+                    path, at = thing.path, float(time)
+                    self.meshcat.SetProperty(path, "scale", scale.tolist(), at)
+
+    def _keys(self, thing: Thing) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns times and poses between which the browser interpolates."""
+        times, poses = thing.times, thing.poses
+        if not thing.jumps:
+            times, poses = self._at_frames(thing, poses)
+            there = np.isfinite(poses[:, 0])
+            if there.any() and not np.ptp(poses[there], axis=0).any():
+                there[1:] = False
+            return times[there], poses[there]
+        seen = np.ones(len(times), dtype=bool) if thing.seen is None else thing.seen
+        again = np.r_[False, seen[1:] & seen[:-1]]
+        again[1:] &= np.isclose(poses[1:], poses[:-1]).all(axis=1)
+        new = seen & ~again
+        # Before each jump, a key keeps the object at rest until then.
+        before = np.r_[new[1:] & seen[:-1], False]
+        return times[new | before], poses[new | before]
+
+    def _at_frames(
+        self, thing: Thing, values: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns times and (n, 3) values, at most one per frame of the replay."""
+        if len(thing.times) <= len(self.frames):
+            return thing.times, values
+        smooth = values.copy()
+        if values is thing.poses:
+            smooth[:, 2] = np.unwrap(values[:, 2])
+        return self.frames, RecordedPath(thing.times, smooth).poses(self.frames)
+
+    def _add(self, thing: Thing) -> None:
+        path, colour = thing.path, thing.colour
+        match thing.shape:
+            case RobotBody() as shape:
+                self._robot(thing, shape)
+            case SourceBody() as shape:
+                self._source(thing, shape)
+            case Box() | Touched() as size:
+                # The touched body covers the body itself.
+                more = 0.01 if isinstance(size, Touched) else 0.0
+                box, middle = Block(*(each + more for each in size)), 0.5 * size.height
+                self.put(f"{path}/box", box, colour, _placed(0.0, 0.0, middle))
+            case Walls() as shape:
+                self._walls(thing, shape)
+            case Cone() as shape:
+                self._cone(thing, shape)
+            case Rings() as shape:
+                self._rings(thing, shape)
+            case Trail() as shape:
+                self._trail(thing, shape)
+            case KnownFloor() as shape:
+                self._known_floor(thing, shape)
+            case Plume() as shape:
+                self._plume(thing, shape)
+            case Bar():
+                bar = Block(0.03, 0.03, 1.0)
+                self.put(f"{path}/bar", bar, colour, _placed(0.0, 0.0, 0.5))
+            case shape if type(shape) in _SINGLE:
+                single = _SINGLE[type(shape)](shape)
+                self.put(path, single, colour, alpha=thing.alpha)
+
+    def _robot(self, thing: Thing, shape: RobotBody) -> None:
+        """Adds a robot at the origin of its body frame B."""
+        path, own = thing.path, shape.parameters
+        width = _BODY_WIDTH_FRACTION * own.width_m
+        body = Block(own.length_m, width, ROBOT_HEIGHT_M - 0.04)
+        middle = 0.5 * ROBOT_HEIGHT_M + 0.02
+        self.put(f"{path}/body", body, thing.colour, _placed(0.0, 0.0, middle))
+        radius = own.wheel_radius_m
+        tyre = Cylinder(radius, _WHEEL_WIDTH_M)
+        spoke = Block(1.7 * radius, 0.25 * radius, _WHEEL_WIDTH_M + 0.004)
+        for side, angles in wheel_angles(own, thing.poses).items():
+            y = (0.5 if side == "left" else -0.5) * own.wheel_separation_m
+            # The axle of the wheel is the z axis of ``wheel``.
+            axle = _placed(0.0, y, radius, roll=-0.5 * math.pi)
+            self.meshcat.SetTransform(f"{path}/{side}", axle)
+            wheel, still = f"{path}/{side}/wheel", np.zeros(len(angles))
+            self.put(f"{wheel}/tyre", tyre, "#1F1F1F")
+            self.put(f"{wheel}/spoke", spoke, "whitesmoke")
+            poses = np.column_stack([still, still, angles])
+            self._move(Thing(wheel, Frame(), "", thing.times, poses))
+        if shape.hears:
+            self._microphones(path, own)
+        if shape.plays:
+            self._loudspeaker(path, ROBOT_HEIGHT_M)
+
+    def _microphones(self, path: str, own: RobotParameters) -> None:
+        grey, x, height = "#595961", own.control_point_m - 0.01, _MICROPHONE_HEIGHT_M
+        bar = Block(0.02, own.width_m, 0.02)
+        self.put(f"{path}/bar", bar, grey, _placed(x, 0.0, height - 0.03))
+        mast = Cylinder(0.012, height - ROBOT_HEIGHT_M)
+        middle = 0.5 * (height + ROBOT_HEIGHT_M) - 0.02
+        self.put(f"{path}/mast", mast, grey, _placed(x, 0.0, middle))
+        for number, (u, v) in enumerate(microphones_B(own), start=1):
+            ball, at = Sphere(0.028), _placed(u, v, height)
+            self.put(f"{path}/microphone_{number}", ball, "#0D0D0D", at)
+
+    def _loudspeaker(self, path: str, height: float) -> None:
+        horn, above = Cylinder(0.07, 0.06), _placed(0.0, 0.0, height + 0.03)
+        self.put(f"{path}/loudspeaker", horn, "#262626", above)
+
+    def _source(self, thing: Thing, shape: SourceBody) -> None:
+        body: Any = Cylinder(0.02, BODY_HEIGHT_M)
+        if shape.is_body:
+            body = Block(shape.length, shape.width, BODY_HEIGHT_M)
+        middle = _placed(0.0, 0.0, 0.5 * BODY_HEIGHT_M)
+        self.put(f"{thing.path}/body", body, thing.colour, middle)
+        self._loudspeaker(thing.path, BODY_HEIGHT_M)
+
+    def _walls(self, thing: Thing, shape: Walls) -> None:
+        """Adds the walls. They are low, so that they do not hide the robots."""
+        (x, y), (wide, deep, _) = shape.corner, shape.size
+        thick, height = 0.06, 0.25
+        for number, (size_x, size_y, at_x, at_y) in enumerate(
+            (
+                (wide + 2.0 * thick, thick, x + wide / 2.0, y - thick / 2.0),
+                (wide + 2.0 * thick, thick, x + wide / 2.0, y + deep + thick / 2.0),
+                (thick, deep, x - thick / 2.0, y + deep / 2.0),
+                (thick, deep, x + wide + thick / 2.0, y + deep / 2.0),
+            )
+        ):
+            wall, place = Block(size_x, size_y, height), _placed(at_x, at_y, 0.125)
+            self.put(f"{thing.path}/wall_{number}", wall, thing.colour, place)
+
+    def _cone(self, thing: Thing, shape: Cone) -> None:
+        """Adds two cones of different colors, of which one is visible at a time."""
+        x, y, axis = thing.poses[0]
+        # The axis of Meshcat's cone is z. The rotations tilt the cone forward, and then
+        # turn it to the axis of the sensor.
+        tilted = _placed(x, y, _SENSOR_HEIGHT_M, axis, pitch=0.5 * math.pi)
+        self.meshcat.SetTransform(thing.path, tilted)
+        radius = _CONE_M * math.tan(shape.half_angle)
+        cone = MeshcatCone(_CONE_M, 0.35 * radius, radius)
+        for name, alpha, seen in (
+            ("echo", 0.55, shape.echo),
+            ("empty", 0.18, ~shape.echo),
+        ):
+            path = f"{thing.path}/{name}"
+            self.put(path, cone, COLOURS[name], alpha=alpha)
+            self.switch(path, thing.times, seen)
+
+    def _rings(self, thing: Thing, shape: Rings) -> None:
+        robot = thing.parent and isinstance(thing.parent.shape, RobotBody)
+        height = ROBOT_HEIGHT_M if robot else BODY_HEIGHT_M
+        times = np.arange(0.0, self.result.simulated_s, RING_S / 2.0)
+        for number, radius in enumerate(RINGS_M):
+            path = f"{thing.path}/{number + 1}"
+            self.put(path, circle(radius, height, 0.03), thing.colour)
+            seen = [ring_at(time, shape.bursts) == number for time in times]
+            self.switch(path, times, seen)
+
+    def _trail(self, thing: Thing, shape: Trail) -> None:
+        """Adds the pieces of a trail; each appears when the body has driven along."""
+        z, width = (0.005, 0.015) if shape.line == ":" else (0.008, 0.03)
+        points = thing.poses[:, :2]
+        step = max(1, round(TRAIL_PIECE_S / self.result.scenario.tick_s))
+        for number, start in enumerate(range(0, len(points) - 1, step)):
+            piece = points[start : start + step + 1]
+            if not np.ptp(piece, axis=0).any():
+                continue
+            path = f"{thing.path}/{number}"
+            self.put(path, ribbon(piece, z, width), thing.colour)
+            drawn = thing.times[min(start + step, len(points) - 1)]
+            self.switch(path, (0.0, drawn), (False, True))
+
+    def _known_floor(self, thing: Thing, shape: KnownFloor) -> None:
+        """Adds the floor that a robot knows to be free, and dots at echo positions."""
+        known = known_space(shape.own, known_times(shape.own))
+        if known is None:
+            return
+        floor = floor_rectangle(self.result)
+        # The floors of several robots have different heights. Surfaces in one plane
+        # would flicker.
+        above = 0.0005 * [*self.result.robots].index(shape.own.name)
+        dots = 0.25 * known.cell_m * np.array([1.0, -1.0, 1.0, -1.0])
+        for name, cells, colour, height, inset in (
+            ("free", known.free, lightened(thing.colour, 0.2), 0.001, 0.0 * dots),
+            ("echoes", known.hits > 0.0, shape.echoes, 0.006, dots),
+        ):
+            layers = floor_layers(known, cells, whole=name == "free")
+            for number, layer in enumerate(layers):
+                edges = clipped(layer.rectangles + inset, floor)
+                if not len(edges):
+                    continue
+                path = f"{thing.path}/{name}_{number}"
+                self.put(path, rectangles(edges, height + above), colour)
+                states = [layer.begin <= k < layer.end for k in range(len(known.times))]
+                self.switch(path, known.times, states)
+
+    def _plume(self, thing: Thing, shape: Plume) -> None:
+        """Adds the container of the odor source, and discs for puffs of the plume.
+
+        Each disc shows the puff that is nearest to the distance of this disc from the
+        source.
+        """
+        purple, height = "#993380", 0.12
+        box, middle = Block(*CONTAINER_M, height), _placed(0.0, 0.0, 0.5 * height)
+        self.put(f"{thing.path}/container", box, purple, middle)
+        if shape.scenario.odor is None or shape.scenario.odor.kind == "steady":
+            return
+        times: list[float] = []
+        discs: list[list[tuple[float, float, float]]] = [[] for _ in range(_DISCS)]
+        x, y, _ = thing.poses[0]
+        for instant in plume_history(shape.scenario, self.result.simulated_s):
+            if round(instant.time_s / _PUFFS_S * 1000) % 1000:
+                continue
+            times.append(instant.time_s)
+            end = PUFFS_BEGIN + PUFF_SIZE * int(instant.plume[2])
+            puffs = instant.plume[PUFFS_BEGIN:end].reshape(-1, PUFF_SIZE)
+            away = np.hypot(puffs[:, 0] - x, puffs[:, 1] - y)
+            for k, disc in enumerate(discs):
+                disc.append(_nearest(puffs, away, _APART_M * (k + 0.5)))
+        for k, disc in enumerate(discs):
+            u, v, size = np.array(disc).T
+            puff = Thing(
+                f"{thing.path}/puff_{k}",
+                Disc(1.0),
+                purple,
+                np.array(times),
+                np.column_stack([u - x, v - y, np.zeros(len(u))]),
+                seen=np.isfinite(size),
+                height=0.004 + 0.0005 * k,
+                alpha=0.5 - 0.4 * k / _DISCS,
+                scale=np.column_stack([size, size, np.ones(len(size))]),
+            )
+            self.draw(puff)
+
+
+def _nearest(
+    puffs: NDArray[np.float64], away: NDArray[np.float64], distance: float
+) -> tuple[float, float, float]:
+    """Returns x, y and size of the puff nearest to a distance from the source, m.
+
+    The values are NaN if no puff is within ``_APART_M`` of the distance.
     """
-    step = max(1, round(TRAIL_PIECE_S / result.scenario.tick_s))
-    for number, start in enumerate(range(0, len(points) - 1, step)):
-        piece = points[start : start + step + 1]
-        if not np.ptp(piece, axis=0).any():
-            continue
-        name = f"{path}/{number}"
-        replay_scene.add_trail(meshcat, name, piece, colour, thin=thin)
-        drawn = result.time[min(start + step, len(points) - 1)]
-        record_switch(meshcat, name, (0.0, drawn), (False, True))
+    if len(away):
+        k = int(np.abs(away - distance).argmin())
+        if abs(away[k] - distance) < _APART_M:
+            return float(puffs[k, 0]), float(puffs[k, 1]), float(puffs[k, 4])
+    return math.nan, math.nan, math.nan
+
+
+#: Geometry of the shapes that are single objects.
+_SINGLE: dict[type, Callable[[Any], Any]] = {
+    Estimate: lambda _: Sphere(0.06),
+    Ball: lambda shape: Sphere(shape.radius),
+    Circle: lambda shape: circle(shape.radius, 0.012, 0.03),
+    Arrow: lambda _: arrow(),
+    Disc: lambda shape: Cylinder(shape.radius, 0.002),
+    Contact: lambda _: star(0.16, BODY_HEIGHT_M + 0.05, 0.035),
+    Goal: lambda _: Cylinder(0.08, 0.01),
+}

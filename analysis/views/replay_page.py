@@ -7,9 +7,11 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from analysis.reporting.render import COLOURS_CSS
+from analysis.views.framing import run_title, shown_rectangle
+from analysis.views.scene import Layer, Scene
 
 _HERE = Path(__file__).parent
 #: Call in Meshcat's page that passes a message to the viewer.
@@ -17,60 +19,35 @@ _HANDLE = "viewer.handle_command_bytearray("
 _SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
-class Layer(NamedTuple):
-    """An entry in the legend of a replay."""
-
-    label: str
-    meaning: str
-    """Short explanation; may be empty."""
-    colours: tuple[str, ...]
-    """Colors of the sample beside the label."""
-    paths: tuple[str, ...] = ()
-    """Paths of objects in the scene tree of the 3D viewer. The switch of this entry
-    hides these objects. If there are no paths, the entry has no switch."""
-
-
-class ReplayFacts(NamedTuple):
-    """Texts and data that the page shows in addition to the 3D scene."""
-
-    title: str
-    end_s: float
-    bounds_m: tuple[float, float, float, float]
-    """Part of the floor that must be in view: least x, greatest x, least y, greatest y,
-    m."""
-    layers: Sequence[Layer]
-    charts: Sequence[Mapping[str, Any]]
-    """Curves over time, from ``page_charts``."""
-    names: Sequence[tuple[str, str]]
-    """Pairs of a path in the scene tree of the 3D viewer, and the name of the object at
-    this path."""
-    robots: Sequence[tuple[str, str]]
-    """Pairs of path and name of each robot that the view can follow."""
-    warnings: Sequence[str] = ()
-    """Warnings about the scenario, which the page shows below the legend."""
-
-
-def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
+def replay_page(
+    meshcat_page: str,
+    scene: Scene,
+    layers: Sequence[Layer],
+    charts: Sequence[Mapping[str, Any]],
+) -> str:
     """Returns the page of Meshcat (Drake's 3D viewer) with added controls and charts.
 
     Args:
         meshcat_page: HTML text from ``Meshcat.StaticHtml``.
-        facts: Texts and data that the page shows in addition to the scene.
+        scene: Scene of the run.
+        layers: Entries of the legend.
+        charts: Curves over time, from ``page_charts``.
 
     Returns:
         HTML text of a page that needs no network.
     """
+    result = scene.result
     data = {
-        "end_s": facts.end_s,
-        "bounds_m": facts.bounds_m,
-        "names": facts.names,
-        "charts": facts.charts,
+        "end_s": result.simulated_s,
+        "bounds_m": shown_rectangle(result),
+        "names": [(body.path, body.name) for body in scene.bodies.values()],
+        "charts": charts,
     }
     # The replacement prevents a text of the scenario from ending the script early.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace(
         "<", "\\u003c"
     )
-    title = html.escape(facts.title)
+    title = html.escape(run_title(result))
     head = (
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<link rel="icon" href="data:,"><title>{title} - replay</title>'
@@ -84,7 +61,7 @@ def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
         f"{{ {_HANDLE}bytes); messagesLeft -= 1; }}</script>"
     )
     meshcat_page = meshcat_page.replace(_HANDLE, "handleMessage(")
-    before, scene, after = meshcat_page.partition('<div id="meshcat-pane">')
+    before, pane, after = meshcat_page.partition('<div id="meshcat-pane">')
     start, _, end = after.rpartition("</body>")
     before = before.replace("<html>", '<html lang="en">', 1)
     opening, _, rest = before.partition("<title>")
@@ -94,10 +71,10 @@ def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
             head,
             rest.partition("</title>")[2],
             f"<header><h1>{title}</h1></header>",
-            scene.replace(">", ' role="img" aria-label="The run in three dimensions">'),
+            pane.replace(">", ' role="img" aria-label="The run in three dimensions">'),
             waiting,
             start,
-            *_panels(facts),
+            *_panels(scene, layers, charts),
             f"<style>{style}</style>",
             f'<script type="application/json" id="replay-facts">{text}</script>',
             f"<script>{script}</script>",
@@ -107,22 +84,27 @@ def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
     )
 
 
-def _panels(facts: ReplayFacts) -> Iterator[str]:
+def _panels(
+    scene: Scene, layers: Sequence[Layer], charts: Sequence[Mapping[str, Any]]
+) -> Iterator[str]:
+    result, end_s = scene.result, scene.result.simulated_s
+    robots = [scene.bodies[name] for name in result.robots]
     speeds = "".join(
         f'<option value="{x:g}"{" selected" if x == 1.0 else ""}>{x:g} \u00d7</option>'
         for x in _SPEEDS
     )
     views = "".join(
-        f'<option value="{html.escape(path)}">follow {html.escape(name)}</option>'
-        for path, name in facts.robots
+        f'<option value="{html.escape(body.path)}">follow {html.escape(body.name)}'
+        "</option>"
+        for body in robots
     )
     yield (
         '<div class="clock" role="group" aria-label="Time and view">'
         '<button type="button" id="play" class="play">\u25b6 Play</button>'
         '<button type="button" id="restart">\u21e4 Start</button>'
-        f'<input type="range" id="time" min="0" max="{facts.end_s:g}" step="0.025" '
+        f'<input type="range" id="time" min="0" max="{end_s:g}" step="0.025" '
         'value="0" aria-label="Time">'
-        f'<output id="clock">0.00 / {facts.end_s:.2f} s</output>'
+        f'<output id="clock">0.00 / {end_s:.2f} s</output>'
         f'<select id="speed" aria-label="Speed">{speeds}</select>'
         '<select id="view" aria-label="View"><option value="all">whole run</option>'
         f'<option value="above">from above</option>{views}</select>'
@@ -130,10 +112,10 @@ def _panels(facts: ReplayFacts) -> Iterator[str]:
         '<button type="button" id="farther" aria-label="Farther">\u2212</button>'
         "</div>"
     )
-    plain = "".join(_entry(layer) for layer in facts.layers if not layer.paths)
-    switched = "".join(_entry(layer) for layer in facts.layers if layer.paths)
+    plain = "".join(_entry(layer) for layer in layers if not layer.switched)
+    switched = "".join(_entry(layer) for layer in layers if layer.switched)
     names = '<li><label><input type="checkbox" checked><span></span>names</label></li>'
-    lines = "".join(f"<li>{html.escape(text)}</li>" for text in facts.warnings)
+    lines = "".join(f"<li>{html.escape(str(each))}</li>" for each in result.warnings)
     warnings = f"<h2>Warnings</h2><ul>{lines}</ul>" if lines else ""
     yield (
         f'<aside aria-label="Legend"><h2>Legend</h2><ul>{plain}</ul>'
@@ -141,7 +123,7 @@ def _panels(facts: ReplayFacts) -> Iterator[str]:
     )
     chart = (
         '<div class="chart"><select aria-label="Quantity">'
-        f"{_quantities(facts)}</select>"
+        f"{_quantities(charts)}</select>"
         '<svg role="img" aria-label="The quantity over time; click to go there"></svg>'
         '<div class="readings"></div></div>'
     )
@@ -155,11 +137,21 @@ def _entry(layer: Layer) -> str:
         html.escape(layer.label),
         f"<small>{html.escape(layer.meaning)}</small>",
     )
-    if not layer.paths:
+    if not layer.switched:
         return f"<li>{swatch}{label}{small if layer.meaning else ''}</li>"
-    paths = html.escape(json.dumps(layer.paths))
+    paths = html.escape(json.dumps(_hidden(layer)))
     box = f'<input type="checkbox" checked data-paths="{paths}">'
     return f"<li><label>{box}{swatch}<span>{label}</span>{small}</label></li>"
+
+
+def _hidden(layer: Layer) -> list[str]:
+    """Returns the paths that the switch of a layer hides, with all paths below them."""
+    paths = [thing.path for thing in layer.things]
+    return [
+        path
+        for path in paths
+        if not any(path.startswith(f"{above}/") for above in paths)
+    ]
 
 
 def _whose(chart: Mapping[str, Any]) -> str:
@@ -167,15 +159,13 @@ def _whose(chart: Mapping[str, Any]) -> str:
     return f"{robot}: {title}" if robot else title
 
 
-def _quantities(facts: ReplayFacts) -> str:
+def _quantities(charts: Sequence[Mapping[str, Any]]) -> str:
     options = []
-    for robot, charts in groupby(
-        enumerate(facts.charts), lambda pair: pair[1]["robot"]
-    ):
+    for robot, own in groupby(enumerate(charts), lambda pair: pair[1]["robot"]):
         inner = "".join(
             # Each option contains the robot's name, because a closed list hides groups.
             f'<option value="{k}">{html.escape(_whose(chart))}</option>'
-            for k, chart in charts
+            for k, chart in own
         )
         label = html.escape(robot)
         options.append(

@@ -13,32 +13,14 @@ WORLD_FRAME = "world"
 
 
 def stamped(time: float, frame: str, **fields: Any) -> Message:
-    """Returns a message with a header.
-
-    Args:
-        time: Time stamp, s.
-        frame: Name of the frame in which the fields are given.
-        **fields: All other fields of the message.
-
-    Returns:
-        The message.
-    """
+    """Returns a message with a header, with the time in s and the name of its frame."""
     sec, nanosec = divmod(round(1e9 * time), 10**9)
     stamp = {"sec": sec, "nanosec": nanosec}
     return {"header": {"stamp": stamp, "frame_id": frame}, **fields}
 
 
 def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
-    """Returns a ``Vector3`` or ``Point`` message.
-
-    Args:
-        x: x component, in any unit.
-        y: y component, in the same unit.
-        z: z component, in the same unit.
-
-    Returns:
-        The message.
-    """
+    """Returns a ``Vector3`` or ``Point`` message, in any unit."""
     return {"x": x, "y": y, "z": z}
 
 
@@ -48,43 +30,20 @@ def _turn(theta: float) -> Message:
 
 
 def pose(at: Sequence[float], height_m: float = 0.0) -> Message:
-    """Returns a ``Pose`` message.
-
-    Args:
-        at: Pose (x, y, theta), m and rad.
-        height_m: Height above the floor, m.
-
-    Returns:
-        The message.
-    """
+    """Returns a ``Pose`` message of a pose (x, y, theta), m and rad."""
     x, y, theta = at
     return {"position": vector(x, y, height_m), "orientation": _turn(theta)}
 
 
 def stamped_pose(time: float, at: Sequence[float]) -> Message:
-    """Returns a ``PoseStamped`` message in the world frame W.
-
-    Args:
-        time: Time stamp, s.
-        at: Pose (x, y, theta) in W, m and rad.
-
-    Returns:
-        The message.
-    """
+    """Returns a ``PoseStamped`` message of a pose (x, y, theta) in W, m and rad."""
     return stamped(time, WORLD_FRAME, pose=pose(at))
 
 
 def transform(time: float, parent: str, child: str, at: Sequence[float]) -> Message:
     """Returns a ``TransformStamped`` message.
 
-    Args:
-        time: Time stamp, s.
-        parent: Name of the parent frame.
-        child: Name of the child frame.
-        at: Pose (x, y, theta) of the child frame in the parent frame, m and rad.
-
-    Returns:
-        The message.
+    ``at`` is the pose (x, y, theta) of the child frame in the parent frame, m and rad.
     """
     x, y, theta = at
     placed = {"translation": vector(x, y), "rotation": _turn(theta)}

@@ -18,7 +18,7 @@ from analysis.reporting.html_page import (
 )
 from analysis.reporting.render import page
 from analysis.runs.metric_table import METRICS
-from analysis.views.scene import run_title
+from analysis.views.framing import run_title
 from diagrams import RunResult
 
 #: Other files in the directory of the page, and their contents.

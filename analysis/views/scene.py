@@ -1,332 +1,548 @@
-"""Computes which objects a picture shows, and where they are at a given time."""
+"""Makes the scene of a run: everything that pictures, films and replays show.
+
+A scene is a list of things with a shape, a color, and poses over time. Each way of
+showing a run draws the shapes that it knows, and leaves out all others.
+"""
 
 from __future__ import annotations
 
 import math
-import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import cycle
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.colors import to_hex, to_rgb
 from numpy.typing import NDArray
 
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
+from analysis.runs.contact import contact_point
+from analysis.runs.known_space import has_known_space
+from analysis.views.bursts import call_time, sound_bursts
 from diagrams import RunResult, Scenario
-from diagrams.running.stop_rules import SUCCESSFUL
-from diagrams.scenario.bodies import Path, robot_rectangle
-from diagrams.scenario.participants import HasRangeSensors
-from systems.framework.input_error import InputError
-from systems.sound.parameters import SoundParameters
-from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
-from systems.world.parameters import ObstacleParameters
+from diagrams.scenario.participants import HasRangeSensors, Robot
+from systems.base.robot import RobotParameters
+from systems.world.geometry import rotate
 
-#: Intervals between times of a picture, s. A reader can count easily with these values.
-_NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
-
-#: Largest number of characters per line of a title.
-LONGEST_LINE = 80
+#: Heights of the bodies, m. The model has no heights, so these values are only for the
+#: display.
+ROBOT_HEIGHT_M, BODY_HEIGHT_M = 0.16, 0.35
 
 
-def tick_at(result: RunResult, time: float) -> int:
-    """Returns the number of the tick (control period) that is nearest to a given time.
+class Box(NamedTuple):
+    """An obstacle."""
 
-    Args:
-        result: Result of the run.
-        time: Time, s. For a time outside the run, the function returns the first or the
-            last tick.
-
-    Returns:
-        Row of the table ``trajectory``, counted from 0.
-    """
-    return int(np.argmin(np.abs(result.time - time)))
+    length: float
+    width: float
+    height: float
 
 
-def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
-    """Returns times at constant intervals, starting at 0.
+class Touched(NamedTuple):
+    """The body that a robot has touched, from the collision on."""
 
-    Args:
-        result: Result of the run.
-        most: Largest number of times; at least 2.
-
-    Returns:
-        (n,) ascending times, s.
-    """
-    end = result.simulated_s
-    period = next((p for p in _NICE_PERIODS_S if end / p < most), end / (most - 1))
-    return np.arange(0.0, end + 1e-9, period)
+    length: float
+    width: float
+    height: float
 
 
-class Look(NamedTuple):
-    """Colors and labels of one robot in pictures."""
+class RobotBody(NamedTuple):
+    """A robot with its wheels and its microphone bar."""
+
+    parameters: RobotParameters
+    hears: bool
+    """Whether the robot has microphones."""
+    plays: bool
+    """Whether the robot has a loudspeaker."""
+
+
+class SourceBody(NamedTuple):
+    """A loudspeaker, with or without a body."""
+
+    length: float
+    width: float
+    is_body: bool
+
+
+class Walls(NamedTuple):
+    """The walls of a room around a rectangle of the world frame W."""
+
+    corner: tuple[float, float]
+    size: tuple[float, float, float]
+
+
+class Cone(NamedTuple):
+    """The cone of a range sensor."""
+
+    half_angle: float
+    """Half of the opening angle, rad."""
+    reach: NDArray[np.float64]
+    """(n,) range reading at each tick, m."""
+    echo: NDArray[np.bool_]
+    """(n,) whether the sensor has an echo at each tick."""
+
+
+class Trail(NamedTuple):
+    """The past positions of a body or of a target: its poses up to now."""
+
+    line: str
+    """Style of the line in matplotlib. A dotted line is thin."""
+
+
+class Estimate(NamedTuple):
+    """The position that a robot assumes for its target."""
+
+    fresh: NDArray[np.bool_] | None = None
+    """(n,) whether the position is new at each tick. None for a target on a route."""
+
+
+class Goal(NamedTuple):
+    """The goal of a route."""
+
+
+class Contact(NamedTuple):
+    """The point at which a robot touched another body."""
+
+
+class Rings(NamedTuple):
+    """Rings around a loudspeaker while it sounds."""
+
+    bursts: list[tuple[float, float]]
+    """Start and end of each burst, s."""
+
+
+class Plume(NamedTuple):
+    """The odor source, and the plume that the wind carries away from it."""
+
+    scenario: Scenario
+
+
+class KnownFloor(NamedTuple):
+    """The floor that a robot knows to be free, and the places of its echoes."""
+
+    own: RunResult
+    echoes: str
+    """Color of the places from which echoes came."""
+    echoes_label: str
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """One object of a scene."""
+
+    path: str
+    """Unique name, as a path in the scene tree of the 3D viewer."""
+    shape: Any
+    """A shape of this module or of ``overlays``."""
+    colour: str
+    """Color in any form of matplotlib."""
+    times: NDArray[np.float64]
+    """(n,) ascending times, s."""
+    poses: NDArray[np.float64]
+    """(n, 3) poses (x, y, theta) at the times, m and rad; (1, 3) at rest. They are in
+    the frame of the parent, or in the world frame W if there is no parent."""
+    name: str = ""
+    """Name that the replay writes above the object."""
+    label: str = ""
+    """Text in the legend of a picture."""
+    seen: NDArray[np.bool_] | None = None
+    """(n,) whether the object is visible at the times. None: it always is."""
+    parent: Thing | None = None
+    """Object that carries this object."""
+    height: float = 0.0
+    """Height above the parent or the floor, m."""
+    alpha: float = 1.0
+    """Opacity, 0 to 1."""
+    scale: NDArray[np.float64] | None = None
+    """(n, 3) scale of the object along its own axes at the times."""
+    jumps: bool = False
+    """Whether the object rests between its jumps from pose to pose."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether the object moves in the frame of its parent."""
+        return bool(np.ptp(self.poses, axis=0).any())
+
+    def pose(self, tick: int) -> NDArray[np.float64]:
+        """Returns the pose (x, y, theta) in W at one of the times."""
+        own = self.poses[min(tick, len(self.poses) - 1)]
+        return own if self.parent is None else compose(self.parent.pose(tick), own)
+
+    def visible(self, tick: int) -> bool:
+        """Returns whether the object is visible at one of the times."""
+        return self.seen is None or bool(self.seen[tick])
+
+
+class Layer(NamedTuple):
+    """Things that share an entry of the legend."""
+
+    label: str
+    meaning: str
+    """Short explanation; may be empty."""
+    colours: tuple[str, ...]
+    """Colors of the sample beside the label."""
+    things: list[Thing]
+    switched: bool = True
+    """Whether a reader can hide the things of this layer in a replay."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All things of a run, with the layers of their legend."""
 
     result: RunResult
-    """Result of the run, for this robot."""
-    colour: str
-    """Color of the robot's path and body."""
-    estimates: str
-    """Color of the source positions that the robot estimates."""
-    path_label: str = "path of the control point P"
-    body_label: str = "robot with its microphones"
-    """Label of the body. It is empty if the color of the path identifies the body."""
-    estimates_label: str = "estimates of the source; faint ones are early"
-    seen: str = COLOURS["seen"]
-    """Color of the floor that the robot knows to be free. Pictures lighten this
-    color."""
-    echoes: str = COLOURS["echoes"]
-    """Color of the positions from which echoes came."""
-    seen_label: str = "seen as free at the end"
-    echoes_label: str = "places that echoes came from"
+    bodies: dict[str, Thing]
+    """Robots, sources and obstacles, by name."""
+    layers: list[Layer]
+
+    @cached_property
+    def things(self) -> list[Thing]:
+        """The things of all layers."""
+        return [thing for layer in self.layers for thing in layer.things]
 
 
-def looks(result: RunResult) -> list[Look]:
-    """Returns the look of each robot; each of several robots has its own colors."""
-    if not result.several:
-        look = Look(result, COLOURS["robot"], COLOURS["estimate"])
-        deaf = result.scenario.only.has_goal
-        return [look._replace(body_label="robot") if deaf else look]
-    colours = cycle(ROBOT_COLOURS)
-    return [
-        Look(
-            own,
-            colour,
-            colour,
-            f"{name}, path of P"
-            if own.scenario.only.kind == "router"
-            else f"path of P of {name}",
-            "" if own.scenario.only.has_goal else f"{name} with its microphones",
-            f"estimates of {name}; faint ones are early",
-            colour,
-            colour,
-            f"seen as free by {name} at the end",
-            f"places that echoes to {name} came from",
-        )
-        for (name, own), colour in zip(result.several.items(), colours, strict=False)
-    ]
-
-
-def lightened(colour: str, part: float) -> str:
-    """Mixes a color with white.
+def make_scene(result: RunResult) -> Scene:
+    """Makes the scene of a run.
 
     Args:
-        colour: Color in any format of matplotlib.
-        part: Fraction of the color in the mixture, 0 to 1.
+        result: Result of the run, for one robot or several robots.
 
     Returns:
-        Lighter color, as a hexadecimal string.
+        Scene with poses at the ticks (control periods) of the run.
     """
-    red, green, blue = (1.0 - part * (1.0 - level) for level in to_rgb(colour))
-    return to_hex((red, green, blue))
-
-
-def run_title(result: RunResult) -> str:
-    """Returns the name, the law and the ending of a run on one line."""
-    told = result.several and result.cause not in SUCCESSFUL
-    who = f"{result.name} " if told else ""
     scenario = result.full_scenario
-    return f"{scenario.name}, law {scenario.law_names}: {who}{result.ending}"
-
-
-def picture_title(result: RunResult) -> str:
-    """Returns the title of a picture: ``run_title``, the fault and the duration."""
-    fault = f" ({result.collision.fault}'s fault)" if result.collision else ""
-    title = f"{run_title(result)}{fault} after {result.simulated_s:.1f} s"
-    return textwrap.fill(title, LONGEST_LINE)
-
-
-def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
-    """Returns all bursts of a sound that begin before a given time.
-
-    Args:
-        sound: Parameters of the sound, which contain the schedule of the bursts.
-        end: Time, s. A burst that lasts longer ends at this time.
-
-    Returns:
-        Start and end of each burst, s.
-    """
-    starts = np.arange(sound.start_s, end, sound.period_s)
-    return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
-
-
-def call_time(result: RunResult) -> float | None:
-    """Returns the time at which the sink first received a call.
-
-    The sink is the computer of the operator. After a robot has found the odor source,
-    it calls the other robots. The function uses the radio frame with which a robot
-    reports this find to the sink.
-
-    Args:
-        result: Result of a run, for one robot or all robots.
-
-    Returns:
-        Time, s. The value is None if the sink received no such frame.
-    """
-    times = [
-        float(result.time[np.argmax(values > 0.5)])
-        for name, values in result.world.items()
-        if name.endswith(".result") and (values > 0.5).any()
+    robots = {name: own.poses("WB") for name, own in result.robots.items()}
+    found = scene_bodies(scenario, result.time, robots)
+    layers = [
+        *_robots(result, found),
+        *_sources(result, found),
+        *_obstacles(scenario, found),
+        *_collisions(result, found),
+        *_cones(result, found),
+        *_estimates(result, found),
+        *_known_floor(result, found),
+        *_trails(result, found),
+        *_walls(scenario),
+        *_odor(scenario),
     ]
-    return min(times, default=None)
+    return Scene(result, found, layers)
 
 
-def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
-    """Returns the bursts of the source that the robot hears.
-
-    If the robot listens to another robot that calls, the bursts begin after the call.
-
-    Args:
-        result: Result of a run, for one robot.
-
-    Returns:
-        Start and end of each burst, s. The list is empty if the robot drives to a goal.
-    """
-    if result.scenario.only.has_goal:
-        return []
-    sound, whole = result.scenario.source.sound, result.full_scenario
-    caller = whole.robots.get(whole.target(result.name))
-    if caller is not None and caller.searches == "odor":
-        since = call_time(result)
-        if since is None:
-            return []
-        sound = sound.model_copy(update={"start_s": since + sound.start_s})
-    return sound_bursts(sound, result.simulated_s)
-
-
-def logged_sensors(result: RunResult) -> range:
-    """Returns the numbers of the range sensors with readings in the log of a run.
+def scene_bodies(
+    scenario: Scenario,
+    times: NDArray[np.float64],
+    robots: Mapping[str, NDArray[np.float64]],
+) -> dict[str, Thing]:
+    """Makes the bodies of a scene.
 
     Args:
-        result: Result of a run, for one robot.
+        scenario: Scenario with all robots.
+        times: (n,) ascending times, s.
+        robots: (n, 3) pose of each robot in W at the times, m and rad, by its name.
 
     Returns:
-        Numbers of the sensors, from 0. The range is empty if the log has no readings.
+        Robots, sources and obstacles, by name.
     """
+    found = {}
+    several, tints = len(robots) > 1, _robot_colours(scenario)
+    for name, poses in robots.items():
+        robot = scenario.robots[name]
+        path = f"robots/{name}" if several else "robot"
+        plays = robot.loudspeaker is not None
+        shape = RobotBody(robot.robot, not robot.has_goal, plays)
+        label = f"{name if several else 'robot'} with its microphones"
+        if robot.has_goal:
+            label = "" if several else "robot"
+        found[name] = Thing(path, shape, tints[name], times, poses, name, label)
+    followed = {scenario.target(name) for name in scenario.robots}
+    for name, source in scenario.sources.items():
+        path = f"sources/{name}" if len(scenario.sources) > 1 else "source"
+        colour = COLOURS["source" if name in followed else "interferer"]
+        body = SourceBody(source.length_m, source.width_m, source.body)
+        poses = source.path().poses(times)
+        label = _source_label(scenario, name, followed)
+        found[name] = Thing(path, body, colour, times, poses, name, label)
+    for each in scenario.obstacles:
+        poses = each.path().poses(times if each.path().moves else times[:1])
+        label = "moving obstacle" if each.path().moves else "obstacle at rest"
+        box, path = Box(*each.size_m, BODY_HEIGHT_M), f"obstacles/{each.name}"
+        colour = COLOURS["obstacle"]
+        found[each.name] = Thing(path, box, colour, times, poses, each.name, label)
+    return found
+
+
+def _source_label(scenario: Scenario, name: str, followed: set[str]) -> str:
+    if name not in followed:
+        return f"{name} (not followed)"
+    return name if len(scenario.sources) > 1 else "the source"
+
+
+def _robot_colours(scenario: Scenario) -> dict[str, str]:
+    """Returns the color of each robot; each of several robots has its own color."""
+    if len(scenario.robots) == 1:
+        return dict.fromkeys(scenario.robots, COLOURS["robot"])
+    return dict(zip(scenario.robots, cycle(ROBOT_COLOURS), strict=False))
+
+
+def _estimate_colours(scenario: Scenario) -> dict[str, str]:
+    """Returns the color of the position that each robot assumes for its target."""
+    if len(scenario.robots) == 1:
+        return dict.fromkeys(scenario.robots, COLOURS["estimate"])
+    return _robot_colours(scenario)
+
+
+def _robots(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
+    sounds = result.full_scenario.sounds()
+    for name, own in result.robots.items():
+        body, law = bodies[name], own.scenario.only.law
+        things = [body]
+        if name in sounds:
+            sound = sounds[name]
+            if own.scenario.only.searches == "odor":  # sounds when it calls the others
+                call = call_time(own)
+                start = own.simulated_s if call is None else call + sound.start_s
+                sound = sound.model_copy(update={"start_s": start})
+            things.append(_rings(body, sound_bursts(sound, result.simulated_s)))
+        yield Layer(name, f"law {law}", (body.colour,), things, switched=False)
+
+
+def _rings(body: Thing, bursts: list[tuple[float, float]]) -> Thing:
+    path, at_rest = f"{body.path}/rings", np.zeros((1, 3))
+    rings = Rings(bursts)
+    return Thing(path, rings, body.colour, body.times, at_rest, parent=body)
+
+
+def _sources(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
+    scenario = result.full_scenario
+    for name, source in scenario.sources.items():
+        body, meaning = bodies[name], "what is followed"
+        if body.colour == COLOURS["interferer"]:
+            meaning = "emits sound, and the robot does not follow it"
+        rings = _rings(body, sound_bursts(source.sound, result.simulated_s))
+        yield Layer(name, meaning, (body.colour,), [body, rings], switched=False)
+
+
+def _obstacles(scenario: Scenario, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
+    things = [bodies[each.name] for each in scenario.obstacles]
+    if things:
+        yield Layer("obstacles", "", (COLOURS["obstacle"],), things, switched=False)
+
+
+def _collisions(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
+    things, colour = [], COLOURS["hit"]
+    for name, own in result.robots.items():
+        if own.collision is None:
+            continue
+        hit, robot = own.collision, bodies[name]
+        after = own.time >= hit.time - 1e-9
+        after[-1] = True
+        x, y, theta, length, width = own.surroundings.bodies[hit.object].rectangle(
+            hit.time
+        )
+        carrier, place = bodies.get(hit.object), np.zeros((1, 3))
+        if carrier is None:
+            place = np.array([[x, y, theta]])
+        things.append(
+            Thing(
+                f"{carrier.path if carrier else 'collision/' + robot.path}/hit",
+                Touched(length, width, BODY_HEIGHT_M),
+                colour,
+                own.time,
+                place,
+                label=f"{hit.object}, which was touched",
+                seen=after,
+                parent=carrier,
+            )
+        )
+        things.append(
+            Thing(
+                f"collision/{robot.path}",
+                Contact(),
+                "#000000",
+                own.time,
+                np.array([[*contact_point(own), 0.0]]),
+                label="where they touched",
+                seen=after,
+            )
+        )
+    if things:
+        yield Layer("what was hit", "from then on", (colour,), things, switched=False)
+
+
+def _cones(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
+    things = [
+        Thing(
+            f"{bodies[name].path}/cone_{sensor + 1}",
+            Cone(
+                float(own.scenario.sensing.ultrasonic.half_angles[sensor]),
+                own.columns[f"range_{sensor + 1}"],
+                own.columns[f"echo_{sensor + 1}"] > 0.5,
+            ),
+            COLOURS["echo"],
+            own.time,
+            sensor_pose(own.scenario.only, sensor)[None],
+            parent=bodies[name],
+        )
+        for name, own in result.robots.items()
+        for sensor in _logged_sensors(own)
+    ]
+    colours, meaning = (COLOURS["echo"], COLOURS["empty"]), "with or without an echo"
+    if things:
+        yield Layer("cones", f"ultrasonic; {meaning}", colours, things)
+
+
+def _logged_sensors(result: RunResult) -> range:
+    """Returns the numbers, from 0, of the range sensors with readings in the log."""
     robot = result.scenario.only
     if isinstance(robot, HasRangeSensors) and "range_1" in result.columns:
         return range(robot.ultrasonic.count)
     return range(0)
 
 
-def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
-    """Returns the pose of an ultrasonic sensor in the robot frame B.
+def sensor_pose(robot: Robot, sensor: int) -> NDArray[np.float64]:
+    """Returns the pose of a range sensor in the robot frame B.
 
     Args:
-        scenario: Scenario with the positions and the axes of the sensors.
+        robot: Robot with range sensors.
         sensor: Number of the sensor, from 0.
 
     Returns:
-        x, y, theta of the sensor frame U in B, m and rad.
+        (3,) x, y, theta of the sensor frame U in B, m and rad.
     """
-    own = scenario.sensing.ultrasonic.sensors[sensor]
+    assert isinstance(robot, HasRangeSensors)
+    own = robot.ultrasonic.sensors[sensor]
     x, y = own.position_m
-    ahead = scenario.only.robot.control_point_m
-    return ahead + x, y, math.radians(own.axis_deg)
+    ahead = robot.robot.control_point_m
+    return np.array([ahead + x, y, math.radians(own.axis_deg)])
 
 
 def compose(
-    pose_WB: NDArray[np.float64], pose_BU: tuple[float, float, float]
-) -> tuple[float, float, float]:
-    """Converts a pose in the robot frame B to a pose in the world frame W.
+    pose_WB: NDArray[np.float64], pose_BU: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Converts a pose (x, y, theta) in the frame B to the world frame W, m and rad.
 
-    Args:
-        pose_WB: (3,) pose (x, y, theta) of B in W, m and rad.
-        pose_BU: Pose (x, y, theta) in B, m and rad.
-
-    Returns:
-        x, y, theta of the pose in W, m and rad. The angle is not wrapped.
+    The angle of the result is not wrapped.
     """
     dx, dy = rotate(pose_WB[2], pose_BU[0], pose_BU[1])
-    return pose_WB[0] + dx, pose_WB[1] + dy, pose_WB[2] + pose_BU[2]
+    return np.array([pose_WB[0] + dx, pose_WB[1] + dy, pose_WB[2] + pose_BU[2]])
 
 
-def moving_and_static(
-    scenario: Scenario,
-) -> tuple[list[ObstacleParameters], list[ObstacleParameters]]:
-    """Returns two lists: the obstacles that ever move, and the obstacles at rest."""
-    moving = [o for o in scenario.obstacles if o.path().moves]
-    return moving, [o for o in scenario.obstacles if not o.path().moves]
+def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
+    scenario, things = result.full_scenario, []
+    colours = _estimate_colours(scenario)
+    routes = any(robot.kind == "router" for robot in scenario.robots.values())
+    for name, own in result.robots.items():
+        robot, columns = own.scenario.only, own.columns
+        path = bodies[name].path.replace("robot", "estimate", 1)
+        if robot.kind == "router":
+            places, seen, shape, label = own.vector("target"), None, Estimate(), ""
+        elif "p_WS_estimated_x" in columns and robot.searches is None:
+            valid = columns["target_valid"] > 0.5
+            # The target uses an estimate from the next tick on.
+            heard = columns.get("detected", np.zeros_like(valid))[:-1] > 0.5
+            shape = Estimate(np.r_[False, heard & valid[1:]])
+            places, seen = own.vector("p_WS_estimated"), valid
+            whose = name if result.several else "the source"
+            label = f"estimates of {whose}; faint ones are early"
+        else:
+            continue
+        poses = np.column_stack([*places, np.zeros(len(own.time))])
+        colour, jumps = colours[name], seen is not None
+        ball = Thing(path, shape, colour, own.time, poses, "", label, seen)
+        height = BODY_HEIGHT_M + (0.07 if jumps else -0.05)
+        things.append(replace(ball, height=height, jumps=jumps))
+        if robot.kind == "router":
+            things.append(_goal(own, bodies[name], several=bool(result.several)))
+    label, meaning = "estimates", "where the robot assumes the source"
+    if routes:
+        label, meaning = "targets", "the target on the route"
+    if things:
+        yield Layer(label, meaning, tuple(colours.values()), things)
 
 
-def followed_sources(scenario: Scenario) -> set[str]:
-    """Returns the names of the sources that a robot follows."""
-    return {scenario.target(name) for name in scenario.robots}.intersection(
-        scenario.sources
-    )
+def _goal(own: RunResult, body: Thing, *, several: bool) -> Thing:
+    path, label = f"goals/{body.path}", "goals" if several else "goal"
+    place = np.array([[*own.scenario.router.route.goal_m, 0.0]])
+    goal = Thing(path, Goal(), body.colour, own.time, place, "", label)
+    return replace(goal, height=0.006, alpha=0.6)
 
 
-def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
-    """Returns a rectangle that contains all bodies during the whole run.
-
-    The rectangle includes the walls of the room, if there is a room. It ignores
-    estimated positions, because a large error would enlarge the picture too much.
-
-    Args:
-        result: Result of the run.
-        margin: Space around the centers of the bodies, m.
-
-    Returns:
-        Least x, greatest x, least y, greatest y in the world frame W, m.
-    """
-    scenario, times = result.full_scenario, picture_times(result, most=60)
-    centres = [
-        own.poses(body)[:, :2]
-        for own in result.robots.values()
-        for body in ("WB", "WS")
-    ]
-    paths: list[Path] = [each.path() for each in scenario.sources.values()]
-    paths += [obstacle.path() for obstacle in scenario.obstacles]
-    centres += [path.poses(times)[:, :2] for path in paths]
-    points = np.concatenate(centres)
-    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    if scenario.room is not None:
-        corner, wall = scenario.room.corner, 0.2
-        low = np.minimum(low, corner - wall)
-        high = np.maximum(high, corner + scenario.room.size_m[:2] + wall)
-    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+def _known_floor(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
+    things = []
+    for name, own in result.robots.items():
+        if not has_known_space(own):
+            continue
+        seen, echoes, colour = "", "", bodies[name].colour
+        if result.several:
+            seen, echoes = f" by {name}", f" to {name}"
+        shape = KnownFloor(
+            own,
+            colour if result.several else COLOURS["echoes"],
+            f"places that echoes{echoes} came from",
+        )
+        colour = colour if result.several else COLOURS["seen"]
+        label, path = f"seen as free{seen} at the end", f"known/{bodies[name].path}"
+        at_rest = np.zeros((1, 3))
+        things.append(Thing(path, shape, colour, own.time, at_rest, label=label))
+    colours = tuple(lightened(thing.colour, 0.35) for thing in things)
+    if things:
+        yield Layer("known floor", "seen as free; dots: echoes", colours, things)
 
 
-def contact_point(result: RunResult) -> NDArray[np.float64]:
-    """Returns the point at which the robot touched the other body.
+def _trails(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
+    scenario, things = result.full_scenario, []
+    several = bool(result.several)
+    for name, own in result.robots.items():
+        body, label = bodies[name], "path of the control point P"
+        if several:
+            routed = own.scenario.only.kind == "router"
+            label = f"{name}, path of P" if routed else f"path of P of {name}"
+        places = own.vector("p_WP")
+        things.append(_trail(f"trail/{body.path}", places, body, "-", label))
+        if own.scenario.only.kind != "router":
+            continue
+        tinted = replace(body, colour=_estimate_colours(scenario)[name])
+        label = "paths of the targets" if several else "path of the target"
+        path, places = f"trail/target/{body.path}", own.vector("target")
+        things.append(_trail(path, places, tinted, ":", label))
+    for name in scenario.sources:
+        body = bodies[name]
+        if body.moves:
+            path, label = f"trail/{body.path}", f"path of {body.label}"
+            things.append(_trail(path, body.poses[:, :2].T, body, "--", label))
+    colours = tuple(_robot_colours(scenario).values())
+    yield Layer("trails", "past positions", colours, things)
 
-    Args:
-        result: Result of a run that ended in a collision.
 
-    Returns:
-        (2,) position in the world frame W, m.
-
-    Raises:
-        InputError: The run had no collision.
-    """
-    result = result.robots[result.name]
-    hit, scenario = result.collision, result.scenario
-    if hit is None:
-        raise InputError("contact_point", f"the run ended by {result.cause!r}")
-    body = result.surroundings.bodies[hit.object].rectangle(hit.time)
-    pose = result.poses("WB")[tick_at(result, hit.time)]
-    footprint = robot_rectangle(pose, scenario.only.robot)
-    return touching_point(footprint, body)
+def _trail(
+    path: str, places: NDArray[np.float64], body: Thing, line: str, label: str
+) -> Thing:
+    poses = np.column_stack([*places, np.zeros(len(body.times))])
+    return Thing(path, Trail(line), body.colour, body.times, poses, label=label)
 
 
-def touching_point(
-    a: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Returns the point at which two rectangles touch.
+def _walls(scenario: Scenario) -> Iterator[Layer]:
+    room, colour = scenario.room, COLOURS["wall"]
+    if room is not None:
+        x, y = map(float, room.corner)
+        at_rest = np.zeros((1, 3))
+        shape = Walls((x, y), room.size_m)
+        label, start = "walls of the room", np.zeros(1)
+        wall = Thing("room", shape, colour, start, at_rest, label=label)
+        yield Layer("walls", "of the room", (colour,), [wall])
 
-    The point is the mean of all corners of either rectangle that lie inside the other
-    rectangle. If there is no such corner, the point is the mean of the corners that are
-    nearest to the other rectangle.
 
-    Args:
-        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
-        b: (5,) second rectangle in the same frame, m and rad.
+def _odor(scenario: Scenario) -> Iterator[Layer]:
+    odor, colour = scenario.odor, COLOURS["odor"]
+    if odor is not None:
+        place, start = np.array([[*odor.position_m, 0.0]]), np.zeros(1)
+        shape, label = Plume(scenario), "source of odour"
+        plume = Thing("odor", shape, colour, start, place, label=label)
+        yield Layer("odour", "the plume", (colour,), [plume])
 
-    Returns:
-        (2,) position in the same frame, m.
-    """
-    corners = np.concatenate([rectangle_corners(a), rectangle_corners(b)])
-    others = [b] * 4 + [a] * 4
-    away = [
-        math.hypot(*nearest_point_on_rectangle(corner, other))
-        for corner, other in zip(corners, others, strict=True)
-    ]
-    return np.mean(corners[np.array(away) <= min(away) + 1e-9], axis=0)
+
+def lightened(colour: str, part: float) -> str:
+    """Mixes a color with white; ``part`` is the share of the color, 0 to 1."""
+    red, green, blue = (1.0 - part * (1.0 - level) for level in to_rgb(colour))
+    return to_hex((red, green, blue))

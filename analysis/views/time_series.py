@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from analysis.reporting.notebook_figure import NotebookFigure
 from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.views.bursts import heard_bursts
 from analysis.views.curves import Curve, Panel, panels
-from analysis.views.scene import heard_bursts, picture_title
+from analysis.views.framing import picture_title
 from diagrams import RunResult
 
 #: Width of the picture, and height of a panel, inch.

@@ -100,10 +100,10 @@ def _drivers(names: str | None) -> Sequence[str]:
 
 def _falsify(options: Namespace, drivers: Sequence[str]) -> Prepared[Printed]:
     from analysis.run_error import RunError
-    from analysis.safety.falsification import falsify
-    from analysis.safety.falsification_text import (
+    from analysis.safety.falsification import (
         falsification_summary,
         falsification_text,
+        falsify,
     )
 
     def run(progress: Callable[[float], None]) -> Printed:
@@ -126,7 +126,7 @@ def _falsify(options: Namespace, drivers: Sequence[str]) -> Prepared[Printed]:
 
 def _only(options: Namespace, drivers: Sequence[str]) -> Prepared[Printed]:
     from analysis.safety.driver_trials import draw_trial, run_trial
-    from analysis.safety.falsification_text import trial_summary, trial_text
+    from analysis.safety.falsification import trial_summary, trial_text
 
     trial = draw_trial(options.seed, options.only, drivers)
 
@@ -139,9 +139,14 @@ def _only(options: Namespace, drivers: Sequence[str]) -> Prepared[Printed]:
 
 def _long(options: Namespace) -> Prepared[Printed]:
     from analysis.run_error import RunError
-    from analysis.safety.falsification_text import long_summary, long_text
     from analysis.safety.job_pool import run_jobs
-    from analysis.safety.long_runs import JOBS_A_WORKER, Journal, jobs
+    from analysis.safety.long_runs import (
+        JOBS_A_WORKER,
+        Journal,
+        jobs,
+        long_summary,
+        long_text,
+    )
     from systems.framework.input_error import InputError
 
     todo = dict(enumerate(jobs(options.seed)))
@@ -179,8 +184,7 @@ def _long(options: Namespace) -> Prepared[Printed]:
 
 
 def _cost() -> Prepared[Printed]:
-    from analysis.safety.falsification_text import cost_summary, cost_text
-    from analysis.safety.guard_cost import tick_costs
+    from analysis.safety.guard_cost import cost_summary, cost_text, tick_costs
 
     def run(_: object) -> Printed:
         costs = tick_costs()

@@ -11,7 +11,7 @@ from phonotaxis.commands.command import Command, Take
 from phonotaxis.result import Prepared
 
 if TYPE_CHECKING:
-    from analysis.listening.step_views import Teller
+    from analysis.listening.step_views import TextLines
     from phonotaxis.listening import ListenResult
 
 
@@ -81,7 +81,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[ListenResult]:
     return Prepared(run=run)
 
 
-def _teller(*, as_json: bool) -> Teller:
+def _teller(*, as_json: bool) -> TextLines:
     from analysis.listening.step_views import JsonLines, Screen, TextLines
 
     if as_json:

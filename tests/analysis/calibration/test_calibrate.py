@@ -11,13 +11,17 @@ import pytest
 import soundfile
 
 import phonotaxis
-from analysis.calibration.calibrate import calibrate, calibration_run
-from analysis.calibration.calibrated_geometry import (
+from analysis.calibration.calibrate import (
+    calibrate,
     calibrated_fields,
-    write_calibration,
+    calibration_run,
 )
 from analysis.calibration.calibration_sounds import load_calibration_sounds
-from analysis.calibration.calibration_text import calibration_document, calibration_text
+from analysis.calibration.calibration_text import (
+    calibration_document,
+    calibration_text,
+    write_calibration,
+)
 from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
 from analysis.recordings.heard_sounds import heard_sound, sightings_of
 from analysis.recordings.recording_search import Sighting

@@ -7,7 +7,6 @@ import math
 import control
 import numpy as np
 import pytest
-from analysis.stability.verdict_readings import CRITERIA
 
 from analysis.design.attraction_search import (
     attraction_loop,
@@ -118,19 +117,6 @@ def test_least_damping_meets_everything_and_less_does_not():
             or below.sensitivity_peak > limits.sensitivity_peak
             or below.disk_margin < limits.disk_margin
         )
-
-
-def test_requirements_are_the_thresholds_of_the_report():
-    """Of the verdicts on phase, gain, M_s, disk, delay, damping, and offset."""
-    limits = {each.name: each.limit for each in CRITERIA}
-    asked = Requirements()
-    assert asked.damping_ratio == limits["damping ratio at rest"]
-    assert asked.phase_margin_deg == limits["least phase margin"]
-    assert asked.gain_margin_db == limits["least gain margin"]
-    assert asked.sensitivity_peak == limits["largest sensitivity peak"]
-    assert asked.disk_margin == limits["least disk margin"]
-    assert asked.delay_margin_s == limits["least delay margin"]
-    assert asked.rest_offset_m == limits["offset from the follow point at rest"]
 
 
 def test_conventional_law_needs_more_damping_and_nothing_else():

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.patches import Ellipse
 
 from analysis.hearing.cramer_rao import LocalizationBound
-from analysis.hearing.listening import Heard, Listener
+from analysis.hearing.listener import Heard, Listener
 from analysis.hearing.localization import (
     LocalizationCell,
     LocalizationExperiment,

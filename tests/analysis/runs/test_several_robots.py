@@ -12,9 +12,9 @@ import pytest
 from analysis.runs.metric_table import run_metrics
 from analysis.runs.run_report import run_document, run_text
 from analysis.views.picture import plot_trajectory
-from analysis.views.replay import record_run, write_replay
+from analysis.views.replay import record, write_replay
 from analysis.views.run_directory import write_run
-from analysis.views.scene import looks
+from analysis.views.scene import make_scene
 from diagrams import RunResult, load_scenario, simulate
 
 
@@ -62,7 +62,8 @@ def test_a_directory_holds_files_of_each_robot(convoy, tmp_path):
 
 
 def test_each_robot_has_its_own_colour_and_label(convoy):
-    colours = [look.colour for look in looks(convoy)]
+    bodies = make_scene(convoy).bodies
+    colours = [bodies[name].colour for name in convoy.robots]
     assert len(set(colours)) == len(colours) == 2
     (axes,) = plot_trajectory(convoy).axes
     _, labels = axes.get_legend_handles_labels()
@@ -85,8 +86,19 @@ def test_each_robot_moves_in_the_replay(convoy):
         def __getattr__(self, name: str):
             return lambda path, *rest, **_: paths.add(path)
 
-    record_run(cast("Any", Recorder()), convoy)
+    scene = make_scene(convoy)
+    record(cast("Any", Recorder()), scene, scene.things)
     expected = {"robots/leader", "robots/second", "source", "estimates/second"}
     assert expected <= paths
-    assert "robots/leader/ring_1" in paths, "its loudspeaker"
-    assert "robots/second/ring_1" not in paths
+    assert "robots/leader/rings/1" in paths, "its loudspeaker"
+    assert "robots/second/rings/1" not in paths
+
+
+def test_a_robot_of_several_can_be_drawn_alone(convoy):
+    for name, own in convoy.robots.items():
+        (axes,) = plot_trajectory(own).axes
+        (path,) = (
+            k for k in axes.lines if k.get_label() == "path of the control point P"
+        )
+        np.testing.assert_array_equal(path.get_xdata(), own.columns["p_WP_x"])
+        assert make_scene(own).bodies[name].path == "robot"

@@ -7,12 +7,14 @@ differ, in size and in sign.
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace as Made
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from analysis.certificates.energy_certificate import certify_energy
+from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.linear_parts import (
     LINEAR_MODELS,
     OPERATING_POINTS,
@@ -20,7 +22,6 @@ from analysis.stability.linear_parts import (
     count_jams,
 )
 from analysis.stability.margin_parts import MARGINS
-from analysis.stability.nonlinear_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.report_parts import ROUTE_PARTS, SEARCH_PARTS, SOUND_PARTS
 from analysis.stability.robustness_parts import (
     CONTACT_ROBUSTNESS,
@@ -38,6 +39,8 @@ from analysis.stability.sampling_parts import (
 from diagrams.scenario.scenario import Scenario
 
 T = 0.025
+#: Stands in for any class.
+Made: Any = SimpleNamespace
 #: (phase deg, gain dB, M_s, alpha) of three cuts: no extreme is first or last.
 CUTS = ((50.0, 9.0, 1.5, 0.9), (20.0, 30.0, 4.0, 0.3), (80.0, 2.0, 1.1, 1.4),
         (60.0, 12.0, 2.5, 0.7))  # fmt: skip
@@ -101,7 +104,7 @@ CYCLES = Made(
 )  # fmt: skip
 
 #: Part, made-up data; and by the criterion's name: value, and whether it passes.
-EXPECTED = [
+EXPECTED: list[tuple[Any, Any, dict[str, tuple[float, str]]]] = [
     (OPERATING_POINTS, points(), {
         "growth at rest": (-0.2, "pass"),
         "damping ratio at rest": (0.28, "fail"),

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 
 from analysis.reporting.criterion import Criterion
 from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import Part, analyse_law
+from analysis.stability.linear_parts import OPERATING_POINTS
+from analysis.stability.margin_parts import MARGINS
 from analysis.stability.report_files import stability_document, stability_text
 from analysis.stability.report_page import stability_page
 from diagrams import load_scenario
+from docs.building.page_code import page_file
 from systems.framework.input_error import InputError
 
 LIGHT = Criterion[float](
@@ -112,3 +116,22 @@ def test_page_of_several_laws():
     assert "All: light." not in page
     assert "conventional and active: light." in page
     assert not re.findall(r'(?:src|href)="(?!#|data:)', page)
+
+
+def test_a_section_is_added_as_docs_extending_says():
+    """Its numbers are those of the section "Margins"."""
+    names: dict[str, Any] = {}
+    exec(compile(page_file("extending.md", "nichols.py"), "nichols.py", "exec"), names)
+    parts = [OPERATING_POINTS, MARGINS, names["NICHOLS"]]
+    analysis = analyse_law(load_scenario("obstacle_free", ["law=none"]), parts)
+    document = stability_document([analysis], None)
+    loops = document["margins"]["implemented_loop"]["margins"]
+    assert document["nichols"]["L at the sensor, along"] == pytest.approx(
+        loops["sensor_along"]["crossover_rad_s"]
+    )
+    assert len(document["nichols"]) == len(loops)
+    page = stability_page([analysis])
+    shown = page[page.index('<h3 id="law0-nichols">') :]
+    shown = shown[: shown.index("</section>")]
+    assert shown.count("<figure>") == shown.count("<table>") == 1
+    assert "crossover (rad/s)" in shown

@@ -19,7 +19,7 @@ def analyses():
     scenario = load_scenario("unknown_block")
     laws = ["trajectory_adaptive", "trajectory_filtered"]
     scenarios = chosen_laws(scenario, laws)
-    work = parts_for(scenarios, full=False)
+    work = parts_for(scenarios)
     return [analyse_law(each, work) for each in scenarios]
 
 

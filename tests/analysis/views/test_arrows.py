@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from analysis.views.arrows import arrows, record_arrows, scale_m_n
+from analysis.views.overlays import commanded_velocity, overlays, scale_m_n
+from analysis.views.scene import make_scene
 
 
-@dataclass
-class Recorder:
-    """Takes down what Meshcat is told."""
-
-    transforms: dict[Any, Any] = field(default_factory=dict)
-    scales: dict[Any, Any] = field(default_factory=dict)
-
-    def SetTransform(self, path, X_ParentPath, time_in_recording=None):
-        self.transforms.setdefault(path, []).append((time_in_recording, X_ParentPath))
-
-    def SetProperty(self, path, property, value, time_in_recording=None):  # noqa: A002
-        self.scales.setdefault(path, []).append((time_in_recording, value))
-
-    def SetTriangleMesh(self, path, vertices, faces, rgba):
-        pass
+def _arrows(run):
+    layers = overlays(make_scene(run), np.zeros(1))
+    return {thing.path: thing for layer in layers for thing in layer.things}
 
 
 def _told(run, **columns):
@@ -54,7 +42,7 @@ def test_a_law_that_tells_no_forces_has_its_command_alone(ideal_run):
     columns = {k: v for k, v in ideal_run.columns.items() if "attraction" not in k}
     run = replace(ideal_run, columns=columns)
     assert scale_m_n(run) is None
-    assert [arrow.name for arrow in arrows(run, None)] == ["law"]
+    assert {"law/robot", "follow/robot"} == _arrows(run).keys()
 
 
 def test_the_command_is_the_velocity_of_p_that_equal_wheels_give(ideal_run):
@@ -67,7 +55,7 @@ def test_the_command_is_the_velocity_of_p_that_equal_wheels_give(ideal_run):
         wheel_speed_right=5.0 * ones,
     )
     wanted = 0.3 * np.array([math.cos(0.5), math.sin(0.5)])
-    vectors = arrows(run, None)[-1].vectors
+    vectors = commanded_velocity(run)
     np.testing.assert_allclose(vectors, np.broadcast_to(wanted, vectors.shape))
 
 
@@ -81,24 +69,21 @@ def test_wheels_against_each_other_move_p_aside(ideal_run):
         wheel_speed_right=ones,
     )
     rate = 2.0 * 0.06 / 0.41
-    np.testing.assert_allclose(arrows(run, None)[-1].vectors[0], [0.0, 0.175 * rate])
+    np.testing.assert_allclose(commanded_velocity(run)[0], [0.0, 0.175 * rate])
 
 
 def test_arrows_begin_at_p_and_have_the_size_of_the_force(crossing_run):
-    recorder, m_per_n = Recorder(), scale_m_n(crossing_run)
-    record_arrows(cast("Any", recorder), crossing_run, "robot", m_per_n)
-    places = recorder.transforms["forces/robot/repulsion"]
-    sizes = recorder.scales["forces/robot/repulsion/arrow"]
-    seen = 0
-    for (time, X), (_, scale) in zip(places, sizes, strict=True):
+    m_per_n, seen = scale_m_n(crossing_run), 0
+    arrow = _arrows(crossing_run)["forces/robot/repulsion"]
+    for time, pose, scale in zip(arrow.times, arrow.poses, arrow.scale, strict=True):
         tick = round(time / 0.025)
         p = crossing_run.vector("p_WP")[:, tick]
-        np.testing.assert_allclose(X.translation()[:2], p, atol=1e-9)
+        np.testing.assert_allclose(pose[:2], p, atol=1e-9)
         force = crossing_run.vector("repulsion")[:, tick]
         length = m_per_n * np.hypot(*force)
         if 1e-3 < length < 1.6:
             seen += 1
             assert scale[0] == pytest.approx(length)
-            along = X.rotation().matrix()[:2, 0]
+            along = [math.cos(pose[2]), math.sin(pose[2])]
             np.testing.assert_allclose(along, force / np.hypot(*force), atol=1e-9)
     assert seen > 20

@@ -14,10 +14,12 @@ import soundfile
 from matplotlib.colors import to_rgb
 from PIL import Image, ImageSequence
 
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
 from analysis.run_error import RunError
-from analysis.views.film import RunFrames
+from analysis.views.film import RunFrames, circles
 from analysis.views.movie_file import MovieFile
+from analysis.views.scene import Rings, make_scene
+from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 
 
@@ -155,3 +157,23 @@ def test_the_pictures_show_the_run(collision_run):
 def test_a_film_lasts_as_long_as_its_run(collision_run):
     count = sum(1 for _ in RunFrames(collision_run).frames(5.0))
     assert count == round(5.0 * collision_run.simulated_s)
+
+
+def test_a_film_shows_the_target_and_the_goal_of_a_route():
+    """The robot has no microphones; both robots have their own color."""
+    result = simulate(load_scenario("robots_2", ["duration_s=1"]))
+    late = RunFrames(result).frame(1.0)
+    assert late.shape[2] == 3
+    for colour in ROBOT_COLOURS[:2]:
+        wanted = 255.0 * np.array(to_rgb(colour))
+        assert (np.abs(late - wanted).max(axis=2) < 12.0).sum() > 10
+
+
+def test_rings_grow_from_a_source_while_it_sounds(crossing_run):
+    """3 m/s: 0.2 s after its start, a burst has rings of 0.6 m and of 0.15 m."""
+    source = crossing_run.vector("p_WS")[:, 168]
+    things = make_scene(crossing_run).things
+    (thing,) = [each for each in things if isinstance(each.shape, Rings)]
+    assert thing.pose(168)[:2] == pytest.approx(source)
+    found = list(circles((0.0, 0.0), thing.shape.bursts, 4.2, "black"))
+    assert [ring.radius for ring in found] == pytest.approx([0.6, 0.15])

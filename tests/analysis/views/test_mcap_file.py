@@ -204,8 +204,8 @@ def test_frames_lead_from_the_world_to_the_sensors(run, file: Path):
     for k in range(3):
         frame = f"{name}/sensor_{k + 1}"
         assert placed[frame].header.frame_id == f"{name}/base_link"
-        found = compose(np.array(at(f"{name}/base_link")), at(frame))
-        expected = compose(own.poses("WB")[-1], sensor_pose(own.scenario, k))
+        found = compose(np.array(at(f"{name}/base_link")), np.array(at(frame)))
+        expected = compose(own.poses("WB")[-1], sensor_pose(own.scenario.only, k))
         assert found[:2] == pytest.approx(expected[:2], abs=1e-12)
         assert math.remainder(found[2] - expected[2], math.tau) == pytest.approx(
             0.0, abs=1e-12

@@ -11,9 +11,11 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon, Rectangle, Wedge
 
 from analysis.reporting.palette import COLOURS
+from analysis.runs.contact import contact_point
 from analysis.runs.known_space import known_space
+from analysis.views.bursts import sound_bursts
+from analysis.views.framing import bounds
 from analysis.views.picture import plot_trajectory
-from analysis.views.scene import bounds, contact_point, sound_bursts
 from analysis.views.time_series import plot_time_series
 from diagrams import load_scenario, simulate
 
@@ -124,8 +126,9 @@ def test_cones_open_30_degrees_up_to_the_range_read(crossing_run):
     echo = np.column_stack([columns[f"echo_{k}"] for k in (1, 2, 3)]) > 0.5
     for index, cone in enumerate(cones):
         assert cone.theta2 - cone.theta1 == pytest.approx(30.0)
-        ticks = np.flatnonzero(read[:, index % 3] == cone.r)
-        colour = "echo" if echo[ticks[0], index % 3] else "empty"
+        sensor = 3 * index // len(cones)
+        ticks = np.flatnonzero(read[:, sensor] == cone.r)
+        colour = "echo" if echo[ticks[0], sensor] else "empty"
         assert cone.get_facecolor()[:3] == pytest.approx(to_rgb(COLOURS[colour]))
     kinds = {cone.get_facecolor()[:3] for cone in cones}
     assert len(kinds) == 2
@@ -133,7 +136,8 @@ def test_cones_open_30_degrees_up_to_the_range_read(crossing_run):
 
 def test_the_middle_cone_looks_ahead(crossing_run):
     # At the start the robot faces along x.
-    left, middle, right = _patches(plot_trajectory(crossing_run), Wedge)[:3]
+    cones = _patches(plot_trajectory(crossing_run), Wedge)
+    left, middle, right = cones[:: len(cones) // 3]
     assert (middle.theta1, middle.theta2) == pytest.approx((-15.0, 15.0))
     assert left.theta1 == pytest.approx(15.0)
     assert right.theta2 == pytest.approx(-15.0)
@@ -330,8 +334,8 @@ def test_panels_of_a_guard_show_its_columns(guarded_run):
     for number, bars in enumerate(actions.collections):
         covered = np.zeros(len(middles), dtype=bool)
         for bar in bars.get_paths():
-            begin, end = np.asarray(bar.vertices)[:, 0].min(), bar.vertices[:, 0].max()
-            covered |= (begin < middles) & (middles < end)
+            times = np.asarray(bar.vertices)[:, 0]
+            covered |= (times.min() < middles) & (middles < times.max())
         assert np.array_equal(covered, columns["guard_action"] == number)
     named = [text.get_text() for text in actions.get_yticklabels()]
     assert named == ["passed", "slowed", "turned", "braked", "halted"]

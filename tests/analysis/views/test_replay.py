@@ -15,15 +15,18 @@ import pytest
 
 from analysis.runs.guarded_motion import guarded_motion
 from analysis.runs.known_space import known_space
+from analysis.views.framing import floor_rectangle
+from analysis.views.overlays import overlays
 from analysis.views.replay import (
+    RINGS_M,
+    frame_times,
     known_times,
-    record_run,
+    record,
     ring_at,
     wheel_angles,
     write_replay,
 )
-from analysis.views.replay_scene import RINGS, add_robot, floor_rectangle
-from analysis.views.scene import looks
+from analysis.views.scene import make_scene
 from diagrams import load_scenario, simulate
 
 FRAME_S = 1.0 / 32.0
@@ -58,11 +61,17 @@ class Recorder:
         return [state for at, state in switches if at <= time + 1e-9][-1]
 
 
+def recording(run):
+    recorder, scene = Recorder(), make_scene(run)
+    layers = [*scene.layers, *overlays(scene, frame_times(run))]
+    things = [thing for layer in layers for thing in layer.things]
+    record(cast("Any", recorder), scene, things)
+    return recorder
+
+
 @pytest.fixture(scope="module")
 def recorded(crossing_run):
-    recorder = Recorder()
-    record_run(cast("Any", recorder), crossing_run)
-    return recorder
+    return recording(crossing_run)
 
 
 def _heading(X):
@@ -91,7 +100,8 @@ def cart_way(time):
 
 
 def test_a_moving_obstacle_moves_and_a_resting_one_rests(recorded):
-    assert "obstacles/box" not in recorded.transforms
+    ((time, _),) = recorded.transforms["obstacles/box"]
+    assert time is None
     for time, X in recorded.transforms["obstacles/cart"][::32]:
         y = -2.0 + cart_way(time)
         assert X.translation()[:2] == pytest.approx([3.0, y])
@@ -108,13 +118,12 @@ def test_cones_change_their_look_with_the_echo(crossing_run, recorded, number):
 
 
 def test_ideal_sensing_records_no_cones(ideal_run):
-    recorder = Recorder()
-    record_run(cast("Any", recorder), ideal_run)
+    recorder = recording(ideal_run)
     assert not [path for path, _ in recorder.properties if "cone" in path]
 
 
 def test_one_ring_is_seen_while_the_source_sounds_and_none_else(recorded):
-    paths = [f"source/ring_{k}" for k in range(1, len(RINGS) + 1)]
+    paths = [f"source/rings/{k}" for k in range(1, len(RINGS_M) + 1)]
     for time in np.arange(0.015, 15.9, 0.03125):
         seen = sum(recorded.visible(path, time) for path in paths)
         assert seen == (1 if math.fmod(time, 2.0) < 0.5 else 0)
@@ -158,11 +167,15 @@ def _driven(run, x, y, theta):
     return replace(run, columns=columns)
 
 
+def _angles(run):
+    return wheel_angles(run.scenario.only.robot, run.poses("WB"))
+
+
 def test_wheels_that_roll_a_metre_turn_by_a_metre_over_their_radius(ideal_run):
     part = np.linspace(0.0, 1.0, len(ideal_run.time))
     heading = np.full_like(part, 0.7)
     straight = _driven(ideal_run, part * math.cos(0.7), part * math.sin(0.7), heading)
-    for angles in wheel_angles(straight).values():
+    for angles in _angles(straight).values():
         assert angles[-1] == pytest.approx(1.0 / 0.06)
 
 
@@ -170,34 +183,30 @@ def test_a_turn_on_the_spot_turns_the_wheels_against_each_other(ideal_run):
     part = np.linspace(0.0, 1.0, len(ideal_run.time))
     # Through pi, where a heading may jump by a turn.
     heading = (3.0 + part + math.pi) % math.tau - math.pi
-    angles = wheel_angles(_driven(ideal_run, 0.0 * part, 0.0 * part, heading))
+    angles = _angles(_driven(ideal_run, 0.0 * part, 0.0 * part, heading))
     assert angles["right"][-1] == pytest.approx(0.5 * 0.41 / 0.06)
     assert angles["left"][-1] == pytest.approx(-0.5 * 0.41 / 0.06)
 
 
-def test_the_robot_has_its_bar_and_three_microphones(crossing_run):
-    built = Recorder()
-    add_robot(cast("Any", built), looks(crossing_run)[0], "robot", "estimate")
-    assert built.shapes["robot/bar"].depth() == pytest.approx(0.82)
-    places = [built.transforms[f"robot/microphone_{k}"][0][1] for k in (1, 2, 3)]
+def test_the_robot_has_its_bar_and_three_microphones(recorded):
+    assert recorded.shapes["robot/bar"].depth() == pytest.approx(0.82)
+    places = [recorded.transforms[f"robot/microphone_{k}"][0][1] for k in (1, 2, 3)]
     np.testing.assert_allclose(
         [X.translation()[:2] for X in places],
         [[0.175, 0.4], [0.175, 0.0], [0.175, -0.4]],
         atol=1e-12,
     )
-    assert sum("/echo" in path for path in built.shapes) == 3
-    assert sum("/empty" in path for path in built.shapes) == 3
+    assert sum("/echo" in path for path in recorded.shapes) == 3
+    assert sum("/empty" in path for path in recorded.shapes) == 3
 
 
 def test_wheels_turn_forward_when_the_robot_drives_forward(recorded, crossing_run):
-    angles = wheel_angles(crossing_run)["left"]
+    angles = _angles(crossing_run)["left"]
     for time, X in recorded.transforms["robot/left/wheel"][::16]:
         turned = _heading(X) - angles[round(time / 0.025)]
         assert math.remainder(turned, math.tau) == pytest.approx(0.0, abs=1e-9)
     # The wheel's own axis is y of B: its top moves along +x of B.
-    built = Recorder()
-    add_robot(cast("Any", built), looks(crossing_run)[0], "robot", "estimate")
-    X_BL = built.transforms["robot/left"][0][1]
+    X_BL = recorded.transforms["robot/left"][0][1]
     axis = X_BL.rotation().matrix()[:, 2]
     top = np.array([0.0, 0.0, 0.06])
     assert np.cross(axis, top)[0] == pytest.approx(0.06)
@@ -234,17 +243,15 @@ def test_the_title_is_escaped(ideal_run, tmp_path):
 
 
 def test_a_run_of_one_tick_has_a_replay(shortest_run):
-    recorder = Recorder()
-    record_run(cast("Any", recorder), shortest_run)
-    assert len(recorder.transforms["robot"]) == 1
+    recorder = recording(shortest_run)
+    assert "robot" not in recorder.transforms  # it is at the origin
+    assert "robot/body" in recorder.shapes
     assert not [path for path in recorder.meshes if path.startswith("trail")]
 
 
 @pytest.fixture(scope="module")
 def guarded(guarded_run):
-    recorder = Recorder()
-    record_run(cast("Any", recorder), guarded_run)
-    return recorder
+    return recording(guarded_run)
 
 
 def _on_show(recorder, prefix, time):
@@ -332,8 +339,8 @@ def test_runs_without_guard_have_no_such_layers(recorded):
 def test_a_guarded_page_is_little_larger(guarded_run, tmp_path, monkeypatch):
     """What is known and the guard add less than a quarter of a megabyte to 8 s."""
     write_replay(guarded_run, tmp_path / "with.html")
-    for name in ("known_space", "guarded_motion"):
-        monkeypatch.setattr(f"analysis.views.replay.{name}", lambda *_: None)
+    for place in ("replay.known_space", "overlays.guarded_motion"):
+        monkeypatch.setattr(f"analysis.views.{place}", lambda *_: None)
     write_replay(guarded_run, tmp_path / "without.html")
     sizes = [(tmp_path / f"{name}.html").stat().st_size for name in ("with", "without")]
     assert 2e4 < sizes[0] - sizes[1] < 2.5e5
@@ -343,8 +350,7 @@ def test_a_robot_on_a_route_shows_its_target_and_its_gains():
     """15 s in, between two contacts of K with 3 N/m at the start: bars of 15 cm."""
     fields = ["law=trajectory_adaptive", "duration_s=16"]
     run = simulate(load_scenario("unknown_block", fields), engine="compiled")
-    recorder = Recorder()
-    record_run(cast("Any", recorder), run)
+    recorder = recording(run)
     tick, columns = 600, run.columns
     (ball,) = (X for time, X in recorder.transforms["estimate"] if time == 15.0)
     target = [columns["target_x"][tick], columns["target_y"][tick]]
@@ -353,6 +359,5 @@ def test_a_robot_on_a_route_shows_its_target_and_its_gains():
     assert scales[0.0] == pytest.approx([1.0, 1.0, 0.15])
     assert scales[15.0][2] == pytest.approx(0.05 * columns["stiffness"][tick])
     assert scales[15.0][2] > 0.151
-    add_robot(cast("Any", recorder), looks(run)[0], "robot", "estimate")
     assert "robot/bar" not in recorder.shapes  # which carries microphones
     assert "goals/robot" in recorder.shapes

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from analysis.runs.metric_table import run_metrics
+from analysis.views.bursts import call_time
+from analysis.views.overlays import overlays
 from analysis.views.picture import plot_trajectory
 from analysis.views.plume_history import concentration_map, plume_history
-from analysis.views.scene import call_time
-from analysis.views.search_replay import record_searches
+from analysis.views.replay import frame_times, record
+from analysis.views.scene import make_scene
 from analysis.views.time_series import plot_time_series
 from diagrams import RunResult, load_scenario, simulate
 from systems.odor.odor_plume import concentration
@@ -69,6 +71,8 @@ class Recorder:
     def SetTransform(self, *_: Any) -> None:
         pass
 
+    SetTriangleMesh = SetObject
+
     def SetProperty(self, path: str, name: str, *rest: Any, **named: Any) -> None:
         if name == "visible":
             change = named["time_in_recording"], named["value"]
@@ -77,15 +81,20 @@ class Recorder:
 
 def test_lamps_show_what_robots_are_at(mission):
     meshcat: Any = Recorder()
-    record_searches(meshcat, mission, {name: name for name in mission.robots})
+    scene = make_scene(mission)
+    layers = [*scene.layers, *overlays(scene, frame_times(mission))]
+    record(meshcat, scene, [thing for layer in layers for thing in layer.things])
     assert {"odor/container", "odor/puff_0"} <= meshcat.objects
     for name, own in mission.robots.items():
         ended = own.time[np.argmax(own.columns["search_ended"] > 0.5)]
-        assert meshcat.seen[f"{name}/lamp/found"] == [(0.0, False), (ended, True)]
+        assert meshcat.seen[f"robots/{name}/lamp/found"] == [
+            (0.0, False),
+            (ended, True),
+        ]
         moves = np.flatnonzero(np.diff(own.columns["move"]) > 0.5)
-        shown = [at for at, seen in meshcat.seen[f"{name}/lamp/moves"] if seen]
+        shown = [at for at, seen in meshcat.seen[f"robots/{name}/lamp/moves"] if seen]
         assert len(shown) == len(moves)
-    flashes = [at for at, seen in meshcat.seen["finder/radio"] if seen]
+    flashes = [at for at, seen in meshcat.seen["robots/finder/radio"] if seen]
     assert flashes
 
 

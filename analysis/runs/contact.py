@@ -1,0 +1,59 @@
+"""Finds the point at which a robot touched another body."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams import RunResult
+from diagrams.scenario.bodies import robot_rectangle
+from systems.framework.input_error import InputError
+from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners
+
+
+def contact_point(result: RunResult) -> NDArray[np.float64]:
+    """Returns the point at which the robot touched the other body.
+
+    Args:
+        result: Result of a run, for one robot, that ended in a collision.
+
+    Returns:
+        (2,) position in the world frame W, m.
+
+    Raises:
+        InputError: The run had no collision.
+    """
+    hit, scenario = result.collision, result.scenario
+    if hit is None:
+        raise InputError("contact_point", f"the run ended by {result.cause!r}")
+    body = result.surroundings.bodies[hit.object].rectangle(hit.time)
+    pose = result.poses("WB")[np.argmin(np.abs(result.time - hit.time))]
+    footprint = robot_rectangle(pose, scenario.only.robot)
+    return touching_point(footprint, body)
+
+
+def touching_point(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Returns the point at which two rectangles touch.
+
+    The point is the mean of all corners of either rectangle that lie inside the other
+    rectangle. If there is no such corner, the point is the mean of the corners that are
+    nearest to the other rectangle.
+
+    Args:
+        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
+        b: (5,) second rectangle in the same frame, m and rad.
+
+    Returns:
+        (2,) position in the same frame, m.
+    """
+    corners = np.concatenate([rectangle_corners(a), rectangle_corners(b)])
+    others = [b] * 4 + [a] * 4
+    away = [
+        math.hypot(*nearest_point_on_rectangle(corner, other))
+        for corner, other in zip(corners, others, strict=True)
+    ]
+    return np.mean(corners[np.array(away) <= min(away) + 1e-9], axis=0)

@@ -1,0 +1,66 @@
+"""Finds when loudspeakers sound in a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagrams import RunResult
+from systems.sound.parameters import SoundParameters
+
+
+def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
+    """Returns all bursts of a sound that begin before a given time.
+
+    Args:
+        sound: Parameters of the sound, which contain the schedule of the bursts.
+        end: Time, s. A burst that lasts longer ends at this time.
+
+    Returns:
+        Start and end of each burst, s.
+    """
+    starts = np.arange(sound.start_s, end, sound.period_s)
+    return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
+
+
+def call_time(result: RunResult) -> float | None:
+    """Returns the time at which the sink first received a call.
+
+    The sink is the computer of the operator. After a robot has found the odor source,
+    it calls the other robots. The function uses the radio frame with which a robot
+    reports this find to the sink.
+
+    Args:
+        result: Result of a run, for one robot or all robots.
+
+    Returns:
+        Time, s. The value is None if the sink received no such frame.
+    """
+    times = [
+        float(result.time[np.argmax(values > 0.5)])
+        for name, values in result.world.items()
+        if name.endswith(".result") and (values > 0.5).any()
+    ]
+    return min(times, default=None)
+
+
+def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
+    """Returns the bursts of the source that the robot hears.
+
+    If the robot listens to another robot that calls, the bursts begin after the call.
+
+    Args:
+        result: Result of a run, for one robot.
+
+    Returns:
+        Start and end of each burst, s. The list is empty if the robot drives to a goal.
+    """
+    if result.scenario.only.has_goal:
+        return []
+    sound, whole = result.scenario.source.sound, result.full_scenario
+    caller = whole.robots.get(whole.target(result.name))
+    if caller is not None and caller.searches == "odor":
+        since = call_time(result)
+        if since is None:
+            return []
+        sound = sound.model_copy(update={"start_s": since + sound.start_s})
+    return sound_bursts(sound, result.simulated_s)

@@ -1,0 +1,116 @@
+"""Chooses the times, the part of the floor and the title of a picture of a run."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams import RunResult
+from diagrams.running.stop_rules import SUCCESSFUL
+from diagrams.scenario.bodies import Path
+
+#: Intervals between times of a picture, s. A reader can count easily with these values.
+_NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
+
+#: Largest number of characters per line of a title.
+LONGEST_LINE = 80
+
+
+def tick_at(result: RunResult, time: float) -> int:
+    """Returns the number of the tick (control period) nearest to a time, s, from 0."""
+    return int(np.argmin(np.abs(result.time - time)))
+
+
+def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
+    """Returns at most ``most`` times, s, at constant intervals from 0 on.
+
+    ``most`` is at least 2.
+    """
+    end = result.simulated_s
+    period = next((p for p in _NICE_PERIODS_S if end / p < most), end / (most - 1))
+    return np.arange(0.0, end + 1e-9, period)
+
+
+def run_title(result: RunResult) -> str:
+    """Returns the name, the law and the ending of a run on one line."""
+    told = result.several and result.cause not in SUCCESSFUL
+    who = f"{result.name} " if told else ""
+    scenario = result.full_scenario
+    return f"{scenario.name}, law {scenario.law_names}: {who}{result.ending}"
+
+
+def picture_title(result: RunResult) -> str:
+    """Returns the title of a picture: ``run_title``, the fault and the duration."""
+    fault = f" ({result.collision.fault}'s fault)" if result.collision else ""
+    title = f"{run_title(result)}{fault} after {result.simulated_s:.1f} s"
+    return textwrap.fill(title, LONGEST_LINE)
+
+
+def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
+    """Returns a rectangle that contains all bodies during the whole run.
+
+    The rectangle includes the walls of the room, if there is a room. It ignores
+    estimated positions, because a large error would enlarge the picture too much.
+
+    Args:
+        result: Result of the run.
+        margin: Space around the centers of the bodies, m.
+
+    Returns:
+        Least x, greatest x, least y, greatest y in the world frame W, m.
+    """
+    scenario, times = result.full_scenario, picture_times(result, most=60)
+    centres = [
+        own.poses(body)[:, :2]
+        for own in result.robots.values()
+        for body in ("WB", "WS")
+    ]
+    paths: list[Path] = [each.path() for each in scenario.sources.values()]
+    paths += [obstacle.path() for obstacle in scenario.obstacles]
+    centres += [path.poses(times)[:, :2] for path in paths]
+    points = np.concatenate(centres)
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    if scenario.room is not None:
+        corner, wall = scenario.room.corner, 0.2
+        low = np.minimum(low, corner - wall)
+        high = np.maximum(high, corner + scenario.room.size_m[:2] + wall)
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def shown_rectangle(result: RunResult) -> tuple[float, float, float, float]:
+    """Returns the part of the floor that the initial view shows.
+
+    Args:
+        result: Result of the run.
+
+    Returns:
+        Least x, greatest x, least y, greatest y in the world frame W, m.
+    """
+    return bounds(result, margin=0.5)
+
+
+def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
+    """Returns the edges of the floor in the world frame W.
+
+    The floor contains the whole run. It is at least as large as the arena of the
+    scenario.
+
+    Args:
+        result: Result of the run.
+
+    Returns:
+        Least x, greatest x, least y, greatest y, as whole meters.
+    """
+    x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
+    width, depth = result.full_scenario.arena_m
+    x_more = max(width - (x_high - x_low), 0.0) / 2.0
+    y_more = max(depth - (y_high - y_low), 0.0) / 2.0
+    return (
+        float(math.floor(x_low - x_more)),
+        float(math.ceil(x_high + x_more)),
+        float(math.floor(y_low - y_more)),
+        float(math.ceil(y_high + y_more)),
+    )

@@ -1,0 +1,340 @@
+"""Makes things of a run that only its replay shows: forces, guards, lamps and gains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.reporting.palette import COLOURS
+from analysis.runs.guarded_motion import guarded_motion
+from analysis.runs.tracked_bodies import tracked_bodies
+from analysis.views.scene import ROBOT_HEIGHT_M, Layer, Scene, Thing
+from diagrams import RunResult
+from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
+from systems.world.geometry import rotate
+
+#: Rate at which arrows are recorded, 1/s. The browser interpolates between these times.
+ARROWS_PER_S = 8.0
+#: Lengths of arrows, m. ``LONGEST_M``: arrow of the greatest force.
+#: ``SHORTEST_M``: shortest arrow.
+LONGEST_M, SHORTEST_M = 0.8, 1e-3
+#: Height of the arrows, m. They are above the microphones.
+ARROW_HEIGHT_M = 0.36
+#: Least probability of a tracked body that the replay shows.
+LEAST_EXISTS = 0.3
+#: Radii of the rings around tracked bodies, m.
+TRACKED_M = (0.1, 0.2, 0.4, 0.8)
+#: Edges of the guarded disc: name, key of the color, and actions of the guard for which
+#: the edge is visible.
+_EDGES = (
+    ("passed", "passed", (PASSED,)),
+    ("lessened", "lessened", (SLOWED, TURNED)),
+    ("braked", "hit", (BRAKED, HALTED)),
+)
+#: Height of the lamp above a robot, m.
+_LAMP_M = 0.32
+#: Color of the lamp for each state of the robot.
+_LAMPS = {
+    "rests": COLOURS["empty"],
+    "senses": COLOURS["sound"],
+    "moves": COLOURS["robot"],
+    "found": COLOURS["seen"],
+    "gave up": COLOURS["source"],
+}
+#: Duration of the flash for a radio frame, s.
+_FLASH_S = 0.25
+#: Gains that the replay shows as bars on a robot. Each entry has the name of the gain,
+#: the distance of the bar to the left of the center line, m, and the key of its color.
+_GAIN_BARS = (
+    ("stiffness", 0.05, "source"),
+    ("damping", 0.0, "robot"),
+    ("contact_stiffness", -0.05, "obstacle"),
+)
+#: Sizes of the bars. ``_BAR_M``: initial height, m. ``_MOST_HIGH``: largest ratio of
+#: the height to the initial height.
+_BAR_M, _MOST_HIGH = 0.15, 10.0
+
+
+class Frame(NamedTuple):
+    """Carries other things, and is invisible itself."""
+
+
+class Arrow(NamedTuple):
+    """A flat arrow of 1 m length along x."""
+
+
+class Circle(NamedTuple):
+    """A circle on the floor."""
+
+    radius: float
+
+
+class Bar(NamedTuple):
+    """An upright bar of 1 m height."""
+
+
+class Ball(NamedTuple):
+    """A ball."""
+
+    radius: float
+
+
+class Disc(NamedTuple):
+    """A thin disc on the floor."""
+
+    radius: float
+
+
+def overlays(scene: Scene, times: NDArray[np.float64]) -> list[Layer]:
+    """Makes the layers that only a replay shows.
+
+    Args:
+        scene: Scene of the run.
+        times: (n,) times of the frames of the replay, s.
+
+    Returns:
+        Layers with things on the robots, and things in the world frame W.
+    """
+    return [
+        *_laws(scene),
+        *_guards(scene),
+        *_tracked(scene, times),
+        *_lamps(scene),
+        *_gains(scene),
+    ]
+
+
+def scale_m_n(result: RunResult) -> float | None:
+    """Returns the length of an arrow for a force of 1 N.
+
+    With this length, the arrow of the greatest force is at most 0.8 m long. The
+    greatest force is the 99th percentile of all forces in the run.
+
+    Args:
+        result: Result of the run, for one robot or several robots.
+
+    Returns:
+        Length, m. The value is 1, 2 or 5 times a power of ten. It is None if no control
+        law logs its forces.
+    """
+    sizes = [
+        np.hypot(*own.vector(name))
+        for own in result.robots.values()
+        if "attraction_x" in own.columns
+        for name in ("attraction", "repulsion")
+    ]
+    if not sizes:
+        return None
+    # A short contact must not make all other arrows short.
+    greatest = max(float(np.percentile(np.concatenate(sizes), 99.0)), 1e-3)
+    power = 10.0 ** np.floor(np.log10(LONGEST_M / greatest))
+    return float(max(k * power for k in (1, 2, 5) if k * power * greatest <= LONGEST_M))
+
+
+def commanded_velocity(own: RunResult) -> NDArray[np.float64]:
+    """Returns the velocity of the control point P that the wheel commands would cause.
+
+    Args:
+        own: Result of a run, for one robot.
+
+    Returns:
+        (n, 2) velocity in W at the ticks, m/s.
+    """
+    robot, theta = own.scenario.only.robot, own.columns["theta_WB"]
+    left = robot.wheel_radius_m * own.columns["wheel_speed_left"]
+    right = robot.wheel_radius_m * own.columns["wheel_speed_right"]
+    aside = robot.control_point_m * (right - left) / robot.wheel_separation_m
+    return np.column_stack(rotate(theta, 0.5 * (left + right), aside))
+
+
+def _laws(scene: Scene) -> Iterator[Layer]:
+    """Yields the arrows of forces, and of the distance that P would move in 1 s."""
+    result, forces, laws = scene.result, [], []
+    m_per_n, meaning = scale_m_n(result), "path of 1 s at the command"
+    for name, own in result.robots.items():
+        path, robot = scene.bodies[name].path, own.scenario.only
+        number = 0
+        if m_per_n is not None and "attraction_x" in own.columns:
+            for force in ("attraction", "repulsion"):
+                vectors = m_per_n * own.vector(force).T
+                place = f"forces/{path}/{force}"
+                forces.append(_arrow(place, own, vectors, force, number))
+                number += 1
+        law = _arrow(f"law/{path}", own, commanded_velocity(own), "law", number)
+        laws.append(law)
+        if robot.searches is None and robot.follow_distance_m:
+            shape, colour = Circle(robot.follow_distance_m), COLOURS["law"]
+            poses, place = own.poses("WS"), f"follow/{path}"
+            laws.append(Thing(place, shape, colour, own.time, poses))
+            meaning = "path of 1 s at the command; follow distance"
+    if forces:
+        text = f"attraction and repulsion; an arrow of {m_per_n:g} m is 1 N"
+        colours = COLOURS["attraction"], COLOURS["repulsion"]
+        yield Layer("forces", text, colours, forces)
+    yield Layer("law", meaning, (COLOURS["law"],), laws)
+
+
+def _arrow(
+    path: str, own: RunResult, vectors: NDArray[np.float64], role: str, number: int
+) -> Thing:
+    """Makes an arrow that begins at P; ``vectors`` are at the ticks, m."""
+    end = own.simulated_s
+    times = np.unique([*np.arange(0.0, end, 1.0 / ARROWS_PER_S), end])
+    ticks = np.abs(own.time[:, None] - times).argmin(axis=0)
+    vectors = vectors[ticks]
+    lengths = np.clip(np.hypot(*vectors.T), SHORTEST_M, 2.0 * LONGEST_M)
+    # An arrow without length keeps its direction.
+    last = np.maximum.accumulate(
+        np.where(lengths > SHORTEST_M, np.arange(len(times)), -1)
+    )
+    yaw = np.where(last >= 0, np.arctan2(vectors[last, 1], vectors[last, 0]), 0.0)
+    poses = np.column_stack([own.vector("p_WP").T[ticks], yaw])
+    wide = np.minimum(1.0, lengths / 0.3)
+    arrow = Thing(path, Arrow(), COLOURS[role], times, poses)
+    # The arrows have different heights. Surfaces in one plane would flicker.
+    return replace(
+        arrow,
+        height=ARROW_HEIGHT_M + 0.004 * number,
+        scale=np.column_stack([lengths, wide, np.ones(len(times))]),
+    )
+
+
+def _guards(scene: Scene) -> Iterator[Layer]:
+    """Yields the edge of the disc that each safety guard keeps free.
+
+    If the robot braked now, its axle would stop at the center of the disc.
+    """
+    things = []
+    for name, own in scene.result.robots.items():
+        motion = guarded_motion(own)
+        if motion is None:
+            continue
+        path, still = f"guard/{scene.bodies[name].path}", np.zeros((1, 3))
+        disc = Thing(path, Frame(), "", own.time, motion.resting_poses)
+        things.append(disc)
+        circle = Thing("", Circle(motion.keep_m), "", own.time, still, parent=disc)
+        things += [
+            replace(
+                circle,
+                path=f"{path}/{edge}",
+                colour=COLOURS[colour],
+                seen=np.isin(motion.actions, numbers),
+            )
+            for edge, colour, numbers in _EDGES
+        ]
+    colours = COLOURS["passed"], COLOURS["lessened"], COLOURS["hit"]
+    if things:
+        yield Layer("guard", "passed the command, slowed, braked", colours, things)
+
+
+def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
+    """Yields a ring around each body that a control law takes as moving.
+
+    The radius of the ring shows the uncertainty of the position.
+    """
+    things, colour, plans = [], COLOURS["tracked"], False
+    for name, own in scene.result.robots.items():
+        tracked = tracked_bodies(own, times)
+        if tracked is None:
+            continue
+        plans = True
+        for k in range(tracked.exists.shape[1]):
+            seen = tracked.exists[:, k] > LEAST_EXISTS
+            if not seen.any():
+                continue
+            path = f"tracked/{scene.bodies[name].path}/{k}"
+            places = np.where(seen[:, None], tracked.places[:, k], np.nan)
+            poses = np.column_stack([places, np.zeros(len(seen))])
+            body = Thing(path, Frame(), colour, tracked.times, poses)
+            things.append(body)
+            wide = np.minimum(tracked.spreads[:, k], TRACKED_M[-1])
+            for least, radius in pairwise((0.0, *TRACKED_M)):
+                states = seen & (wide > least) & (wide <= radius)
+                if states.any():
+                    things.append(
+                        Thing(
+                            f"{path}/{radius:g}",
+                            Circle(radius),
+                            colour,
+                            tracked.times,
+                            np.zeros((1, 3)),
+                            seen=states,
+                            parent=body,
+                        )
+                    )
+    if plans:
+        meaning = "bodies that the robot takes as moving"
+        yield Layer("tracked", meaning, (colour,), things)
+
+
+def _lamps(scene: Scene) -> Iterator[Layer]:
+    """Yields a lamp above each searching robot, and a flash for each radio frame.
+
+    The flash is for radio frames that the sink receives. The sink is the computer of
+    the operator.
+    """
+    things = []
+    for name, own in scene.result.robots.items():
+        if own.scenario.only.searches is None:
+            continue
+        columns, robot = own.columns, scene.bodies[name]
+        over, moves = columns["search_ended"], columns["move"] > 0.5
+        going = over < 0.5
+        senses = columns.get("listening", np.zeros_like(over)) > 0.5
+        states = {
+            "rests": going & ~moves & ~senses,
+            "senses": going & senses,
+            "moves": going & moves,
+            "found": np.abs(over - 1.0) < 0.5,
+            "gave up": over > 1.5,
+        }
+        ball = Thing("", Ball(0.035), "", own.time, np.zeros((1, 3)), parent=robot)
+        ball = replace(ball, height=_LAMP_M)
+        things += [
+            replace(
+                ball, path=f"{robot.path}/lamp/{state}", colour=_LAMPS[state], seen=seen
+            )
+            for state, seen in states.items()
+        ]
+        frames = scene.result.world.get(f"{name}.frames")
+        if frames is None:
+            continue
+        heard = own.time[1:][np.diff(frames) > 0.5]
+        since = np.searchsorted(heard, own.time, side="right")
+        last = np.where(since > 0, np.r_[-1e9, heard][since], -1e9)
+        flash = replace(ball, path=f"{robot.path}/radio", shape=Ball(0.06), alpha=0.8)
+        lit = own.time - last < _FLASH_S
+        height = _LAMP_M + 0.09
+        things.append(replace(flash, colour="white", height=height, seen=lit))
+    text = "gray: at rest; yellow: senses; blue: moves; green: found; orange: gave up"
+    if things:
+        yield Layer("lamps", text, (COLOURS["sound"],), things)
+
+
+def _gains(scene: Scene) -> Iterator[Layer]:
+    """Yields one bar per adapted gain; its height is relative to the initial gain."""
+    things = []
+    for name, own in scene.result.robots.items():
+        if own.scenario.only.kind != "router":
+            continue
+        for gain, aside, colour in _GAIN_BARS:
+            if gain not in own.columns or own.columns[gain][0] <= 0.0:
+                continue
+            values, robot = own.columns[gain], scene.bodies[name]
+            share = np.clip(values / values[0], 0.0, _MOST_HIGH)
+            ones = np.ones(len(share))
+            place = np.array([[0.0, aside, 0.0]])
+            bar = Thing(f"{robot.path}/{gain}", Bar(), COLOURS[colour], own.time, place)
+            scale = np.column_stack([ones, ones, _BAR_M * share])
+            things.append(
+                replace(bar, parent=robot, height=ROBOT_HEIGHT_M, scale=scale)
+            )
+    colours = COLOURS["source"], COLOURS["robot"], COLOURS["obstacle"]
+    text = "K, D and K_e; a bar of 15 cm is the initial value"
+    if things:
+        yield Layer("gains", text, colours, things)
