@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure as Drawing
+from matplotlib.figure import Figure
 
 from analysis.models.model_export import write_models
 from analysis.reporting.criterion import compare_verdicts
@@ -66,7 +66,7 @@ def stability_text(analyses: Sequence[LawAnalysis]) -> str:
     return "\n".join(lines)
 
 
-def report_figures(analyses: Sequence[LawAnalysis]) -> dict[str, Drawing]:
+def report_figures(analyses: Sequence[LawAnalysis]) -> dict[str, Figure]:
     """Draws all figures of a report, by caption."""
     drawn = {}
     for each in analyses:

@@ -89,12 +89,15 @@ def _prepare(options: Namespace, take: Take) -> Prepared[RunResult]:
 def _require_outside(place: Place, option: str, given: str, path: Path) -> None:
     """Rejects a file or directory inside the result directory."""
     if path.resolve().is_relative_to(place.out.expanduser().resolve()):
+        where = "is in the directory of the results"
+        if option == "save_audio":
+            where = "is the directory of the results or in it"
         from systems.framework.input_error import InputError
 
         raise InputError(
             option,
-            f"{given} is in the directory of the results, and that directory is "
-            "created at the end; name another directory",
+            f"{given} {where}, and that directory is created at the end; name another "
+            "directory",
         )
 
 
