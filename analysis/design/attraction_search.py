@@ -258,19 +258,9 @@ def recommend_gains(
 ) -> RecommendedGains:
     """Finds gains of the attraction and of the law that meet the requirements.
 
-    Args:
-        scenario: The scenario with the current gains, the law, the robot, and the
-            plant.
-        requirements: Requirements that the gains must meet. None means the default
-            requirements.
-        springs: Values of K_r that are tried, as multiples of the current K_r.
-
-    Returns:
-        The current gains, the least D_r for each K_r, and the recommended gains.
-
-    Raises:
-        InputError: The current K_r is 0.
-        InputError: No gains of the law meet a requirement that must be met.
+    ``springs`` are the values of K_r to try, as multiples of the current K_r. Raises
+    InputError if the current K_r is 0, or if no gains of the law meet a requirement
+    that must be met.
     """
     requirements = requirements or Requirements()
     K_r = scenario.follower.attraction.stiffness_n_m
@@ -324,17 +314,9 @@ def _chosen(
 def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scenario:
     """Chooses the follow distance, and the gains of the scenario's law with it.
 
-    Args:
-        scenario: The scenario with K_r, D_r, the law, the robot, and the source.
-        requirements: Requirements that the gains must meet.
-
-    Returns:
-        A copy of the scenario. Its follow distance is at least the current one, leaves
-        room for the overshoot, and is so long that the law shifts P at rest little
-        enough.
-
-    Raises:
-        InputError: No gains meet a requirement that must be met.
+    The follow distance is at least the current one, leaves room for the overshoot, and
+    is so long that the law shifts P at rest little enough. Raises InputError if no
+    gains meet a requirement that must be met.
     """
     law = scenario.only.law
     least = follow_distance(scenario, requirements, braking_overshoot(scenario))
@@ -360,16 +342,8 @@ def fitting_gains(
 ) -> LawGains:
     """Returns the gains of a scenario, with new gains of laws that need them.
 
-    Args:
-        scenario: The scenario with the attraction, the robot, and the current gains.
-        requirements: Requirements that the gains must meet.
-        *laws: Names of the laws to check, all of them in ``DESIGNED_LAWS``.
-
-    Returns:
-        The law parameters. The gains of a law that meets all requirements stay.
-
-    Raises:
-        InputError: No gain meets a requirement that must be met.
+    The gains of a law that meets all requirements stay. Raises InputError if no gain
+    meets a requirement that must be met.
     """
     unfit = [x for x in laws if not check_law(scenario, x, requirements).acceptable]
     return search_gains(scenario, requirements, laws=unfit)
@@ -389,15 +363,9 @@ def _whole_loop(chosen: Scenario) -> WholeLoop:
 def least_damping(
     scenario: Scenario, K_r: float, requirements: Requirements
 ) -> GainChoice:
-    """Finds the least D_r that meets the requirements with one K_r.
+    """Finds the least D_r that meets the requirements with one K_r above 0, N/m.
 
-    Args:
-        scenario: The scenario with the robot, the plant, and the law.
-        K_r: Stiffness of the attraction, N/m, above 0.
-        requirements: Requirements on the loop and on the contact mode.
-
-    Returns:
-        The least D_r, of values up to three times critical damping.
+    The search ends at three times critical damping.
     """
     critical = 2.0 * math.sqrt(K_r * scenario.only.robot.mass_kg)
 
@@ -465,16 +433,9 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
     """Returns the sampled open loop of the attraction without the force of the law.
 
     The attraction consists of a spring and a damper. The robot moves along the line to
-    a source at rest.
-
-    Args:
-        scenario: The scenario with the gains, the robot, and the plant.
-        at: Where the loop is cut. A cut at ``sensor`` opens the path of the spring
-            only. A cut at ``actuator`` opens the paths of both the spring and the
-            damper.
-
-    Returns:
-        The model of the open loop. Its input and its output are accelerations, m/s^2.
+    a source at rest. A cut at ``sensor`` opens the path of the spring only. A cut at
+    ``actuator`` opens the paths of both the spring and the damper. The input and the
+    output are accelerations, m/s^2.
     """
     chain = motion_chain(scenario)
     mass = scenario.only.robot.mass_kg
@@ -494,13 +455,8 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
 def gain_figures(scenario: Scenario, requirements: Requirements) -> GainFigures:
     """Computes performance figures of the stiffness K_r and damping D_r of a scenario.
 
-    Args:
-        scenario: The scenario with the gains, the robot, and the plant.
-        requirements: The requirements, of which only ``spare_latency_ticks`` is used.
-
-    Returns:
-        The performance figures. The loop is cut at the sensor and at the actuator. Each
-        margin is the worse of the margins of the two cuts.
+    The loop is cut at the sensor and at the actuator. Each margin is the worse of the
+    margins of the two cuts. Of the requirements, only ``spare_latency_ticks`` is used.
     """
     both = [_margins(loop_margins(attraction_loop(scenario, at))) for at in _CUTS]
     worst = {
@@ -544,17 +500,11 @@ def braking_overshoot(scenario: Scenario) -> float:
 def follow_distance(
     scenario: Scenario, requirements: Requirements, overshoot_m: float
 ) -> float:
-    """Returns the least follow distance that leaves room for an overshoot.
+    """Returns the least follow distance that leaves room for an overshoot, m.
 
-    Args:
-        scenario: The scenario with the length of the leader. The leader is the robot
-            that carries the source.
-        requirements: The requirements with the clearance to the body of the leader.
-        overshoot_m: Overshoot of the follower past the follow point, m.
-
-    Returns:
-        The distance from the follower's control point to the source, m. The distance is
-        rounded up to a multiple of 5 cm.
+    This is the distance from the follower's control point to the source, rounded up to
+    a multiple of 5 cm. The follower passes the follow point by ``overshoot_m`` and
+    keeps the clearance to the body of the leader, which carries the source.
     """
     room = scenario.source.length_m / 2.0 + requirements.clearance_m
     least = overshoot_m + room
@@ -562,16 +512,7 @@ def follow_distance(
 
 
 def with_attraction(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
-    """Returns a copy of a scenario with other gains of the attraction.
-
-    Args:
-        scenario: The scenario, which stays unchanged.
-        K_r: Stiffness of the spring, N/m.
-        D_r: Damping of the damper, N s/m.
-
-    Returns:
-        The copy with the new gains.
-    """
+    """Returns a copy of a scenario with other gains K_r, N/m, and D_r, N s/m."""
     attraction = AttractionParameters.model_validate(
         scenario.follower.attraction.model_dump()
         | {"stiffness_n_m": K_r, "damping_n_s_m": D_r}

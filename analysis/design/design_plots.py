@@ -26,14 +26,8 @@ def plot_design(study: DesignStudy) -> Figure:
     The left panel shows forces over the distance of an obstacle. It compares the push
     of each law away from the obstacle with the pull toward the source. In shaded areas,
     the push exceeds the pull. The right panel shows the stiffness of each law, and the
-    limits of a stable motion at an obstacle, over the damping D_r.
-
-    Args:
-        study: The result of ``study_design``. The figure shows its current attraction,
-            and not its recommended one.
-
-    Returns:
-        The figure with two panels.
+    limits of a stable motion at an obstacle, over the damping D_r. The attraction is
+    the current one, and not the recommended one.
     """
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
     balance, conflict = figure.subplots(1, 2)

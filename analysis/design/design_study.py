@@ -110,23 +110,11 @@ def study_design(
 ) -> DesignStudy:
     """Chooses gains of the laws for a scenario, and also recommends another attraction.
 
-    The recommendation is that of the stability report.
-
-    Args:
-        scenario: The scenario with the attraction and the robot. Of the parameters of
-            its laws, only the reaches and the speed limits are used.
-        requirements: Requirements that the gains must meet. None means the default
-            requirements.
-        progress: Function that is called with the number of finished runs. There are
-            ``STUDY_RUNS`` runs.
-
-    Returns:
-        The gains and their performance figures, both for the current attraction and for
-        the recommended attraction.
-
-    Raises:
-        InputError: There are several robots, or no gains meet a requirement that must
-            be met.
+    The recommendation is that of the stability report. Of the parameters of the
+    scenario's laws, only the reaches and the speed limits are used. ``progress`` is
+    called with the number of finished runs, of which there are ``STUDY_RUNS``. Raises
+    InputError if there are several robots, or if no gains meet a requirement that must
+    be met.
     """
     scenario.require_one_robot("a design of gains")
     requirements = requirements or Requirements()

@@ -90,15 +90,7 @@ def _check_text(check: Check) -> str:
 
 
 def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
-    """Returns the JSON document of the design.
-
-    Args:
-        study: The result of the design.
-        out: The result directory, whose name is written into the document.
-
-    Returns:
-        Plain values that can be written as JSON.
-    """
+    """Returns the JSON document of the design, which names the directory ``out``."""
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": study.today.scenario.name,
@@ -109,18 +101,13 @@ def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
 
 
 def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -> None:
-    """Writes the files of a design into a directory.
+    """Writes the files of a design into an existing directory.
 
-    - ``summary.json`` is the JSON document.
+    - ``summary.json`` is the JSON document from ``design_summary``.
     - ``scenario.yaml`` is the scenario with new gains of the laws.
     - ``recommended.yaml`` is the scenario with the recommended gains.
     - ``design.png`` is the figure of ``plot_design``.
     - ``law_curves.png`` shows the forces of the laws.
-
-    Args:
-        study: The result of the design.
-        summary: The JSON document from ``design_summary``.
-        directory: An existing directory.
     """
     from analysis.design.design_plots import plot_design
     from analysis.laws.law_curves import law_curves

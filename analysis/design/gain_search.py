@@ -53,19 +53,10 @@ def search_gains(
     *,
     laws: Iterable[str] = tuple(DESIGNED_LAWS),
 ) -> LawGains:
-    """Finds gains of laws that meet the requirements.
+    """Finds gains of laws of ``DESIGNED_LAWS`` that meet the requirements.
 
-    Args:
-        scenario: The scenario with the attraction, the robot, and the sensors. The
-            reaches, speed limits, and saturations of its laws are also used.
-        requirements: Requirements that the gains must meet.
-        laws: Names of the laws, all of them in ``DESIGNED_LAWS``.
-
-    Returns:
-        The law parameters of the scenario, with the gains that were found.
-
-    Raises:
-        InputError: No gain meets a requirement that must be met.
+    The reaches, speed limits, and saturations of the scenario's laws stay. Raises
+    InputError if no gain meets a requirement that must be met.
     """
     for law in laws:
         rule = _RULES[DESIGNED_LAWS[law].rule]
@@ -83,21 +74,9 @@ def gain_for_barrier(
     """Returns the value of a gain with which a law just stops the robot at an obstacle.
 
     During an approach, the push of the law must take the kinetic energy of top speed
-    from the robot. This energy is called the barrier.
-
-    Args:
-        scenario: The scenario with all other values.
-        law: Name of the law that has the gain.
-        field: Name of the gain, whose unit is N/m or N m. The push of the law must be
-            proportional to the gain.
-        requirements: The requirements with the largest distance of the source.
-        **also: Other gains of the law, as multiples of this gain.
-
-    Returns:
-        The gain in the unit of its field.
-
-    Raises:
-        InputError: No gain from 1e-3 to 1e5 stops the robot.
+    from the robot. This energy is called the barrier. ``field`` is a gain in N/m or N m
+    to which the push is proportional. ``also`` has other gains of the law as multiples
+    of this gain. Raises InputError if no gain from 1e-3 to 1e5 stops the robot.
     """
     to_go, energy = metres_to_go(scenario, requirements), kinetic_energy(scenario)
 

@@ -36,18 +36,11 @@ def jam_runs(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> list[JamRuns]:
-    """Simulates the scenario ``two_static_obstacles`` for several laws and starts.
+    """Simulates ``two_static_obstacles`` for each law and each of ``JAM_STARTS_M``.
 
-    The starts are ``JAM_STARTS_M``. The runs have exact hearing and ultrasonic cones.
-
-    Args:
-        scenario: The scenario with the attraction and the gains. The runs also use its
-            tick, its engine, and the sample periods of its sensors.
-        laws: Names of the laws.
-        progress: Function that is called with the number of finished runs.
-
-    Returns:
-        One entry per law, in the order of the laws.
+    The runs have exact hearing and ultrasonic cones. Besides the gains, they use the
+    tick, the engine, and the sample periods of the sensors of ``scenario``.
+    ``progress`` is called with the number of finished runs.
     """
     settings = (
         f"tick_s={scenario.tick_s}",

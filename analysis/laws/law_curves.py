@@ -46,17 +46,9 @@ class LawCurves:
 
 
 def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
-    """Computes the force curves of laws with the gains of a scenario.
+    """Computes the force curves of the named laws with the gains of a scenario.
 
-    Args:
-        scenario: The scenario with the gains and the robot.
-        laws: Names of the laws.
-
-    Returns:
-        One entry per law, with forces in N.
-
-    Raises:
-        InputError: A law does not exist, or it is a block without a radial force.
+    Raises InputError if a law does not exist or has no radial force.
     """
     closing = scenario.follower.collision_vector.velocity_term == "closing"
     # The law sees the speed of approach, or without ``closing`` its magnitude.

@@ -19,17 +19,10 @@ LAW_STYLES = {
 
 
 def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
-    """Plots the forces of laws over distance and over speed.
+    """Plots forces over the distance (left) and the speed of approach (right).
 
-    The left panel shows the force over the distance of an obstacle at rest. The right
-    panel shows the force over the speed at which the obstacle approaches.
-
-    Args:
-        curves: One entry per law and velocity term. Curves with the velocity term
-            ``closing`` are dashed.
-
-    Returns:
-        The figure with two panels.
+    The obstacle of the left panel is at rest. Curves with the velocity term ``closing``
+    are dashed.
     """
     figure = Figure(figsize=(10.0, 4.0), layout="constrained")
     by_distance, by_speed = figure.subplots(1, 2)

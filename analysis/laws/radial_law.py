@@ -56,8 +56,7 @@ class RadialLaw:
     def forces_n(self) -> NDArray[np.float64]:
         """(n,) force f(c, 0) at ``distances_m``, N. The first entry is the limit at 0.
 
-        Raises:
-            InputError: A force is not finite.
+        Raises InputError if a force is not finite.
         """
         distances = np.maximum(self.distances_m, 1e-9).tolist()
         forces = np.array([float(self.function(c, 0.0)) for c in distances])
@@ -113,15 +112,10 @@ class RadialLaw:
         return self.stiffest[1]
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """Returns the force of the law away from an obstacle.
+        """Returns the force f(c, s), N, positive away from the obstacle.
 
-        Args:
-            c: Distance of the obstacle, m.
-            s: Relative speed of the obstacle that the law uses, m/s.
-
-        Returns:
-            The force f(c, s) in N, positive away from the obstacle. Beyond the range of
-            the sensors, the force is 0.
+        ``c`` is the distance of the obstacle, m, and ``s`` is the relative speed that
+        the law uses, m/s. Beyond the range of the sensors, the force is 0.
         """
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
@@ -134,15 +128,9 @@ class RadialLaw:
         return np.interp(np.asarray(c), self.distances_m, self.energies_j, right=0.0)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
-        """Returns the partial derivatives of the force f(c, s).
+        """Returns the partial derivatives df/dc, N/m, and df/ds, N s/m, of ``force``.
 
-        Args:
-            c: Distance of the obstacle, m.
-            s: Relative speed of the obstacle that the law uses, m/s. At s = 0, the
-                derivative by s is the one-sided derivative for s > 0.
-
-        Returns:
-            The first value is df/dc, N/m. The second value is df/ds, N s/m.
+        At s = 0, the derivative by s is the one-sided derivative for s > 0.
         """
         f = self.function(AutoDiffXd(c, np.eye(2)[0]), AutoDiffXd(s, np.eye(2)[1]))
         slopes = f.derivatives() if isinstance(f, AutoDiffXd) else np.zeros(0)
@@ -150,17 +138,9 @@ class RadialLaw:
 
 
 def radial_law(scenario: Scenario) -> RadialLaw:
-    """Returns the force of the law of a scenario.
+    """Returns the force of a scenario's law, up to the sensor range and top speed.
 
-    Args:
-        scenario: The scenario with the law, the sensors, and the top speed.
-
-    Returns:
-        The force, with tables up to the sensor range and the top speed.
-
-    Raises:
-        InputError: The law does not exist.
-        InputError: The law is a block without a radial force.
+    Raises InputError if the law does not exist or has no radial force.
     """
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
     return _radial_law(

@@ -54,11 +54,7 @@ class DelayMargin:
 class DelayedLoop:
     """Sampled loop with an arbitrary delay of one signal.
 
-    Args:
-        point: Operating point.
-        at: Place of the delay: ``sensor`` or ``wheels``.
-        direction: Direction of the delayed signal: along the line to the source, or
-            across.
+    The signal is that of one direction: along the line to the source, or across.
     """
 
     def __init__(
@@ -181,18 +177,8 @@ def delay_margin(
 ) -> DelayMargin:
     """Returns the smallest additional delay at which the loop becomes unstable.
 
-    Args:
-        point: Stable operating point.
-        at: Place of the delay: ``sensor`` or ``wheels``.
-        direction: Direction of the delayed signal: along the line to the source, or
-            across.
-
-    Returns:
-        Delay margin and frequency of the oscillation. If no delay makes the loop
-        unstable, the margin is infinite.
-
-    Raises:
-        InputError: The loop is unstable without any additional delay.
+    The margin is infinite if no delay makes the loop unstable. Raises InputError if the
+    loop is unstable without any additional delay.
     """
     loop = DelayedLoop(point, at, direction)
     if loop.spectral_radius(0.0) >= 1.0:

@@ -47,14 +47,6 @@ def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangO
     """Returns the closed-loop frequency responses S, T, PS and CS in one direction.
 
     The disturbances are errors of hearing, and accelerations of the virtual mass.
-
-    Args:
-        point: Operating point.
-        direction: Direction of disturbances and responses: along the line to the
-            source, or across.
-
-    Returns:
-        The responses, up to the Nyquist frequency.
     """
     cut = cut_model(point, "sensor", "actuator")
     whole = closed(cut, cut.input_names)

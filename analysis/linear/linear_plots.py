@@ -201,15 +201,9 @@ def plot_nyquist(loops: Sequence[LoopMargins]) -> Figure:
 def panels(
     count: int, *, columns: int, size: tuple[float, float]
 ) -> tuple[Figure, list[Axes]]:
-    """Creates a figure with rows of panels. Unused places of the last row stay empty.
+    """Creates a figure with rows of panels, each ``size`` inches wide and high.
 
-    Args:
-        count: Number of panels.
-        columns: Largest number of panels in a row.
-        size: Width and height of a panel, inches.
-
-    Returns:
-        The figure, and its panels row by row.
+    Unused places of the last row stay empty.
     """
     columns = min(columns, count)
     rows = math.ceil(count / columns)
@@ -350,16 +344,7 @@ def plot_pole_cloud(cloud: PoleCloud) -> Figure:
 
 
 def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
-    """Plots the change of the slowest pole over each parameter's interval.
-
-    The change is computed to first order.
-
-    Args:
-        rows: Sensitivities, one per parameter.
-
-    Returns:
-        The figure.
-    """
+    """Plots the first-order change of the slowest pole over each interval."""
     figure = Figure(figsize=(8.0, 0.4 * len(rows) + 1.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     ordered = sorted(rows, key=lambda row: abs(row.per_interval))

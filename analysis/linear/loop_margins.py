@@ -194,12 +194,6 @@ def frequency_response(model: LinearModel) -> FrequencyResponse:
     """Returns the frequency response of a loop for figures.
 
     The frequencies include all modes of the open and of the closed loop.
-
-    Args:
-        model: Loop with one input and one output.
-
-    Returns:
-        The response.
     """
     omega = _grid(model, GRID_POINTS)
     return FrequencyResponse(omega, model.response(omega)[0, 0])
@@ -218,16 +212,9 @@ def is_loop(model: LinearModel) -> bool:
 
 
 def loop_margins(model: LinearModel) -> LoopMargins:
-    """Computes all margins of a loop with one input and one output.
+    """Computes all margins of a loop L for negative feedback.
 
-    Args:
-        model: Loop transfer function L for negative feedback.
-
-    Returns:
-        The margins.
-
-    Raises:
-        InputError: The model has several inputs or outputs.
+    Raises InputError if the model has several inputs or outputs.
     """
     if model.B.shape[1] != 1 or model.C.shape[0] != 1:
         raise InputError(
@@ -374,12 +361,6 @@ def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:
     Each cut gives two loops: along the line to the source, and across this line. Loops
     that do not exist are left out. For example, without repulsion no force acts across
     the line at the follow distance.
-
-    Args:
-        point: Operating point.
-
-    Returns:
-        Margins of all existing loops.
     """
     found = []
     for at in BREAK_POINTS:

@@ -25,14 +25,7 @@ _TEMPERATURES_C = (5.0, 35.0)
 
 
 def following_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
-    """Returns the uncertain parameters of the loop that follows the source.
-
-    Args:
-        scenario: Scenario with the nominal values.
-
-    Returns:
-        Parameters with their intervals.
-    """
+    """Returns the uncertain parameters of the loop that follows the source."""
     common = (p for p in _common(scenario) if p.name != "extra_ticks")
     return (*common, _sound_speed(scenario))
 
@@ -40,14 +33,7 @@ def following_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
 def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     """Returns the uncertain parameters of the loop that rests against an obstacle.
 
-    Args:
-        scenario: Scenario with the nominal values.
-
-    Returns:
-        Parameters with their intervals.
-
-    Raises:
-        InputError: The repulsion does not grow as the obstacle comes nearer.
+    Raises InputError if the repulsion does not grow as the obstacle comes nearer.
     """
     stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:
@@ -122,7 +108,7 @@ def _sound_speed(scenario: Scenario) -> UncertainParameter:
 
 
 def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
-    """Returns the scenario with uncertain parameters at given values.
+    """Returns a validated copy with uncertain parameters at given values, in SI units.
 
     The name of a parameter determines its effect:
 
@@ -132,13 +118,6 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
     - ``sound_speed_m_s`` changes the slope of the estimated range, and so the stiffness
       of the attraction's spring.
     - All other names are ignored here.
-
-    Args:
-        scenario: Scenario with the nominal values. It is not changed.
-        values: Values by name of the parameter, in SI units.
-
-    Returns:
-        A validated copy.
     """
     data = scenario.model_dump()
     for name, value in values.items():
@@ -165,14 +144,8 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
 
         l^2/(2 k (h - R)) - k (h - R)/2.
 
-    The slope of this range is ((h + R)/k + k (h - R))/(2 h).
-
-    Args:
-        scenario: Scenario with the believed speed of sound.
-        true_speed: True speed of sound, m/s.
-
-    Returns:
-        The slope, without unit. It is 1 if the believed speed is the true speed.
+    The slope of this range is ((h + R)/k + k (h - R))/(2 h). It is 1 if the believed
+    speed is ``true_speed``, m/s.
     """
     k = scenario.believed_sound_speed_m_s / true_speed
     half = max(abs(y) for _, y in scenario.only.robot.microphones_m)
@@ -186,12 +159,6 @@ def contact_poles(scenario: Scenario) -> PoleFunction:
 
     The motion is straight towards the obstacle (contact mode), at the distance where
     the repulsion is stiffest.
-
-    Args:
-        scenario: Scenario with the nominal values.
-
-    Returns:
-        Function from parameter values to poles.
     """
 
     def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:
@@ -212,12 +179,6 @@ def following_poles(at: OperatingPoint) -> PoleFunction:
     latency of hearing is not a parameter here. Odometry assigns each measurement to the
     pose at which the sound was heard. A latency therefore delays the source's motion,
     but not the motion of the loop.
-
-    Args:
-        at: Equilibrium at the nominal values.
-
-    Returns:
-        Function from parameter values to poles.
     """
 
     def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:

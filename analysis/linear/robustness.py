@@ -118,16 +118,9 @@ class PoleSensitivity:
 
 
 def slowest_pole(poles: NDArray[np.complex128], period: float) -> complex:
-    """Returns the pole with the largest |z|.
+    """Returns the pole z with the largest |z| in the s plane, 1/s.
 
     Of a conjugate pair, the pole in the upper half plane is returned.
-
-    Args:
-        poles: (n,) poles in the z plane.
-        period: Sampling period, s.
-
-    Returns:
-        The pole in the s plane, 1/s.
     """
     pole = complex(s_plane(poles[[np.argmax(np.abs(poles))]], period)[0])
     return pole if pole.imag >= 0.0 else pole.conjugate()
@@ -147,17 +140,7 @@ def pole_cloud(
     the nominal values. It moves one parameter after the other to the other end of its
     interval, as long as this slows the decay. It finds the worst corner if each
     parameter acts in one direction only. The worst case is the worse of this corner and
-    the worst sample.
-
-    Args:
-        poles: Loop, as function from parameter values to poles.
-        parameters: Uncertain parameters.
-        period: Sampling period, s.
-        samples: Number of random samples.
-        seed: Seed of the random numbers.
-
-    Returns:
-        Poles in the z plane: nominal, of every sample, and of the worst case.
+    the worst sample. ``period`` is in s.
     """
     from scipy.stats import qmc
 
@@ -217,15 +200,7 @@ def pole_sensitivities(
     The differences are central, with two exceptions. If the nominal value is an end of
     the interval, the parameter varies towards the inside only. A whole number varies
     over its whole interval. After the variation, the pole nearest to the nominal pole
-    counts as the same pole. This is valid for simple poles.
-
-    Args:
-        poles: Loop, as function from parameter values to poles.
-        parameters: Uncertain parameters.
-        period: Sampling period, s.
-
-    Returns:
-        One sensitivity per parameter, in the order of ``parameters``.
+    counts as the same pole. This is valid for simple poles. ``period`` is in s.
     """
     nominal = {p.name: p.nominal for p in parameters}
     pole = slowest_pole(poles(nominal), period)

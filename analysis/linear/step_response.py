@@ -73,18 +73,10 @@ def check_step(
 ) -> StepCheck:
     """Simulates a start near the equilibrium and compares it with the linear model.
 
-    Args:
-        scenario: Any scenario. Its bodies rest where they are at 0 s.
-        step_m: Distance of the start from the equilibrium towards the source, m.
-        duration_s: Simulated time, s.
-        full: Whether to simulate the scenario's own sensors too.
-
-    Returns:
-        Frequencies and damping ratios, predicted and fitted, with the motions.
-
-    Raises:
-        InputError: There is no stable equilibrium, or its linear model does not
-            oscillate.
+    The start is ``step_m`` from the equilibrium towards the source. Bodies rest where
+    they are at 0 s. ``full`` also simulates the scenario's own sensors. Raises
+    InputError if there is no stable equilibrium, or its linear model does not
+    oscillate.
     """
     point = follow_equilibrium(scenario)
     modes = [mode for mode in point.modes if mode.eigenvalue.imag > 1e-6]
@@ -166,15 +158,8 @@ def fitted_step(
 
     The fit also has a bias and a second harmonic that decay with the oscillation. The
     repulsion depends on the norm of a velocity. This norm causes a bias and a second
-    harmonic, but no damping.
-
-    Args:
-        time_s: (n,) times, s. The first two seconds are left out.
-        distance_m: (n,) distances, m.
-        guess_rad_s: Initial guess of the frequency, rad/s.
-
-    Returns:
-        Natural frequency and damping ratio.
+    harmonic, but no damping. The first two seconds are left out. ``guess_rad_s`` is an
+    initial guess of the frequency.
     """
     later = time_s >= 2.0
     t, x = time_s[later] - 2.0, distance_m[later]

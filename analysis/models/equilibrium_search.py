@@ -142,11 +142,7 @@ class Leftover:
 
 
 class CellSearch:
-    """Bounds the force in each cell and excludes cells without equilibria.
-
-    Args:
-        field: Force on the control point P of the robot at rest.
-    """
+    """Bounds the force in each cell and excludes cells without equilibria."""
 
     def __init__(self, field: ForceField) -> None:
         scenario = field.loop.scenario
@@ -166,17 +162,9 @@ class CellSearch:
     ) -> tuple[NDArray[np.float64], int, float]:
         """Returns the cells of an area that may contain an equilibrium.
 
-        Args:
-            area: Area to search.
-            smallest_m: Cells whose edge is not longer than this are not divided any
-                more, m.
-
-        Returns:
-            Three values:
-
-            - (n, 2) centers of these cells, m
-            - number of cells of all sizes that were examined
-            - edge of these cells, m
+        Cells whose edge is not longer than ``smallest_m`` are not divided any more. The
+        three values are the (n, 2) centers of these cells, m, the number of cells of
+        all sizes that were examined, and the edge of these cells, m.
         """
         edge = _FIRST_CELL_M
         x = np.arange(area[0] + edge / 2, area[1] + edge / 2, edge)
@@ -194,15 +182,8 @@ class CellSearch:
     ) -> tuple[NDArray[np.float64], float]:
         """Divides cells into quarters, and returns those with a possible equilibrium.
 
-        Args:
-            cells: (n, 2) centers of the cells, m.
-            edge: Edge of the cells, m.
-
-        Returns:
-            Two values:
-
-            - (k, 2) centers of these quarters, m
-            - edge of the quarters, m
+        ``cells`` are (n, 2) centers, m. The result has the (k, 2) centers and the edge
+        of these quarters, m.
         """
         edge /= 2.0
         corners = edge / 2.0 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
@@ -358,15 +339,7 @@ class CellSearch:
         return np.asarray(largest[index])
 
     def groups(self, cells: NDArray[np.float64], edge: float) -> list[Leftover]:
-        """Divides cells into groups of neighbors.
-
-        Args:
-            cells: (n, 2) centers of the cells, m.
-            edge: Edge of the cells, m.
-
-        Returns:
-            The groups. Each cell belongs to one group.
-        """
+        """Divides cells, given by (n, 2) centers, m, into groups of neighbors."""
         if not len(cells):
             return []
         index = np.rint((cells - cells.min(axis=0)) / edge).astype(int)
@@ -401,15 +374,10 @@ class CellSearch:
         )
 
     def switching_points(self, group: Leftover, edge: float) -> list[SwitchingPoint]:
-        """Finds places of rest where two or three bodies are equally near.
+        """Finds places of rest near a group where two or three bodies are equally near.
 
-        Args:
-            group: Cells in which the search begins.
-            edge: Edge of the cells, m.
-
-        Returns:
-            All such points in or next to the group. With ``aggregation: sum`` the list
-            is empty, because the force then switches between sums.
+        With ``aggregation: sum`` the list is empty, because the force then switches
+        between sums.
         """
         starts = group.centres[group.switches]
         if not len(starts) or self._slots > 1:

@@ -176,15 +176,7 @@ class LinearModel:
         return np.moveaxis(np.concatenate(rows), 0, -1) + self.D[:, :, None]
 
     def part(self, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
-        """Returns the model with only some of its inputs and outputs.
-
-        Args:
-            inputs: Names of the inputs to keep, in their new order.
-            outputs: Names of the outputs to keep, in their new order.
-
-        Returns:
-            A model with the same states.
-        """
+        """Returns the model with only the named inputs and outputs, in this order."""
         columns = [self.input_names.index(name) for name in inputs]
         rows = [self.output_names.index(name) for name in outputs]
         return replace(
@@ -200,15 +192,9 @@ class LinearModel:
 def s_plane(
     poles: NDArray[np.complex128], period_s: float | None
 ) -> NDArray[np.complex128]:
-    """Returns poles in the s plane, ln(z)/T, without pure delays (z = 0).
+    """Returns poles in the s plane, ln(z)/T, rad/s, without pure delays (z = 0).
 
-    Args:
-        poles: (n,) poles: in the z plane if ``period_s`` is set, otherwise in the s
-            plane, rad/s.
-        period_s: Sample period T, s. In continuous time: None.
-
-    Returns:
-        (k,) poles in the s plane, rad/s, in the order of ``poles``.
+    In continuous time, where the period is None, the poles stay the same.
     """
     poles = np.asarray(poles, dtype=np.complex128)
     if not period_s:
@@ -228,16 +214,10 @@ def damping_ratio(s: Any) -> Any:
 
 
 def simple_poles(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Returns the poles that are neither near zero nor within 1e-4 of another pole.
+    """Returns the poles z that are neither near zero nor within 1e-4 of another pole.
 
     A multiple pole moves by a root of a perturbation of the matrix. Two computations
     whose matrices agree up to rounding can therefore differ in their multiple poles.
-
-    Args:
-        poles: (n,) poles in the z plane.
-
-    Returns:
-        (k,) simple poles with magnitude above 1e-3, in the order of ``poles``.
     """
     distances = np.abs(poles[:, None] - poles[None, :])
     np.fill_diagonal(distances, np.inf)

@@ -19,13 +19,8 @@ def minimal_model(model: LinearModel) -> LinearModel:
     The frequency response stays the same. The closed loop has many states outside this
     part: the error of odometry, the angles of the wheels, and the covariances of the
     tracker. Their poles are at z = 1 or z = 0. With these states, transfer polynomials
-    of the model would be useless.
-
-    Args:
-        model: Any model.
-
-    Returns:
-        A model whose states are orthonormal combinations of the states of ``model``.
+    of the model would be useless. The remaining states are orthonormal combinations of
+    those of ``model``.
     """
     moved = _on(model, _span(model.A, model.B))
     return _on(moved, _span(moved.A.T, moved.C.T))
