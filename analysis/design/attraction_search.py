@@ -77,7 +77,11 @@ _APPROACH_M, _STAND_OFF_M = 8.0, 3.0
 
 @dataclass(frozen=True)
 class GainFigures:
-    """Performance figures of one pair of gains K_r and D_r."""
+    """Performance figures of one pair of gains K_r and D_r.
+
+    Each margin, and the sensitivity peak M_s, is the worse of those at the sensor and
+    at the actuator.
+    """
 
     stiffness_n_m: float
     """K_r, N/m."""
@@ -85,16 +89,11 @@ class GainFigures:
     """D_r, N s/m."""
     damping_ratio: float
     phase_margin_deg: float
-    """Phase margin at the sensor or at the actuator, whichever is smaller, deg."""
     gain_margin_db: float
-    """Gain margin at the sensor or at the actuator, whichever is smaller, dB."""
     sensitivity_peak: float
-    """Sensitivity peak M_s at the sensor or at the actuator, whichever is larger."""
     disk_margin: float
-    """Disk margin at the sensor or at the actuator, whichever is smaller."""
     delay_margin_s: float
-    """Delay margin at the sensor or at the actuator, whichever is smaller, s: phase
-    margin divided by crossover frequency."""
+    """Phase margin divided by crossover frequency, s."""
     contact_radius: float
     """Spectral radius of the motion in front of an obstacle; stable below 1."""
     following_lag_m: float
@@ -117,12 +116,13 @@ class GainChoice:
 
 @dataclass(frozen=True)
 class WholeLoop:
-    """Least margins at rest of the loop that includes the law, over all cuts."""
+    """Least margins at rest of the loop that includes the law, over all cuts.
+
+    Gain may rise or fall, and phase may lag or lead.
+    """
 
     gain_margin_db: float
-    """Least gain margin for an increase or a decrease, dB."""
     phase_margin_deg: float
-    """Least phase margin for a lag or a lead, deg."""
     disk_margin: float
     weakest: str
     """Name of the cut loop with the least disk margin."""
@@ -148,11 +148,9 @@ class RecommendedGains:
     """Scenario with the recommended K_r, D_r, follow distance, and gains of its law.
     None if no gains meet the requirements."""
     recommended: GainFigures | None
-    """Figures of the recommended K_r and D_r."""
     law: LawDesign | None
     """Gains of the law. None if the design chooses no gains of this law."""
     whole_loop: WholeLoop | None
-    """Margins of the loop with the recommended gains and the law."""
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the figures and the recommended gains for the JSON document."""

@@ -42,16 +42,13 @@ class Alternative:
     """An attraction with its performance figures and with the gains of the laws."""
 
     scenario: Scenario
-    """Scenario with this attraction and these gains."""
     figures: GainFigures
-    """Margins and other figures of K_r and D_r."""
     overshoot_m: float
     """Overshoot past the follow point after an approach at top speed, m."""
     follow_distance_m: float
     """Least follow distance that leaves room for the overshoot, m."""
     metres_to_go: float
-    """Distance from an obstacle to the point behind it where the robot would rest,
-    m."""
+    """Distance from an obstacle to the point of rest behind it, m."""
     allowed_stiffness_n_m: float
     """Largest stiffness of a push that is stable in contact with late echoes, N/m."""
     laws: tuple[LawDesign, ...]

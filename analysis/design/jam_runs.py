@@ -25,7 +25,7 @@ class JamRuns:
 
     law: str
     causes: dict[str, int]
-    """Number of runs by outcome."""
+    """Number of runs by outcome, ``RunResult.cause``."""
     jams: int
     """Number of runs that got stuck or timed out and never reached the goal."""
 

@@ -50,7 +50,6 @@ class Check:
     bound: float
     unit: str
     at_least: bool = False
-    """Whether the bound is a lower bound."""
 
     @property
     def ratio(self) -> float:
@@ -80,21 +79,18 @@ class Check:
 class Requirements:
     """Requirements on the attraction and on the gains of the laws.
 
-    The criteria of the stability report have the same thresholds.
+    The criteria of the stability report have the same thresholds. The first six are
+    bounds of the loop to the follow point.
     """
 
     damping_ratio: float = 0.4
-    """Least damping ratio of the loop to the follow point."""
     phase_margin_deg: float = 45.0
-    """Least phase margin of this loop, deg."""
     gain_margin_db: float = 6.0
-    """Least gain margin of this loop, up or down, dB."""
+    """Least gain margin, up or down, dB."""
     sensitivity_peak: float = 2.0
-    """Largest sensitivity peak M_s of this loop."""
+    """Largest sensitivity peak M_s."""
     disk_margin: float = 2.0 / 3.0
-    """Least disk margin of this loop."""
     delay_margin_s: float = 0.1
-    """Least delay margin of this loop, s."""
     rest_offset_m: float = 0.1
     """Largest offset of a robot at rest due to the push away from the leader, m. The
     leader is the robot that carries the source."""

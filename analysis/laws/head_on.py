@@ -35,9 +35,7 @@ class HeadOn:
     """
 
     scenario: Scenario
-    """Scenario with the gains and the mass."""
     law: RadialLaw
-    """Law of the scenario."""
     to_go_m: float
     """Distance L from the face to the follow point, m."""
     equilibria_m: tuple[float, ...]

@@ -29,18 +29,16 @@ class LawCurves:
     """Force of one law away from an obstacle straight ahead."""
 
     law: str
-    """Name of the law in scenarios."""
     velocity_term: str
-    """Velocity term of the scenario: ``printed`` or ``closing``."""
+    """``printed`` or ``closing``."""
     distance_m: NDArray[np.float64]
     """(n,) distances of the obstacle, m."""
     push_n: NDArray[np.float64]
     """(n,) force at ``distance_m`` for an obstacle at rest, N."""
     at_distance_m: float
-    """Distance for the curve over speed, m."""
+    """Distance of the obstacle for ``force_n``, m."""
     speed_m_s: NDArray[np.float64]
-    """(k,) speeds of approach, m/s. A negative speed means that the obstacle
-    recedes."""
+    """(k,) speeds of approach, m/s; negative if the obstacle recedes."""
     force_n: NDArray[np.float64]
     """(k,) force at ``speed_m_s``, N."""
 

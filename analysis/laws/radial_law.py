@@ -38,7 +38,6 @@ class RadialLaw:
     """
 
     name: str
-    """Name of the law in the scenario."""
     function: Callable[[Any, Any], Any]
     """The function f(c, s) of the controller, N, for floats and for AutoDiffXd."""
     range_m: float

@@ -57,7 +57,6 @@ class BurstCycle:
     matrices: NDArray[np.float64] = field(repr=False)
     """(ticks, n, n) matrices of the whole state over each control period of a cycle."""
     loop: IdealLoop = field(repr=False)
-    """Control loop with exact sensors and bursts of sound."""
     state: NDArray[np.float64] = field(repr=False)
     """(n,) state at the beginning of a cycle."""
     point: OperatingPoint = field(repr=False)
@@ -85,7 +84,6 @@ class BurstRun:
     """Simulated motion over many cycles after a small initial velocity."""
 
     hold: Hold
-    """How the tracker holds the target during the silence."""
     factor: float
     """Fitted growth factor per cycle, to compare with the largest |multiplier|."""
     time_s: NDArray[np.float64] = field(repr=False)

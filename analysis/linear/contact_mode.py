@@ -228,7 +228,6 @@ class ContactLimits:
     active_slope_today_n_m: float
     """Largest slope -df/dc of the active law with the scenario's gains, N/m."""
     tick_s: float
-    """Control period of the scenario, s."""
 
 
 def contact_limits(

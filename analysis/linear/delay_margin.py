@@ -42,9 +42,7 @@ class DelayMargin:
     """Delay at which a loop begins to oscillate."""
 
     at: DelayPlace
-    """Place of the delay."""
     direction: Direction
-    """Direction of the delayed signal and of the oscillation."""
     delay_s: float
     """Delay in addition to that of the diagram, s. Infinity: no delay destabilizes."""
     frequency_rad_s: float

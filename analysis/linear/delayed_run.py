@@ -26,15 +26,12 @@ class DelayedRun:
     """Simulated motion about an operating point after a small initial velocity."""
 
     delay_s: float
-    """Additional delay, s."""
     duration_s: float
-    """Simulated time, s."""
     growth_per_s: float
     """Fitted growth rate of the envelope, 1/s; negative if the motion decays."""
     frequency_rad_s: float
-    """Fitted frequency, rad/s."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,) times, s."""
+    """(n,)"""
     offset_m: NDArray[np.float64] = field(repr=False)
     """(n,) deviation of P from the operating point in the direction of the kick, m."""
 
@@ -44,7 +41,6 @@ class DelayCheck:
     """Computed delay margin with two simulated runs, below and above the margin."""
 
     margin: DelayMargin
-    """Computed delay margin."""
     below: DelayedRun
     """Run with 0.95 of the delay margin. Its motion should decay."""
     above: DelayedRun

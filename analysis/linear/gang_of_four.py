@@ -22,7 +22,6 @@ class GangOfFour:
     """Closed-loop frequency responses in one direction."""
 
     direction: Direction
-    """Along the line to the source, or across it."""
     omega: NDArray[np.float64]
     """(n,) frequencies with all modes and peaks, up to the Nyquist frequency, rad/s."""
     S: NDArray[np.complex128]

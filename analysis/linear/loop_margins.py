@@ -47,9 +47,9 @@ class FrequencyResponse:
     """Frequency response of a loop."""
 
     omega: NDArray[np.float64]
-    """(n,) frequencies, rad/s."""
+    """(n,) rad/s."""
     L: NDArray[np.complex128]
-    """(n,) values of the loop transfer function."""
+    """(n,)"""
 
 
 @dataclass(frozen=True)
@@ -123,9 +123,7 @@ class LoopMargins:
     """
 
     name: str
-    """Name of the loop."""
     stable: bool
-    """Whether the closed loop is stable."""
     gain_increase_margin: float
     """Gain factor above 1 at which the loop becomes unstable; infinite if none does."""
     gain_reduction_margin: float
@@ -143,7 +141,6 @@ class LoopMargins:
     modulus_margin: float
     """Smallest distance of L from -1."""
     modulus_frequency_rad_s: float
-    """Frequency of the modulus margin, rad/s."""
     sensitivity_peak: float
     """Largest |S| (M_s)."""
     complementary_peak: float
@@ -348,11 +345,9 @@ class PointMargins:
     """Margins of one cut loop at an operating point."""
 
     at: BreakPoint
-    """Signal at which the loop is cut."""
     direction: Direction
-    """Direction of the cut: along the line to the source, or across."""
     margins: LoopMargins
-    """Margins of this loop. The loop of the other direction is closed."""
+    """The loop of the other direction is closed."""
 
 
 def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:

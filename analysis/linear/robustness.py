@@ -34,13 +34,11 @@ class UncertainParameter:
     unit: str
     nominal: float
     low: float
-    """Smallest value; not above the nominal value."""
     high: float
-    """Largest value; not below the nominal value."""
     reason: str
     """Reason for the width of the interval."""
     whole: bool = False
-    """Whether the parameter is a whole number."""
+    """Whether only whole numbers are possible."""
 
     def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high or self.low == self.high:
@@ -56,7 +54,6 @@ class PoleCloud:
     """Poles over all combinations of uncertain parameters."""
 
     period_s: float
-    """Sampling period, s."""
     parameters: tuple[UncertainParameter, ...]
     nominal_poles: NDArray[np.complex128]
     """Poles at the nominal values, in the z plane."""

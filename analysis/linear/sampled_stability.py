@@ -50,7 +50,6 @@ class ConditionCheck:
     condition: str
     """Necessary and sufficient condition on stiffness K, damping D and period T."""
     pairs: int
-    """Number of random pairs (K, D)."""
     stable: int
     """Number of pairs that are stable by their eigenvalues."""
     mismatches: int
@@ -160,15 +159,14 @@ class StabilityChart:
     """Growth rate of the slowest mode over two parameters."""
 
     title: str
-    """Title of the chart."""
     x_name: str
-    """Name and unit of the horizontal parameter."""
+    """Name and unit."""
     y_name: str
-    """Name and unit of the vertical parameter."""
+    """Name and unit."""
     x: NDArray[np.float64]
-    """(nx,) values of the horizontal parameter."""
+    """(nx,)"""
     y: NDArray[np.float64]
-    """(ny,) values of the vertical parameter."""
+    """(ny,)"""
     growth_per_s: NDArray[np.float64]
     """(ny, nx) growth rates, 1/s; negative where all modes decay."""
     today: tuple[float, float]

@@ -24,9 +24,7 @@ class Oscillation:
     """Damped oscillation."""
 
     frequency_rad_s: float
-    """Natural frequency, rad/s."""
     damping_ratio: float
-    """Damping ratio."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +35,14 @@ class StepCheck:
     """
 
     predicted: Oscillation
-    """Oscillation of the sampled linear model."""
+    """By the sampled linear model."""
     ideal: Oscillation
-    """Oscillation fitted to the simulation with exact sensors."""
+    """Fitted to the simulation with exact sensors."""
     full: Oscillation | None
-    """Oscillation fitted to the simulation with the scenario's sensors, or None."""
+    """Fitted to the simulation with the scenario's sensors."""
     step_m: float
-    """Size of the step, m."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,) times, s."""
+    """(n,)"""
     predicted_m: NDArray[np.float64] = field(repr=False)
     """(n,) distance of P from the source, by the linear model, m."""
     ideal_m: NDArray[np.float64] = field(repr=False)

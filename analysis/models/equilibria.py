@@ -70,7 +70,7 @@ class EquilibriumSearch:
     cell_m: float
     """Edge of the smallest cells of the first round, m."""
     cells: int
-    """Number of cells of all sizes that were examined."""
+    """Number of cells of all sizes."""
     unresolved: tuple[tuple[float, float], ...]
     """One point, m, of each group of cells that the search could neither exclude nor
     explain by a listed place of rest."""

@@ -62,25 +62,17 @@ class LinearModel:
 
     Continuous time: x' = A x + B u, y = C x + D u. Sampled time, if ``period_s`` is
     set: x+ = A x + B u, y = C x + D u. All quantities are deviations from the operating
-    point, in SI units.
+    point, in SI units. The n states, m inputs and p outputs have names.
     """
 
     name: str
-    """Name for reports and files."""
     A: NDArray[np.float64]
-    """(n, n)"""
     B: NDArray[np.float64]
-    """(n, m)"""
     C: NDArray[np.float64]
-    """(p, n)"""
     D: NDArray[np.float64]
-    """(p, m)"""
     state_names: tuple[str, ...]
-    """n names."""
     input_names: tuple[str, ...]
-    """m names."""
     output_names: tuple[str, ...]
-    """p names."""
     period_s: float | None = None
     """Sample period, s. In continuous time: None."""
 

@@ -113,7 +113,6 @@ class RouteComparison:
     simple_poles: NDArray[np.complex128]
     """Compared poles in the z plane."""
     states: int
-    """Number of states."""
 
 
 def compare_routes(point: OperatingPoint) -> RouteComparison:

@@ -41,7 +41,6 @@ class OperatingPoint:
     """Equilibrium of the closed loop, at rest or at the source's constant velocity."""
 
     loop: IdealLoop = field(repr=False)
-    """Control loop with exact sensors."""
     p_WP: NDArray[np.float64]
     """(2,) position of the control point P in W at ``time_s``, m."""
     theta_WB: float

@@ -30,8 +30,6 @@ _TERMS = {"none": 0, "printed": 1, "closing": 2}
 #: Runge-Kutta step of ``PointMass.run``, s. In this time the stiffest contact mode
 #: that the margins allow advances by a twentieth of a radian.
 STEP_S = 0.02
-#: A robot slower than this at the end of a run counts as at rest, m/s.
-REST_M_S = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +64,13 @@ class PointMass:
     p_WP: NDArray[np.float64]
     """(2,) control point P at the start in W, m."""
     stiffness_n_m: float
-    """Stiffness K_r of the attraction."""
+    """K_r."""
     damping_n_s_m: float
-    """Damping D_r."""
+    """D_r."""
     follow_distance_m: float
-    """Follow distance d_f."""
+    """d_f."""
     mass_kg: float
-    """Virtual mass M."""
     top_speed_m_s: float
-    """Largest speed |v| of P."""
     all_bodies: bool
     """Whether all bodies push P. If false, only the nearest one pushes."""
 
