@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.design.design_study import DesignStudy
-from analysis.laws.law_curves_plots import LAW_STYLES
+from analysis.laws.law_curves import LAW_STYLES
 from analysis.laws.push_and_pull import DESIGNED_LAWS, spring
 from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import largest_contact_stiffness
@@ -63,10 +63,8 @@ def _plot_balance(axes: Axes, study: DesignStudy) -> None:
 
 def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
     scenario = study.today.scenario
-    attraction, spare = (
-        scenario.follower.attraction,
-        study.gains.requirements.spare_latency_ticks,
-    )
+    attraction = scenario.follower.attraction
+    spare = study.gains.requirements.spare_latency_ticks
     lines = dict.fromkeys((0, spare), "-") | {spare: "--"}
     for ticks, line in lines.items():
         limits = [

@@ -110,8 +110,7 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
     - ``law_curves.png`` shows the forces of the laws.
     """
     from analysis.design.design_plots import plot_design
-    from analysis.laws.law_curves import law_curves
-    from analysis.laws.law_curves_plots import plot_law_curves
+    from analysis.laws.law_curves import law_curves, plot_law_curves
     from analysis.laws.push_and_pull import DESIGNED_LAWS
 
     write_json(summary, directory / "summary.json")

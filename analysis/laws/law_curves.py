@@ -1,4 +1,4 @@
-"""Curves of the force of each law over distance and over speed.
+"""Curves of the force of each law over distance and over speed, and their figure.
 
 Han 2019 describes such curves in words (figure 6), and so does Kim 2017. The figures
 themselves are missing. The forces are those of the controllers of the simulation.
@@ -6,14 +6,18 @@ themselves are missing. The forces are those of the controllers of the simulatio
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analysis.laws.radial_law import radial_law
+from analysis.reporting.palette import SERIES_COLOURS
 from diagrams.scenario.scenario import Scenario
+from systems.laws.catalogue import LAWS
 
 #: Distances of the curves, m.
 DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
@@ -22,6 +26,11 @@ DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
 SPEEDS_M_S = np.linspace(-1.0, 1.0, 201)
 #: Distance for the curves over speed, m. This distance is half of rho_0.
 AT_DISTANCE_M = 0.4
+#: Color and title of each law of the package, by name.
+LAW_STYLES = {
+    law.name: (law.colour or colour, law.label)
+    for law, colour in zip(LAWS.values(), cycle(SERIES_COLOURS), strict=False)
+}
 
 
 @dataclass(frozen=True)
@@ -68,3 +77,32 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
             )
         )
     return curves
+
+
+def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
+    """Plots forces over the distance (left) and the speed of approach (right).
+
+    The obstacle of the left panel is at rest. Curves with the velocity term ``closing``
+    are dashed.
+    """
+    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+    by_distance, by_speed = figure.subplots(1, 2)
+    for curve in curves:
+        colour, title = LAW_STYLES.get(curve.law, (None, curve.law))
+        if curve.velocity_term == "printed":
+            by_distance.plot(curve.distance_m, curve.push_n, color=colour, label=title)
+            by_speed.plot(curve.speed_m_s, curve.force_n, color=colour, label=title)
+        else:
+            by_speed.plot(curve.speed_m_s, curve.force_n, "--", color=colour)
+    by_distance.set_xlabel("distance c (m)")
+    by_distance.set_ylabel("force away from the obstacle (N)")
+    by_distance.set_title("the obstacle at rest")
+    by_speed.set_xlabel("speed of approach (m/s); negative: receding")
+    by_speed.set_title(
+        f"at c = {curves[0].at_distance_m:g} m; dashed: s of the approach only"
+    )
+    for axes in (by_distance, by_speed):
+        axes.set_ylim(bottom=0.0)
+        axes.grid(visible=True, alpha=0.3)
+    by_distance.legend()
+    return figure

@@ -111,14 +111,11 @@ def rest_offset(law: str, scenario: Scenario) -> float:
     body of the leader as an obstacle. The follower is straight behind the leader.
     """
     force = radial_law(scenario.with_robot(law=law)).function
-    K_r, follow = (
-        scenario.follower.attraction.stiffness_n_m,
-        scenario.follower.attraction.follow_distance_m,
-    )
-    gap = follow - scenario.source.length_m / 2.0
+    attraction = scenario.follower.attraction
+    gap = attraction.follow_distance_m - scenario.source.length_m / 2.0
 
     def unbalanced(offset: float) -> float:
-        return K_r * offset - force(max(gap + offset, 1e-6), 0.0)
+        return attraction.stiffness_n_m * offset - force(max(gap + offset, 1e-6), 0.0)
 
     # If the body of the leader covers the follow point, P rests outside the body.
     nearest = max(0.0, -gap)
@@ -148,7 +145,5 @@ def injected_share(law: str, scenario: Scenario) -> float:
     within = 0.5 * scenario.follower.laws.conventional.reach_m
     speeds = scenario.only.robot.top_speed_m_s * _SPEEDS
     term = np.array([force(within, s) for s in speeds.tolist()]) - force(within, 0.0)
-    return (
-        float(np.max(np.abs(term) / speeds))
-        / scenario.follower.attraction.damping_n_s_m
-    )
+    damping = scenario.follower.attraction.damping_n_s_m
+    return float(np.max(np.abs(term) / speeds)) / damping

@@ -142,14 +142,12 @@ def radial_law(scenario: Scenario) -> RadialLaw:
     Raises InputError if the law does not exist or has no radial force.
     """
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
+    sensor = key.follower.ultrasonic
     return _radial_law(
         key.only.law,
         str(loaded_digests(key)),
         key.follower.laws.model_dump_json(),
-        (
-            key.follower.ultrasonic.minimum_range_m,
-            key.follower.ultrasonic.maximum_range_m,
-        ),
+        (sensor.minimum_range_m, sensor.maximum_range_m),
         key.only.robot.top_speed_m_s,
         _Scenario(key),
     )

@@ -18,8 +18,7 @@ from analysis.linear.delayed_run import kicked, offsets
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
 from analysis.models.ideal_scenarios import changed
-from analysis.models.linear_models import NEUTRAL
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import NEUTRAL, minimal_model
 from analysis.models.open_loops import DIRECTIONS, Direction
 from analysis.models.operating_points import OperatingPoint, motion_model
 from diagrams.scenario.scenario import Scenario

@@ -28,8 +28,7 @@ from scipy.optimize import brentq
 from analysis.laws.radial_law import radial_law
 from analysis.models.block_models import block_model
 from analysis.models.ideal_scenarios import require_rolling
-from analysis.models.linear_models import LinearModel
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import LinearModel, minimal_model
 from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant
 from systems.base.parameters import PlantParameters

@@ -19,9 +19,8 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from analysis.linear.loop_margins import is_loop, loop_margins
-from analysis.models.linear_models import NEUTRAL, LinearModel
+from analysis.models.linear_models import NEUTRAL, LinearModel, minimal_model
 from analysis.models.linearisation import plant_jacobians
-from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model, open_loop
 from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.linear.frequency_levels import frequency_grid, peak
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model
 from analysis.models.operating_points import OperatingPoint
 

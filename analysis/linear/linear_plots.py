@@ -88,23 +88,13 @@ def plot_step(check: StepCheck) -> Figure:
     """Plots the distance from the source after a step: predicted and simulated."""
     figure = Figure(figsize=(7.5, 3.8), layout="constrained")
     axes = figure.subplots()
-    if check.full_m is not None:
-        axes.plot(
-            check.time_s,
-            check.full_m,
-            color=COLOURS["echo"],
-            label="the scenario's sensors",
-        )
-    axes.plot(
-        check.time_s, check.ideal_m, color=COLOURS["robot"], label="exact sensors"
-    )
-    axes.plot(
-        check.time_s,
-        check.predicted_m,
-        "--",
-        color=COLOURS["source"],
-        label="linear model",
-    )
+    for distance, line, colour, label in (
+        (check.full_m, "-", "echo", "the scenario's sensors"),
+        (check.ideal_m, "-", "robot", "exact sensors"),
+        (check.predicted_m, "--", "source", "linear model"),
+    ):
+        if distance is not None:
+            axes.plot(check.time_s, distance, line, color=COLOURS[colour], label=label)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("distance of P from the source (m)")
     axes.set_title(

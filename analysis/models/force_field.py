@@ -83,10 +83,8 @@ class ForceField:
         """(n,) repulsion by one body at rest, N, at distances (n,), m."""
         block, context = self._controller(twin=False)
         self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
-        port, read = (
-            block.GetInputPort("collision_vectors_B"),
-            block.GetOutputPort("forces_W"),
-        )
+        port = block.GetInputPort("collision_vectors_B")
+        read = block.GetOutputPort("forces_W")
         forces = np.zeros(len(distances))
         for k, c in enumerate(distances):
             if c <= self.reach_m:

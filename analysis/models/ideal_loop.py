@@ -26,9 +26,7 @@ from analysis.models.diagram_state import (
     run_periods,
     set_state,
 )
-from analysis.models.ideal_scenarios import (
-    require_ideal,
-)
+from analysis.models.ideal_scenarios import require_ideal
 from diagrams import build_sound_follower
 from diagrams.building.robot import parts_of
 from diagrams.running.simulation import simulator_config

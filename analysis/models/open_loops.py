@@ -18,8 +18,7 @@ from analysis.models.diagram_state import Port
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import changed, ideal_scenario
-from analysis.models.linear_models import LinearModel
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import LinearModel, minimal_model
 from analysis.models.operating_points import OperatingPoint
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError

@@ -19,8 +19,13 @@ from scipy.optimize import root_scalar
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
 from analysis.models.ideal_scenarios import changed, ideal_scenario
-from analysis.models.linear_models import NEUTRAL, LinearModel, Mode, s_plane
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import (
+    NEUTRAL,
+    LinearModel,
+    Mode,
+    minimal_model,
+    s_plane,
+)
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, nearest_point_on_rectangle

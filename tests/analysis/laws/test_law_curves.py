@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.laws.law_curves import law_curves
-from analysis.laws.law_curves_plots import plot_law_curves
+from analysis.laws.law_curves import law_curves, plot_law_curves
 from analysis.reporting.plain_values import plain
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
