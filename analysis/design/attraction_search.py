@@ -187,10 +187,7 @@ class RecommendedGains:
 
     @property
     def command(self) -> str:
-        """Command line that simulates the scenario with the recommended gains.
-
-        The command is empty if no gains are recommended.
-        """
+        """Command line that simulates the recommended gains; empty without any."""
         if self.chosen is None:
             return ""
         name = self.scenario.name
@@ -313,8 +310,7 @@ def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scen
     """Chooses the follow distance, and the gains of the scenario's law with it.
 
     The follow distance is at least the current one, leaves room for the overshoot, and
-    is so long that the law shifts P at rest little enough. Raises InputError if no
-    gains meet a requirement that must be met.
+    is so long that the law shifts P at rest little enough.
     """
     law = scenario.only.law
     least = follow_distance(scenario, requirements, braking_overshoot(scenario))
@@ -338,11 +334,7 @@ def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scen
 def fitting_gains(
     scenario: Scenario, requirements: Requirements, *laws: str
 ) -> LawGains:
-    """Returns the gains of a scenario, with new gains of laws that need them.
-
-    The gains of a law that meets all requirements stay. Raises InputError if no gain
-    meets a requirement that must be met.
-    """
+    """Returns the gains of a scenario, new for laws that miss a requirement."""
     unfit = [x for x in laws if not check_law(scenario, x, requirements).acceptable]
     return search_gains(scenario, requirements, laws=unfit)
 
@@ -361,10 +353,7 @@ def _whole_loop(chosen: Scenario) -> WholeLoop:
 def least_damping(
     scenario: Scenario, K_r: float, requirements: Requirements
 ) -> GainChoice:
-    """Finds the least D_r that meets the requirements with one K_r above 0, N/m.
-
-    The search ends at three times critical damping.
-    """
+    """Finds the least D_r, up to three times critical, that meets the requirements."""
     critical = 2.0 * math.sqrt(K_r * scenario.only.robot.mass_kg)
 
     def meets(D_r: float) -> bool:
@@ -382,10 +371,7 @@ def least_damping(
 
 
 def _bisected(meets: Callable[[float], bool], low: float, high: float) -> float:
-    """Returns the least value that meets the requirements, by bisection.
-
-    The value is rounded up to two decimals, unless the rounded value fails.
-    """
+    """Least value that meets the requirements, if possible rounded up to 2 decimals."""
     while high - low > 1e-3 * high:
         middle = (low + high) / 2.0
         low, high = (low, middle) if meets(middle) else (middle, high)
@@ -453,8 +439,7 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
 def gain_figures(scenario: Scenario, requirements: Requirements) -> GainFigures:
     """Computes performance figures of the stiffness K_r and damping D_r of a scenario.
 
-    The loop is cut at the sensor and at the actuator. Each margin is the worse of the
-    margins of the two cuts. Of the requirements, only ``spare_latency_ticks`` is used.
+    Of the requirements, only ``spare_latency_ticks`` is used.
     """
     both = [_margins(loop_margins(attraction_loop(scenario, at))) for at in _CUTS]
     worst = {

@@ -15,11 +15,7 @@ from diagrams import dump_scenario
 
 
 def design_text(study: DesignStudy) -> str:
-    """Returns the results of the design as text for a terminal.
-
-    The text has the requirements, the gains that were found, and whether the gains meet
-    the requirements.
-    """
+    """Returns requirements, gains and checks of the design as text for a terminal."""
     lines = [
         f"kinetic energy at top speed {study.kinetic_energy_j:.3f} J",
         "",

@@ -93,11 +93,7 @@ def gain_for_barrier(
 def _barrier_gains(
     scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
-    """Derives the two gains of a law by the rule ``barrier``.
-
-    The spring gain follows from the kinetic energy that the law must remove. The damper
-    gain follows from the energy that the velocity term may return to the motion.
-    """
+    """Derives the two gains of a law by the rule ``barrier``."""
     gains = LAWS[law].loop_gains
     assert gains is not None, f"{law} does not name the gains that tune it"
     spring_gain, damper_gain = gains
@@ -128,11 +124,7 @@ _RULES = {"barrier": _barrier_gains, "matched": _matched_gains}
 def _matched_damper(
     scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
-    """Derives the two gains of the velocity term of the active law of 2019.
-
-    The gain d_ref follows from the offset that a far echo may cause. The gain D_0
-    follows from the energy that the velocity term may return to the motion.
-    """
+    """Derives d_ref from the offset by a far echo, and D_0 from the returned energy."""
     far = scenario.follower.ultrasonic.maximum_range_m
     tail = spring(law, scenario)(far)
     at_rest = (

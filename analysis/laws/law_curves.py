@@ -44,19 +44,14 @@ class LawCurves:
     """(n,) distances of the obstacle, m."""
     push_n: NDArray[np.float64]
     """(n,) force at ``distance_m`` for an obstacle at rest, N."""
-    at_distance_m: float
-    """Distance of the obstacle for ``force_n``, m."""
     speed_m_s: NDArray[np.float64]
     """(k,) speeds of approach, m/s; negative if the obstacle recedes."""
     force_n: NDArray[np.float64]
-    """(k,) force at ``speed_m_s``, N."""
+    """(k,) force at ``speed_m_s`` and ``AT_DISTANCE_M``, N."""
 
 
 def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
-    """Computes the force curves of the named laws with the gains of a scenario.
-
-    Raises InputError if a law does not exist or has no radial force.
-    """
+    """Computes the force curves of the named laws with the gains of a scenario."""
     closing = scenario.follower.collision_vector.velocity_term == "closing"
     # The law sees the speed of approach, or without ``closing`` its magnitude.
     speeds = np.maximum(SPEEDS_M_S, 0.0) if closing else np.abs(SPEEDS_M_S)
@@ -69,7 +64,6 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
                 velocity_term=scenario.follower.collision_vector.velocity_term,
                 distance_m=DISTANCES_M,
                 push_n=np.array([float(force(c, 0.0)) for c in DISTANCES_M.tolist()]),
-                at_distance_m=AT_DISTANCE_M,
                 speed_m_s=SPEEDS_M_S,
                 force_n=np.array(
                     [float(force(AT_DISTANCE_M, s)) for s in speeds.tolist()]
@@ -98,9 +92,7 @@ def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
     by_distance.set_ylabel("force away from the obstacle (N)")
     by_distance.set_title("the obstacle at rest")
     by_speed.set_xlabel("speed of approach (m/s); negative: receding")
-    by_speed.set_title(
-        f"at c = {curves[0].at_distance_m:g} m; dashed: s of the approach only"
-    )
+    by_speed.set_title(f"at c = {AT_DISTANCE_M:g} m; dashed: s of the approach only")
     for axes in (by_distance, by_speed):
         axes.set_ylim(bottom=0.0)
         axes.grid(visible=True, alpha=0.3)

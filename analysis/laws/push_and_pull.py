@@ -34,10 +34,7 @@ _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
 
 def spring(law: str, scenario: Scenario) -> Push:
-    """Returns the push of a law without its velocity term.
-
-    Raises InputError if the law is not one of ``DESIGNED_LAWS``.
-    """
+    """Returns the push of a law of ``DESIGNED_LAWS`` without its velocity term."""
     if law not in DESIGNED_LAWS:
         raise InputError(
             "law", f"{law!r} has no gains to choose; use {', '.join(DESIGNED_LAWS)}"
@@ -77,11 +74,7 @@ def sampled_push(
 
 
 def largest_rise(net: NDArray[np.float64]) -> float:
-    """Returns the largest rise of the potential during an approach, J, 0 or more.
-
-    ``net`` is the (n,) net force away from the obstacle at the distances of
-    ``sampled_push``, N.
-    """
+    """Returns the largest rise, J, of the potential of forces at ``sampled_push``."""
     potential = np.concatenate([[0.0], np.cumsum(net[1:] + net[:-1]) * _STEP_M / 2.0])
     return float(np.max(potential - np.minimum.accumulate(potential)))
 

@@ -33,8 +33,8 @@ INCREMENT_STEPS = (2e-3, 0.01)
 class RadialLaw:
     """The force f(c, s) of a law away from an obstacle.
 
-    - c is the distance of the obstacle, m.
-    - s is the relative speed of the obstacle that the law uses, m/s.
+    The distance of the obstacle is c, m, and its relative speed that the law uses is s,
+    m/s.
     """
 
     name: str
@@ -53,10 +53,7 @@ class RadialLaw:
 
     @cached_property
     def forces_n(self) -> NDArray[np.float64]:
-        """(n,) force f(c, 0) at ``distances_m``, N. The first entry is the limit at 0.
-
-        Raises InputError if a force is not finite.
-        """
+        """(n,) force f(c, 0) at ``distances_m``, N; first the limit at 0."""
         distances = np.maximum(self.distances_m, 1e-9).tolist()
         forces = np.array([float(self.function(c, 0.0)) for c in distances])
         if not np.all(np.isfinite(forces)):
@@ -111,11 +108,7 @@ class RadialLaw:
         return self.stiffest[1]
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """Returns the force f(c, s), N, positive away from the obstacle.
-
-        ``c`` is the distance of the obstacle, m, and ``s`` is the relative speed that
-        the law uses, m/s. Beyond the range of the sensors, the force is 0.
-        """
+        """Returns f(c, s), N, positive away from the obstacle; 0 beyond the sensors."""
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
     def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
@@ -137,10 +130,7 @@ class RadialLaw:
 
 
 def radial_law(scenario: Scenario) -> RadialLaw:
-    """Returns the force of a scenario's law, up to the sensor range and top speed.
-
-    Raises InputError if the law does not exist or has no radial force.
-    """
+    """Returns the force of a scenario's law, up to the sensor range and top speed."""
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
     sensor = key.follower.ultrasonic
     return _radial_law(
@@ -154,11 +144,7 @@ def radial_law(scenario: Scenario) -> RadialLaw:
 
 
 class _Scenario:
-    """Wrapper that carries a scenario into a cached function.
-
-    All wrappers compare equal. Therefore, the cache distinguishes calls by the other
-    arguments only.
-    """
+    """Carries a scenario into a cached function without being part of the key."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario

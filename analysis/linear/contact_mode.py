@@ -13,7 +13,6 @@ at rest, the printed velocity terms have no damping on average.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypedDict, Unpack
@@ -40,9 +39,9 @@ _STIFFNESSES = np.geomspace(1e-3, 1e5, 400)
 #: A spectral radius above 1 by less than this is a rounding error.
 _ROUNDING = 1e-11
 #: Motor lags of the table.
-MOTOR_LAGS_S = (0.01, 0.02, 0.05, 0.1, 0.2)
+_MOTOR_LAGS_S = (0.01, 0.02, 0.05, 0.1, 0.2)
 #: Latencies of the table, in control periods.
-LATENCY_TICKS = (0, 1, 2, 3, 4)
+_LATENCY_TICKS = (0, 1, 2, 3, 4)
 
 
 def motion_chain(
@@ -229,25 +228,20 @@ class ContactLimits:
     tick_s: float
 
 
-def contact_limits(
-    scenario: Scenario,
-    *,
-    motor_lags_s: Sequence[float] = MOTOR_LAGS_S,
-    latency_ticks: Sequence[int] = LATENCY_TICKS,
-) -> ContactLimits:
+def contact_limits(scenario: Scenario) -> ContactLimits:
     """Computes the largest stable stiffness before an obstacle for two control laws.
 
     The results are tables over motor lag (rows) and latency (columns), without the
     stiffness of the attraction. The motor lag of the scenario is one of the rows.
     """
-    lags = sorted({*motor_lags_s, scenario.only.plant.motor_lag_s})
+    lags = sorted({*_MOTOR_LAGS_S, scenario.only.plant.motor_lag_s})
     total = np.array(
         [
             [
                 largest_contact_stiffness(
                     scenario, motor_lag_s=lag, latency_ticks=ticks
                 )
-                for ticks in latency_ticks
+                for ticks in _LATENCY_TICKS
             ]
             for lag in lags
         ]
@@ -257,7 +251,7 @@ def contact_limits(
     slope = radial_law(scenario.with_robot(law="active")).stiffest_n_m
     return ContactLimits(
         motor_lags_s=tuple(lags),
-        latency_ticks=tuple(latency_ticks),
+        latency_ticks=_LATENCY_TICKS,
         stiffness_n_m=left,
         reference_stiffness_n_m=left * (k_ref / slope),
         today=(scenario.only.plant.motor_lag_s, 0),

@@ -49,10 +49,7 @@ class DelayMargin:
 
 
 class DelayedLoop:
-    """Sampled loop with an arbitrary delay of one signal.
-
-    The signal is that of one direction: along the line to the source, or across.
-    """
+    """Sampled loop with an arbitrary delay of one signal in one direction."""
 
     def __init__(
         self,
@@ -79,11 +76,7 @@ class DelayedLoop:
         self._turn = np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
 
     def _flow(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Two derivatives of the plant's state after some seconds.
-
-        The first is by the state at the beginning, the second by the constant wheel
-        command.
-        """
+        """Derivatives of the plant state by the earlier state and the wheel speeds."""
         n, m = self._B_plant.shape
         block = np.zeros((n + m, n + m))
         block[:n, :n], block[:n, n:] = self._A_plant, self._B_plant
@@ -172,11 +165,7 @@ def delay_margin(
     at: DelayPlace = "sensor",
     direction: Direction = "along",
 ) -> DelayMargin:
-    """Returns the smallest additional delay at which the loop becomes unstable.
-
-    The margin is infinite if no delay makes the loop unstable. Raises InputError if the
-    loop is unstable without any additional delay.
-    """
+    """Returns the smallest delay that makes a stable loop unstable, or infinity."""
     loop = DelayedLoop(point, at, direction)
     if loop.spectral_radius(0.0) >= 1.0:
         raise InputError(

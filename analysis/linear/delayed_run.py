@@ -59,11 +59,7 @@ def check_delay_margin(
     *,
     duration_s: float = 300.0,
 ) -> DelayCheck:
-    """Simulates the loop with 0.95 and with 1.05 of the computed delay margin.
-
-    Each run begins with a small kick to the robot. Raises InputError if the loop has no
-    finite delay margin.
-    """
+    """Simulates the loop with 0.95 and with 1.05 of its finite delay margin."""
     margin = delay_margin(point, at, direction)
     if not np.isfinite(margin.delay_s):
         raise InputError(
@@ -118,10 +114,7 @@ def simulate_delayed(
 def kicked(
     point: OperatingPoint, state: NDArray[np.float64], kick_W: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Returns a copy of the state (n,) with an additional velocity of the virtual mass.
-
-    ``kick_W`` is the (2,) velocity to add in the world frame W, m/s.
-    """
+    """Returns a copy of the state with a (2,) velocity, m/s, added to the mass."""
     names, moved = point.loop.state_names, state.copy()
     moved[[names.index(f"command.v_WP_{k}") for k in "xy"]] += kick_W
     return moved
@@ -132,11 +125,7 @@ def offsets(
     poses_WB: Sequence[NDArray[np.float64]],
     axis: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Returns the (n,) deviations of P from an equilibrium along an axis, m.
-
-    ``poses_WB`` are poses of the robot in the world frame W, m and rad, and ``axis`` is
-    a (2,) unit vector in W.
-    """
+    """Returns (n,) deviations of P from an equilibrium along a (2,) unit vector, m."""
     x, y, theta = np.array(poses_WB).T
     epsilon = point.loop.scenario.only.robot.control_point_m
     places = np.column_stack([x + epsilon * np.cos(theta), y + epsilon * np.sin(theta)])

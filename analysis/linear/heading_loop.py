@@ -22,11 +22,7 @@ from systems.heading.parameters import MotorDriverParameters
 
 @dataclass(frozen=True)
 class HeadingLoopMargins:
-    """Margins of the loop that controls the heading, with and without sampling.
-
-    The loop is cut at the heading deviation. Fields without ``continuous`` in their
-    names belong to the sampled loop.
-    """
+    """Margins of the loop cut at the heading deviation, with and without sampling."""
 
     tick_s: float
     crossover_rad_s: float
@@ -129,10 +125,7 @@ def heading_loop_margins(
     lag_s: float,
     tick_s: float = TICK_S,
 ) -> HeadingLoopMargins:
-    """Returns the margins of ``heading_loop``.
-
-    If no gain makes the loop unstable, the gain margin is infinite.
-    """
+    """Returns the margins of ``heading_loop``."""
     parts = motors, robot, lag_s
     found = loop_margins(heading_loop(*parts, tick_s))
     free = loop_margins(heading_loop(*parts, None))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +15,10 @@ from numpy.typing import NDArray
 
 from analysis.linear.gang_of_four import GangOfFour
 from analysis.linear.loop_margins import FrequencyResponse, LoopMargins
-from analysis.linear.robustness import PoleCloud, PoleSensitivity
+from analysis.linear.robustness import (
+    PoleCloud,
+    PoleSensitivity,
+)
 from analysis.linear.step_response import StepCheck
 from analysis.models.equilibria import EquilibriumSearch
 from analysis.models.equilibrium_search import CellSearch
@@ -131,7 +135,7 @@ def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     lowest = -360.0
-    for loop, colour in zip(loops, _cycle(loops), strict=True):
+    for loop, colour in zip(loops, cycle(_CYCLE), strict=False):
         omega, L = loop.response.omega, loop.response.L
         upper.semilogx(omega, _size_db(L), color=colour, label=loop.name)
         phase = _phase_deg(loop.response)
@@ -191,10 +195,7 @@ def plot_nyquist(loops: Sequence[LoopMargins]) -> Figure:
 def panels(
     count: int, *, columns: int, size: tuple[float, float]
 ) -> tuple[Figure, list[Axes]]:
-    """Creates a figure with rows of panels, each ``size`` inches wide and high.
-
-    Unused places of the last row stay empty.
-    """
+    """Creates a figure with ``count`` panels in rows, each ``size`` inches."""
     columns = min(columns, count)
     rows = math.ceil(count / columns)
     figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
@@ -227,7 +228,7 @@ def plot_nichols(loops: Sequence[LoopMargins]) -> Figure:
     figure = Figure(figsize=(7.5, 5.6), layout="constrained")
     axes = figure.subplots()
     _contours(axes)
-    for loop, colour in zip(loops, _cycle(loops), strict=True):
+    for loop, colour in zip(loops, cycle(_CYCLE), strict=False):
         L = loop.response.L
         phase = _phase_deg(loop.response)
         axes.plot(phase, _size_db(L), color=colour, label=loop.name)
@@ -289,10 +290,6 @@ def plot_gang_of_four(gang: GangOfFour) -> Figure:
         if axes.get_subplotspec().is_last_row():
             axes.set_xlabel("frequency (rad/s)")
     return figure
-
-
-def _cycle(loops: Sequence[LoopMargins]) -> list[str]:
-    return [_CYCLE[k % len(_CYCLE)] for k in range(len(loops))]
 
 
 #: Poles faster than this hardly affect the motion and are not shown, 1/s.

@@ -29,10 +29,7 @@ class Oscillation:
 
 @dataclass(frozen=True)
 class StepCheck:
-    """Response to a step along the line to the source: predicted and simulated.
-
-    The simulation uses exact sensors and, if requested, the scenario's sensors.
-    """
+    """Response to a step along the line to the source: predicted and simulated."""
 
     predicted: Oscillation
     """By the sampled linear model."""

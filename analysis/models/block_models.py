@@ -150,10 +150,7 @@ def _context(block: Any, time_s: float, state: Any) -> Any:
 
 
 def sampled_twin(loop: IdealLoop, role: str) -> Any:
-    """Returns a continuous block as a discrete block over one period, for AutoDiffXd.
-
-    The block is converted at the first call, and then kept in ``loop.sampled_twins``.
-    """
+    """Returns a continuous block as an AutoDiffXd block, discrete over a period."""
     if role not in loop.sampled_twins:
         config = simulator_config(loop.scenario)
         sampled = DiscreteTimeApproximation(loop.block(role), loop.tick_s, config)
@@ -191,7 +188,7 @@ def join_blocks(
     feed = feed.reshape(len(heard), len(inputs))
     read = np.array([[float(a == b) for b in said] for a in outputs])
     read = read.reshape(len(outputs), len(said))
-    apart = control.append(*(_stateful(model) for model in models))
+    apart = control.append(*(model.to_control() for model in models))
     joined = control.feedback(apart, control.ss([], [], [], wires), sign=1)
     states = [state for model in models for state in model.state_names]
     order = [states.index(state) for state in state_names]
@@ -207,9 +204,3 @@ def join_blocks(
         output_names=outputs,
         period_s=models[0].period_s,
     )
-
-
-def _stateful(model: LinearModel) -> Any:
-    import control
-
-    return control.ss(model.A, model.B, model.C, model.D, dt=model.period_s)

@@ -65,20 +65,14 @@ class Runner:
 def run_periods(
     simulator: Any, state: Any, time_s: float, periods: int, tick_s: float
 ) -> None:
-    """Simulates whole control periods, up to just before the next control update.
-
-    The run begins at ``state`` (n,), just before the control update at ``time_s``.
-    """
+    """Simulates periods from a state (n,) to just before the next control update."""
     begin(simulator, state, time_s, tick_s)
     # Drake computes tick times as multiples; a sum of periods could miss the next tick.
     simulator.AdvanceTo((round(time_s / tick_s) + periods) * tick_s)
 
 
 def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
-    """Puts a simulator into a given state (n,) just before a control update.
-
-    The time of this update is rounded to a multiple of the period.
-    """
+    """Puts a simulator into a state (n,) just before the nearest control update."""
     context = simulator.get_mutable_context()
     context.SetTime(round(time_s / tick_s) * tick_s)
     set_state(context, state)

@@ -288,8 +288,7 @@ class _Found:
     ) -> None:
         """Searches for places of rest in and near a group of cells.
 
-        If the equilibria form a continuum, the equilibrium nearest to the robot's start
-        represents the continuum.
+        The equilibrium nearest to the robot's start represents a continuum.
         """
         near = np.linalg.norm(group.centres - self.start, axis=1).argmin()
         turned = np.flatnonzero(group.winding)

@@ -233,10 +233,7 @@ class CellSearch:
         return -vectors * (force / np.maximum(distances, 1e-12))[..., None]
 
     def _excluded(self, cells: NDArray[np.float64], edge: float) -> NDArray[np.bool_]:
-        """(n,) whether each cell certainly contains no equilibrium.
-
-        The proof is at the top of this module.
-        """
+        """(n,) whether the proof above rules out an equilibrium in each cell."""
         radius = edge * np.sqrt(0.5)
         vectors, distances = self._vectors(cells)
         pull, pushes = self._pull(cells), self._pushes(vectors, distances)
@@ -406,10 +403,7 @@ class CellSearch:
     def _newton(
         self, starts: NDArray[np.float64], bodies: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        """(n, 2) points at which the bodies are equally near, by Newton's method, m.
-
-        With two bodies, their forces are also parallel at these points.
-        """
+        """(n, 2) points where bodies are equally near, m, and two forces parallel."""
 
         def residual(points: NDArray[np.float64]) -> NDArray[np.float64]:
             distances, forces = self._each(points, bodies)

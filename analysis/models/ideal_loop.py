@@ -41,11 +41,10 @@ SETTLING_TICKS = 40
 
 @dataclass(frozen=True)
 class PeriodDerivatives:
-    """Linearization of one control period about a state.
+    """Linearization of one control period: x+ = f(x, u) and y = g(x, u).
 
-    The period maps state x and held inputs u to the next state x+ = f(x, u). The
-    outputs y = g(x, u) are those at the beginning of the period, before the control
-    update.
+    The inputs u are held over the period. The outputs y are those at the beginning of
+    the period, before the control update.
     """
 
     next_state: NDArray[np.float64]
@@ -149,10 +148,7 @@ class IdealLoop:
         return self._twin_blocks[role] if twin else self.follower.blocks[role]
 
     def _names(self) -> tuple[str, ...]:
-        """Names ``part.element`` of all states: continuous first, then discrete.
-
-        States without a name, such as those of a user's own law, are numbered.
-        """
+        """Names ``part.element`` of all states; states without a name are numbered."""
         context = self.follower.diagram.CreateDefaultContext()
         continuous: list[str] = []
         discrete: list[str] = []
@@ -171,10 +167,7 @@ class IdealLoop:
         return [k for k, n in enumerate(self.state_names) if n.startswith(prefix)]
 
     def context(self, state: NDArray[np.float64], time_s: float = 0.0) -> Any:
-        """Returns the root context of the float diagram at a state (n,).
-
-        The context is valid until the next call of any method.
-        """
+        """Returns the root context at a state (n,), valid until the next call."""
         simulator = self._simulator(frozenset(), twin=False)
         context = simulator.get_mutable_context()
         context.SetTime(time_s)
@@ -307,10 +300,7 @@ class IdealLoop:
         return self._simulators[key]
 
     def fix(self, context: Any, port: Port, value: Any, *, twin: bool = False) -> None:
-        """Cuts an input port off from its source and sets its value.
-
-        The context is a root context, of the AutoDiffXd diagram if ``twin`` is true.
-        """
+        """Cuts an input port in a root context off from its source; sets its value."""
         role, name = port
         block = self.block(role, twin=twin)
         own = block.GetMyMutableContextFromRoot(context)

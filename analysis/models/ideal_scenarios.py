@@ -20,10 +20,7 @@ _ALL_IDEAL: dict[str, Any] = {
 
 
 def ideal_scenario(scenario: Scenario) -> Scenario:
-    """Returns a copy with exact sensors and a sound without pauses.
-
-    Raises InputError if the wheels can slip (``plant.friction`` is set).
-    """
+    """Returns a copy with exact sensors and a sound without pauses."""
     require_rolling(scenario.only.plant)
     return changed(scenario, _ALL_IDEAL)
 
@@ -48,10 +45,7 @@ def moving_bodies(scenario: Scenario) -> tuple[str, ...]:
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """Returns a validated copy of a scenario with other values by field name.
-
-    If a value is a mapping, it changes single fields of a group.
-    """
+    """Returns a validated copy with other values, or single fields of a group."""
     data = scenario.model_dump()
     for key, value in changes.items():
         data[key] = data[key] | value if isinstance(value, dict) else value
@@ -70,10 +64,7 @@ def require_rolling(plant: PlantParameters) -> None:
 
 
 def require_ideal(scenario: Scenario) -> None:
-    """Raises InputError if a scenario cannot be linearized.
-
-    The reasons are several robots or sampling rates, or a block without a derivative.
-    """
+    """Raises InputError if a scenario cannot be linearized."""
     scenario.require_one_robot("a linear model")
     scenario.require_one_rate("a linear model")
     require_rolling(scenario.only.plant)

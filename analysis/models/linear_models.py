@@ -24,10 +24,7 @@ _NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class Mode:
-    """One real pole, or one conjugate pair of poles.
-
-    The pole with the positive imaginary part represents the pair.
-    """
+    """One real pole, or a conjugate pair, represented by its upper pole."""
 
     z: complex | None
     """Pole in the z plane. In a continuous model: None."""
@@ -111,10 +108,7 @@ class LinearModel:
 
     @property
     def growth_per_s(self) -> float:
-        """Growth rate of the slowest mode, 1/s; negative if all modes decay.
-
-        If all poles are pure delays, the value is -infinity.
-        """
+        """Growth rate of the slowest mode, 1/s; -infinity if all poles are delays."""
         if self.period_s:
             return float(growth_per_s(self.spectral_radius, self.period_s))
         return float(self.poles.real.max(initial=-math.inf))

@@ -67,10 +67,7 @@ def sampled_model(point: OperatingPoint) -> LinearModel:
 
 
 def blockwise_model(point: OperatingPoint) -> LinearModel:
-    """Returns the sampled closed loop, joined from blocks that are linearized alone.
-
-    The signals are those of ``sampled_model``.
-    """
+    """Returns the model of ``sampled_model``, joined from blocks linearized alone."""
     loop = point.loop
     joined = join_blocks(
         sampled_blocks(loop, point.state, point.time_s),

@@ -120,9 +120,9 @@ def open_loop(
     at: BreakPoint = "sensor",
     direction: Direction = "along",
 ) -> LinearModel:
-    """Returns the sampled loop transfer function L of one direction.
+    """Returns the loop L of one direction, for negative feedback.
 
-    L is for negative feedback. The loop of the other direction stays closed.
+    The loop of the other direction stays closed.
     """
     whole = cut_model(point, at)
     own = f"{at}_{direction}"

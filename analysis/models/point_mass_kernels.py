@@ -164,8 +164,7 @@ def _advance(
     """State, energy V and smallest distance after one step.
 
     The force jumps where another body becomes the nearest. A step across such a jump is
-    repeated in small parts. Otherwise the integration error would appear as a change of
-    the energy.
+    repeated in small parts, or its error would appear as a change of the energy.
     """
     _, _, _, _, before = _force(state, world)
     new = _step(state, h, world)

@@ -12,7 +12,9 @@ from analysis.linear.contact_mode import contact_model, largest_contact_stiffnes
 from analysis.linear.delay_margin import delay_margin
 from analysis.linear.delayed_run import check_delay_margin
 from analysis.linear.loop_margins import loop_margins
-from analysis.linear.loop_uncertainty import following_poles
+from analysis.linear.robustness import (
+    following_poles,
+)
 from analysis.linear.root_locus import root_loci
 from analysis.linear.sampled_stability import check_conditions, gain_delay_chart
 from analysis.linear.step_response import check_step
