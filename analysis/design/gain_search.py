@@ -136,24 +136,17 @@ def _matched_damper(
     unit_term = force(far, 0.0) - spring(law, with_unit)(far)
     d_ref = _rounded(at_rest / unit_term)
 
+    def with_damping(D_0: float) -> Scenario:
+        gains = {"reference_damping_n_s_m": d_ref, "matched_damping_n_s_m": D_0}
+        return with_gains(scenario, law, **gains)
+
     def excess(D_0: float) -> float:
-        changed = with_gains(
-            scenario,
-            law,
-            reference_damping_n_s_m=d_ref,
-            matched_damping_n_s_m=D_0,
-        )
-        return injected_share(law, changed) - requirements.injected_share
+        return injected_share(law, with_damping(D_0)) - requirements.injected_share
 
     # If D_0 is below sqrt(e) d_ref, the term never exceeds its value at rest.
     field = f"laws.{law}.matched_damping_n_s_m"
     D_0 = _root(excess, math.sqrt(math.e) * d_ref, 1e3 * d_ref, field)
-    return with_gains(
-        scenario,
-        law,
-        reference_damping_n_s_m=d_ref,
-        matched_damping_n_s_m=_rounded(D_0),
-    )
+    return with_damping(_rounded(D_0))
 
 
 def _matched_spring(

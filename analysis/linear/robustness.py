@@ -266,25 +266,14 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
         # Zero means that the robot has no such spring, damper or lag.
         *(_share(*row) for row in shares if row[3] > 0.0),
         UncertainParameter(
-            "wheel_radius_share",
-            "r",
-            "1",
-            1.0,
-            0.98,
-            1.02,
+            "wheel_radius_share", "r", "1", 1.0, 0.98, 1.02,
             "true radius over stated radius: wear, pressure",
         ),
         UncertainParameter(
-            "extra_ticks",
-            "latency",
-            f"{scenario.tick_s * 1e3:g} ms",
-            0.0,
-            0.0,
-            1.0,
-            "a processor that needs one more tick; whole ticks",
-            whole=True,
+            "extra_ticks", "latency", f"{scenario.tick_s * 1e3:g} ms", 0.0, 0.0, 1.0,
+            "a processor that needs one more tick; whole ticks", whole=True,
         ),
-    )
+    )  # fmt: skip
 
 
 def _share(
@@ -298,14 +287,9 @@ def _sound_speed(scenario: Scenario) -> UncertainParameter:
     c = scenario.sound_speed_m_s
     ends = [331.5 + 0.6 * t for t in _TEMPERATURES_C]
     return UncertainParameter(
-        "sound_speed_m_s",
-        "c",
-        "m/s",
-        c,
-        min(c, ends[0]),
-        max(c, ends[1]),
+        "sound_speed_m_s", "c", "m/s", c, min(c, ends[0]), max(c, ends[1]),
         "air of 5 to 35 deg C, while the estimator assumes one speed",
-    )
+    )  # fmt: skip
 
 
 def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:

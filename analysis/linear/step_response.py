@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +73,14 @@ def check_step(
     """
     point = follow_equilibrium(scenario)
     modes = [mode for mode in point.modes if mode.eigenvalue.imag > 1e-6]
-    along = _along(point, modes)
+    if not modes:
+        raise InputError(
+            "attraction",
+            "nothing oscillates about the equilibrium, so that there is no frequency "
+            "to compare; use a larger stiffness_n_m for this damping_n_s_m",
+        )
+    # Along the line to the source, the oscillation has the highest frequency.
+    along = max(modes, key=lambda mode: mode.frequency_rad_s)
     ideal = _run(point.loop.scenario, point, step_m, duration_s)
     own = None
     if full:
@@ -89,17 +95,6 @@ def check_step(
         ideal_m=ideal[1],
         full_m=own[1] if own else None,
     )
-
-
-def _along(point: OperatingPoint, modes: list[Any]) -> Any:
-    """Mode along the line to the source: the oscillation with the highest frequency."""
-    if not modes:
-        raise InputError(
-            "attraction",
-            "nothing oscillates about the equilibrium, so that there is no frequency "
-            "to compare; use a larger stiffness_n_m for this damping_n_s_m",
-        )
-    return max(modes, key=lambda mode: mode.frequency_rad_s)
 
 
 def _predicted(

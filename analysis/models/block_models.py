@@ -38,7 +38,11 @@ def sampled_blocks(
     just before the update.
     """
     after = loop.period_map(state, time_s)
-    continuous = [role for role in loop.follower.blocks if _is_continuous(loop, role)]
+    continuous = [
+        role
+        for role, block in loop.follower.blocks.items()
+        if block.CreateDefaultContext().num_continuous_states()
+    ]
     held = {
         port.get_name()
         for role in continuous
@@ -63,11 +67,6 @@ def sampled_blocks(
         names = tuple(loop.state_names[k] for k in loop.indices(role))
         models.append(replace(model, name=role, state_names=names))
     return tuple(models)
-
-
-def _is_continuous(loop: IdealLoop, role: str) -> bool:
-    context = loop.block(role).CreateDefaultContext()
-    return bool(context.num_continuous_states())
 
 
 def _ports(block: Any, kind: str) -> list[Any]:
