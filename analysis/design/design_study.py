@@ -49,7 +49,7 @@ class JamRuns:
 
     law: str
     causes: dict[str, int]
-    """Number of runs by outcome, ``RunResult.cause``."""
+    """Number of runs by outcome."""
     jams: int
     """Number of runs that got stuck or timed out and never reached the goal."""
 

@@ -74,7 +74,10 @@ def sampled_push(
 
 
 def largest_rise(net: NDArray[np.float64]) -> float:
-    """Returns the largest rise, J, of the potential of forces at ``sampled_push``."""
+    """Returns the largest rise, J, of the potential of a force ``net``, N.
+
+    The force has one value for each distance of ``sampled_push``.
+    """
     potential = np.concatenate([[0.0], np.cumsum(net[1:] + net[:-1]) * _STEP_M / 2.0])
     return float(np.max(potential - np.minimum.accumulate(potential)))
 

@@ -114,7 +114,7 @@ def simulate_delayed(
 def kicked(
     point: OperatingPoint, state: NDArray[np.float64], kick_W: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Returns a copy of the state with a (2,) velocity, m/s, added to the mass."""
+    """Returns a copy of the state with ``kick_W``, m/s, added to the velocity."""
     names, moved = point.loop.state_names, state.copy()
     moved[[names.index(f"command.v_WP_{k}") for k in "xy"]] += kick_W
     return moved

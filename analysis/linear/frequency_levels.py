@@ -190,8 +190,8 @@ def peak(model: LinearModel, offset: float = 0.0) -> tuple[float, float]:
     This is the H-infinity norm of a stable model with one input and one output. The
     method is that of Bruinsma and Steinbuch. The largest value so far is a level. The
     method then looks for larger values at the frequencies where the response crosses
-    this level, and half way between them. The frequency is between 0 and the Nyquist
-    frequency, or infinity in continuous time.
+    this level, and half way between them. Frequencies reach to the Nyquist frequency,
+    or to infinity in continuous time.
     """
 
     def size(omega: NDArray[np.float64]) -> NDArray[np.float64]:

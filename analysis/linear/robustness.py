@@ -127,7 +127,7 @@ class PoleSensitivity:
 
 
 def slowest_pole(poles: NDArray[np.complex128], period: float) -> complex:
-    """Returns the upper pole in the s plane, 1/s, with the largest |z|."""
+    """Returns the s-plane pole, 1/s, with the largest |z|; of a pair, the upper one."""
     pole = complex(s_plane(poles[[np.argmax(np.abs(poles))]], period)[0])
     return pole if pole.imag >= 0.0 else pole.conjugate()
 

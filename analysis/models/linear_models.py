@@ -24,7 +24,7 @@ _NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class Mode:
-    """One real pole, or a conjugate pair, represented by its upper pole."""
+    """One real pole, or a conjugate pair, of which the fields give the upper pole."""
 
     z: complex | None
     """Pole in the z plane. In a continuous model: None."""
