@@ -85,21 +85,24 @@ def _check_text(check: Check) -> str:
     return f"{check.name:<26}{value:8.3f} {sign} {check.bound:.3f}{unit}{told}"
 
 
-def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
-    """Returns the JSON document of the design, which names the directory ``out``."""
+def design_document(study: DesignStudy) -> dict[str, Any]:
+    """Returns the JSON document of the design, from plain values.
+
+    The key ``out`` is None until the files of the design have a directory.
+    """
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": study.today.scenario.name,
         **plain(study),
         "versions": versions(),
-        "out": str(out),
+        "out": None,
     }
 
 
-def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -> None:
+def write_design(study: DesignStudy, document: dict[str, Any], directory: Path) -> None:
     """Writes the files of a design into an existing directory.
 
-    - ``summary.json`` is the JSON document from ``design_summary``.
+    - ``summary.json`` is the JSON document from ``design_document``.
     - ``scenario.yaml`` is the scenario with new gains of the laws.
     - ``recommended.yaml`` is the scenario with the recommended gains.
     - ``design.png`` is the figure of ``plot_design``.
@@ -109,7 +112,7 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
     from analysis.laws.law_curves import law_curves, plot_law_curves
     from analysis.laws.push_and_pull import DESIGNED_LAWS
 
-    write_json(summary, directory / "summary.json")
+    write_json(document, directory / "summary.json")
     for name, alternative in (
         ("scenario", study.today),
         ("recommended", study.recommended),

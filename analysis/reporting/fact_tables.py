@@ -5,42 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analysis.reporting.section import Cell, Table, number
+from analysis.reporting.section import Table, number
+from analysis.reporting.units import without_unit
 
-#: Endings of names, and the units that they mean; longest endings first.
-_UNITS = {
-    "_n_s_m": "N s/m",
-    "_rad_s3": "rad/s\u00b3",
-    "_m_s3": "m/s\u00b3",
-    "_rad_m": "rad/m",
-    "_rad_s": "rad/s",
-    "_per_s": "1/s",
-    "_1_s": "1/s",
-    "_m_s2": "m/s\u00b2",
-    "_n_m": "N/m",
-    "_m_s": "m/s",
-    "_deg": "deg",
-    "_db": "dB",
-    "_rad": "rad",
-    "_j": "J",
-    "_n": "N",
-    "_m": "m",
-    "_s": "s",
-}
 #: Greatest length of a list in a table. Longer lists are in the JSON document only.
 _LONGEST = 8
 
 
 def readable_name(name: str) -> str:
     """Makes a name readable: `top_energy_j` becomes 'top energy (J)'."""
-    for ending, unit in _UNITS.items():
-        if name.endswith(ending):
-            return f"{_words(name.removesuffix(ending))} ({unit})"
-    return _words(name)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+    plain, unit = without_unit(name)
+    words = plain.replace("_", " ")
+    return f"{words} ({unit})" if unit else words
 
 
 def fact_table(
@@ -86,14 +62,3 @@ def _cell(value: Any) -> Any:
             item if isinstance(item, str) else number(item) for item in value
         )
     return _LEFT_OUT
-
-
-def row_table(rows: Sequence[Mapping[str, Any]], *, caption: str = "") -> Table:
-    """Makes a table with one row for each mapping; there is at least one.
-
-    The names of the first row are the headings of the columns. The table omits values
-    that do not fit into a cell.
-    """
-    keys = [k for k, value in rows[0].items() if _cell(value) is not _LEFT_OUT]
-    body: list[list[Cell]] = [[_cell(row.get(key)) for key in keys] for row in rows]
-    return Table([readable_name(key) for key in keys], body, caption)

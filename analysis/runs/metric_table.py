@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.reporting.units import without_unit
 from analysis.runs.measured_run import (
     MOVING_M_S,
+    Flags,
+    Floats,
     MeasuredRun,
     lengths,
     quantile,
@@ -58,9 +60,7 @@ class Metric:
     """A number that describes a run, and how numbers of many runs are averaged."""
 
     name: str
-    """Name in JSON documents and in the tables of sweeps."""
-    unit: str
-    """Unit; empty for counts and ratios."""
+    """Name in JSON documents and in the tables of sweeps; it ends in the unit."""
     title: str
     """Name for readers, without the unit."""
     meaning: str
@@ -81,6 +81,11 @@ class Metric:
     shown: Literal["", "table", "picture"] = ""
     """Whether the pages of sweeps and comparisons show the metric: not at all, in
     tables, or in tables and pictures."""
+
+    @property
+    def unit(self) -> str:
+        """Unit; empty for counts and ratios."""
+        return without_unit(self.name)[1]
 
     @property
     def label(self) -> str:
@@ -104,16 +109,10 @@ class Group(NamedTuple):
 
 
 def run_metrics(result: RunResult) -> dict[str, float | None]:
-    """Computes all metrics of a run, in the units of ``METRICS``.
+    """Computes all metrics of a run by name, in the units of ``METRICS``.
 
     If a metric does not apply to the run, its value is None. If the run has several
     robots, each name begins with the name of the robot and a dot.
-
-    Args:
-        result: Result of a run, for one robot or several robots.
-
-    Returns:
-        Value of each metric, by name.
     """
     if result.several:
         return {
@@ -149,7 +148,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _first_time(run: MeasuredRun, flags: NDArray[np.bool_]) -> float | None:
+def _first_time(run: MeasuredRun, flags: Flags) -> float | None:
     found = np.flatnonzero(flags)
     return float(run.time[found[0]]) if len(found) else None
 
@@ -257,42 +256,28 @@ def _reaction_distance(run: MeasuredRun) -> float | None:
         [columns[f"feature_{k}"], *result.vector(f"collision_{k}_B")] for k in (1, 2, 3)
     ]
     distance = _first_reaction(
-        run.bodies,
-        result.vector("p_WP"),
-        result.vector("repulsion"),
-        np.array(echoes),
+        run.bodies, result.vector("p_WP"), result.vector("repulsion"), np.array(echoes)
     )
     return distance if math.isfinite(distance) else None
 
 
 @njit(cache=True)
 def _first_reaction(
-    bodies: NDArray[np.float64],
-    p_WP: NDArray[np.float64],
-    push: NDArray[np.float64],
-    echoes: NDArray[np.float64],
+    bodies: Floats, p_WP: Floats, push: Floats, echoes: Floats
 ) -> float:  # pragma: no cover  (compiled)
-    """Returns how near an obstacle is when the control law first reacts to it.
+    """Returns how near an obstacle is when the control law first reacts to it, m.
 
-    The law reacts at a tick (control period) if three conditions hold:
+    The law reacts at a tick (control period) if three conditions hold. If it never
+    reacts, the distance is infinite.
 
-    - The repulsive force is at least ``REACTION_N``.
-    - The nearest obstacle is nearer to the control point P than the target is.
+    - The repulsive force ``push`` (2, n) is at least ``REACTION_N``.
+    - The nearest obstacle is nearer to the control point P than the target is. The
+      target is the last of the m ``bodies`` (m, n, 5).
     - A collision vector agrees with this obstacle: its length differs from the distance
-      of the obstacle by at most ``ECHO_M``. A collision vector points from P to an
-      echo.
+      of the obstacle by at most ``ECHO_M``.
 
-    Args:
-        bodies: (m, n, 5) rectangles of the m bodies at n ticks. The last body is the
-            target of the robot.
-        p_WP: (2, n) positions of P in the world frame W, m.
-        push: (2, n) repulsive force of the law in W, N.
-        echoes: (k, 3, n) k collision vectors. Each has three entries: a number above 0
-            if there is a vector, and its x and y in the robot frame B, m.
-
-    Returns:
-        Distance from P to the nearest obstacle, m. It is infinite if the law never
-        reacted.
+    The ``echoes`` (k, 3, n) hold k collision vectors, which point from P to an echo: a
+    number above 0 if there is a vector, and its x and y in the robot frame B, m.
     """
     for i in range(push.shape[1]):
         if math.hypot(push[0, i], push[1, i]) < REACTION_N:
@@ -313,7 +298,6 @@ def _first_reaction(
 _ALL = (
     Metric(
         "minimum_clearance_m",
-        "m",
         "least clearance",
         "smallest clearance to any body: an obstacle, another robot or the source. "
         "When a contact switch touches an odor source, the clearance can be as low as "
@@ -325,7 +309,6 @@ _ALL = (
     ),
     Metric(
         "minimum_obstacle_clearance_m",
-        "m",
         "least clearance from obstacles",
         "smallest clearance to any body except the source that the robot follows",
         lambda run: min(run.obstacle_clearances, default=None),
@@ -335,7 +318,6 @@ _ALL = (
     ),
     Metric(
         "path_length_m",
-        "m",
         "path length",
         "length of the path of the origin of B, in a search until the search ends",
         lambda run: run.path_length,
@@ -344,7 +326,6 @@ _ALL = (
     ),
     Metric(
         "final_distance_m",
-        "m",
         "distance at the end",
         "distance from P to the source at the end of the run. In a search, it is the "
         "distance from the origin of B to the source or the calling robot at the end "
@@ -355,14 +336,12 @@ _ALL = (
 _NEAR = (
     Metric(
         "clearance_p05_m",
-        "m",
         "5th percentile of the clearance",
         "5th percentile of the clearance to the nearest body, over all ticks",
         lambda run: quantile(run.clearance, 0.05) if len(run.bodies) else None,
     ),
     Metric(
         "minimum_time_to_contact_s",
-        "s",
         "least time to contact",
         "smallest predicted time until the robot touches another body, over all ticks. "
         "The prediction assumes that all bodies keep their present velocity and "
@@ -374,7 +353,6 @@ _NEAR = (
     ),
     Metric(
         "reaction_distance_m",
-        "m",
         "reaction distance",
         "distance from P to the nearest obstacle when the law first reacts to this "
         "obstacle. The law reacts if it pushes with at least 0.5 N, if the obstacle is "
@@ -388,7 +366,6 @@ _NEAR = (
 _CONTACT = (
     Metric(
         "contact_warning_s",
-        "s",
         "first echo before contact",
         "time from the first echo of the body to the contact; `null` if the body never "
         "caused an echo",
@@ -397,7 +374,6 @@ _CONTACT = (
     ),
     Metric(
         "contact_unseen_s",
-        "s",
         "last echo before contact",
         "time from the last echo of the body to the contact; `null` if the body never "
         "caused an echo",
@@ -406,7 +382,6 @@ _CONTACT = (
     ),
     Metric(
         "contact_push_n",
-        "N",
         "push at contact",
         "magnitude of the law's push at the last tick",
         _contact_push,
@@ -416,7 +391,6 @@ _CONTACT = (
 _GOAL = (
     Metric(
         "time_to_goal_s",
-        "s",
         "time to the goal",
         "time of the first tick at which P is in the goal, at any speed",
         lambda run: _first_time(run, run.in_goal),
@@ -427,7 +401,6 @@ _GOAL = (
     ),
     Metric(
         "settling_time_s",
-        "s",
         "settling time",
         "time of the first tick after which P stays in the goal until the run ends. If "
         "the source is at rest, P must also stay slower than 0.05 m/s, for at least "
@@ -439,7 +412,6 @@ _GOAL = (
     ),
     Metric(
         "shortest_path_m",
-        "m",
         "shortest path",
         "length of the shortest path from the start to the goal around all obstacles "
         "at rest; `null` for a moving source",
@@ -447,7 +419,6 @@ _GOAL = (
     ),
     Metric(
         "spl",
-        "",
         "success weighted by path length",
         "success weighted by path length (SPL, Anderson et al. 2018, arXiv "
         "1807.06757). If the outcome is `reached`, the value is `shortest_path_m` "
@@ -460,7 +431,6 @@ _GOAL = (
 _FOLLOWING = (
     Metric(
         "following_fraction",
-        "",
         "share of time in the following band",
         "fraction of the ticks after the first detection at which the magnitude of the "
         "following error is at most `stop.following_band_m`. For the outcome "
@@ -472,7 +442,6 @@ _FOLLOWING = (
     ),
     Metric(
         "following_error_rms_m",
-        "m",
         "rms following error",
         "RMS value of the following error",
         lambda run: rms(np.abs(run.following_error)[run.after_second_burst]),
@@ -482,7 +451,6 @@ _FOLLOWING = (
     ),
     Metric(
         "following_error_p95_m",
-        "m",
         "95th percentile of the following error",
         "95th percentile of the magnitude of the following error",
         lambda run: quantile(np.abs(run.following_error)[run.after_second_burst], 0.95),
@@ -491,7 +459,6 @@ _FOLLOWING = (
     ),
     Metric(
         "following_bearing_rms_deg",
-        "deg",
         "rms bearing of the source",
         "RMS value of the true bearing of the source",
         lambda run: rms(
@@ -502,7 +469,6 @@ _FOLLOWING = (
     ),
     Metric(
         "valid_target_fraction",
-        "",
         "share of time with a target",
         "fraction of all ticks at which the robot has a valid target",
         lambda run: share(run.target_valid),
@@ -512,7 +478,6 @@ _FOLLOWING = (
 _ROUTE = (
     Metric(
         "route_deviation_m",
-        "m",
         "median deviation from the route",
         "median distance of P from the path along which the target moved",
         lambda run: float(np.median(run.route_deviation)),
@@ -520,7 +485,6 @@ _ROUTE = (
     ),
     Metric(
         "route_deviation_max_m",
-        "m",
         "greatest deviation from the route",
         "greatest distance of P from the path along which the target moved",
         lambda run: float(np.max(run.route_deviation)),
@@ -530,7 +494,6 @@ _ROUTE = (
     ),
     Metric(
         "yaw_ripple_rad_s",
-        "rad/s",
         "yaw ripple",
         "RMS value of the difference between the yaw rate and its moving mean over "
         "1 s. The metric includes only the ticks at which a body is nearer than 1 m to "
@@ -541,7 +504,6 @@ _ROUTE = (
     ),
     Metric(
         "replans",
-        "",
         "new routes",
         "number of times that the planner computed a new route",
         lambda run: float(run.columns["replans"][-1]),
@@ -551,38 +513,33 @@ _ROUTE = (
 )
 
 
-def _gains(name: str, unit: str, ending: str, symbol: str) -> tuple[Metric, ...]:
+def _gains(name: str, unit: str, symbol: str) -> tuple[Metric, ...]:
     """Metrics of a gain that the law may adapt: its extremes and its last value."""
 
-    def of(which: str, read: Callable[[NDArray[np.float64]], float]) -> Metric:
+    def of(
+        which: str,
+        robots: Literal["mean", "least", "greatest"],
+        read: Callable[[Floats], float],
+    ) -> Metric:
         return Metric(
-            f"{which}_{name}_{ending}",
-            unit,
+            f"{which}_{name}_{unit}",
             f"{which} {name} {symbol}",
             f"{which} value of the {name} {symbol}, if the law adapts {symbol}",
             lambda run: float(read(run.columns[name])),
-            robots=_OF_ROBOTS[which],
+            robots=robots,
             paired=True,
         )
 
     return (
-        of("least", np.min),
-        of("greatest", np.max),
-        of("last", lambda values: values[-1]),
+        of("least", "least", np.min),
+        of("greatest", "greatest", np.max),
+        of("last", "mean", lambda values: values[-1]),
     )
 
 
-_OF_ROBOTS: dict[str, Literal["mean", "least", "greatest"]] = {
-    "least": "least",
-    "greatest": "greatest",
-    "last": "mean",
-}
-_STIFFNESS = _gains("stiffness", "N/m", "n_m", "K")
-_DAMPING = _gains("damping", "N s/m", "n_s_m", "D")
 _SEARCH = (
     Metric(
         "search_steps",
-        "",
         "steps",
         "number of moves that the robot began",
         lambda run: run.search_steps,
@@ -590,7 +547,6 @@ _SEARCH = (
     ),
     Metric(
         "search_time_s",
-        "s",
         "time of the search",
         "duration of the search. If the robot waits for a call, the search starts when "
         "the robot first listens to the sound of the caller.",
@@ -599,14 +555,12 @@ _SEARCH = (
     ),
     Metric(
         "step_length_m",
-        "m",
         "step length",
         "`path_length_m` divided by `search_steps`",
         lambda run: run.path_length / run.search_steps if run.search_steps else None,
     ),
     Metric(
         "path_efficiency",
-        "",
         "straight over driven",
         "decrease of the distance to the source during the search, divided by "
         "`path_length_m`",
@@ -615,7 +569,6 @@ _SEARCH = (
     ),
     Metric(
         "minimum_distance_m",
-        "m",
         "least distance",
         "smallest distance from the origin of B to the source or the calling robot. At "
         "less than 0.35 m from the calling robot, the arms of both robots can touch.",
@@ -624,7 +577,6 @@ _SEARCH = (
     ),
     Metric(
         "driving_fraction",
-        "",
         "share of time in motion",
         "fraction of the ticks at which the robot moves faster than 2 cm/s",
         _driving_fraction,
@@ -634,7 +586,6 @@ _SEARCH = (
 _SMOOTHNESS = (
     Metric(
         "jerk_rms_m_s3",
-        "m/s³",
         "rms jerk",
         "RMS value of the magnitude of the jerk",
         lambda run: rms(run.jerk),
@@ -644,7 +595,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "jerk_max_m_s3",
-        "m/s³",
         "greatest jerk",
         "maximum magnitude of the jerk",
         lambda run: float(np.max(run.jerk)) if len(run.jerk) else None,
@@ -654,7 +604,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "angular_jerk_rms_rad_s3",
-        "rad/s³",
         "rms angular jerk",
         "RMS value of the angular jerk",
         lambda run: rms(jerk(run.columns["omega_WB"], run.tick_s)),
@@ -663,7 +612,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "sparc",
-        "",
         "SPARC",
         "spectral arc length of the speed (Balasubramanian et al. 2012). The value is "
         "negative, and it is closer to 0 for smoother motion.",
@@ -674,7 +622,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "ldlj",
-        "",
         "LDLJ",
         "log dimensionless jerk of the speed (Balasubramanian et al. 2015). The value "
         "is larger for smoother motion.",
@@ -686,7 +633,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "turn_reversals_per_s",
-        "1/s",
         "turn reversals per second",
         "number of changes of the turning direction per second. The metric ignores yaw "
         "rates below 0.1 rad/s.",
@@ -696,7 +642,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "heading_change_rad_m",
-        "rad/m",
         "heading change per path length",
         "sum of the magnitudes of all heading changes, divided by the path length",
         _heading_change,
@@ -705,14 +650,12 @@ _SMOOTHNESS = (
     ),
     Metric(
         "mean_speed_m_s",
-        "m/s",
         "mean speed",
         "mean speed of the origin of B",
         lambda run: float(np.mean(run.speed)),
     ),
     Metric(
         "top_speed_m_s",
-        "m/s",
         "top speed",
         "maximum speed of the origin of B",
         lambda run: float(np.max(run.speed)),
@@ -720,7 +663,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "control_effort_rms_n",
-        "N",
         "rms control effort",
         "RMS value of the total force on the virtual mass: attraction plus repulsion",
         _control_effort,
@@ -729,7 +671,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "push_work_j",
-        "J",
         "work of the push",
         "net work of the push on the virtual mass. If the value is positive, the push "
         "added more energy to the motion than it removed.",
@@ -737,7 +678,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "wheel_variation_m_s2",
-        "m/s²",
         "variation of the wheel commands",
         "mean magnitude of the rate of change of the commanded speeds of the wheel "
         "rims",
@@ -747,7 +687,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "saturated_fraction",
-        "",
         "share of time at a speed limit",
         "fraction of the ticks at which the virtual mass or a wheel is at its speed "
         "limit",
@@ -758,7 +697,6 @@ _SMOOTHNESS = (
     ),
     Metric(
         "impossible_obstacle_speed_ticks",
-        "",
         "ticks with an impossible obstacle speed",
         "number of ticks at which the obstacle speed s that the law computed is more "
         "than twice the robot's top speed",
@@ -769,7 +707,6 @@ _SMOOTHNESS = (
 _ODOMETRY = (
     Metric(
         "odometry_error_rms_m",
-        "m",
         "rms odometry error",
         "RMS value of the distance between the true and the computed position. Without "
         "slip, this distance is below 1 mm.",
@@ -779,7 +716,6 @@ _ODOMETRY = (
     ),
     Metric(
         "odometry_error_final_m",
-        "m",
         "odometry error at the end",
         "final value of the distance between the true and the computed position",
         lambda run: float(run.odometry_error[-1]),
@@ -788,7 +724,6 @@ _ODOMETRY = (
     ),
     Metric(
         "odometry_heading_error_rms_deg",
-        "deg",
         "rms heading error of the odometry",
         "RMS value of the heading error",
         lambda run: rms(
@@ -799,7 +734,6 @@ _ODOMETRY = (
     ),
     Metric(
         "slip_way_m",
-        "m",
         "slip of the wheels",
         "distance by which the wheel rims slid over the floor in any direction, "
         "averaged over both wheels; `null` without `plant.friction`",
@@ -811,7 +745,6 @@ _ODOMETRY = (
 _HEARING = (
     Metric(
         "frames_with_sound",
-        "",
         "frames with sound",
         "number of frames with sound",
         lambda run: int(np.count_nonzero(run.frames_with_sound)),
@@ -819,7 +752,6 @@ _HEARING = (
     ),
     Metric(
         "frames_with_sound_heard",
-        "",
         "frames with sound that were heard",
         "number of frames with sound in which the robot detected the source",
         lambda run: int(np.count_nonzero(run.frames_with_sound & run.detections)),
@@ -827,7 +759,6 @@ _HEARING = (
     ),
     Metric(
         "detections",
-        "",
         "detections",
         "number of all detections",
         lambda run: int(np.count_nonzero(run.detections)),
@@ -835,7 +766,6 @@ _HEARING = (
     ),
     Metric(
         "detections_with_range",
-        "",
         "detections with a range",
         "number of detections that include a range",
         lambda run: int(np.count_nonzero(run.ranged_detections)),
@@ -843,14 +773,12 @@ _HEARING = (
     ),
     Metric(
         "source_error_median_m",
-        "m",
         "median position error of the source",
         "median of the position error, over the detections that include a range",
         lambda run: quantile(run.source_errors, 0.5),
     ),
     Metric(
         "source_error_p95_m",
-        "m",
         "95th percentile of the position error",
         "95th percentile of the position error, over the detections that include a "
         "range",
@@ -858,7 +786,6 @@ _HEARING = (
     ),
     Metric(
         "source_outlier_fraction",
-        "",
         "share of outliers",
         "fraction of the detections that have a position error above 0.5 m. Only "
         "detections that include a range count.",
@@ -874,8 +801,16 @@ GROUPS = (
     Group("goal", _drives, _GOAL),
     Group("following", _follows, _FOLLOWING),
     Group("route", lambda run: run.routed, _ROUTE),
-    Group("stiffness", lambda run: run.routed and run.has("stiffness"), _STIFFNESS),
-    Group("damping", lambda run: run.routed and run.has("damping"), _DAMPING),
+    Group(
+        "stiffness",
+        lambda run: run.routed and run.has("stiffness"),
+        _gains("stiffness", "n_m", "K"),
+    ),
+    Group(
+        "damping",
+        lambda run: run.routed and run.has("damping"),
+        _gains("damping", "n_s_m", "D"),
+    ),
     Group("search", lambda run: run.searches, _SEARCH),
     Group("smoothness", _drives, _SMOOTHNESS),
     Group("odometry", _drives, _ODOMETRY),

@@ -31,7 +31,7 @@ class Study:
     scenario: Scenario
     """The scenario with the law to analyze."""
     full: bool = False
-    """Whether the parts may take minutes."""
+    """Whether checks by simulation take longer."""
     found: dict[str, Any] = field(default_factory=dict)
     """Data objects of earlier parts, by key. A part without a result has no entry."""
 
@@ -69,8 +69,6 @@ class Part(Generic[Data]):
     """Returns notes that readers must know before they use the numbers."""
     fresh: bool = False
     """Whether the section begins on a new page of paper."""
-    slow: bool = False
-    """Whether the part takes minutes. Only a full report has such parts."""
 
     def section(self, data: Data) -> Section:
         """Returns the section of the report about a data object."""
@@ -151,7 +149,7 @@ def analyse_law(
         scenario: The scenario with the law. The sensors may be exact or realistic,
             because each part chooses its own sensors.
         parts: The parts, in the order in which they run.
-        full: Whether the parts may take minutes.
+        full: Whether checks by simulation take longer, see ``Study``.
         step: Function that is called with the title of each part before the part runs.
 
     Returns:

@@ -8,26 +8,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure as Drawing
+
 from analysis.models.model_export import write_models
 from analysis.reporting.criterion import compare_verdicts
 from analysis.reporting.plain_values import plain
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.reporting.render import text
-from analysis.reporting.section import Table
+from analysis.reporting.section import Table, figures_of
 from analysis.stability.law_analysis import LawAnalysis
 from analysis.stability.report_page import stability_page, verdict_table
 from diagrams import write_scenario
 
 
-def stability_document(
-    analyses: Sequence[LawAnalysis], out: Path | None
-) -> dict[str, Any]:
+def stability_document(analyses: Sequence[LawAnalysis]) -> dict[str, Any]:
     """Returns the JSON document of a stability analysis of one or several laws.
 
     The document of one law has its results as keys at the top level. The document of
     several laws has the key ``laws`` with one document per law, and the key
-    ``comparison`` with the verdicts side by side. ``out`` is the result directory,
-    whose name is written into the document, or None if no files are written.
+    ``comparison`` with the verdicts side by side. The key ``out`` is None until the
+    files of the report have a directory.
     """
     first = analyses[0].scenario
     common = {
@@ -35,7 +35,7 @@ def stability_document(
         "scenario": first.name,
         "seed": first.seed,
     }
-    ending = {"versions": versions(), "out": str(out) if out is not None else None}
+    ending = {"versions": versions(), "out": None}
     laws = [_law_document(analysis) for analysis in analyses]
     if len(laws) == 1:
         return {**common, **laws[0], **ending}
@@ -64,6 +64,17 @@ def stability_text(analyses: Sequence[LawAnalysis]) -> str:
         before = f"{each.law}: " if len(analyses) > 1 else ""
         lines += [f"note: {before}{note}" for note in each.notes]
     return "\n".join(lines)
+
+
+def report_figures(analyses: Sequence[LawAnalysis]) -> dict[str, Drawing]:
+    """Draws all figures of a report, by caption."""
+    drawn = {}
+    for each in analyses:
+        before = f"{each.law}: " if len(analyses) > 1 else ""
+        for section in each.sections:
+            for figure in figures_of(section):
+                drawn[before + figure.caption] = figure.draw()
+    return drawn
 
 
 def write_stability(

@@ -44,7 +44,7 @@ def write_run(
 
     Args:
         result: Result of the run.
-        summary: Summary of the run, from ``run_summary``.
+        summary: Summary of the run, from ``run_document``.
         directory: Existing directory.
         pictures: Whether to write the PNG and SVG files.
     """
