@@ -77,7 +77,11 @@ _APPROACH_M, _STAND_OFF_M = 8.0, 3.0
 
 @dataclass(frozen=True)
 class GainFigures:
-    """Performance figures of one pair of gains K_r and D_r."""
+    """Performance figures of one pair of gains K_r and D_r.
+
+    Each margin, and the sensitivity peak M_s, is the worse of those at the sensor and
+    at the actuator.
+    """
 
     stiffness_n_m: float
     """K_r, N/m."""
@@ -85,16 +89,11 @@ class GainFigures:
     """D_r, N s/m."""
     damping_ratio: float
     phase_margin_deg: float
-    """Phase margin at the sensor or at the actuator, whichever is smaller, deg."""
     gain_margin_db: float
-    """Gain margin at the sensor or at the actuator, whichever is smaller, dB."""
     sensitivity_peak: float
-    """Sensitivity peak M_s at the sensor or at the actuator, whichever is larger."""
     disk_margin: float
-    """Disk margin at the sensor or at the actuator, whichever is smaller."""
     delay_margin_s: float
-    """Delay margin at the sensor or at the actuator, whichever is smaller, s: phase
-    margin divided by crossover frequency."""
+    """Phase margin divided by crossover frequency, s."""
     contact_radius: float
     """Spectral radius of the motion in front of an obstacle; stable below 1."""
     following_lag_m: float
@@ -117,12 +116,13 @@ class GainChoice:
 
 @dataclass(frozen=True)
 class WholeLoop:
-    """Least margins at rest of the loop that includes the law, over all cuts."""
+    """Least margins at rest of the loop that includes the law, over all cuts.
+
+    Gain may rise or fall, and phase may lag or lead.
+    """
 
     gain_margin_db: float
-    """Least gain margin for an increase or a decrease, dB."""
     phase_margin_deg: float
-    """Least phase margin for a lag or a lead, deg."""
     disk_margin: float
     weakest: str
     """Name of the cut loop with the least disk margin."""
@@ -148,11 +148,9 @@ class RecommendedGains:
     """Scenario with the recommended K_r, D_r, follow distance, and gains of its law.
     None if no gains meet the requirements."""
     recommended: GainFigures | None
-    """Figures of the recommended K_r and D_r."""
     law: LawDesign | None
     """Gains of the law. None if the design chooses no gains of this law."""
     whole_loop: WholeLoop | None
-    """Margins of the loop with the recommended gains and the law."""
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the figures and the recommended gains for the JSON document."""
@@ -189,10 +187,7 @@ class RecommendedGains:
 
     @property
     def command(self) -> str:
-        """Command line that simulates the scenario with the recommended gains.
-
-        The command is empty if no gains are recommended.
-        """
+        """Command line that simulates the recommended gains; empty without any."""
         if self.chosen is None:
             return ""
         name = self.scenario.name
@@ -258,19 +253,9 @@ def recommend_gains(
 ) -> RecommendedGains:
     """Finds gains of the attraction and of the law that meet the requirements.
 
-    Args:
-        scenario: The scenario with the current gains, the law, the robot, and the
-            plant.
-        requirements: Requirements that the gains must meet. None means the default
-            requirements.
-        springs: Values of K_r that are tried, as multiples of the current K_r.
-
-    Returns:
-        The current gains, the least D_r for each K_r, and the recommended gains.
-
-    Raises:
-        InputError: The current K_r is 0.
-        InputError: No gains of the law meet a requirement that must be met.
+    ``springs`` are the values of K_r to try, as multiples of the current K_r. Raises
+    InputError if the current K_r is 0, or if no gains of the law meet a requirement
+    that must be met.
     """
     requirements = requirements or Requirements()
     K_r = scenario.follower.attraction.stiffness_n_m
@@ -324,17 +309,8 @@ def _chosen(
 def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scenario:
     """Chooses the follow distance, and the gains of the scenario's law with it.
 
-    Args:
-        scenario: The scenario with K_r, D_r, the law, the robot, and the source.
-        requirements: Requirements that the gains must meet.
-
-    Returns:
-        A copy of the scenario. Its follow distance is at least the current one, leaves
-        room for the overshoot, and is so long that the law shifts P at rest little
-        enough.
-
-    Raises:
-        InputError: No gains meet a requirement that must be met.
+    The follow distance is at least the current one, leaves room for the overshoot, and
+    is so long that the law shifts P at rest little enough.
     """
     law = scenario.only.law
     least = follow_distance(scenario, requirements, braking_overshoot(scenario))
@@ -358,19 +334,7 @@ def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scen
 def fitting_gains(
     scenario: Scenario, requirements: Requirements, *laws: str
 ) -> LawGains:
-    """Returns the gains of a scenario, with new gains of laws that need them.
-
-    Args:
-        scenario: The scenario with the attraction, the robot, and the current gains.
-        requirements: Requirements that the gains must meet.
-        *laws: Names of the laws to check, all of them in ``DESIGNED_LAWS``.
-
-    Returns:
-        The law parameters. The gains of a law that meets all requirements stay.
-
-    Raises:
-        InputError: No gain meets a requirement that must be met.
-    """
+    """Returns the gains of a scenario, new for laws that miss a requirement."""
     unfit = [x for x in laws if not check_law(scenario, x, requirements).acceptable]
     return search_gains(scenario, requirements, laws=unfit)
 
@@ -389,16 +353,7 @@ def _whole_loop(chosen: Scenario) -> WholeLoop:
 def least_damping(
     scenario: Scenario, K_r: float, requirements: Requirements
 ) -> GainChoice:
-    """Finds the least D_r that meets the requirements with one K_r.
-
-    Args:
-        scenario: The scenario with the robot, the plant, and the law.
-        K_r: Stiffness of the attraction, N/m, above 0.
-        requirements: Requirements on the loop and on the contact mode.
-
-    Returns:
-        The least D_r, of values up to three times critical damping.
-    """
+    """Finds the least D_r, up to three times critical, that meets the requirements."""
     critical = 2.0 * math.sqrt(K_r * scenario.only.robot.mass_kg)
 
     def meets(D_r: float) -> bool:
@@ -416,10 +371,7 @@ def least_damping(
 
 
 def _bisected(meets: Callable[[float], bool], low: float, high: float) -> float:
-    """Returns the least value that meets the requirements, by bisection.
-
-    The value is rounded up to two decimals, unless the rounded value fails.
-    """
+    """Least value that meets the requirements, if possible rounded up to 2 decimals."""
     while high - low > 1e-3 * high:
         middle = (low + high) / 2.0
         low, high = (low, middle) if meets(middle) else (middle, high)
@@ -465,16 +417,9 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
     """Returns the sampled open loop of the attraction without the force of the law.
 
     The attraction consists of a spring and a damper. The robot moves along the line to
-    a source at rest.
-
-    Args:
-        scenario: The scenario with the gains, the robot, and the plant.
-        at: Where the loop is cut. A cut at ``sensor`` opens the path of the spring
-            only. A cut at ``actuator`` opens the paths of both the spring and the
-            damper.
-
-    Returns:
-        The model of the open loop. Its input and its output are accelerations, m/s^2.
+    a source at rest. A cut at ``sensor`` opens the path of the spring only. A cut at
+    ``actuator`` opens the paths of both the spring and the damper. The input and the
+    output are accelerations, m/s^2.
     """
     chain = motion_chain(scenario)
     mass = scenario.only.robot.mass_kg
@@ -494,13 +439,7 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
 def gain_figures(scenario: Scenario, requirements: Requirements) -> GainFigures:
     """Computes performance figures of the stiffness K_r and damping D_r of a scenario.
 
-    Args:
-        scenario: The scenario with the gains, the robot, and the plant.
-        requirements: The requirements, of which only ``spare_latency_ticks`` is used.
-
-    Returns:
-        The performance figures. The loop is cut at the sensor and at the actuator. Each
-        margin is the worse of the margins of the two cuts.
+    Of the requirements, only ``spare_latency_ticks`` is used.
     """
     both = [_margins(loop_margins(attraction_loop(scenario, at))) for at in _CUTS]
     worst = {
@@ -544,17 +483,11 @@ def braking_overshoot(scenario: Scenario) -> float:
 def follow_distance(
     scenario: Scenario, requirements: Requirements, overshoot_m: float
 ) -> float:
-    """Returns the least follow distance that leaves room for an overshoot.
+    """Returns the least follow distance that leaves room for an overshoot, m.
 
-    Args:
-        scenario: The scenario with the length of the leader. The leader is the robot
-            that carries the source.
-        requirements: The requirements with the clearance to the body of the leader.
-        overshoot_m: Overshoot of the follower past the follow point, m.
-
-    Returns:
-        The distance from the follower's control point to the source, m. The distance is
-        rounded up to a multiple of 5 cm.
+    This is the distance from the follower's control point to the source, rounded up to
+    a multiple of 5 cm. The follower passes the follow point by ``overshoot_m`` and
+    keeps the clearance to the body of the leader, which carries the source.
     """
     room = scenario.source.length_m / 2.0 + requirements.clearance_m
     least = overshoot_m + room
@@ -562,16 +495,7 @@ def follow_distance(
 
 
 def with_attraction(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
-    """Returns a copy of a scenario with other gains of the attraction.
-
-    Args:
-        scenario: The scenario, which stays unchanged.
-        K_r: Stiffness of the spring, N/m.
-        D_r: Damping of the damper, N s/m.
-
-    Returns:
-        The copy with the new gains.
-    """
+    """Returns a copy of a scenario with other gains K_r, N/m, and D_r, N s/m."""
     attraction = AttractionParameters.model_validate(
         scenario.follower.attraction.model_dump()
         | {"stiffness_n_m": K_r, "damping_n_s_m": D_r}

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.design.design_study import DesignStudy
-from analysis.laws.law_curves_plots import LAW_STYLES
+from analysis.laws.law_curves import LAW_STYLES
 from analysis.laws.push_and_pull import DESIGNED_LAWS, spring
 from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import largest_contact_stiffness
@@ -26,14 +26,8 @@ def plot_design(study: DesignStudy) -> Figure:
     The left panel shows forces over the distance of an obstacle. It compares the push
     of each law away from the obstacle with the pull toward the source. In shaded areas,
     the push exceeds the pull. The right panel shows the stiffness of each law, and the
-    limits of a stable motion at an obstacle, over the damping D_r.
-
-    Args:
-        study: The result of ``study_design``. The figure shows its current attraction,
-            and not its recommended one.
-
-    Returns:
-        The figure with two panels.
+    limits of a stable motion at an obstacle, over the damping D_r. The attraction is
+    the current one, and not the recommended one.
     """
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
     balance, conflict = figure.subplots(1, 2)
@@ -69,10 +63,8 @@ def _plot_balance(axes: Axes, study: DesignStudy) -> None:
 
 def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
     scenario = study.today.scenario
-    attraction, spare = (
-        scenario.follower.attraction,
-        study.gains.requirements.spare_latency_ticks,
-    )
+    attraction = scenario.follower.attraction
+    spare = study.gains.requirements.spare_latency_ticks
     lines = dict.fromkeys((0, spare), "-") | {spare: "--"}
     for ticks, line in lines.items():
         limits = [

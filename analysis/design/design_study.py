@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from analysis.design.attraction_search import (
     GainFigures,
@@ -16,7 +19,6 @@ from analysis.design.attraction_search import (
     recommend_gains,
 )
 from analysis.design.gain_search import gain_for_barrier, search_gains
-from analysis.design.jam_runs import JAM_STARTS_M, JamRuns, jam_runs
 from analysis.design.requirements import (
     LawDesign,
     Requirements,
@@ -30,11 +32,26 @@ from analysis.laws.push_and_pull import (
     kinetic_energy,
 )
 from analysis.linear.contact_mode import largest_contact_stiffness
+from diagrams import load_scenario, simulate
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
+#: Lateral offsets of the start, m. At both ends, the robot starts in front of an
+#: obstacle.
+JAM_STARTS_M = tuple(np.linspace(-0.6, 0.6, 9).round(3).tolist())
 #: Distances from the obstacle to the point of rest in the table of barriers, m.
 _TO_GO_M = (1.0, 1.5, 2.0, 3.0)
+
+
+@dataclass(frozen=True)
+class JamRuns:
+    """The outcomes of the runs of one law."""
+
+    law: str
+    causes: dict[str, int]
+    """Number of runs by outcome."""
+    jams: int
+    """Number of runs that got stuck or timed out and never reached the goal."""
 
 
 @dataclass(frozen=True)
@@ -42,16 +59,13 @@ class Alternative:
     """An attraction with its performance figures and with the gains of the laws."""
 
     scenario: Scenario
-    """Scenario with this attraction and these gains."""
     figures: GainFigures
-    """Margins and other figures of K_r and D_r."""
     overshoot_m: float
     """Overshoot past the follow point after an approach at top speed, m."""
     follow_distance_m: float
     """Least follow distance that leaves room for the overshoot, m."""
     metres_to_go: float
-    """Distance from an obstacle to the point behind it where the robot would rest,
-    m."""
+    """Distance from an obstacle to the point of rest behind it, m."""
     allowed_stiffness_n_m: float
     """Largest stiffness of a push that is stable in contact with late echoes, N/m."""
     laws: tuple[LawDesign, ...]
@@ -110,23 +124,11 @@ def study_design(
 ) -> DesignStudy:
     """Chooses gains of the laws for a scenario, and also recommends another attraction.
 
-    The recommendation is that of the stability report.
-
-    Args:
-        scenario: The scenario with the attraction and the robot. Of the parameters of
-            its laws, only the reaches and the speed limits are used.
-        requirements: Requirements that the gains must meet. None means the default
-            requirements.
-        progress: Function that is called with the number of finished runs. There are
-            ``STUDY_RUNS`` runs.
-
-    Returns:
-        The gains and their performance figures, both for the current attraction and for
-        the recommended attraction.
-
-    Raises:
-        InputError: There are several robots, or no gains meet a requirement that must
-            be met.
+    The recommendation is that of the stability report. Of the parameters of the
+    scenario's laws, only the reaches and the speed limits are used. ``progress`` is
+    called with the number of finished runs, of which there are ``STUDY_RUNS``. Raises
+    InputError if there are several robots, or if no gains meet a requirement that must
+    be met.
     """
     scenario.require_one_robot("a design of gains")
     requirements = requirements or Requirements()
@@ -176,10 +178,55 @@ def _alternative(
 
 
 def _barrier_row(scenario: Scenario, to_go: float) -> BarrierRow:
-    attraction, reach = (
-        scenario.follower.attraction,
-        scenario.follower.laws.conventional.reach_m,
-    )
-    farther = Requirements(source_range_m=to_go + attraction.follow_distance_m + reach)
+    follow = scenario.follower.attraction.follow_distance_m
+    reach = scenario.follower.laws.conventional.reach_m
+    farther = Requirements(source_range_m=to_go + follow + reach)
     needed = gain_for_barrier(scenario, "conventional", "stiffness_n_m", farther)
     return BarrierRow(to_go, needed, barrier_from_reach_n_m(scenario, to_go))
+
+
+def jam_runs(
+    scenario: Scenario,
+    laws: Sequence[str],
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> list[JamRuns]:
+    """Simulates ``two_static_obstacles`` for each law and each of ``JAM_STARTS_M``.
+
+    The runs have exact hearing and ultrasonic cones. Besides the gains, they use the
+    tick, the engine, and the sample periods of the sensors of ``scenario``.
+    ``progress`` is called with the number of finished runs.
+    """
+    settings = (
+        f"tick_s={scenario.tick_s}",
+        f"microphones.frame_s={scenario.follower.microphones.frame_s}",
+        f"ultrasonic.period_s={scenario.follower.ultrasonic.period_s}",
+        f"engine={scenario.engine}",
+    )
+    layout = load_scenario("two_static_obstacles", ["hearing=ideal", *settings])
+    limit, gains = layout.follower.laws.active.speed_limit_m_s, scenario.follower.laws
+    active = gains.active.model_copy(update={"speed_limit_m_s": limit})
+    gains = gains.model_copy(update={"active": active})
+    done, found = 0, []
+    goal = layout.with_robot(attraction=scenario.follower.attraction).goal_radius_m
+    for law in laws:
+        causes: Counter[str] = Counter()
+        jams = 0
+        for start in JAM_STARTS_M:
+            place = layout.only.start.model_copy(update={"position_m": (0.0, start)})
+            run = simulate(
+                layout.with_robot(
+                    law=law,
+                    start=place,
+                    attraction=scenario.follower.attraction,
+                    laws=gains,
+                )
+            )
+            causes[run.cause] += 1
+            came = bool(np.any(run.columns["source_range_true"] <= goal))
+            jams += run.cause in ("stuck", "timeout") and not came
+            done += 1
+            if progress is not None:
+                progress(done)
+        found.append(JamRuns(law, dict(causes), jams))
+    return found

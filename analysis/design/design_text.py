@@ -15,11 +15,7 @@ from diagrams import dump_scenario
 
 
 def design_text(study: DesignStudy) -> str:
-    """Returns the results of the design as text for a terminal.
-
-    The text has the requirements, the gains that were found, and whether the gains meet
-    the requirements.
-    """
+    """Returns requirements, gains and checks of the design as text for a terminal."""
     lines = [
         f"kinetic energy at top speed {study.kinetic_energy_j:.3f} J",
         "",
@@ -104,22 +100,16 @@ def design_document(study: DesignStudy) -> dict[str, Any]:
 
 
 def write_design(study: DesignStudy, document: dict[str, Any], directory: Path) -> None:
-    """Writes the files of a design into a directory.
+    """Writes the files of a design into an existing directory.
 
-    - ``summary.json`` is the JSON document.
+    - ``summary.json`` is the JSON document from ``design_document``.
     - ``scenario.yaml`` is the scenario with new gains of the laws.
     - ``recommended.yaml`` is the scenario with the recommended gains.
     - ``design.png`` is the figure of ``plot_design``.
     - ``law_curves.png`` shows the forces of the laws.
-
-    Args:
-        study: The result of the design.
-        document: The JSON document from ``design_document``.
-        directory: An existing directory.
     """
     from analysis.design.design_plots import plot_design
-    from analysis.laws.law_curves import law_curves
-    from analysis.laws.law_curves_plots import plot_law_curves
+    from analysis.laws.law_curves import law_curves, plot_law_curves
     from analysis.laws.push_and_pull import DESIGNED_LAWS
 
     write_json(document, directory / "summary.json")

@@ -53,19 +53,10 @@ def search_gains(
     *,
     laws: Iterable[str] = tuple(DESIGNED_LAWS),
 ) -> LawGains:
-    """Finds gains of laws that meet the requirements.
+    """Finds gains of laws of ``DESIGNED_LAWS`` that meet the requirements.
 
-    Args:
-        scenario: The scenario with the attraction, the robot, and the sensors. The
-            reaches, speed limits, and saturations of its laws are also used.
-        requirements: Requirements that the gains must meet.
-        laws: Names of the laws, all of them in ``DESIGNED_LAWS``.
-
-    Returns:
-        The law parameters of the scenario, with the gains that were found.
-
-    Raises:
-        InputError: No gain meets a requirement that must be met.
+    The reaches, speed limits, and saturations of the scenario's laws stay. Raises
+    InputError if no gain meets a requirement that must be met.
     """
     for law in laws:
         rule = _RULES[DESIGNED_LAWS[law].rule]
@@ -83,21 +74,9 @@ def gain_for_barrier(
     """Returns the value of a gain with which a law just stops the robot at an obstacle.
 
     During an approach, the push of the law must take the kinetic energy of top speed
-    from the robot. This energy is called the barrier.
-
-    Args:
-        scenario: The scenario with all other values.
-        law: Name of the law that has the gain.
-        field: Name of the gain, whose unit is N/m or N m. The push of the law must be
-            proportional to the gain.
-        requirements: The requirements with the largest distance of the source.
-        **also: Other gains of the law, as multiples of this gain.
-
-    Returns:
-        The gain in the unit of its field.
-
-    Raises:
-        InputError: No gain from 1e-3 to 1e5 stops the robot.
+    from the robot. This energy is called the barrier. ``field`` is a gain in N/m or N m
+    to which the push is proportional. ``also`` has other gains of the law as multiples
+    of this gain. Raises InputError if no gain from 1e-3 to 1e5 stops the robot.
     """
     to_go, energy = metres_to_go(scenario, requirements), kinetic_energy(scenario)
 
@@ -114,11 +93,7 @@ def gain_for_barrier(
 def _barrier_gains(
     scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
-    """Derives the two gains of a law by the rule ``barrier``.
-
-    The spring gain follows from the kinetic energy that the law must remove. The damper
-    gain follows from the energy that the velocity term may return to the motion.
-    """
+    """Derives the two gains of a law by the rule ``barrier``."""
     gains = LAWS[law].loop_gains
     assert gains is not None, f"{law} does not name the gains that tune it"
     spring_gain, damper_gain = gains
@@ -149,11 +124,7 @@ _RULES = {"barrier": _barrier_gains, "matched": _matched_gains}
 def _matched_damper(
     scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
-    """Derives the two gains of the velocity term of the active law of 2019.
-
-    The gain d_ref follows from the offset that a far echo may cause. The gain D_0
-    follows from the energy that the velocity term may return to the motion.
-    """
+    """Derives d_ref from the offset by a far echo, and D_0 from the returned energy."""
     far = scenario.follower.ultrasonic.maximum_range_m
     tail = spring(law, scenario)(far)
     at_rest = (
@@ -165,24 +136,17 @@ def _matched_damper(
     unit_term = force(far, 0.0) - spring(law, with_unit)(far)
     d_ref = _rounded(at_rest / unit_term)
 
+    def with_damping(D_0: float) -> Scenario:
+        gains = {"reference_damping_n_s_m": d_ref, "matched_damping_n_s_m": D_0}
+        return with_gains(scenario, law, **gains)
+
     def excess(D_0: float) -> float:
-        changed = with_gains(
-            scenario,
-            law,
-            reference_damping_n_s_m=d_ref,
-            matched_damping_n_s_m=D_0,
-        )
-        return injected_share(law, changed) - requirements.injected_share
+        return injected_share(law, with_damping(D_0)) - requirements.injected_share
 
     # If D_0 is below sqrt(e) d_ref, the term never exceeds its value at rest.
     field = f"laws.{law}.matched_damping_n_s_m"
     D_0 = _root(excess, math.sqrt(math.e) * d_ref, 1e3 * d_ref, field)
-    return with_gains(
-        scenario,
-        law,
-        reference_damping_n_s_m=d_ref,
-        matched_damping_n_s_m=_rounded(D_0),
-    )
+    return with_damping(_rounded(D_0))
 
 
 def _matched_spring(

@@ -50,7 +50,6 @@ class Check:
     bound: float
     unit: str
     at_least: bool = False
-    """Whether the bound is a lower bound."""
 
     @property
     def ratio(self) -> float:
@@ -80,21 +79,18 @@ class Check:
 class Requirements:
     """Requirements on the attraction and on the gains of the laws.
 
-    The criteria of the stability report have the same thresholds.
+    The criteria of the stability report have the same thresholds. The first six are
+    bounds of the loop to the follow point.
     """
 
     damping_ratio: float = 0.4
-    """Least damping ratio of the loop to the follow point."""
     phase_margin_deg: float = 45.0
-    """Least phase margin of this loop, deg."""
     gain_margin_db: float = 6.0
-    """Least gain margin of this loop, up or down, dB."""
+    """Least gain margin, up or down, dB."""
     sensitivity_peak: float = 2.0
-    """Largest sensitivity peak M_s of this loop."""
+    """Largest sensitivity peak M_s."""
     disk_margin: float = 2.0 / 3.0
-    """Least disk margin of this loop."""
     delay_margin_s: float = 0.1
-    """Least delay margin of this loop, s."""
     rest_offset_m: float = 0.1
     """Largest offset of a robot at rest due to the push away from the leader, m. The
     leader is the robot that carries the source."""
@@ -121,11 +117,7 @@ class Requirements:
         return replace(self, rest_offset_m=scenario.stop.goal_margin_m)
 
     def loop(self) -> Iterator[tuple[str, Requirement]]:
-        """Yields the requirements on the loop to the follow point.
-
-        Yields:
-            Name of the field of ``GainFigures``, and the requirement.
-        """
+        """Yields fields of ``GainFigures`` with the requirements on the loop."""
         for field, name, unit in (
             ("damping_ratio", "damping ratio", "1"),
             ("phase_margin_deg", "phase margin", "deg"),
@@ -166,39 +158,18 @@ class LawDesign:
 
 
 def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
-    """Returns a copy of a scenario with other gains of one law, without validation.
-
-    Args:
-        scenario: The scenario, which stays unchanged.
-        law: Name of the law.
-        **gains: New values by field of the law's parameters, in the unit of the field.
-
-    Returns:
-        The copy with the new gains.
-    """
+    """Returns a copy with other gains of one law, without validation."""
     parameters = getattr(scenario.follower.laws, law).model_copy(update=gains)
     laws = scenario.follower.laws.model_copy(update={law: parameters})
     return scenario.with_robot(laws=laws)
 
 
 def metres_to_go(scenario: Scenario, requirements: Requirements) -> float:
-    """Returns how far the robot would still go if an obstacle did not stop it.
+    """Returns the distance from an obstacle to the follow point behind it, m.
 
     The obstacle is at the distance rho_0 ahead of the robot, where rho_0 is the reach
-    of the conventional law. The follow point is the point where the attraction is zero.
-    The result is the distance from the obstacle to the follow point. The source has its
-    largest distance.
-
-    Args:
-        scenario: The scenario with the follow distance and rho_0.
-        requirements: The requirements with the largest distance of the source.
-
-    Returns:
-        The distance in m, above 0.
-
-    Raises:
-        InputError: The follow distance and rho_0 together are too long for the largest
-            distance of the source.
+    of the conventional law. At the follow point, the attraction is zero. The source has
+    its largest distance. Raises InputError if the result is not above 0.
     """
     follow = scenario.follower.attraction.follow_distance_m
     reach = scenario.follower.laws.conventional.reach_m
@@ -213,16 +184,10 @@ def metres_to_go(scenario: Scenario, requirements: Requirements) -> float:
 
 
 def allowed_stiffness(scenario: Scenario, requirements: Requirements) -> float:
-    """Returns the largest stiffness of a law with a stable motion at an obstacle.
+    """Returns the largest stiffness of a law with a stable motion at an obstacle, N/m.
 
-    Args:
-        scenario: The scenario with the robot, the plant, and the attraction.
-        requirements: The requirements with ``spare_latency_ticks``, the additional
-            delay of echoes.
-
-    Returns:
-        The stiffness in N/m. If the attraction alone is too stiff, the result is
-        negative.
+    Echoes are ``spare_latency_ticks`` later than in the model. If the attraction alone
+    is too stiff, the result is negative.
     """
     total = largest_contact_stiffness(
         scenario, latency_ticks=requirements.spare_latency_ticks
@@ -231,19 +196,10 @@ def allowed_stiffness(scenario: Scenario, requirements: Requirements) -> float:
 
 
 def check_law(scenario: Scenario, law: str, requirements: Requirements) -> LawDesign:
-    """Checks the gains of a law in a scenario against the requirements.
+    """Checks the gains of a law in a scenario against five requirements.
 
-    Args:
-        scenario: The scenario with the gains, the robot, the plant, and the sensors.
-        law: Name of the law.
-        requirements: Requirements that the gains must meet.
-
-    Returns:
-        The gains of the law with five checks. Each check has a number and its bound.
-
-    Raises:
-        InputError: The design does not choose gains for this law.
-        InputError: The follow distance is too long; see ``metres_to_go``.
+    Raises InputError if the law is not one of ``DESIGNED_LAWS``, or if the follow
+    distance is too long; see ``metres_to_go``.
     """
     push = spring(law, scenario)
     to_go = metres_to_go(scenario, requirements)

@@ -34,19 +34,7 @@ _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
 
 def spring(law: str, scenario: Scenario) -> Push:
-    """Returns the spring term of a law as a function of distance.
-
-    Args:
-        law: One of ``DESIGNED_LAWS``.
-        scenario: The scenario with the gains and the sensors.
-
-    Returns:
-        A function from the distance of an obstacle, m, to the force away from it, N.
-        The force does not include the velocity term.
-
-    Raises:
-        InputError: The design does not choose gains for this law.
-    """
+    """Returns the push of a law of ``DESIGNED_LAWS`` without its velocity term."""
     if law not in DESIGNED_LAWS:
         raise InputError(
             "law", f"{law!r} has no gains to choose; use {', '.join(DESIGNED_LAWS)}"
@@ -63,23 +51,13 @@ def kinetic_energy(scenario: Scenario) -> float:
 
 
 def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
-    """Returns the largest energy that a robot loses on its way to an obstacle.
+    """Returns the largest energy that a robot loses on its way to an obstacle, J.
 
-    The robot drives straight toward the obstacle. The law pushes the robot back, and
-    the attraction pulls the robot forward. Where the push exceeds the pull, the robot
-    loses kinetic energy. The result is the largest loss between two points of the
-    approach. If this loss is at least the kinetic energy of top speed, the robot stops,
-    because it cannot be faster than top speed. The approach ends at the least distance
-    that the sensors measure.
-
-    Args:
-        push: Force away from the obstacle over its distance; see ``spring``.
-        scenario: The scenario with the attraction and the least range of the sensors.
-        metres_to_go: Distance from the surface of the obstacle to the point behind it
-            where the attraction is zero, m.
-
-    Returns:
-        The energy in J. If the push never exceeds the pull, the energy is 0.
+    Where the push exceeds the pull of the attraction, the robot loses kinetic energy.
+    The result is the largest loss between two points of the approach, which ends at the
+    least distance that the sensors measure. If this loss is at least the kinetic energy
+    of top speed, the robot stops, because it cannot be faster than top speed. The
+    attraction is zero at ``metres_to_go`` behind the surface of the obstacle.
     """
     c, forces = sampled_push(push, scenario)
     return largest_rise(
@@ -90,36 +68,22 @@ def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
 def sampled_push(
     push: Push, scenario: Scenario
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Samples a push at many distances, starting at the least range of the sensors.
-
-    Args:
-        push: Force away from an obstacle over its distance; see ``spring``.
-        scenario: The scenario with the least range of the sensors.
-
-    Returns:
-        The first array has the (n,) distances, m. The second array has the (n,) forces,
-        N.
-    """
+    """Returns (n,) distances from the least range of the sensors, m, and forces, N."""
     c = np.arange(scenario.follower.ultrasonic.minimum_range_m, _FARTHEST_M, _STEP_M)
     return c, np.array([push(distance) for distance in c.tolist()])
 
 
 def largest_rise(net: NDArray[np.float64]) -> float:
-    """Returns the largest rise of the potential of a force during an approach.
+    """Returns the largest rise, J, of the potential of a force ``net``, N.
 
-    Args:
-        net: (n,) net force away from the obstacle, N. The distances are those of
-            ``sampled_push``.
-
-    Returns:
-        The largest rise between two distances in J, 0 or more.
+    The force has one value for each distance of ``sampled_push``.
     """
     potential = np.concatenate([[0.0], np.cumsum(net[1:] + net[:-1]) * _STEP_M / 2.0])
     return float(np.max(potential - np.minimum.accumulate(potential)))
 
 
 def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
-    """Returns the K_0 with which the conventional law stops a robot at an obstacle.
+    """Returns the K_0, N/m, with which the conventional law stops a robot.
 
     The law acts as a spring of stiffness K_0 within its reach rho_0. Within this reach,
     the speed of the robot has no limit. The largest energy of the spring, K_0
@@ -128,14 +92,7 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
     - The kinetic energy at top speed, which the robot has at the distance rho_0.
     - The work of the attraction from the distance rho_0 to the obstacle.
 
-    Args:
-        scenario: The scenario with the attraction, the reach rho_0, the mass, and the
-            top speed.
-        metres_to_go: Distance from the surface of the obstacle to the point behind it
-            where the attraction is zero, m.
-
-    Returns:
-        K_0 in N/m.
+    The attraction is zero at ``metres_to_go`` behind the surface of the obstacle.
     """
     K_r = scenario.follower.attraction.stiffness_n_m
     reach = scenario.follower.laws.conventional.reach_m
@@ -144,28 +101,17 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
 
 
 def rest_offset(law: str, scenario: Scenario) -> float:
-    """Returns how far the leader pushes the follower off the follow point at rest.
+    """Returns how far the leader pushes the follower off the follow point at rest, m.
 
     The leader is the robot that carries the source. The law of the follower treats the
     body of the leader as an obstacle. The follower is straight behind the leader.
-
-    Args:
-        law: One of ``DESIGNED_LAWS``.
-        scenario: The scenario with the gains, the follow distance, and the length of
-            the leader.
-
-    Returns:
-        The offset in m, 0 or more.
     """
     force = radial_law(scenario.with_robot(law=law)).function
-    K_r, follow = (
-        scenario.follower.attraction.stiffness_n_m,
-        scenario.follower.attraction.follow_distance_m,
-    )
-    gap = follow - scenario.source.length_m / 2.0
+    attraction = scenario.follower.attraction
+    gap = attraction.follow_distance_m - scenario.source.length_m / 2.0
 
     def unbalanced(offset: float) -> float:
-        return K_r * offset - force(max(gap + offset, 1e-6), 0.0)
+        return attraction.stiffness_n_m * offset - force(max(gap + offset, 1e-6), 0.0)
 
     # If the body of the leader covers the follow point, P rests outside the body.
     nearest = max(0.0, -gap)
@@ -175,15 +121,7 @@ def rest_offset(law: str, scenario: Scenario) -> float:
 
 
 def far_offset(law: str, scenario: Scenario) -> float:
-    """Returns how far an echo at the largest sensor range pushes a robot at rest.
-
-    Args:
-        law: One of ``DESIGNED_LAWS``.
-        scenario: The scenario with the gains and the largest range of the sensors.
-
-    Returns:
-        The offset in m. If the law has a shorter reach, the offset is 0.
-    """
+    """Returns how far an echo at the largest sensor range pushes a robot at rest, m."""
     force = radial_law(scenario.with_robot(law=law)).function
     farthest = scenario.follower.ultrasonic.maximum_range_m
     return force(farthest, 0.0) / scenario.follower.attraction.stiffness_n_m
@@ -194,23 +132,14 @@ def injected_share(law: str, scenario: Scenario) -> float:
 
     The obstacle is at rest, and the robot recedes from it at the speed s. The velocity
     term of the law adds at most the power h(s) s, with h(s) = f(c, s) - f(c, 0). Here,
-    f is the force of the law at the distance c. The damping D_r of the attraction
-    removes the power D_r s^2. The result is the largest ratio of the two powers. If the
-    ratio is below 1, the motion cannot gain energy.
-
-    Args:
-        law: One of ``DESIGNED_LAWS``.
-        scenario: The scenario with the gains, D_r, and the top speed.
-
-    Returns:
-        The ratio, 0 or more. The distance c is half the reach rho_0 of the conventional
-        law.
+    f is the force of the law, and the distance c is half the reach rho_0 of the
+    conventional law. The damping D_r of the attraction removes the power D_r s^2. The
+    result is the largest ratio of the two powers. If the ratio is below 1, the motion
+    cannot gain energy.
     """
     force = radial_law(scenario.with_robot(law=law)).function
     within = 0.5 * scenario.follower.laws.conventional.reach_m
     speeds = scenario.only.robot.top_speed_m_s * _SPEEDS
     term = np.array([force(within, s) for s in speeds.tolist()]) - force(within, 0.0)
-    return (
-        float(np.max(np.abs(term) / speeds))
-        / scenario.follower.attraction.damping_n_s_m
-    )
+    damping = scenario.follower.attraction.damping_n_s_m
+    return float(np.max(np.abs(term) / speeds)) / damping

@@ -33,12 +33,11 @@ INCREMENT_STEPS = (2e-3, 0.01)
 class RadialLaw:
     """The force f(c, s) of a law away from an obstacle.
 
-    - c is the distance of the obstacle, m.
-    - s is the relative speed of the obstacle that the law uses, m/s.
+    The distance of the obstacle is c, m, and its relative speed that the law uses is s,
+    m/s.
     """
 
     name: str
-    """Name of the law in the scenario."""
     function: Callable[[Any, Any], Any]
     """The function f(c, s) of the controller, N, for floats and for AutoDiffXd."""
     range_m: float
@@ -54,11 +53,7 @@ class RadialLaw:
 
     @cached_property
     def forces_n(self) -> NDArray[np.float64]:
-        """(n,) force f(c, 0) at ``distances_m``, N. The first entry is the limit at 0.
-
-        Raises:
-            InputError: A force is not finite.
-        """
+        """(n,) force f(c, 0) at ``distances_m``, N; first the limit at 0."""
         distances = np.maximum(self.distances_m, 1e-9).tolist()
         forces = np.array([float(self.function(c, 0.0)) for c in distances])
         if not np.all(np.isfinite(forces)):
@@ -113,16 +108,7 @@ class RadialLaw:
         return self.stiffest[1]
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """Returns the force of the law away from an obstacle.
-
-        Args:
-            c: Distance of the obstacle, m.
-            s: Relative speed of the obstacle that the law uses, m/s.
-
-        Returns:
-            The force f(c, s) in N, positive away from the obstacle. Beyond the range of
-            the sensors, the force is 0.
-        """
+        """Returns f(c, s), N, positive away from the obstacle; 0 beyond the sensors."""
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
     def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
@@ -134,15 +120,9 @@ class RadialLaw:
         return np.interp(np.asarray(c), self.distances_m, self.energies_j, right=0.0)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
-        """Returns the partial derivatives of the force f(c, s).
+        """Returns the partial derivatives df/dc, N/m, and df/ds, N s/m, of ``force``.
 
-        Args:
-            c: Distance of the obstacle, m.
-            s: Relative speed of the obstacle that the law uses, m/s. At s = 0, the
-                derivative by s is the one-sided derivative for s > 0.
-
-        Returns:
-            The first value is df/dc, N/m. The second value is df/ds, N s/m.
+        At s = 0, the derivative by s is the one-sided derivative for s > 0.
         """
         f = self.function(AutoDiffXd(c, np.eye(2)[0]), AutoDiffXd(s, np.eye(2)[1]))
         slopes = f.derivatives() if isinstance(f, AutoDiffXd) else np.zeros(0)
@@ -150,38 +130,21 @@ class RadialLaw:
 
 
 def radial_law(scenario: Scenario) -> RadialLaw:
-    """Returns the force of the law of a scenario.
-
-    Args:
-        scenario: The scenario with the law, the sensors, and the top speed.
-
-    Returns:
-        The force, with tables up to the sensor range and the top speed.
-
-    Raises:
-        InputError: The law does not exist.
-        InputError: The law is a block without a radial force.
-    """
+    """Returns the force of a scenario's law, up to the sensor range and top speed."""
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
+    sensor = key.follower.ultrasonic
     return _radial_law(
         key.only.law,
         str(loaded_digests(key)),
         key.follower.laws.model_dump_json(),
-        (
-            key.follower.ultrasonic.minimum_range_m,
-            key.follower.ultrasonic.maximum_range_m,
-        ),
+        (sensor.minimum_range_m, sensor.maximum_range_m),
         key.only.robot.top_speed_m_s,
         _Scenario(key),
     )
 
 
 class _Scenario:
-    """Wrapper that carries a scenario into a cached function.
-
-    All wrappers compare equal. Therefore, the cache distinguishes calls by the other
-    arguments only.
-    """
+    """Carries a scenario into a cached function without being part of the key."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario

@@ -18,8 +18,7 @@ from analysis.linear.delayed_run import kicked, offsets
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
 from analysis.models.ideal_scenarios import changed
-from analysis.models.linear_models import NEUTRAL
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import NEUTRAL, minimal_model
 from analysis.models.open_loops import DIRECTIONS, Direction
 from analysis.models.operating_points import OperatingPoint, motion_model
 from diagrams.scenario.scenario import Scenario
@@ -57,7 +56,6 @@ class BurstCycle:
     matrices: NDArray[np.float64] = field(repr=False)
     """(ticks, n, n) matrices of the whole state over each control period of a cycle."""
     loop: IdealLoop = field(repr=False)
-    """Control loop with exact sensors and bursts of sound."""
     state: NDArray[np.float64] = field(repr=False)
     """(n,) state at the beginning of a cycle."""
     point: OperatingPoint = field(repr=False)
@@ -85,7 +83,6 @@ class BurstRun:
     """Simulated motion over many cycles after a small initial velocity."""
 
     hold: Hold
-    """How the tracker holds the target during the silence."""
     factor: float
     """Fitted growth factor per cycle, to compare with the largest |multiplier|."""
     time_s: NDArray[np.float64] = field(repr=False)
@@ -104,24 +101,11 @@ def burst_cycle(
 ) -> BurstCycle:
     """Computes the multipliers at the equilibrium where the robot follows the source.
 
-    The source alternates between sound and silence. A multiplier is an eigenvalue of
-    the map over one cycle of both.
-
-    Args:
-        scenario: Any scenario. Its sensors are taken as exact, and its bodies as at
-            rest.
-        hold: How the tracker holds the target during the silence: ``world``, ``robot``
-            or ``motion``.
-        on_s: Duration of the sound instead of ``sound.on_s``, s.
-        gap_s: Duration of the silence instead of the scenario's, s.
-        point: Equilibrium, if it is already known.
-
-    Returns:
-        Multipliers along and across the line to the source.
-
-    Raises:
-        InputError: The cycle is not a whole number of control periods, or has no sound.
-            Or there is no stable equilibrium.
+    The source alternates between sound and silence, by default as long as in the
+    scenario. A multiplier is an eigenvalue of the map over one cycle of both. Sensors
+    are taken as exact, and bodies as at rest. ``point`` is the equilibrium, if it is
+    already known. Raises InputError if the cycle is not a whole number of control
+    periods or has no sound, or if there is no stable equilibrium.
     """
     point = point or follow_equilibrium(scenario)
     sound = scenario.source.sound
@@ -211,15 +195,8 @@ def simulate_burst_cycle(
 ) -> BurstRun:
     """Simulates many cycles of sound and silence after a small kick to the robot.
 
-    The kick changes the velocity of the virtual mass.
-
-    Args:
-        cycle: Linearized cycle, whose multipliers the simulation checks.
-        cycles: Number of cycles. The first quarter is left out of the fit.
-        direction: Direction of the kick: along the line to the source, or across.
-
-    Returns:
-        Growth factor per cycle, and the motion of the robot's control point.
+    The kick changes the velocity of the virtual mass. The fit of the growth factor
+    leaves out the first quarter of the cycles.
     """
     loop, point = cycle.loop, cycle.point
     axis = point.axes[DIRECTIONS.index(direction)]

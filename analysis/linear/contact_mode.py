@@ -13,7 +13,6 @@ at rest, the printed velocity terms have no damping on average.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypedDict, Unpack
@@ -28,8 +27,7 @@ from scipy.optimize import brentq
 from analysis.laws.radial_law import radial_law
 from analysis.models.block_models import block_model
 from analysis.models.ideal_scenarios import require_rolling
-from analysis.models.linear_models import LinearModel
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import LinearModel, minimal_model
 from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant
 from systems.base.parameters import PlantParameters
@@ -41,9 +39,9 @@ _STIFFNESSES = np.geomspace(1e-3, 1e5, 400)
 #: A spectral radius above 1 by less than this is a rounding error.
 _ROUNDING = 1e-11
 #: Motor lags of the table.
-MOTOR_LAGS_S = (0.01, 0.02, 0.05, 0.1, 0.2)
+_MOTOR_LAGS_S = (0.01, 0.02, 0.05, 0.1, 0.2)
 #: Latencies of the table, in control periods.
-LATENCY_TICKS = (0, 1, 2, 3, 4)
+_LATENCY_TICKS = (0, 1, 2, 3, 4)
 
 
 def motion_chain(
@@ -55,22 +53,15 @@ def motion_chain(
     """Returns the model from the law's acceleration to the robot's forward motion.
 
     The model is linearized at rest. Input and outputs are the values before the control
-    update that begins the period.
+    update that begins the period. The model has the controllable and observable states
+    only.
 
-    - Input: ``acceleration_W``, m/s^2.
+    - Input: ``acceleration``, m/s^2.
     - Outputs: position of the control point P, m, and velocity of the virtual mass,
       m/s.
 
-    Args:
-        scenario: Scenario with robot and plant.
-        motor_lag_s: Motor lag to use instead of ``plant.motor_lag_s``, s.
-        period_s: Control period to use instead of the scenario's, s.
-
-    Returns:
-        Model of one period with the controllable and observable states only.
-
-    Raises:
-        ValueError: The wheels can slip (``plant.friction`` is set).
+    ``motor_lag_s`` and ``period_s`` replace values of the scenario. Raises InputError
+    if the wheels can slip (``plant.friction`` is set).
     """
     plant = scenario.only.plant
     require_rolling(plant)
@@ -119,15 +110,9 @@ def _chain(
 
 
 def delayed_output(model: LinearModel, output: str, ticks: int) -> LinearModel:
-    """Returns the model with one of its outputs delayed by whole periods.
+    """Returns the model with one of its outputs delayed by 0 or more whole periods.
 
-    Args:
-        model: Sampled model.
-        output: Name of the output.
-        ticks: Delay in periods, 0 or more.
-
-    Returns:
-        Model with one more state per period of delay: ``<output>_1`` and so on.
+    Each period of delay adds a state: ``<output>_1`` and so on.
     """
     if ticks == 0:
         return model
@@ -159,21 +144,14 @@ def contact_model(
 ) -> LinearModel:
     """Returns the sampled model of the robot's motion straight towards an obstacle.
 
-    Args:
-        scenario: Scenario with mass, robot, plant and damping.
-        stiffness_n_m: Sum of all springs, those of attraction and obstacle, N/m.
-        damping_n_s_m: Damping to use instead of the attraction's, N s/m.
-        motor_lag_s: Motor lag to use instead of ``plant.motor_lag_s``, s.
-        latency_ticks: Age of the position that the springs act on, in control periods.
-            It is 0 in the diagram, where an echo drives the wheels in the same period.
-        approach_damping_n_s_m: Slope of the repulsion in the obstacle's speed, N s/m.
-            The speed is the mean rate of the position over one period. The result is
-            valid only while the obstacle comes nearer.
-        period_s: Control period to use instead of the scenario's, s.
-
-    Returns:
-        Closed loop with the signals of ``motion_chain``. The states are those of
-        ``motion_chain``, then the delayed positions, m.
+    ``stiffness_n_m`` is the sum of all springs, those of attraction and obstacle. They
+    act on a position that is ``latency_ticks`` control periods old. This is 0 in the
+    diagram, where an echo drives the wheels in the same period.
+    ``approach_damping_n_s_m`` is the slope of the repulsion in the obstacle's speed.
+    This speed is the mean rate of the position over one period. The result is valid
+    only while the obstacle comes nearer. Damping, motor lag and period replace values
+    of the scenario. The signals and states are those of ``motion_chain``, then the
+    delayed positions, m.
     """
     damping = damping_n_s_m
     if damping is None:
@@ -205,18 +183,12 @@ class ContactOptions(TypedDict, total=False):
 def largest_contact_stiffness(
     scenario: Scenario, **options: Unpack[ContactOptions]
 ) -> float:
-    """Returns the largest stable stiffness of the motion straight towards an obstacle.
+    """Returns the largest stable stiffness of the motion towards an obstacle, N/m.
 
     The stiffness is the sum of all springs: those of the attraction and of the
-    obstacle.
-
-    Args:
-        scenario: Scenario with mass, robot, plant and damping.
-        **options: Options of ``contact_model``.
-
-    Returns:
-        Stiffness, N/m. It is 0 if no spring is stable, for example without damping. It
-        is infinite if all springs up to 1e5 N/m are stable.
+    obstacle. It is 0 if no spring is stable, for example without damping. It is
+    infinite if all springs up to 1e5 N/m are stable. The options are those of
+    ``contact_model``.
     """
 
     def excess(stiffness: float) -> float:
@@ -254,36 +226,22 @@ class ContactLimits:
     active_slope_today_n_m: float
     """Largest slope -df/dc of the active law with the scenario's gains, N/m."""
     tick_s: float
-    """Control period of the scenario, s."""
 
 
-def contact_limits(
-    scenario: Scenario,
-    *,
-    motor_lags_s: Sequence[float] = MOTOR_LAGS_S,
-    latency_ticks: Sequence[int] = LATENCY_TICKS,
-) -> ContactLimits:
+def contact_limits(scenario: Scenario) -> ContactLimits:
     """Computes the largest stable stiffness before an obstacle for two control laws.
 
-    The results are tables over motor lag and latency. The motor lag of the scenario is
-    one of the rows.
-
-    Args:
-        scenario: Scenario with mass, robot, plant and attraction.
-        motor_lags_s: Further rows of the tables, s.
-        latency_ticks: Columns of the tables, in control periods.
-
-    Returns:
-        Stiffnesses of both laws, N/m. The stiffness of the attraction is subtracted.
+    The results are tables over motor lag (rows) and latency (columns), without the
+    stiffness of the attraction. The motor lag of the scenario is one of the rows.
     """
-    lags = sorted({*motor_lags_s, scenario.only.plant.motor_lag_s})
+    lags = sorted({*_MOTOR_LAGS_S, scenario.only.plant.motor_lag_s})
     total = np.array(
         [
             [
                 largest_contact_stiffness(
                     scenario, motor_lag_s=lag, latency_ticks=ticks
                 )
-                for ticks in latency_ticks
+                for ticks in _LATENCY_TICKS
             ]
             for lag in lags
         ]
@@ -293,7 +251,7 @@ def contact_limits(
     slope = radial_law(scenario.with_robot(law="active")).stiffest_n_m
     return ContactLimits(
         motor_lags_s=tuple(lags),
-        latency_ticks=tuple(latency_ticks),
+        latency_ticks=_LATENCY_TICKS,
         stiffness_n_m=left,
         reference_stiffness_n_m=left * (k_ref / slope),
         today=(scenario.only.plant.motor_lag_s, 0),

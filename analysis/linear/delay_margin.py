@@ -19,9 +19,8 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from analysis.linear.loop_margins import is_loop, loop_margins
-from analysis.models.linear_models import NEUTRAL, LinearModel
+from analysis.models.linear_models import NEUTRAL, LinearModel, minimal_model
 from analysis.models.linearisation import plant_jacobians
-from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model, open_loop
 from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
@@ -42,9 +41,7 @@ class DelayMargin:
     """Delay at which a loop begins to oscillate."""
 
     at: DelayPlace
-    """Place of the delay."""
     direction: Direction
-    """Direction of the delayed signal and of the oscillation."""
     delay_s: float
     """Delay in addition to that of the diagram, s. Infinity: no delay destabilizes."""
     frequency_rad_s: float
@@ -52,14 +49,7 @@ class DelayMargin:
 
 
 class DelayedLoop:
-    """Sampled loop with an arbitrary delay of one signal.
-
-    Args:
-        point: Operating point.
-        at: Place of the delay: ``sensor`` or ``wheels``.
-        direction: Direction of the delayed signal: along the line to the source, or
-            across.
-    """
+    """Sampled loop with an arbitrary delay of one signal in one direction."""
 
     def __init__(
         self,
@@ -86,11 +76,7 @@ class DelayedLoop:
         self._turn = np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
 
     def _flow(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Two derivatives of the plant's state after some seconds.
-
-        The first is by the state at the beginning, the second by the constant wheel
-        command.
-        """
+        """Derivatives of the plant state by the earlier state and the wheel speeds."""
         n, m = self._B_plant.shape
         block = np.zeros((n + m, n + m))
         block[:n, :n], block[:n, n:] = self._A_plant, self._B_plant
@@ -179,21 +165,7 @@ def delay_margin(
     at: DelayPlace = "sensor",
     direction: Direction = "along",
 ) -> DelayMargin:
-    """Returns the smallest additional delay at which the loop becomes unstable.
-
-    Args:
-        point: Stable operating point.
-        at: Place of the delay: ``sensor`` or ``wheels``.
-        direction: Direction of the delayed signal: along the line to the source, or
-            across.
-
-    Returns:
-        Delay margin and frequency of the oscillation. If no delay makes the loop
-        unstable, the margin is infinite.
-
-    Raises:
-        InputError: The loop is unstable without any additional delay.
-    """
+    """Returns the smallest delay that makes a stable loop unstable, or infinity."""
     loop = DelayedLoop(point, at, direction)
     if loop.spectral_radius(0.0) >= 1.0:
         raise InputError(

@@ -26,15 +26,12 @@ class DelayedRun:
     """Simulated motion about an operating point after a small initial velocity."""
 
     delay_s: float
-    """Additional delay, s."""
     duration_s: float
-    """Simulated time, s."""
     growth_per_s: float
     """Fitted growth rate of the envelope, 1/s; negative if the motion decays."""
     frequency_rad_s: float
-    """Fitted frequency, rad/s."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,) times, s."""
+    """(n,)"""
     offset_m: NDArray[np.float64] = field(repr=False)
     """(n,) deviation of P from the operating point in the direction of the kick, m."""
 
@@ -44,7 +41,6 @@ class DelayCheck:
     """Computed delay margin with two simulated runs, below and above the margin."""
 
     margin: DelayMargin
-    """Computed delay margin."""
     below: DelayedRun
     """Run with 0.95 of the delay margin. Its motion should decay."""
     above: DelayedRun
@@ -63,23 +59,7 @@ def check_delay_margin(
     *,
     duration_s: float = 300.0,
 ) -> DelayCheck:
-    """Simulates the loop with 0.95 and with 1.05 of the computed delay margin.
-
-    Each run begins with a small kick to the robot.
-
-    Args:
-        point: Equilibrium at rest.
-        at: Place of the delay: ``sensor`` or ``wheels``.
-        direction: Direction of the delayed signal and of the kick: along the line to
-            the source, or across.
-        duration_s: Simulated time of each run, s.
-
-    Returns:
-        The margin and both runs.
-
-    Raises:
-        InputError: The loop has no finite delay margin.
-    """
+    """Simulates the loop with 0.95 and with 1.05 of its finite delay margin."""
     margin = delay_margin(point, at, direction)
     if not np.isfinite(margin.delay_s):
         raise InputError(
@@ -110,21 +90,8 @@ def simulate_delayed(
 
     The kick changes the velocity of the virtual mass. Both elements of the signal are
     delayed. At rest, the motions along and across the line to the source are decoupled.
-    A kick along this line therefore shows only the loop along the line.
-
-    Args:
-        point: Equilibrium at rest.
-        at: Place of the delay. ``wheels``: wheel commands reach the motors later.
-            ``sensor``: estimates of the source are older.
-        delay_s: Additional delay, 0 or more, s.
-        direction: Direction of the kick.
-        duration_s: Simulated time, s.
-
-    Returns:
-        The motion of the robot's control point, with fitted growth rate and frequency.
-
-    Raises:
-        InputError: The operating point moves, or the delay is negative.
+    A kick along this line therefore shows only the loop along the line. Raises
+    InputError if the operating point moves or the delay is negative.
     """
     if point.moves:
         raise InputError(
@@ -147,16 +114,7 @@ def simulate_delayed(
 def kicked(
     point: OperatingPoint, state: NDArray[np.float64], kick_W: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Returns a state with an additional velocity of the virtual mass.
-
-    Args:
-        point: Operating point, whose loop gives the names of the states.
-        state: (n,) state of the diagram. It is not changed.
-        kick_W: (2,) velocity to add in the world frame W, m/s.
-
-    Returns:
-        (n,) the changed copy.
-    """
+    """Returns a copy of the state with ``kick_W``, m/s, added to the velocity."""
     names, moved = point.loop.state_names, state.copy()
     moved[[names.index(f"command.v_WP_{k}") for k in "xy"]] += kick_W
     return moved
@@ -167,16 +125,7 @@ def offsets(
     poses_WB: Sequence[NDArray[np.float64]],
     axis: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Returns the deviation of the control point P from an equilibrium along one axis.
-
-    Args:
-        point: Equilibrium.
-        poses_WB: n poses of the robot in the world frame W, m and rad.
-        axis: (2,) unit vector in W.
-
-    Returns:
-        (n,) deviations, m.
-    """
+    """Returns (n,) deviations of P from an equilibrium along a (2,) unit vector, m."""
     x, y, theta = np.array(poses_WB).T
     epsilon = point.loop.scenario.only.robot.control_point_m
     places = np.column_stack([x + epsilon * np.cos(theta), y + epsilon * np.sin(theta)])
@@ -239,21 +188,11 @@ def _hearing_late(
 def fitted_oscillation(
     time_s: NDArray[np.float64], offset_m: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Fits the growth rate and the frequency of an oscillation.
+    """Fits the growth rate, 1/s, and the frequency, rad/s, of an oscillation.
 
     The peaks between the zeros give the envelope. The spacing of the peaks gives the
-    frequency. The first fifth of the time is left out, because faster modes die out
-    there.
-
-    Args:
-        time_s: (n,) ascending, evenly spaced times, s.
-        offset_m: (n,) deviations from rest, m.
-
-    Returns:
-        Two values:
-
-        - growth rate of the envelope, 1/s
-        - frequency, rad/s; 0 if there are fewer than three peaks
+    frequency, which is 0 if there are fewer than three peaks. The first fifth of the
+    evenly spaced times is left out, because faster modes die out there.
     """
     later = time_s >= time_s[0] + 0.2 * (time_s[-1] - time_s[0])
     t, x = time_s[later], offset_m[later]

@@ -58,18 +58,11 @@ def frequency_grid(
     lowest: float = _LOWEST,
     points: int = GRID_POINTS,
 ) -> NDArray[np.float64]:
-    """Returns frequencies that resolve every mode, for figures and to begin a search.
+    """Returns (k,) ascending frequencies that resolve every mode, rad/s.
 
-    Args:
-        poles: (n,) poles: in the z plane if ``period_s`` is set, otherwise in the s
-            plane.
-        period_s: Sample period, s. In continuous time: None.
-        lowest: The grid begins here, or below the slowest mode, rad/s.
-        points: Number of points on a logarithmic scale, besides those near the modes.
-
-    Returns:
-        (k,) ascending frequencies, rad/s. They end at the Nyquist frequency, or beyond
-        the fastest mode in continuous time.
+    The grid begins at ``lowest`` or below the slowest mode. It ends at the Nyquist
+    frequency, or beyond the fastest mode in continuous time, where ``period_s`` is
+    None. It has ``points`` on a logarithmic scale, besides those near the modes.
     """
     s = s_plane(poles, period_s)
     size = np.abs(s)
@@ -96,16 +89,11 @@ def level_frequencies(
 ) -> NDArray[np.float64]:
     """Returns frequencies at which a |G|^2 + 2 Re(b G) + c may be zero.
 
-    Args:
-        model: G, with one input and one output, and without poles on the border of
-            stability.
-        a: Weight of the squared magnitude.
-        b: Weight of the response: 1 for its real part, -1j for its imaginary part.
-        c: Constant term.
-
-    Returns:
-        (k,) ascending frequencies between 0 and the Nyquist frequency, rad/s. All zeros
-        are among them, up to rounding errors. Not every frequency is a zero.
+    G is a model with one input and one output, and without poles on the border of
+    stability. With b = 1, the sum has the real part of G, and with b = -1j the
+    imaginary part. The (k,) ascending frequencies, rad/s, are between 0 and the Nyquist
+    frequency. All zeros are among them, up to rounding errors. Not every frequency is a
+    zero.
     """
     n, T = len(model.A), model.period_s
     if n == 0:
@@ -164,14 +152,7 @@ def _shifts(model: LinearModel) -> list[float]:
 
 
 def with_middles(omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Adds the geometric mean between each two neighboring frequencies.
-
-    Args:
-        omega: (k,) frequencies in any order, rad/s.
-
-    Returns:
-        (2 k - 1,) ascending frequencies without duplicates, rad/s.
-    """
+    """Adds the geometric mean between each two neighbors, and sorts the frequencies."""
     omega = np.unique(omega)
     return np.sort(np.concatenate((omega, np.sqrt(omega[:-1] * omega[1:]))))
 
@@ -180,15 +161,10 @@ def crossings(
     omega: NDArray[np.float64],
     function: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> list[float]:
-    """Returns the frequencies at which a function changes its sign.
+    """Returns the ascending frequencies at which a function changes its sign.
 
-    Args:
-        omega: (k,) ascending frequencies, rad/s. At least one must lie between any two
-            zeros. ``with_middles`` of ``level_frequencies`` satisfies this condition.
-        function: Function from (m,) frequencies, rad/s, to (m,) values.
-
-    Returns:
-        Ascending frequencies, rad/s.
+    At least one of the ascending frequencies ``omega`` must lie between any two zeros.
+    ``with_middles`` of ``level_frequencies`` satisfies this condition.
     """
     values = np.sign(function(omega))
     exact = [float(w) for w in omega[values == 0.0]]
@@ -209,21 +185,13 @@ def crossings(
 
 
 def peak(model: LinearModel, offset: float = 0.0) -> tuple[float, float]:
-    """Returns the largest |G - offset| over all frequencies: the H-infinity norm.
+    """Returns the largest |G - offset| over all frequencies, and its frequency, rad/s.
 
-    The method is that of Bruinsma and Steinbuch. The largest value so far is a level.
-    The method then looks for larger values at the frequencies where the response
-    crosses this level, and half way between them.
-
-    Args:
-        model: Stable G with one input and one output.
-        offset: Real number that is subtracted from the response.
-
-    Returns:
-        Two values:
-
-        - the peak
-        - its frequency, rad/s, from 0 to infinity or to the Nyquist frequency
+    This is the H-infinity norm of a stable model with one input and one output. The
+    method is that of Bruinsma and Steinbuch. The largest value so far is a level. The
+    method then looks for larger values at the frequencies where the response crosses
+    this level, and half way between them. Frequencies reach to the Nyquist frequency,
+    or to infinity in continuous time.
     """
 
     def size(omega: NDArray[np.float64]) -> NDArray[np.float64]:

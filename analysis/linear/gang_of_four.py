@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.linear.frequency_levels import frequency_grid, peak
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model
 from analysis.models.operating_points import OperatingPoint
 
@@ -22,7 +22,6 @@ class GangOfFour:
     """Closed-loop frequency responses in one direction."""
 
     direction: Direction
-    """Along the line to the source, or across it."""
     omega: NDArray[np.float64]
     """(n,) frequencies with all modes and peaks, up to the Nyquist frequency, rad/s."""
     S: NDArray[np.complex128]
@@ -47,14 +46,6 @@ def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangO
     """Returns the closed-loop frequency responses S, T, PS and CS in one direction.
 
     The disturbances are errors of hearing, and accelerations of the virtual mass.
-
-    Args:
-        point: Operating point.
-        direction: Direction of disturbances and responses: along the line to the
-            source, or across.
-
-    Returns:
-        The responses, up to the Nyquist frequency.
     """
     cut = cut_model(point, "sensor", "actuator")
     whole = closed(cut, cut.input_names)

@@ -22,11 +22,7 @@ from systems.heading.parameters import MotorDriverParameters
 
 @dataclass(frozen=True)
 class HeadingLoopMargins:
-    """Margins of the loop that controls the heading, with and without sampling.
-
-    The loop is cut at the heading deviation. Fields without ``continuous`` in their
-    names belong to the sampled loop.
-    """
+    """Margins of the loop cut at the heading deviation, with and without sampling."""
 
     tick_s: float
     crossover_rad_s: float
@@ -59,17 +55,8 @@ def heading_loop(
     - heading as the integral of the difference of the wheel speeds
 
     As long as no limit is reached, the loop is linear in the deviation. The common
-    speed of the wheels does not turn the robot.
-
-    Args:
-        motors: Parameters with the speed at full duty.
-        robot: Parameters with the distance between the wheels.
-        lag_s: Motor lag, s.
-        tick_s: Period in which controller and motors hold their outputs, s. With None
-            the loop is continuous.
-
-    Returns:
-        Loop with one input and one output, both in deg, for negative feedback.
+    speed of the wheels does not turn the robot. Input and output are in deg, for
+    negative feedback. With ``tick_s`` None, the loop is continuous.
     """
     full = min(motors.full_speed_m_s, robot.top_speed_m_s)
     turn = math.degrees(2.0 * 0.01 * full / robot.wheel_separation_m)
@@ -138,17 +125,7 @@ def heading_loop_margins(
     lag_s: float,
     tick_s: float = TICK_S,
 ) -> HeadingLoopMargins:
-    """Returns the margins of ``heading_loop``.
-
-    Args:
-        motors: Parameters with the speed at full duty.
-        robot: Parameters with the distance between the wheels.
-        lag_s: Motor lag, s.
-        tick_s: Period of controller and motors, s.
-
-    Returns:
-        The margins. If no gain makes the loop unstable, the gain margin is infinite.
-    """
+    """Returns the margins of ``heading_loop``."""
     parts = motors, robot, lag_s
     found = loop_margins(heading_loop(*parts, tick_s))
     free = loop_margins(heading_loop(*parts, None))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +17,10 @@ from analysis.linear.contact_mode import ContactLimits
 from analysis.linear.delayed_run import DelayCheck
 from analysis.linear.gang_of_four import GangOfFour
 from analysis.linear.loop_margins import FrequencyResponse, LoopMargins
-from analysis.linear.robustness import PoleCloud, PoleSensitivity
+from analysis.linear.robustness import (
+    PoleCloud,
+    PoleSensitivity,
+)
 from analysis.linear.step_response import StepCheck
 from analysis.models.equilibria import EquilibriumSearch
 from analysis.models.equilibrium_search import CellSearch
@@ -90,23 +94,13 @@ def plot_step(check: StepCheck) -> Figure:
     """Plots the distance from the source after a step: predicted and simulated."""
     figure = Figure(figsize=(7.5, 3.8), layout="constrained")
     axes = figure.subplots()
-    if check.full_m is not None:
-        axes.plot(
-            check.time_s,
-            check.full_m,
-            color=COLOURS["echo"],
-            label="the scenario's sensors",
-        )
-    axes.plot(
-        check.time_s, check.ideal_m, color=COLOURS["robot"], label="exact sensors"
-    )
-    axes.plot(
-        check.time_s,
-        check.predicted_m,
-        "--",
-        color=COLOURS["source"],
-        label="linear model",
-    )
+    for distance, line, colour, label in (
+        (check.full_m, "-", "echo", "the scenario's sensors"),
+        (check.ideal_m, "-", "robot", "exact sensors"),
+        (check.predicted_m, "--", "source", "linear model"),
+    ):
+        if distance is not None:
+            axes.plot(check.time_s, distance, line, color=COLOURS[colour], label=label)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("distance of P from the source (m)")
     axes.set_title(
@@ -143,7 +137,7 @@ def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     lowest = -360.0
-    for loop, colour in zip(loops, _cycle(loops), strict=True):
+    for loop, colour in zip(loops, cycle(_CYCLE), strict=False):
         omega, L = loop.response.omega, loop.response.L
         upper.semilogx(omega, _size_db(L), color=colour, label=loop.name)
         phase = _phase_deg(loop.response)
@@ -203,16 +197,7 @@ def plot_nyquist(loops: Sequence[LoopMargins]) -> Figure:
 def panels(
     count: int, *, columns: int, size: tuple[float, float]
 ) -> tuple[Figure, list[Axes]]:
-    """Creates a figure with rows of panels. Unused places of the last row stay empty.
-
-    Args:
-        count: Number of panels.
-        columns: Largest number of panels in a row.
-        size: Width and height of a panel, inches.
-
-    Returns:
-        The figure, and its panels row by row.
-    """
+    """Creates a figure with ``count`` panels in rows, each ``size`` inches."""
     columns = min(columns, count)
     rows = math.ceil(count / columns)
     figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
@@ -245,7 +230,7 @@ def plot_nichols(loops: Sequence[LoopMargins]) -> Figure:
     figure = Figure(figsize=(7.5, 5.6), layout="constrained")
     axes = figure.subplots()
     _contours(axes)
-    for loop, colour in zip(loops, _cycle(loops), strict=True):
+    for loop, colour in zip(loops, cycle(_CYCLE), strict=False):
         L = loop.response.L
         phase = _phase_deg(loop.response)
         axes.plot(phase, _size_db(L), color=colour, label=loop.name)
@@ -309,10 +294,6 @@ def plot_gang_of_four(gang: GangOfFour) -> Figure:
     return figure
 
 
-def _cycle(loops: Sequence[LoopMargins]) -> list[str]:
-    return [_CYCLE[k % len(_CYCLE)] for k in range(len(loops))]
-
-
 #: Poles faster than this hardly affect the motion and are not shown, 1/s.
 _SLOW_1_S = 12.0
 
@@ -352,16 +333,7 @@ def plot_pole_cloud(cloud: PoleCloud) -> Figure:
 
 
 def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
-    """Plots the change of the slowest pole over each parameter's interval.
-
-    The change is computed to first order.
-
-    Args:
-        rows: Sensitivities, one per parameter.
-
-    Returns:
-        The figure.
-    """
+    """Plots the first-order change of the slowest pole over each interval."""
     figure = Figure(figsize=(8.0, 0.4 * len(rows) + 1.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     ordered = sorted(rows, key=lambda row: abs(row.per_interval))

@@ -47,9 +47,9 @@ class FrequencyResponse:
     """Frequency response of a loop."""
 
     omega: NDArray[np.float64]
-    """(n,) frequencies, rad/s."""
+    """(n,) rad/s."""
     L: NDArray[np.complex128]
-    """(n,) values of the loop transfer function."""
+    """(n,)"""
 
 
 @dataclass(frozen=True)
@@ -116,42 +116,37 @@ class DiskMargin:
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Stability margins of a loop.
-
-    If the closed loop is unstable, both gain margins are 1, and all other margins are
-    0.
-    """
+    """Stability margins of a loop; the defaults are those of an unstable loop."""
 
     name: str
-    """Name of the loop."""
-    stable: bool
-    """Whether the closed loop is stable."""
-    gain_increase_margin: float
+    model: LinearModel = field(repr=False)
+    """Loop transfer function L."""
+    stable: bool = False
+    gain_increase_margin: float = 1.0
     """Gain factor above 1 at which the loop becomes unstable; infinite if none does."""
-    gain_reduction_margin: float
+    gain_reduction_margin: float = 1.0
     """Gain factor below 1 at which the loop becomes unstable; 0 if none does."""
-    phase_lag_margin_deg: float
+    phase_lag_margin_deg: float = 0.0
     """Smallest destabilizing phase lag at a gain crossover, deg; infinite if none."""
-    phase_lead_margin_deg: float
+    phase_lead_margin_deg: float = 0.0
     """Smallest destabilizing phase lead at a gain crossover, deg; infinite if none."""
-    crossover_rad_s: float
+    crossover_rad_s: float = math.nan
     """Gain crossover of the phase margin, rad/s. Without a crossover: NaN."""
-    delay_margin_s: float
+    delay_margin_s: float = 0.0
     """Delay margin, s: smallest ratio of phase lag margin, rad, to frequency, rad/s,
     over all gain crossovers. The value is exact in continuous time. For sampled loops
     see ``analysis.linear.delay_margin``."""
-    modulus_margin: float
+    modulus_margin: float = 0.0
     """Smallest distance of L from -1."""
-    modulus_frequency_rad_s: float
-    """Frequency of the modulus margin, rad/s."""
-    sensitivity_peak: float
+    modulus_frequency_rad_s: float = math.nan
+    sensitivity_peak: float = math.inf
     """Largest |S| (M_s)."""
-    complementary_peak: float
+    complementary_peak: float = math.inf
     """Largest |T| (M_t)."""
-    disks: tuple[DiskMargin, ...]
+    disks: tuple[DiskMargin, ...] = tuple(
+        DiskMargin(skew, 0.0, math.nan) for skew in SKEWS
+    )
     """One disk margin for each of ``SKEWS``."""
-    model: LinearModel = field(repr=False)
-    """Loop transfer function L."""
 
     @cached_property
     def response(self) -> FrequencyResponse:
@@ -191,16 +186,7 @@ def _least_db(low: float, high: float) -> float:
 
 
 def frequency_response(model: LinearModel) -> FrequencyResponse:
-    """Returns the frequency response of a loop for figures.
-
-    The frequencies include all modes of the open and of the closed loop.
-
-    Args:
-        model: Loop with one input and one output.
-
-    Returns:
-        The response.
-    """
+    """Returns the response at all modes of the open and the closed loop."""
     omega = _grid(model, GRID_POINTS)
     return FrequencyResponse(omega, model.response(omega)[0, 0])
 
@@ -218,17 +204,7 @@ def is_loop(model: LinearModel) -> bool:
 
 
 def loop_margins(model: LinearModel) -> LoopMargins:
-    """Computes all margins of a loop with one input and one output.
-
-    Args:
-        model: Loop transfer function L for negative feedback.
-
-    Returns:
-        The margins.
-
-    Raises:
-        InputError: The model has several inputs or outputs.
-    """
+    """Computes all margins of a loop L with one input and output, negative feedback."""
     if model.B.shape[1] != 1 or model.C.shape[0] != 1:
         raise InputError(
             f"{model.name}",
@@ -237,7 +213,7 @@ def loop_margins(model: LinearModel) -> LoopMargins:
         )
     T = _complementary(model)
     if not T.stable:
-        return _nothing(model)
+        return LoopMargins(model.name, model)
     omega = _grid(model, SEARCH_POINTS)
     upper, lower = _gain_margins(model, T, omega)
     lag, lead, crossover, delay = _phase_margins(model, T, omega)
@@ -250,6 +226,7 @@ def loop_margins(model: LinearModel) -> LoopMargins:
     largest_T, (largest_S, where) = peaks[0][0], peaks[-1]
     return LoopMargins(
         name=model.name,
+        model=model,
         stable=True,
         gain_increase_margin=upper,
         gain_reduction_margin=lower,
@@ -262,27 +239,6 @@ def loop_margins(model: LinearModel) -> LoopMargins:
         sensitivity_peak=largest_S,
         complementary_peak=largest_T,
         disks=disks,
-        model=model,
-    )
-
-
-def _nothing(model: LinearModel) -> LoopMargins:
-    """Margins of an unstable closed loop."""
-    return LoopMargins(
-        name=model.name,
-        stable=False,
-        gain_increase_margin=1.0,
-        gain_reduction_margin=1.0,
-        phase_lag_margin_deg=0.0,
-        phase_lead_margin_deg=0.0,
-        crossover_rad_s=math.nan,
-        delay_margin_s=0.0,
-        modulus_margin=0.0,
-        modulus_frequency_rad_s=math.nan,
-        sensitivity_peak=math.inf,
-        complementary_peak=math.inf,
-        disks=tuple(DiskMargin(skew, 0.0, math.nan) for skew in SKEWS),
-        model=model,
     )
 
 
@@ -301,10 +257,7 @@ def _complementary(model: LinearModel) -> LinearModel:
 def _gain_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Returns two gain factors that put a pole on the stability border.
-
-    The first is the smallest above 1, the second the largest below 1.
-    """
+    """Smallest gain above 1 and largest below 1 that put a pole on the border."""
     # L is real where T is.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, -1j, 0.0))))
     at = crossings(found, lambda w: model.response(w)[0, 0].imag)
@@ -330,15 +283,7 @@ def _gain_margins(
 def _phase_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """Returns phase and delay margins as four numbers.
-
-    The numbers are:
-
-    - smallest lag, rad
-    - smallest lead, rad
-    - frequency of the smaller of both, rad/s
-    - smallest delay, s
-    """
+    """Smallest lag and lead, rad, frequency of the smaller, rad/s, and delay, s."""
     # |L| = 1 where the real part of T is 1/2.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))
     at = crossings(found, lambda w: np.abs(model.response(w)[0, 0]) - 1.0)
@@ -361,11 +306,9 @@ class PointMargins:
     """Margins of one cut loop at an operating point."""
 
     at: BreakPoint
-    """Signal at which the loop is cut."""
     direction: Direction
-    """Direction of the cut: along the line to the source, or across."""
     margins: LoopMargins
-    """Margins of this loop. The loop of the other direction is closed."""
+    """The loop of the other direction is closed."""
 
 
 def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:
@@ -374,12 +317,6 @@ def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:
     Each cut gives two loops: along the line to the source, and across this line. Loops
     that do not exist are left out. For example, without repulsion no force acts across
     the line at the follow distance.
-
-    Args:
-        point: Operating point.
-
-    Returns:
-        Margins of all existing loops.
     """
     found = []
     for at in BREAK_POINTS:

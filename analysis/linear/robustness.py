@@ -1,4 +1,4 @@
-"""Effects of uncertain parameters on the poles of a sampled loop.
+"""Uncertain parameters of the robot, and their effects on the poles of its loops.
 
 A function from parameter values to poles in the z plane represents the loop. The same
 code therefore serves every operating point, and does not depend on the meaning of the
@@ -7,13 +7,23 @@ parameters.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.laws.radial_law import radial_law
+from analysis.linear.contact_mode import contact_model
+from analysis.models.equilibria import nearest_equilibrium
+from analysis.models.force_field import ForceField
+from analysis.models.ideal_loop import ideal_loop
 from analysis.models.linear_models import damping_ratio, growth_per_s, s_plane
+from analysis.models.operating_points import OperatingPoint, resting_equilibrium
+from diagrams import Scenario
+from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 
 #: Function from parameter values by name to poles in the z plane. Poles that are
@@ -22,6 +32,8 @@ PoleFunction = Callable[[Mapping[str, float]], NDArray[np.complex128]]
 
 #: Step of the finite differences, as a share of the parameter's interval.
 _STEP = 1e-3
+#: Range of air temperatures, which bounds the speed of sound, deg C.
+_TEMPERATURES_C = (5.0, 35.0)
 
 
 @dataclass(frozen=True)
@@ -34,13 +46,11 @@ class UncertainParameter:
     unit: str
     nominal: float
     low: float
-    """Smallest value; not above the nominal value."""
     high: float
-    """Largest value; not below the nominal value."""
     reason: str
     """Reason for the width of the interval."""
     whole: bool = False
-    """Whether the parameter is a whole number."""
+    """Whether only whole numbers are possible."""
 
     def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high or self.low == self.high:
@@ -56,7 +66,6 @@ class PoleCloud:
     """Poles over all combinations of uncertain parameters."""
 
     period_s: float
-    """Sampling period, s."""
     parameters: tuple[UncertainParameter, ...]
     nominal_poles: NDArray[np.complex128]
     """Poles at the nominal values, in the z plane."""
@@ -118,17 +127,7 @@ class PoleSensitivity:
 
 
 def slowest_pole(poles: NDArray[np.complex128], period: float) -> complex:
-    """Returns the pole with the largest |z|.
-
-    Of a conjugate pair, the pole in the upper half plane is returned.
-
-    Args:
-        poles: (n,) poles in the z plane.
-        period: Sampling period, s.
-
-    Returns:
-        The pole in the s plane, 1/s.
-    """
+    """Returns the s-plane pole, 1/s, with the largest |z|; of a pair, the upper one."""
     pole = complex(s_plane(poles[[np.argmax(np.abs(poles))]], period)[0])
     return pole if pole.imag >= 0.0 else pole.conjugate()
 
@@ -147,17 +146,7 @@ def pole_cloud(
     the nominal values. It moves one parameter after the other to the other end of its
     interval, as long as this slows the decay. It finds the worst corner if each
     parameter acts in one direction only. The worst case is the worse of this corner and
-    the worst sample.
-
-    Args:
-        poles: Loop, as function from parameter values to poles.
-        parameters: Uncertain parameters.
-        period: Sampling period, s.
-        samples: Number of random samples.
-        seed: Seed of the random numbers.
-
-    Returns:
-        Poles in the z plane: nominal, of every sample, and of the worst case.
+    the worst sample. ``period`` is in s.
     """
     from scipy.stats import qmc
 
@@ -217,15 +206,7 @@ def pole_sensitivities(
     The differences are central, with two exceptions. If the nominal value is an end of
     the interval, the parameter varies towards the inside only. A whole number varies
     over its whole interval. After the variation, the pole nearest to the nominal pole
-    counts as the same pole. This is valid for simple poles.
-
-    Args:
-        poles: Loop, as function from parameter values to poles.
-        parameters: Uncertain parameters.
-        period: Sampling period, s.
-
-    Returns:
-        One sensitivity per parameter, in the order of ``parameters``.
+    counts as the same pole. This is valid for simple poles. ``period`` is in s.
     """
     nominal = {p.name: p.nominal for p in parameters}
     pole = slowest_pole(poles(nominal), period)
@@ -245,3 +226,152 @@ def pole_sensitivities(
 
 def _nearest(poles: NDArray[np.complex128], pole: complex) -> complex:
     return complex(poles[np.argmin(np.abs(poles - pole))])
+
+
+def following_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
+    """Returns the uncertain parameters of the loop that follows the source."""
+    common = (p for p in _common(scenario) if p.name != "extra_ticks")
+    return (*common, _sound_speed(scenario))
+
+
+def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
+    """Returns the uncertain parameters of the loop that rests against an obstacle."""
+    stiffness = radial_law(scenario).stiffest_n_m
+    if stiffness <= 0.0:
+        raise InputError(
+            "law",
+            f"{scenario.only.law!r} does not push harder as an obstacle comes nearer, "
+            "so that it has no contact mode; choose another law",
+        )
+    law = _share(
+        "law_stiffness_n_m", "K_law", "N/m", stiffness, 0.1, "largest slope -df/dc"
+    )
+    return (*_common(scenario), law)
+
+
+def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
+    gains, robot = scenario.follower.attraction, scenario.only.robot
+    printed = "printed without unit"
+    lag_reason = "not printed; load, battery"
+    shares = (
+        ("robot.mass_kg", "M", "kg", robot.mass_kg, 0.1, "virtual mass, as set"),
+        ("attraction.stiffness_n_m", "K_r", "N/m", gains.stiffness_n_m, 0.1, printed),
+        ("attraction.damping_n_s_m", "D_r", "N s/m", gains.damping_n_s_m, 0.1, printed),
+        (
+            "plant.motor_lag_s", "lag", "s", scenario.only.plant.motor_lag_s, 0.4,
+            lag_reason,
+        ),
+    )  # fmt: skip
+    return (
+        # Zero means that the robot has no such spring, damper or lag.
+        *(_share(*row) for row in shares if row[3] > 0.0),
+        UncertainParameter(
+            "wheel_radius_share", "r", "1", 1.0, 0.98, 1.02,
+            "true radius over stated radius: wear, pressure",
+        ),
+        UncertainParameter(
+            "extra_ticks", "latency", f"{scenario.tick_s * 1e3:g} ms", 0.0, 0.0, 1.0,
+            "a processor that needs one more tick; whole ticks", whole=True,
+        ),
+    )  # fmt: skip
+
+
+def _share(
+    name: str, symbol: str, unit: str, nominal: float, share: float, reason: str
+) -> UncertainParameter:
+    low, high = nominal * (1.0 - share), nominal * (1.0 + share)
+    return UncertainParameter(name, symbol, unit, nominal, low, high, reason)
+
+
+def _sound_speed(scenario: Scenario) -> UncertainParameter:
+    c = scenario.sound_speed_m_s
+    ends = [331.5 + 0.6 * t for t in _TEMPERATURES_C]
+    return UncertainParameter(
+        "sound_speed_m_s", "c", "m/s", c, min(c, ends[0]), max(c, ends[1]),
+        "air of 5 to 35 deg C, while the estimator assumes one speed",
+    )  # fmt: skip
+
+
+def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
+    """Returns a validated copy with uncertain parameters at given values, in SI units.
+
+    The name of a parameter determines its effect:
+
+    - A name with a dot is a field of the scenario.
+    - ``wheel_radius_share`` acts as negative slip of the wheels, which the encoders do
+      not measure.
+    - ``sound_speed_m_s`` changes the slope of the estimated range, and so the stiffness
+      of the attraction's spring.
+    - All other names are ignored here.
+    """
+    data = scenario.model_dump()
+    for name, value in values.items():
+        *groups, field = name.split(".")
+        node: dict[str, Any] = data
+        for group in groups:
+            node = node[group]
+        if groups:
+            node[field] = value
+    if "wheel_radius_share" in values:
+        data["plant"]["slip"] = [1.0 - values["wheel_radius_share"]] * 2
+    if "sound_speed_m_s" in values:
+        slope = range_slope(scenario, values["sound_speed_m_s"])
+        data["attraction"]["stiffness_n_m"] *= slope
+    return scenario_from_mapping(data)
+
+
+def range_slope(scenario: Scenario, true_speed: float) -> float:
+    """Returns the slope d(estimated range)/d(true range) for a source straight ahead.
+
+    The slope is that at the follow distance. Let l be half the length of the microphone
+    row, R the range, h^2 = R^2 + l^2, and k the believed over the true speed of sound.
+    From the measured delay the estimator computes the range
+
+        l^2/(2 k (h - R)) - k (h - R)/2.
+
+    The slope of this range is ((h + R)/k + k (h - R))/(2 h). It is 1 if the believed
+    speed is ``true_speed``, m/s.
+    """
+    k = scenario.believed_sound_speed_m_s / true_speed
+    half = max(abs(y) for _, y in scenario.only.robot.microphones_m)
+    distance = scenario.follower.attraction.follow_distance_m
+    h = math.hypot(distance, half)
+    return ((h + distance) / k + k * (h - distance)) / (2.0 * h)
+
+
+def contact_poles(scenario: Scenario) -> PoleFunction:
+    """Returns a function for the z-plane poles of the contact mode at its stiffest."""
+
+    def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:
+        changed = with_values(scenario, values)
+        stiffness = changed.follower.attraction.stiffness_n_m + values.get(
+            "law_stiffness_n_m", 0.0
+        )
+        late = round(values["extra_ticks"])
+        return contact_model(changed, stiffness, latency_ticks=late).poles
+
+    return poles
+
+
+def following_poles(at: OperatingPoint) -> PoleFunction:
+    """Returns a function for the z-plane poles of the motion about an equilibrium.
+
+    The equilibrium moves with the parameters. Neutral poles (z = 1) are left out. The
+    latency of hearing is not a parameter here. Odometry assigns each measurement to the
+    pose at which the sound was heard. A latency therefore delays the source's motion,
+    but not the motion of the loop.
+    """
+
+    def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:
+        loop = ideal_loop(with_values(at.loop.scenario, values))
+        place = nearest_equilibrium(ForceField(loop), at.p_WP)
+        if place is None:
+            raise InputError(
+                "attraction",
+                f"with {dict(values)} the equilibrium at ({at.p_WP[0]:.3f},"
+                f" {at.p_WP[1]:.3f}) m is gone; narrow the box",
+            )
+        moved = resting_equilibrium(loop, place)
+        return np.asarray(np.exp(moved.eigenvalues * loop.tick_s))
+
+    return poles

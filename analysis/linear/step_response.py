@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,28 +23,22 @@ class Oscillation:
     """Damped oscillation."""
 
     frequency_rad_s: float
-    """Natural frequency, rad/s."""
     damping_ratio: float
-    """Damping ratio."""
 
 
 @dataclass(frozen=True)
 class StepCheck:
-    """Response to a step along the line to the source: predicted and simulated.
-
-    The simulation uses exact sensors and, if requested, the scenario's sensors.
-    """
+    """Response to a step along the line to the source: predicted and simulated."""
 
     predicted: Oscillation
-    """Oscillation of the sampled linear model."""
+    """By the sampled linear model."""
     ideal: Oscillation
-    """Oscillation fitted to the simulation with exact sensors."""
+    """Fitted to the simulation with exact sensors."""
     full: Oscillation | None
-    """Oscillation fitted to the simulation with the scenario's sensors, or None."""
+    """Fitted to the simulation with the scenario's sensors."""
     step_m: float
-    """Size of the step, m."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,) times, s."""
+    """(n,)"""
     predicted_m: NDArray[np.float64] = field(repr=False)
     """(n,) distance of P from the source, by the linear model, m."""
     ideal_m: NDArray[np.float64] = field(repr=False)
@@ -73,22 +66,21 @@ def check_step(
 ) -> StepCheck:
     """Simulates a start near the equilibrium and compares it with the linear model.
 
-    Args:
-        scenario: Any scenario. Its bodies rest where they are at 0 s.
-        step_m: Distance of the start from the equilibrium towards the source, m.
-        duration_s: Simulated time, s.
-        full: Whether to simulate the scenario's own sensors too.
-
-    Returns:
-        Frequencies and damping ratios, predicted and fitted, with the motions.
-
-    Raises:
-        InputError: There is no stable equilibrium, or its linear model does not
-            oscillate.
+    The start is ``step_m`` from the equilibrium towards the source. Bodies rest where
+    they are at 0 s. ``full`` also simulates the scenario's own sensors. Raises
+    InputError if there is no stable equilibrium, or its linear model does not
+    oscillate.
     """
     point = follow_equilibrium(scenario)
     modes = [mode for mode in point.modes if mode.eigenvalue.imag > 1e-6]
-    along = _along(point, modes)
+    if not modes:
+        raise InputError(
+            "attraction",
+            "nothing oscillates about the equilibrium, so that there is no frequency "
+            "to compare; use a larger stiffness_n_m for this damping_n_s_m",
+        )
+    # Along the line to the source, the oscillation has the highest frequency.
+    along = max(modes, key=lambda mode: mode.frequency_rad_s)
     ideal = _run(point.loop.scenario, point, step_m, duration_s)
     own = None
     if full:
@@ -103,17 +95,6 @@ def check_step(
         ideal_m=ideal[1],
         full_m=own[1] if own else None,
     )
-
-
-def _along(point: OperatingPoint, modes: list[Any]) -> Any:
-    """Mode along the line to the source: the oscillation with the highest frequency."""
-    if not modes:
-        raise InputError(
-            "attraction",
-            "nothing oscillates about the equilibrium, so that there is no frequency "
-            "to compare; use a larger stiffness_n_m for this damping_n_s_m",
-        )
-    return max(modes, key=lambda mode: mode.frequency_rad_s)
 
 
 def _predicted(
@@ -166,15 +147,8 @@ def fitted_step(
 
     The fit also has a bias and a second harmonic that decay with the oscillation. The
     repulsion depends on the norm of a velocity. This norm causes a bias and a second
-    harmonic, but no damping.
-
-    Args:
-        time_s: (n,) times, s. The first two seconds are left out.
-        distance_m: (n,) distances, m.
-        guess_rad_s: Initial guess of the frequency, rad/s.
-
-    Returns:
-        Natural frequency and damping ratio.
+    harmonic, but no damping. The first two seconds are left out. ``guess_rad_s`` is an
+    initial guess of the frequency.
     """
     later = time_s >= 2.0
     t, x = time_s[later] - 2.0, distance_m[later]

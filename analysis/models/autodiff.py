@@ -18,17 +18,9 @@ def seed(values: Any) -> Any:
 def value_and_gradient(
     values: Any, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Splits a vector of AutoDiffXd into values and derivatives.
+    """Splits AutoDiffXd or floats into (k,) values and (k, count) derivatives.
 
-    Args:
-        values: (k,) floats or AutoDiffXd.
-        count: Number n of independent variables.
-
-    Returns:
-        Two arrays:
-
-        - (k,) values
-        - (k, n) derivatives by the variables; zero for a value without derivatives
+    Derivatives of floats are zero. ``count`` is the number of independent variables.
     """
     if len(values) == 0:
         return np.empty(0), np.empty((0, count))

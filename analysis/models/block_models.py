@@ -29,23 +29,20 @@ AFTER = "_after"
 def sampled_blocks(
     loop: IdealLoop, state: NDArray[np.float64], time_s: float = 0.0
 ) -> tuple[LinearModel, ...]:
-    """Linearizes every block that has inputs, each block alone.
+    """Linearizes every block that has inputs, each block alone, over one period.
 
     At the control update that begins a period, sampled blocks read each other's outputs
     before the update. Continuous blocks read outputs after the update, because these
     are held over the period. A block that feeds a continuous block therefore has some
-    outputs twice: before and after the update.
-
-    Args:
-        loop: Control loop with exact sensors.
-        state: (n,) operating point, just before a control update.
-        time_s: Time of this control update, s.
-
-    Returns:
-        One model per block over one period, in the order of ``SoundFollower.blocks``.
+    outputs twice: before and after the update. ``state`` is the (n,) operating point
+    just before the update.
     """
     after = loop.period_map(state, time_s)
-    continuous = [role for role in loop.follower.blocks if _is_continuous(loop, role)]
+    continuous = [
+        role
+        for role, block in loop.follower.blocks.items()
+        if block.CreateDefaultContext().num_continuous_states()
+    ]
     held = {
         port.get_name()
         for role in continuous
@@ -70,11 +67,6 @@ def sampled_blocks(
         names = tuple(loop.state_names[k] for k in loop.indices(role))
         models.append(replace(model, name=role, state_names=names))
     return tuple(models)
-
-
-def _is_continuous(loop: IdealLoop, role: str) -> bool:
-    context = loop.block(role).CreateDefaultContext()
-    return bool(context.num_continuous_states())
 
 
 def _ports(block: Any, kind: str) -> list[Any]:
@@ -103,22 +95,13 @@ def block_model(
     held: Collection[str] = (),
     read_after: bool = False,
 ) -> LinearModel:
-    """Linearizes one sampled block about an operating point.
+    """Linearizes one sampled block, given as LeafSystem_[AutoDiffXd], over one period.
 
-    Args:
-        twin: Block as LeafSystem_[AutoDiffXd].
-        state: (n,) state of the block, just before its update.
-        values: Values at the input ports, in their order.
-        period_s: Period of the updates, s.
-        ports: Block with the names of the ports. By default the names are those of
-            ``twin``.
-        time_s: Time of the update, s.
-        held: Names of output ports that continuous blocks read after the update.
-        read_after: Whether this block reads its inputs after the update of other
-            blocks.
-
-    Returns:
-        A model over one period. Inputs and outputs have the names ``port[element]``.
+    Inputs and outputs have the names ``port[element]``, with the names of the ports of
+    ``ports``, which is ``twin`` by default. ``state`` (n,) is that just before the
+    update, and ``values`` are those at the input ports. Continuous blocks read the
+    output ports ``held`` after the update. ``read_after`` says whether this block reads
+    its inputs after the update of other blocks.
     """
     ports = ports or twin
     count = len(state)
@@ -166,17 +149,7 @@ def _context(block: Any, time_s: float, state: Any) -> Any:
 
 
 def sampled_twin(loop: IdealLoop, role: str) -> Any:
-    """Returns a continuous block as a discrete block over one period, for AutoDiffXd.
-
-    The block is converted at the first call, and then kept in ``loop.sampled_twins``.
-
-    Args:
-        loop: Control loop with exact sensors.
-        role: A key of ``SoundFollower.blocks``.
-
-    Returns:
-        The discrete block.
-    """
+    """Returns a continuous block as an AutoDiffXd block, discrete over a period."""
     if role not in loop.sampled_twins:
         config = simulator_config(loop.scenario)
         sampled = DiscreteTimeApproximation(loop.block(role), loop.tick_s, config)
@@ -198,15 +171,9 @@ def join_blocks(
 ) -> LinearModel:
     """Joins linearized blocks: connects each output to all inputs of the same name.
 
-    Args:
-        models: Linearized blocks with the same period.
-        state_names: Names of the states in the order of the result.
-        name: Name of the joined model.
-        inputs: Names of signals that are fed from outside.
-        outputs: Names of signals that the joined model returns.
-
-    Returns:
-        A model with the states of all blocks.
+    The blocks have the same period. The result has all their states in the order of
+    ``state_names``. The signals ``inputs`` are fed from outside, and the signals
+    ``outputs`` are returned.
     """
     import control
 
@@ -220,7 +187,7 @@ def join_blocks(
     feed = feed.reshape(len(heard), len(inputs))
     read = np.array([[float(a == b) for b in said] for a in outputs])
     read = read.reshape(len(outputs), len(said))
-    apart = control.append(*(_stateful(model) for model in models))
+    apart = control.append(*(model.to_control() for model in models))
     joined = control.feedback(apart, control.ss([], [], [], wires), sign=1)
     states = [state for model in models for state in model.state_names]
     order = [states.index(state) for state in state_names]
@@ -236,9 +203,3 @@ def join_blocks(
         output_names=outputs,
         period_s=models[0].period_s,
     )
-
-
-def _stateful(model: LinearModel) -> Any:
-    import control
-
-    return control.ss(model.A, model.B, model.C, model.D, dt=model.period_s)

@@ -17,14 +17,9 @@ class Runner:
     """Simulation whose state and cut inputs can be changed between steps.
 
     The run uses the context of its simulator. Finish the run before you use the same
-    loop for anything else.
-
-    Args:
-        simulator: Simulator whose context the run uses.
-        fix: Function ``fix(context, port, value)`` that sets the value of a cut input.
-        state: (n,) state just before the control update at ``time_s``.
-        time_s: Time of the first control update, a multiple of the period, s.
-        tick_s: Control period, s.
+    loop for anything else. It begins at ``state`` (n,), just before the control update
+    at ``time_s``, a multiple of ``tick_s``. ``fix(context, port, value)`` sets the
+    value of a cut input.
     """
 
     def __init__(
@@ -48,12 +43,7 @@ class Runner:
         begin(simulator, state, time_s, tick_s)
 
     def fix(self, port: Port, value: NDArray[np.float64]) -> None:
-        """Sets the value of a cut input from now on.
-
-        Args:
-            port: Role of the block, and name of its input port.
-            value: (size of the port,) value in the unit of the port.
-        """
+        """Sets the value of a cut input from now on, in the unit of the port."""
         self._fix(self._context, port, value)
 
     def advance(self, time_s: float) -> None:
@@ -66,12 +56,7 @@ class Runner:
         return np.concatenate([part.CopyToVector() for part in self._parts])
 
     def set_state(self, indices: Sequence[int], values: NDArray[np.float64]) -> None:
-        """Replaces some elements of the state.
-
-        Args:
-            indices: Indices of k elements.
-            values: (k,) new values of these elements.
-        """
+        """Replaces the elements of the state at some indices."""
         state = self.state()
         state[list(indices)] = values
         set_state(self._context, state)
@@ -80,30 +65,14 @@ class Runner:
 def run_periods(
     simulator: Any, state: Any, time_s: float, periods: int, tick_s: float
 ) -> None:
-    """Simulates whole control periods, up to just before the next control update.
-
-    Args:
-        simulator: Simulator whose context is changed.
-        state: (n,) state just before the control update at ``time_s``.
-        time_s: Time of the first control update, a multiple of the period, s.
-        periods: Number of periods, 0 or more.
-        tick_s: Control period, s.
-    """
+    """Simulates periods from a state (n,) to just before the next control update."""
     begin(simulator, state, time_s, tick_s)
     # Drake computes tick times as multiples; a sum of periods could miss the next tick.
     simulator.AdvanceTo((round(time_s / tick_s) + periods) * tick_s)
 
 
 def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
-    """Puts a simulator into a given state just before a control update.
-
-    Args:
-        simulator: Simulator whose context is changed.
-        state: (n,) state just before the control update.
-        time_s: Time of the control update, s. It is rounded to a multiple of the
-            period.
-        tick_s: Control period, s.
-    """
+    """Puts a simulator into a state (n,) just before the nearest control update."""
     context = simulator.get_mutable_context()
     context.SetTime(round(time_s / tick_s) * tick_s)
     set_state(context, state)
@@ -113,25 +82,14 @@ def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
 
 
 def set_state(context: Any, state: Any) -> None:
-    """Sets the whole state of a diagram.
-
-    Args:
-        context: Context of the diagram. It is changed.
-        state: (n,) continuous states, then the discrete groups. The elements are
-            floats, or AutoDiffXd for an AutoDiffXd context.
-    """
+    """Sets the continuous states, then the discrete groups, from one vector."""
     start = context.num_continuous_states()
     context.SetContinuousState(state[:start])
     set_discrete_state(context, state[start:])
 
 
 def set_discrete_state(context: Any, state: Any) -> None:
-    """Sets all discrete groups of a context from one vector.
-
-    Args:
-        context: Context of a diagram or block. It is changed.
-        state: (m,) values of the groups, one group after the other.
-    """
+    """Sets all discrete groups of a context from one vector."""
     start = 0
     for group in range(context.num_discrete_state_groups()):
         size = context.get_discrete_state(group).size()

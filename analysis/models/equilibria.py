@@ -70,7 +70,7 @@ class EquilibriumSearch:
     cell_m: float
     """Edge of the smallest cells of the first round, m."""
     cells: int
-    """Number of cells of all sizes that were examined."""
+    """Number of cells of all sizes."""
     unresolved: tuple[tuple[float, float], ...]
     """One point, m, of each group of cells that the search could neither exclude nor
     explain by a listed place of rest."""
@@ -86,17 +86,11 @@ class EquilibriumSearch:
         return not self.unresolved and self.empty_outside
 
     def way_m(self, point: OperatingPoint) -> float:
-        """Returns the length of the shortest free path from the start to a point.
+        """Returns the length of the shortest free path from the start to a point, m.
 
         The path is that of the control point P. The path keeps a distance of half the
         robot's width from every body. If the start or the point itself is nearer to a
-        body, the path may come as near as this.
-
-        Args:
-            point: One of ``points``.
-
-        Returns:
-            Length of the path, m; infinite if there is no path.
+        body, the path may come as near as this. Without a path, the length is infinite.
         """
         return self._way(point, self.scenario.only.robot.width_m / 2.0)
 
@@ -122,12 +116,7 @@ class EquilibriumSearch:
           the follow distance.
         - If several candidates are equally near, the method returns the one nearest to
           the start.
-
-        Returns:
-            One of ``points``.
-
-        Raises:
-            InputError: There is no stable equilibrium.
+        - If there is no stable equilibrium, the method raises InputError.
         """
         sinks = [point for point in self.points if point.stable]
         if not sinks:
@@ -219,20 +208,12 @@ def find_equilibria(
 ) -> EquilibriumSearch:
     """Searches a workspace for all equilibria of the closed loop at rest.
 
-    Args:
-        scenario: Any scenario. The search takes its sensors as exact, and its bodies as
-            at rest where they are at 0 s. Use ``frozen_scenario`` for another time.
-        area_m: Area in which to search for positions of the control point P. By default
-            the area contains all bodies and the start, with a margin of the follow
-            distance plus 1 m.
-        smallest_m: Cells whose edge is not longer than this are not divided any more,
-            m.
-
-    Returns:
-        All equilibria that were found, and the groups of cells that remain unresolved.
-
-    Raises:
-        InputError: The area is empty, or the law has no derivative.
+    The sensors are taken as exact, and the bodies as at rest where they are at 0 s. Use
+    ``frozen_scenario`` for another time. ``area_m`` bounds the positions of the control
+    point P. By default, it contains all bodies and the start, with a margin of the
+    follow distance plus 1 m. Cells whose edge is not longer than ``smallest_m`` are not
+    divided any more. Raises InputError if the area is empty or the law has no
+    derivative.
     """
     if not smallest_m > 0.0:
         raise InputError("smallest_m", f"is {smallest_m}; give a positive length in m")
@@ -307,8 +288,7 @@ class _Found:
     ) -> None:
         """Searches for places of rest in and near a group of cells.
 
-        If the equilibria form a continuum, the equilibrium nearest to the robot's start
-        represents the continuum.
+        The equilibrium nearest to the robot's start represents a continuum.
         """
         near = np.linalg.norm(group.centres - self.start, axis=1).argmin()
         turned = np.flatnonzero(group.winding)
@@ -396,12 +376,8 @@ def nearest_equilibrium(
 ) -> NDArray[np.float64] | None:
     """Finds a point without force on the robot by Newton's method.
 
-    Args:
-        field_: Force on the control point P of the robot at rest.
-        begin: (2,) start of the iteration in the world frame W, m.
-
-    Returns:
-        (2,) position of P in W, m, or None if the method did not converge.
+    ``begin`` and the result are (2,) positions of P in the world frame W, m. The result
+    is None if the method does not converge.
     """
     p = begin.copy()
     for _ in range(30):
@@ -417,17 +393,5 @@ def nearest_equilibrium(
 
 
 def follow_equilibrium(scenario: Scenario) -> OperatingPoint:
-    """Returns the stable equilibrium at rest where the robot should follow the source.
-
-    ``EquilibriumSearch.follow_point`` describes the choice.
-
-    Args:
-        scenario: Any scenario, see ``find_equilibria``.
-
-    Returns:
-        The equilibrium.
-
-    Raises:
-        InputError: There is no stable equilibrium.
-    """
+    """Returns the equilibrium of ``EquilibriumSearch.follow_point``."""
     return find_equilibria(scenario).follow_point()

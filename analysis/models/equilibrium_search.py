@@ -50,6 +50,9 @@ from scipy.spatial import cKDTree
 from analysis.models.force_field import ForceField
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
 
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
 #: Spacing of the samples of the law, m.
 _SAMPLE_M = 1e-3
 #: Edge of the first cells, m.
@@ -73,19 +76,19 @@ _SAME_M = 1e-9
 SearchArea = tuple[float, float, float, float]
 
 
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unit(vectors: Floats) -> Floats:
     size = np.linalg.norm(vectors, axis=1)
     return vectors / np.maximum(size, 1e-300)[:, None]
 
 
-def _sampled(field: ForceField, farthest: float) -> tuple[NDArray[np.float64], ...]:
+def _sampled(field: ForceField, farthest: float) -> tuple[Floats, ...]:
     """Distances, m, law, N, and deviation of the law from its chord, N.
 
     The deviation belongs to the interval after each distance. If the law has a corner
     inside an interval, one end of the interval is moved to the corner.
     """
 
-    def law(c: NDArray[np.float64]) -> NDArray[np.float64]:
+    def law(c: Floats) -> Floats:
         # At a distance of exactly zero a push has no direction.
         return field.law(np.maximum(c, 1e-9))
 
@@ -120,7 +123,7 @@ class SwitchingPoint:
     these forces is zero.
     """
 
-    p_WP: NDArray[np.float64]
+    p_WP: Floats
     """(2,) position of P in W, m."""
     attractive: bool
     """Whether all forces drive P to this point, so that P chatters near the point."""
@@ -130,23 +133,19 @@ class SwitchingPoint:
 class Leftover:
     """Group of neighboring smallest cells that may contain an equilibrium."""
 
-    centres: NDArray[np.float64]
+    centres: Floats
     """(n, 2) centers of the cells in W, m."""
-    strengths: NDArray[np.float64]
+    strengths: Floats
     """(n,) magnitude of the force at each center, N."""
     winding: NDArray[np.int64]
     """(n,) number of turns of the force direction along the edge of each cell. It is
     nonzero around an isolated equilibrium."""
-    switches: NDArray[np.bool_]
+    switches: Flags
     """(n,) whether the nearest body changes within the cell."""
 
 
 class CellSearch:
-    """Bounds the force in each cell and excludes cells without equilibria.
-
-    Args:
-        field: Force on the control point P of the robot at rest.
-    """
+    """Bounds the force in each cell and excludes cells without equilibria."""
 
     def __init__(self, field: ForceField) -> None:
         scenario = field.loop.scenario
@@ -163,20 +162,12 @@ class CellSearch:
 
     def left_over(
         self, area: SearchArea, smallest_m: float
-    ) -> tuple[NDArray[np.float64], int, float]:
+    ) -> tuple[Floats, int, float]:
         """Returns the cells of an area that may contain an equilibrium.
 
-        Args:
-            area: Area to search.
-            smallest_m: Cells whose edge is not longer than this are not divided any
-                more, m.
-
-        Returns:
-            Three values:
-
-            - (n, 2) centers of these cells, m
-            - number of cells of all sizes that were examined
-            - edge of these cells, m
+        Cells whose edge is not longer than ``smallest_m`` are not divided any more. The
+        three values are the (n, 2) centers of these cells, m, the number of cells of
+        all sizes that were examined, and the edge of these cells, m.
         """
         edge = _FIRST_CELL_M
         x = np.arange(area[0] + edge / 2, area[1] + edge / 2, edge)
@@ -189,20 +180,11 @@ class CellSearch:
             cells, edge = self.quartered(cells, edge)
         return cells, looked_at, edge
 
-    def quartered(
-        self, cells: NDArray[np.float64], edge: float
-    ) -> tuple[NDArray[np.float64], float]:
+    def quartered(self, cells: Floats, edge: float) -> tuple[Floats, float]:
         """Divides cells into quarters, and returns those with a possible equilibrium.
 
-        Args:
-            cells: (n, 2) centers of the cells, m.
-            edge: Edge of the cells, m.
-
-        Returns:
-            Two values:
-
-            - (k, 2) centers of these quarters, m
-            - edge of the quarters, m
+        ``cells`` are (n, 2) centers, m. The result has the (k, 2) centers and the edge
+        of these quarters, m.
         """
         edge /= 2.0
         corners = edge / 2.0 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
@@ -223,7 +205,7 @@ class CellSearch:
         push = float(np.abs(self._f[self._c >= nearest - _SAMPLE_M]).max(initial=0.0))
         return pull > push * self._slots
 
-    def forces(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def forces(self, points: Floats) -> Floats:
         """(n, 2) forces in W at points (n, 2), from the samples of the law, N."""
         vectors, distances = self._vectors(points)
         pushes = self._pushes(vectors, distances)
@@ -231,31 +213,24 @@ class CellSearch:
         counted = np.where((rank < self._slots)[..., None], pushes, 0.0)
         return np.asarray(self._pull(points) + counted.sum(axis=0))
 
-    def _pull(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _pull(self, points: Floats) -> Floats:
         to_source = self.p_WS - points
         distance = np.maximum(np.linalg.norm(to_source, axis=1), 1e-12)[:, None]
         share = 1.0 - self._attraction.follow_distance_m / distance
         return self._attraction.stiffness_n_m * share * to_source
 
-    def _vectors(
-        self, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _vectors(self, points: Floats) -> tuple[Floats, Floats]:
         """Vectors to the nearest points of bodies (k, n, 2), and lengths (k, n), m."""
         vectors = (nearest_point_on_rectangle(points.T, body) for body in self._bodies)
         stacked = np.array([np.stack(vector, axis=-1) for vector in vectors])
         return stacked, np.linalg.norm(stacked, axis=-1)
 
-    def _pushes(
-        self, vectors: NDArray[np.float64], distances: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _pushes(self, vectors: Floats, distances: Floats) -> Floats:
         force = np.interp(distances, self._c, self._f, right=0.0)
         return -vectors * (force / np.maximum(distances, 1e-12))[..., None]
 
-    def _excluded(self, cells: NDArray[np.float64], edge: float) -> NDArray[np.bool_]:
-        """(n,) whether each cell certainly contains no equilibrium.
-
-        The proof is at the top of this module.
-        """
+    def _excluded(self, cells: Floats, edge: float) -> Flags:
+        """(n,) whether the proof above rules out an equilibrium in each cell."""
         radius = edge * np.sqrt(0.5)
         vectors, distances = self._vectors(cells)
         pull, pushes = self._pull(cells), self._pushes(vectors, distances)
@@ -287,12 +262,12 @@ class CellSearch:
 
     def _one_sided(
         self,
-        pull: NDArray[np.float64],
-        pushes: NDArray[np.float64],
-        maybe: NDArray[np.bool_],
-        surely: NDArray[np.bool_],
-        change: NDArray[np.float64],
-    ) -> NDArray[np.bool_]:
+        pull: Floats,
+        pushes: Floats,
+        maybe: Flags,
+        surely: Flags,
+        change: Floats,
+    ) -> Flags:
         """(n,) whether all forces of a cell exceed their change along some direction.
 
         The change is the largest that is possible within a cell. Gilbert's method tries
@@ -304,7 +279,7 @@ class CellSearch:
         if not missing.any():
             return np.asarray(np.linalg.norm(fixed, axis=1) > change)
 
-        def least(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+        def least(direction: Floats) -> Floats:
             """(n, 2) force with the smallest component along a direction (n, 2)."""
             along = np.einsum("knj,nj->kn", pushes, direction)
             rank = np.where(maybe, along, np.inf).argsort(axis=0).argsort(axis=0)
@@ -327,7 +302,7 @@ class CellSearch:
             point = point + way[:, None] * step
         return clear
 
-    def _depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _depth(self, points: Floats) -> Floats:
         """(n,) depth of points inside a body, m; negative outside all bodies."""
         depth = np.full(len(points), -np.inf)
         for x, y, theta, length, width in self._bodies:
@@ -336,9 +311,7 @@ class CellSearch:
             depth = np.maximum(depth, own)
         return depth
 
-    def _pull_slope(
-        self, cells: NDArray[np.float64], radius: float
-    ) -> NDArray[np.float64]:
+    def _pull_slope(self, cells: Floats, radius: float) -> Floats:
         """(n,) largest slope of the attraction within each cell, N/m."""
         distance = np.linalg.norm(self.p_WS - cells, axis=1) - radius
         d_f = self._attraction.follow_distance_m
@@ -347,9 +320,7 @@ class CellSearch:
         return self._attraction.stiffness_n_m * np.maximum(1.0, np.abs(bent))
 
     @staticmethod
-    def _in_cell(
-        samples: NDArray[np.float64], distances: NDArray[np.float64], radius: float
-    ) -> NDArray[np.float64]:
+    def _in_cell(samples: Floats, distances: Floats, radius: float) -> Floats:
         """(k, n) largest value of a function of distance within each cell."""
         # Samples may be moved by half their spacing.
         window = 2 * int(np.ceil(radius / _SAMPLE_M)) + 5
@@ -357,16 +328,8 @@ class CellSearch:
         index = np.clip((distances / _SAMPLE_M).astype(int), 0, len(largest) - 1)
         return np.asarray(largest[index])
 
-    def groups(self, cells: NDArray[np.float64], edge: float) -> list[Leftover]:
-        """Divides cells into groups of neighbors.
-
-        Args:
-            cells: (n, 2) centers of the cells, m.
-            edge: Edge of the cells, m.
-
-        Returns:
-            The groups. Each cell belongs to one group.
-        """
+    def groups(self, cells: Floats, edge: float) -> list[Leftover]:
+        """Divides cells, given by (n, 2) centers, m, into groups of neighbors."""
         if not len(cells):
             return []
         index = np.rint((cells - cells.min(axis=0)) / edge).astype(int)
@@ -382,7 +345,7 @@ class CellSearch:
         ends = np.cumsum(np.bincount(group, minlength=count))[:-1]
         return [self._group(cells[part], edge) for part in np.split(order, ends)]
 
-    def _group(self, centres: NDArray[np.float64], edge: float) -> Leftover:
+    def _group(self, centres: Floats, edge: float) -> Leftover:
         offsets = edge / 2.0 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         corners = (centres[:, None, :] + offsets).reshape(-1, 2)
         forces = self.forces(corners).reshape(-1, 4, 2)
@@ -401,15 +364,10 @@ class CellSearch:
         )
 
     def switching_points(self, group: Leftover, edge: float) -> list[SwitchingPoint]:
-        """Finds places of rest where two or three bodies are equally near.
+        """Finds places of rest near a group where two or three bodies are equally near.
 
-        Args:
-            group: Cells in which the search begins.
-            edge: Edge of the cells, m.
-
-        Returns:
-            All such points in or next to the group. With ``aggregation: sum`` the list
-            is empty, because the force then switches between sums.
+        With ``aggregation: sum`` the list is empty, because the force then switches
+        between sums.
         """
         starts = group.centres[group.switches]
         if not len(starts) or self._slots > 1:
@@ -426,24 +384,17 @@ class CellSearch:
                     found.append(SwitchingPoint(end, self._attracts(end, bodies)))
         return found
 
-    def _each(
-        self, points: NDArray[np.float64], bodies: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _each(self, points: Floats, bodies: NDArray[np.int64]) -> tuple[Floats, Floats]:
         """Distances (size, n) of bodies (size, n), m, and forces (size, n, 2), N."""
         vectors, distances = self._vectors(points)
         row = np.arange(points.shape[0])
         forces = self._pull(points) + self._pushes(vectors, distances)
         return distances[bodies, row], forces[bodies, row]
 
-    def _newton(
-        self, starts: NDArray[np.float64], bodies: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
-        """(n, 2) points at which the bodies are equally near, by Newton's method, m.
+    def _newton(self, starts: Floats, bodies: NDArray[np.int64]) -> Floats:
+        """(n, 2) points where bodies are equally near, m, and two forces parallel."""
 
-        With two bodies, their forces are also parallel at these points.
-        """
-
-        def residual(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        def residual(points: Floats) -> Floats:
             distances, forces = self._each(points, bodies)
             first = distances[0] - distances[1]
             if len(bodies) == 3:
@@ -467,7 +418,7 @@ class CellSearch:
             p = p + move * np.minimum(1.0, 0.01 / np.maximum(size, 1e-300))
         return p
 
-    def _cancels(self, p: NDArray[np.float64], bodies: NDArray[np.int64]) -> bool:
+    def _cancels(self, p: Floats, bodies: NDArray[np.int64]) -> bool:
         """Whether the bodies are the nearest at p and the hull contains the origin."""
         distances, forces = self._each(p[None], bodies[:, None])
         least = self._vectors(p[None])[1].min()
@@ -483,7 +434,7 @@ class CellSearch:
         turns = [np.linalg.det(np.array([F[k], F[(k + 1) % 3]])) for k in range(3)]
         return bool(min(turns) > 0.0 or max(turns) < 0.0)
 
-    def _attracts(self, p: NDArray[np.float64], bodies: NDArray[np.int64]) -> bool:
+    def _attracts(self, p: Floats, bodies: NDArray[np.int64]) -> bool:
         """Whether the forces drive the control point P to a switching point.
 
         The nearest body alone pushes P. The force is then that of a potential: the
@@ -507,9 +458,7 @@ class CellSearch:
         )
         return bool(ahead - behind < 1e-9)
 
-    def _sliding(
-        self, p: NDArray[np.float64], bodies: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def _sliding(self, p: Floats, bodies: NDArray[np.int64]) -> Floats:
         """(2,) mean of two forces that keeps P equally near to their bodies, N."""
         vectors, distances = (x[bodies, 0] for x in self._vectors(p[None]))
         away = -vectors / distances[:, None]

@@ -27,15 +27,8 @@ class ForceField:
     exception: a source straight behind the robot pulls slightly sideways. This class
     therefore turns the robot so that the source is ahead. The controller takes the
     speed of every obstacle as zero, as in the control period in which it first sees the
-    obstacle.
-
-    Args:
-        loop: The control loop with exact sensors.
-        time_s: Time at which moving bodies are frozen, s. It may be None if no body
-            moves.
-
-    Raises:
-        InputError: A body moves, and no time is given.
+    obstacle. Moving bodies are frozen at ``time_s``. Without this time, they raise
+    InputError.
     """
 
     def __init__(self, loop: IdealLoop, time_s: float | None = None) -> None:
@@ -90,10 +83,8 @@ class ForceField:
         """(n,) repulsion by one body at rest, N, at distances (n,), m."""
         block, context = self._controller(twin=False)
         self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
-        port, read = (
-            block.GetInputPort("collision_vectors_B"),
-            block.GetOutputPort("forces_W"),
-        )
+        port = block.GetInputPort("collision_vectors_B")
+        read = block.GetOutputPort("forces_W")
         forces = np.zeros(len(distances))
         for k, c in enumerate(distances):
             if c <= self.reach_m:

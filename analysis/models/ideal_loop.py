@@ -26,9 +26,7 @@ from analysis.models.diagram_state import (
     run_periods,
     set_state,
 )
-from analysis.models.ideal_scenarios import (
-    require_ideal,
-)
+from analysis.models.ideal_scenarios import require_ideal
 from diagrams import build_sound_follower
 from diagrams.building.robot import parts_of
 from diagrams.running.simulation import simulator_config
@@ -43,11 +41,10 @@ SETTLING_TICKS = 40
 
 @dataclass(frozen=True)
 class PeriodDerivatives:
-    """Linearization of one control period about a state.
+    """Linearization of one control period: x+ = f(x, u) and y = g(x, u).
 
-    The period maps state x and held inputs u to the next state x+ = f(x, u). The
-    outputs y = g(x, u) are those at the beginning of the period, before the control
-    update.
+    The inputs u are held over the period. The outputs y are those at the beginning of
+    the period, before the control update.
     """
 
     next_state: NDArray[np.float64]
@@ -70,13 +67,8 @@ class IdealLoop:
     The AutoDiffXd diagram is converted once and used again. The state is that of the
     diagram: first the continuous states, then the discrete groups. ``state_names``
     names its elements. A period begins just before one control update and ends just
-    before the next.
-
-    Args:
-        scenario: Scenario with exact sensors, see ``ideal_scenario``.
-
-    Raises:
-        InputError: The scenario, or a user's own law, has no derivative.
+    before the next. The scenario is that of ``ideal_scenario``. Raises InputError if
+    the scenario, or a user's own law, has no derivative.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -152,22 +144,11 @@ class IdealLoop:
             ) from error
 
     def block(self, role: str, *, twin: bool = False) -> Any:
-        """Returns a block of the diagram.
-
-        Args:
-            role: A key of ``SoundFollower.blocks``.
-            twin: Whether to return the AutoDiffXd form of the block.
-
-        Returns:
-            The block as a LeafSystem of float, or of AutoDiffXd if ``twin`` is true.
-        """
+        """Returns the block of a role in the float or the AutoDiffXd (twin) diagram."""
         return self._twin_blocks[role] if twin else self.follower.blocks[role]
 
     def _names(self) -> tuple[str, ...]:
-        """Names ``part.element`` of all states: continuous first, then discrete.
-
-        States without a name, such as those of a user's own law, are numbered.
-        """
+        """Names ``part.element`` of all states; states without a name are numbered."""
         context = self.follower.diagram.CreateDefaultContext()
         continuous: list[str] = []
         discrete: list[str] = []
@@ -186,17 +167,7 @@ class IdealLoop:
         return [k for k, n in enumerate(self.state_names) if n.startswith(prefix)]
 
     def context(self, state: NDArray[np.float64], time_s: float = 0.0) -> Any:
-        """Returns the context of the float diagram at a state.
-
-        The context is valid until the next call of any method.
-
-        Args:
-            state: (n,) state of the diagram.
-            time_s: Time, s.
-
-        Returns:
-            Root context of the diagram.
-        """
+        """Returns the root context at a state (n,), valid until the next call."""
         simulator = self._simulator(frozenset(), twin=False)
         context = simulator.get_mutable_context()
         context.SetTime(time_s)
@@ -211,17 +182,11 @@ class IdealLoop:
         fixed: Mapping[Port, Sequence[float]] | None = None,
         periods: int = 1,
     ) -> NDArray[np.float64]:
-        """Returns the state after some whole periods.
+        """Returns the state (n,) after some whole periods.
 
-        Args:
-            state: (n,) state just before the control update at ``time_s``.
-            time_s: Time of the first control update, a multiple of the period, s.
-            fixed: Constant values of input ports. These ports are cut off from their
-                source.
-            periods: Number of periods.
-
-        Returns:
-            (n,) state just before the control update that follows the last period.
+        Both states are those just before a control update. ``time_s`` is a multiple of
+        the period. The ports ``fixed`` are cut off from their source and have constant
+        values.
         """
         fixed = fixed or {}
         simulator = self._simulator(frozenset(fixed), twin=False)
@@ -241,15 +206,10 @@ class IdealLoop:
     ) -> PeriodDerivatives:
         """Differentiates one period with AutoDiff through the whole diagram.
 
-        Args:
-            state: (n,) state just before the control update at ``time_s``.
-            time_s: Time of the control update, a multiple of the period, s.
-            inputs: Values of input ports that are cut off from their source and held
-                over the period. The ports of one key share a value and its derivative.
-            outputs: Output ports to read and differentiate before the control update.
-
-        Returns:
-            The next state, the outputs, and the derivatives of both.
+        The state (n,) is that just before the control update at ``time_s``, a multiple
+        of the period. The ports ``inputs`` are cut off from their source and held over
+        the period. The ports of one key share a value and its derivative. The ports
+        ``outputs`` are read before the control update.
         """
         inputs = inputs or {}
         ports = frozenset(port for group in inputs for port in group)
@@ -285,14 +245,9 @@ class IdealLoop:
     ) -> Runner:
         """Prepares a run of the float diagram that can be stopped at any time.
 
-        Args:
-            state: (n,) state just before the control update at ``time_s``.
-            time_s: Time of the first control update, a multiple of the period, s.
-            fixed: Input ports that are cut off from their source. ``Runner.fix`` sets
-                their values.
-
-        Returns:
-            The run, before its first control update.
+        The run begins at ``state`` (n,), just before the control update at ``time_s``,
+        a multiple of the period. The ports ``fixed`` are cut off from their source.
+        ``Runner.fix`` sets their values.
         """
         simulator = self._simulator(frozenset(fixed), twin=False)
         return Runner(simulator, self.fix, state, time_s, self.tick_s)
@@ -303,25 +258,13 @@ class IdealLoop:
         v_WP: tuple[float, float] = (0.0, 0.0),
         begin_s: float = 0.0,
     ) -> tuple[NDArray[np.float64], float]:
-        """Returns the state of the diagram after a long steady motion.
+        """Returns the state (n,) after a long steady motion, and its time, s.
 
         The robot rests or moves at constant velocity along its heading, and the source
-        follows its path. The law's acceleration is zero meanwhile. At the end, the
-        tracker and the controller's memory have settled.
-
-        Args:
-            pose_WB: (3,) pose of the robot in the world frame W at ``begin_s``, m and
-                rad.
-            v_WP: Velocity of the robot's control point P in W, m/s. It points along the
-                heading.
-            begin_s: Time from which on the source moves steadily, s. It is a multiple
-                of the period.
-
-        Returns:
-            Two values:
-
-            - (n,) state just before a control update
-            - time of this control update, s
+        follows its path. ``pose_WB`` is the pose, m and rad, at ``begin_s``, from which
+        on the source moves steadily. The law's acceleration is zero meanwhile. At the
+        end, just before a control update, the tracker and the controller's memory have
+        settled.
         """
         context = self.follower.diagram.CreateDefaultContext()
         state = get_state(context)
@@ -357,15 +300,7 @@ class IdealLoop:
         return self._simulators[key]
 
     def fix(self, context: Any, port: Port, value: Any, *, twin: bool = False) -> None:
-        """Cuts an input port off from its source and sets its value.
-
-        Args:
-            context: Root context of the diagram. It is changed.
-            port: Role of the block, and name of its input port.
-            value: (size of the port,) value in the unit of the port. The AutoDiffXd
-                diagram takes AutoDiffXd values.
-            twin: Whether the context belongs to the AutoDiffXd diagram.
-        """
+        """Cuts an input port in a root context off from its source; sets its value."""
         role, name = port
         block = self.block(role, twin=twin)
         own = block.GetMyMutableContextFromRoot(context)
@@ -383,18 +318,10 @@ def _cached_loop(key: str, _own_code: str) -> IdealLoop:
 
 
 def ideal_loop(scenario: Scenario) -> IdealLoop:
-    """Returns the control loop of a scenario with exact sensors.
+    """Returns the control loop of a scenario with exact sensors (``ideal_scenario``).
 
     Each process builds and converts the loop of a scenario only once, because Drake
-    never frees blocks that are written in Python.
-
-    Args:
-        scenario: Scenario with exact sensors, see ``ideal_scenario``.
-
-    Returns:
-        The loop. Callers with the same scenario share it.
-
-    Raises:
-        InputError: The scenario has no linear model.
+    never frees blocks that are written in Python. Callers with the same scenario share
+    it. Raises InputError if the scenario has no linear model.
     """
     return _cached_loop(scenario.model_dump_json(), str(loaded_digests(scenario)))

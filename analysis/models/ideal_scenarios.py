@@ -20,31 +20,13 @@ _ALL_IDEAL: dict[str, Any] = {
 
 
 def ideal_scenario(scenario: Scenario) -> Scenario:
-    """Returns the scenario with exact sensors and a sound without pauses.
-
-    Args:
-        scenario: Any scenario. It is not changed.
-
-    Returns:
-        A copy with exact sensors.
-
-    Raises:
-        ValueError: The wheels can slip (``plant.friction`` is set).
-    """
+    """Returns a copy with exact sensors and a sound without pauses."""
     require_rolling(scenario.only.plant)
     return changed(scenario, _ALL_IDEAL)
 
 
 def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
-    """Returns the scenario with source and obstacles at rest.
-
-    Args:
-        scenario: Any scenario. It is not changed.
-        time_s: The bodies rest at the poses that they have at this time, s.
-
-    Returns:
-        A copy in which no body moves.
-    """
+    """Returns a copy in which all bodies rest where they are at ``time_s``."""
     x, y, theta = scenario.source.path().pose(time_s)
     source = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
     obstacles = []
@@ -63,16 +45,7 @@ def moving_bodies(scenario: Scenario) -> tuple[str, ...]:
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """Returns a validated copy of a scenario with other values.
-
-    Args:
-        scenario: Any scenario. It is not changed.
-        changes: New values by field name, in the units of the fields. If a value is a
-            mapping, it changes single fields of a group.
-
-    Returns:
-        The changed copy.
-    """
+    """Returns a validated copy with other values, or single fields of a group."""
     data = scenario.model_dump()
     for key, value in changes.items():
         data[key] = data[key] | value if isinstance(value, dict) else value
@@ -80,14 +53,7 @@ def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 
 
 def require_rolling(plant: PlantParameters) -> None:
-    """Raises an error if the wheels can slip.
-
-    Args:
-        plant: Parameters of the robot's plant.
-
-    Raises:
-        InputError: ``plant.friction`` is set.
-    """
+    """Raises InputError if the wheels can slip (``plant.friction`` is set)."""
     if plant.friction is not None:
         raise InputError(
             "plant.friction",
@@ -98,15 +64,7 @@ def require_rolling(plant: PlantParameters) -> None:
 
 
 def require_ideal(scenario: Scenario) -> None:
-    """Raises an error if a scenario cannot be linearized.
-
-    Args:
-        scenario: The scenario to check.
-
-    Raises:
-        InputError: The scenario has several robots or sampling rates, or a block
-            without a derivative.
-    """
+    """Raises InputError if a scenario cannot be linearized."""
     scenario.require_one_robot("a linear model")
     scenario.require_one_rate("a linear model")
     require_rolling(scenario.only.plant)

@@ -1,4 +1,4 @@
-"""Linear models as matrices with named signals, and their modes."""
+"""Linear models as matrices with named signals, their modes, and their reduction."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ NEUTRAL = 1e-5
 DELAY = 1e-6
 #: Number of matrix elements that are solved at once.
 _CHUNK = 100_000
+#: A new direction of a unit vector counts as rounding error if its length is below.
+_NEGLIGIBLE = 1e-9
 
 
 @dataclass(frozen=True)
 class Mode:
-    """One real pole, or one conjugate pair of poles.
-
-    The pole with the positive imaginary part represents the pair.
-    """
+    """One real pole, or a conjugate pair, of which the fields give the upper pole."""
 
     z: complex | None
     """Pole in the z plane. In a continuous model: None."""
@@ -62,25 +61,17 @@ class LinearModel:
 
     Continuous time: x' = A x + B u, y = C x + D u. Sampled time, if ``period_s`` is
     set: x+ = A x + B u, y = C x + D u. All quantities are deviations from the operating
-    point, in SI units.
+    point, in SI units. The n states, m inputs and p outputs have names.
     """
 
     name: str
-    """Name for reports and files."""
     A: NDArray[np.float64]
-    """(n, n)"""
     B: NDArray[np.float64]
-    """(n, m)"""
     C: NDArray[np.float64]
-    """(p, n)"""
     D: NDArray[np.float64]
-    """(p, m)"""
     state_names: tuple[str, ...]
-    """n names."""
     input_names: tuple[str, ...]
-    """m names."""
     output_names: tuple[str, ...]
-    """p names."""
     period_s: float | None = None
     """Sample period, s. In continuous time: None."""
 
@@ -117,10 +108,7 @@ class LinearModel:
 
     @property
     def growth_per_s(self) -> float:
-        """Growth rate of the slowest mode, 1/s; negative if all modes decay.
-
-        If all poles are pure delays, the value is -infinity.
-        """
+        """Growth rate of the slowest mode, 1/s; -infinity if all poles are delays."""
         if self.period_s:
             return float(growth_per_s(self.spectral_radius, self.period_s))
         return float(self.poles.real.max(initial=-math.inf))
@@ -176,15 +164,7 @@ class LinearModel:
         return np.moveaxis(np.concatenate(rows), 0, -1) + self.D[:, :, None]
 
     def part(self, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
-        """Returns the model with only some of its inputs and outputs.
-
-        Args:
-            inputs: Names of the inputs to keep, in their new order.
-            outputs: Names of the outputs to keep, in their new order.
-
-        Returns:
-            A model with the same states.
-        """
+        """Returns the model with only the named inputs and outputs, in this order."""
         columns = [self.input_names.index(name) for name in inputs]
         rows = [self.output_names.index(name) for name in outputs]
         return replace(
@@ -200,15 +180,9 @@ class LinearModel:
 def s_plane(
     poles: NDArray[np.complex128], period_s: float | None
 ) -> NDArray[np.complex128]:
-    """Returns poles in the s plane, ln(z)/T, without pure delays (z = 0).
+    """Returns poles in the s plane, ln(z)/T, rad/s, without pure delays (z = 0).
 
-    Args:
-        poles: (n,) poles: in the z plane if ``period_s`` is set, otherwise in the s
-            plane, rad/s.
-        period_s: Sample period T, s. In continuous time: None.
-
-    Returns:
-        (k,) poles in the s plane, rad/s, in the order of ``poles``.
+    In continuous time, where the period is None, the poles stay the same.
     """
     poles = np.asarray(poles, dtype=np.complex128)
     if not period_s:
@@ -228,18 +202,55 @@ def damping_ratio(s: Any) -> Any:
 
 
 def simple_poles(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Returns the poles that are neither near zero nor within 1e-4 of another pole.
+    """Returns the poles z that are neither near zero nor within 1e-4 of another pole.
 
     A multiple pole moves by a root of a perturbation of the matrix. Two computations
     whose matrices agree up to rounding can therefore differ in their multiple poles.
-
-    Args:
-        poles: (n,) poles in the z plane.
-
-    Returns:
-        (k,) simple poles with magnitude above 1e-3, in the order of ``poles``.
     """
     distances = np.abs(poles[:, None] - poles[None, :])
     np.fill_diagonal(distances, np.inf)
     alone = (distances.min(axis=1) > 1e-4) & (np.abs(poles) > 1e-3)
     return poles[alone]
+
+
+def minimal_model(model: LinearModel) -> LinearModel:
+    """Returns the controllable and observable part of a model.
+
+    The frequency response stays the same. The closed loop has many states outside this
+    part: the error of odometry, the angles of the wheels, and the covariances of the
+    tracker. Their poles are at z = 1 or z = 0. With these states, transfer polynomials
+    of the model would be useless. The remaining states are orthonormal combinations of
+    those of ``model``.
+    """
+    moved = _on(model, _span(model.A, model.B))
+    return _on(moved, _span(moved.A.T, moved.C.T))
+
+
+def _span(A: NDArray[np.float64], B: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, k) orthonormal basis of the controllable subspace of A and B."""
+    basis = np.empty((len(A), 0))
+    waiting = list(B.T)
+    while waiting:
+        vector = waiting.pop(0)
+        size = np.linalg.norm(vector)
+        if size == 0.0:
+            continue
+        vector = vector / size
+        for _ in range(2):  # twice, to remove rounding errors of the first time
+            vector = vector - basis @ (basis.T @ vector)
+        size = np.linalg.norm(vector)
+        if size > _NEGLIGIBLE:
+            vector = vector / size
+            basis = np.column_stack([basis, vector])
+            waiting.append(A @ vector)
+    return basis
+
+
+def _on(model: LinearModel, basis: NDArray[np.float64]) -> LinearModel:
+    return replace(
+        model,
+        A=basis.T @ model.A @ basis,
+        B=basis.T @ model.B,
+        C=model.C @ basis,
+        state_names=tuple(f"combination_{k}" for k in range(basis.shape[1])),
+    )

@@ -44,12 +44,6 @@ def sampled_model(point: OperatingPoint) -> LinearModel:
     - Outputs: position of the control point P, heading, source position that hearing
       reports, and acceleration from the law.
     - States: all states of the diagram.
-
-    Args:
-        point: Operating point.
-
-    Returns:
-        The model.
     """
     loop = point.loop
     found = loop.period_derivatives(
@@ -73,16 +67,7 @@ def sampled_model(point: OperatingPoint) -> LinearModel:
 
 
 def blockwise_model(point: OperatingPoint) -> LinearModel:
-    """Returns the sampled closed loop, joined from blocks that are linearized alone.
-
-    The signals are those of ``sampled_model``.
-
-    Args:
-        point: Operating point.
-
-    Returns:
-        The model.
-    """
+    """Returns the model of ``sampled_model``, joined from blocks linearized alone."""
     loop = point.loop
     joined = join_blocks(
         sampled_blocks(loop, point.state, point.time_s),
@@ -125,18 +110,10 @@ class RouteComparison:
     simple_poles: NDArray[np.complex128]
     """Compared poles in the z plane."""
     states: int
-    """Number of states."""
 
 
 def compare_routes(point: OperatingPoint) -> RouteComparison:
-    """Compares the models of ``sampled_model`` and ``blockwise_model``.
-
-    Args:
-        point: Operating point.
-
-    Returns:
-        Differences of matrices and poles.
-    """
+    """Compares the models of ``sampled_model`` and ``blockwise_model``."""
     whole, joined = sampled_model(point), blockwise_model(point)
     pairs = [(getattr(whole, m), getattr(joined, m)) for m in ("A", "B", "C", "D")]
     poles = simple_poles(whole.poles)
@@ -171,14 +148,7 @@ def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:
     """Compares A with finite differences of the float diagram, state by state.
 
     The covariances of the tracker are left out. They are zero with exact hearing, and a
-    step to one side would make them negative.
-
-    Args:
-        point: Operating point.
-        step: Step in each state, in its SI unit.
-
-    Returns:
-        Largest differences, with the names of the states.
+    step to one side would make them negative. ``step`` is in the SI unit of each state.
     """
     loop, state, time_s = point.loop, point.state, point.time_s
     A = loop.period_derivatives(state, time_s).A
@@ -223,12 +193,6 @@ def continuous_model(point: OperatingPoint) -> LinearModel:
     - Inputs: position of the source, m, and an acceleration added to that of the
       virtual mass, m/s^2.
     - Outputs: position of the control point P, m, and heading, rad.
-
-    Args:
-        point: Operating point.
-
-    Returns:
-        The model.
     """
     loop = point.loop
     models = sampled_blocks(loop, point.state, point.time_s)
@@ -286,17 +250,9 @@ def plant_jacobians(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Returns A (7, 7) and B (7, 2) of the plant in continuous time.
 
-    The matrices are constant, because the robot rests or drives straight at an
+    They are the derivatives of the state's rate by the state, and by the two commanded
+    wheel speeds. They are constant, because the robot rests or drives straight at an
     operating point.
-
-    Args:
-        point: Operating point.
-
-    Returns:
-        Two matrices:
-
-        - A: derivative of the state's rate by the state
-        - B: derivative of the state's rate by the two commanded wheel speeds
     """
     loop = point.loop
     plant = loop.block("plant", twin=True)

@@ -24,11 +24,7 @@ def write_models(models: Sequence[LinearModel], directory: Path) -> None:
 
     Each matrix also has a CSV file: ``models/NAME_A.csv``, ``_B``, ``_C`` and ``_D``.
     The first row has the names of the columns, the first column the names of the rows.
-
-    Args:
-        models: Models to write. If several have the same name, the second gets the
-            suffix ``_2``, and so on.
-        directory: An existing directory.
+    If several models have the same name, the second gets the suffix ``_2``, and so on.
     """
     names = distinct_names([_identifier(m.name) for m in models], joint="_")
     structs = {name: _struct(model) for name, model in zip(names, models, strict=True)}

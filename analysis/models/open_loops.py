@@ -18,8 +18,7 @@ from analysis.models.diagram_state import Port
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import changed, ideal_scenario
-from analysis.models.linear_models import LinearModel
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import LinearModel, minimal_model
 from analysis.models.operating_points import OperatingPoint
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -49,15 +48,9 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
 
     A signal is cut between the block that produces the signal and the block that reads
     it. At each cut, the input ``<place>_<direction>`` feeds the reading block. The
-    output of the same name is the signal from the producing block. At the operating
-    point the robot faces the source, so that "along" means ahead.
-
-    Args:
-        point: The operating point.
-        *places: Signals to cut. Without any, the model is that of the closed loop.
-
-    Returns:
-        A model in SI units with two inputs and two outputs per cut, along and across.
+    output of the same name is the signal from the producing block. Each cut has two of
+    both, along and across. At the operating point the robot faces the source, so that
+    "along" means ahead. Without cuts, the model is that of the closed loop.
     """
     loop = point.loop
     now = loop.context(point.state, point.time_s)
@@ -110,15 +103,8 @@ def _axes(point: OperatingPoint, place: BreakPoint) -> NDArray[np.float64]:
 def closed(model: LinearModel, signals: tuple[str, ...]) -> LinearModel:
     """Closes the loop again at some cut signals of a model.
 
-    The inputs of these signals remain. Each remaining input is added to its signal.
-
-    Args:
-        model: A model that is cut at ``signals`` at least.
-        signals: Names of the cut signals. Each names both an input and the output that
-            is connected to this input.
-
-    Returns:
-        The model with the same inputs and outputs.
+    Each name is that of an input and of the output that is connected to this input. The
+    inputs remain, and each is added to its signal.
     """
     import control
 
@@ -134,17 +120,9 @@ def open_loop(
     at: BreakPoint = "sensor",
     direction: Direction = "along",
 ) -> LinearModel:
-    """Returns the sampled loop transfer function L of one direction.
+    """Returns the loop L of one direction, for negative feedback.
 
     The loop of the other direction stays closed.
-
-    Args:
-        point: Operating point.
-        at: Signal at which the loop is cut: ``sensor``, ``actuator`` or ``wheels``.
-        direction: Direction of the cut: along the line to the source, or across.
-
-    Returns:
-        L for negative feedback, with one input and one output in the same unit.
     """
     whole = cut_model(point, at)
     own = f"{at}_{direction}"
@@ -160,18 +138,9 @@ def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
     The target loop has no obstacle, no motor lag and no sampling. It is a point mass
     that the attraction's spring and damper act on, along the line to a source at rest.
     Stiffness and damping are the slopes of the controller's force. If the loop is cut
-    at the sensor, the damping loop stays closed. If it is cut at the actuator, spring
-    and damper are both cut.
-
-    Args:
-        scenario: Scenario with attraction, mass and controller.
-        at: ``sensor`` or ``actuator``.
-
-    Returns:
-        A model in continuous time. The states are position, m, and velocity, m/s.
-
-    Raises:
-        InputError: The stiffness of the attraction is zero.
+    at the ``sensor``, the damping loop stays closed. If it is cut at the ``actuator``,
+    spring and damper are both cut. The states are position, m, and velocity, m/s.
+    Raises InputError if the stiffness is zero.
     """
     if scenario.follower.attraction.stiffness_n_m == 0.0:
         raise InputError(

@@ -19,8 +19,13 @@ from scipy.optimize import root_scalar
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
 from analysis.models.ideal_scenarios import changed, ideal_scenario
-from analysis.models.linear_models import NEUTRAL, LinearModel, Mode, s_plane
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import (
+    NEUTRAL,
+    LinearModel,
+    Mode,
+    minimal_model,
+    s_plane,
+)
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, nearest_point_on_rectangle
@@ -41,7 +46,6 @@ class OperatingPoint:
     """Equilibrium of the closed loop, at rest or at the source's constant velocity."""
 
     loop: IdealLoop = field(repr=False)
-    """Control loop with exact sensors."""
     p_WP: NDArray[np.float64]
     """(2,) position of the control point P in W at ``time_s``, m."""
     theta_WB: float
@@ -163,16 +167,10 @@ class OperatingPoint:
 def motion_model(
     point: OperatingPoint, A: NDArray[np.float64], period_s: float
 ) -> LinearModel:
-    """Returns a model of the motion of the control point P.
+    """Returns a model of the motion of P from the (n, n) map of the whole loop.
 
-    Args:
-        point: Operating point.
-        A: (n, n) map of the loop's whole state over one period.
-        period_s: The period, s.
-
-    Returns:
-        A model with the controllable and observable states only. Its signals are those
-        of ``OperatingPoint.motion``.
+    The map is over one ``period_s``. The model has the controllable and observable
+    states only, and the signals of ``OperatingPoint.motion``.
     """
     names = point.loop.state_names
     kick = [names.index(f"command.v_WP_{axis}") for axis in "xy"]
@@ -198,17 +196,10 @@ def motion_model(
 
 
 def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> OperatingPoint:
-    """Returns the equilibrium at rest at a given position without force.
+    """Returns the equilibrium at rest with P at (2,) ``p_WP`` in W, m.
 
-    Args:
-        loop: Control loop with exact sensors and bodies at rest.
-        p_WP: (2,) position of the control point P in the world frame W, m.
-
-    Returns:
-        The equilibrium in which the robot heads towards the source.
-
-    Raises:
-        InputError: A force acts at ``p_WP``, or a body moves.
+    The robot heads towards the source. Raises InputError if a force acts at ``p_WP`` or
+    a body moves.
     """
     field_ = ForceField(loop)
     force, slope = field_.gradient(p_WP)
@@ -241,21 +232,11 @@ def moving_equilibrium(
 ) -> OperatingPoint:
     """Returns the equilibrium of following a source at constant velocity.
 
-    The source drives straight on. The robot follows on the line behind the source and
-    heads in the direction of motion. Obstacles are left out, because none moves with
-    the robot.
-
-    Args:
-        scenario: Any scenario. Its sensors are taken as exact.
-        velocity_W: Velocity of the source in the world frame W, m/s. By default
-            ``source.speed_m_s`` along x.
-
-    Returns:
-        The equilibrium, with its state just before a control update.
-
-    Raises:
-        InputError: The source is too fast or at rest, or the forces balance at no
-            distance.
+    The source drives straight on, by default with ``source.speed_m_s`` along x. The
+    robot follows on the line behind the source and heads in the direction of motion.
+    Obstacles are left out, because none moves with the robot, and sensors are taken as
+    exact. Raises InputError if the source is too fast or at rest, or the forces balance
+    at no distance.
     """
     vx, vy = velocity_W or (scenario.source.speed_m_s, 0.0)
     speed, top = math.hypot(vx, vy), scenario.only.robot.top_speed_m_s

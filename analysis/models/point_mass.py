@@ -30,8 +30,6 @@ _TERMS = {"none": 0, "printed": 1, "closing": 2}
 #: Runge-Kutta step of ``PointMass.run``, s. In this time the stiffest contact mode
 #: that the margins allow advances by a twentieth of a radian.
 STEP_S = 0.02
-#: A robot slower than this at the end of a run counts as at rest, m/s.
-REST_M_S = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +64,13 @@ class PointMass:
     p_WP: NDArray[np.float64]
     """(2,) control point P at the start in W, m."""
     stiffness_n_m: float
-    """Stiffness K_r of the attraction."""
+    """K_r."""
     damping_n_s_m: float
-    """Damping D_r."""
+    """D_r."""
     follow_distance_m: float
-    """Follow distance d_f."""
+    """d_f."""
     mass_kg: float
-    """Virtual mass M."""
     top_speed_m_s: float
-    """Largest speed |v| of P."""
     all_bodies: bool
     """Whether all bodies push P. If false, only the nearest one pushes."""
 
@@ -116,16 +112,11 @@ class PointMass:
         return kinetic + self.potential(states[:, :2])
 
     def force(self, states: ArrayLike, term: VelocityTermModel) -> NDArray[np.float64]:
-        """Returns the sum of all forces on the point mass.
+        """Returns the (n, 2) sum of all forces on the point mass in W, N.
 
-        Args:
-            states: (n, 4) states x, y, vx, vy in the world frame W, in m and m/s.
-            term: Dependence of the repulsion on speed. ``none`` takes the speed as
-                zero, ``printed`` takes the speed |dC/dt|, ``closing`` the speed of
-                approach. C is the vector to the nearest point of a body.
-
-        Returns:
-            (n, 2) forces in W, N.
+        ``states`` are (n, 4) x, y, vx, vy in W, m and m/s. The repulsion takes the
+        speed as zero with ``term`` ``none``, |dC/dt| with ``printed``, and the speed of
+        approach with ``closing``. C is the vector to the nearest point of a body.
         """
         states = np.ascontiguousarray(states, dtype=float)
         return kernels.forces(states, self._world(term))
@@ -142,17 +133,8 @@ class PointMass:
 
         The method is classical Runge-Kutta with fixed steps of STEP_S. After each step,
         |v| is limited to the top speed. In the limit of short steps this equals the
-        speed limit of the model.
-
-        Args:
-            starts: (n, 4) initial states x, y, vx, vy in the world frame W, in m and
-                m/s.
-            contact_m: Distance at which the point mass touches a body, m.
-            duration_s: Simulated time, s.
-            term: Dependence of the repulsion on speed, see ``force``.
-
-        Returns:
-            Contact times, smallest distances and energy rises of all starts.
+        speed limit of the model. ``starts`` and ``term`` are those of ``force``. The
+        point mass touches a body at the distance ``contact_m``.
         """
         starts = np.ascontiguousarray(starts, dtype=float)
         steps = round(duration_s / STEP_S)
@@ -164,17 +146,10 @@ class PointMass:
     def trajectory(
         self, start: ArrayLike, *, duration_s: float, term: VelocityTermModel
     ) -> NDArray[np.float64]:
-        """Integrates the point mass from one start and returns all states.
+        """Returns the (steps + 1, 4) states from one start at intervals of STEP_S.
 
-        Contact with a body does not end the run.
-
-        Args:
-            start: (4,) initial state x, y, vx, vy in the world frame W, in m and m/s.
-            duration_s: Simulated time, s.
-            term: Dependence of the repulsion on speed, see ``force``.
-
-        Returns:
-            (steps + 1, 4) states x, y, vx, vy at intervals of STEP_S.
+        ``start`` and ``term`` are those of ``force``. Contact with a body does not end
+        the run.
         """
         start = np.ascontiguousarray(start, dtype=float)
         steps = round(duration_s / STEP_S)
@@ -203,16 +178,8 @@ class PointMass:
 def point_mass(scenario: Scenario) -> PointMass:
     """Builds the point-mass model of a scenario, with the bodies as they are at 0 s.
 
-    Args:
-        scenario: Scenario with gains, bodies and start.
-
-    Returns:
-        The model.
-
-    Raises:
-        InputError: The law is not known or has no radial force. The error also occurs
-            if the pushes of all bodies are added (``aggregation: sum``) and there are
-            more than three bodies.
+    Raises InputError if the law is not known or has no radial force, or if the pushes
+    of more than three bodies are added (``aggregation: sum``).
     """
     bodies = scenario.bodies()
     all_bodies = scenario.follower.collision_vector.aggregation == "sum"

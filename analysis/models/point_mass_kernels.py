@@ -122,15 +122,7 @@ def _force(
 
 @njit(cache=True)
 def forces(states: _Array, world: _World) -> _Array:  # pragma: no cover  (compiled)
-    """Returns the sum of all forces on the point mass at each state.
-
-    Args:
-        states: (n, 4) states x, y, vx, vy in the world frame W, in m and m/s.
-        world: World as described at the top of the module.
-
-    Returns:
-        (n, 2) forces in W, N.
-    """
+    """Returns (n, 2) forces in W, N, at (n, 4) states x, y, vx, vy in m and m/s."""
     out = np.empty((states.shape[0], 2))
     for i in range(states.shape[0]):
         state = (states[i, 0], states[i, 1], states[i, 2], states[i, 3])
@@ -172,8 +164,7 @@ def _advance(
     """State, energy V and smallest distance after one step.
 
     The force jumps where another body becomes the nearest. A step across such a jump is
-    repeated in small parts. Otherwise the integration error would appear as a change of
-    the energy.
+    repeated in small parts, or its error would appear as a change of the energy.
     """
     _, _, _, _, before = _force(state, world)
     new = _step(state, h, world)
@@ -191,21 +182,13 @@ def _advance(
 def run(
     starts: _Array, steps: int, h: float, contact: float, world: _World
 ) -> tuple[_Array, _Array, _Array]:  # pragma: no cover
-    """Integrates the point mass from each start until contact or until the last step.
+    """Integrates from each start until contact or until the last step of ``h`` seconds.
 
-    Args:
-        starts: (n, 4) initial states x, y, vx, vy in the world frame W, in m and m/s.
-        steps: Largest number of steps.
-        h: Integration step, s.
-        contact: Distance at which the point mass touches a body, m.
-        world: World as described at the top of the module.
+    ``starts`` are (n, 4) states as in ``forces``. Three arrays are returned:
 
-    Returns:
-        Three arrays:
-
-        - (n,) times of contact, s; infinity for a run without contact
-        - (n,) smallest distances, m
-        - (n,) largest rises of the energy above its smallest earlier value, J
+    - (n,) times of contact, s; infinity for a run without contact
+    - (n,) smallest distances, m
+    - (n,) largest rises of the energy above its smallest earlier value, J
     """
     count = starts.shape[0]
     times, closest = np.full(count, np.inf), np.full(count, np.inf)
@@ -228,19 +211,7 @@ def run(
 def trajectory(
     start: _Array, steps: int, h: float, world: _World
 ) -> _Array:  # pragma: no cover
-    """Integrates the point mass from one start and returns all states.
-
-    Contact with a body does not end the run.
-
-    Args:
-        start: (4,) initial state x, y, vx, vy in the world frame W, in m and m/s.
-        steps: Number of steps.
-        h: Integration step, s.
-        world: World as described at the top of the module.
-
-    Returns:
-        (steps + 1, 4) states x, y, vx, vy at intervals of h.
-    """
+    """Returns the (steps + 1, 4) states from one start at intervals of ``h``, s."""
     out = np.empty((steps + 1, 4))
     out[0] = start
     state = (start[0], start[1], start[2], start[3])

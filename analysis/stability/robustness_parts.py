@@ -6,17 +6,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
-from analysis.linear.loop_uncertainty import (
-    contact_poles,
-    contact_uncertainty,
-    following_poles,
-    following_uncertainty,
-)
 from analysis.linear.robustness import (
     PoleCloud,
     PoleFunction,
     PoleSensitivity,
     UncertainParameter,
+    contact_poles,
+    contact_uncertainty,
+    following_poles,
+    following_uncertainty,
     pole_cloud,
     pole_sensitivities,
 )

@@ -11,8 +11,7 @@ from pydrake.systems.analysis import DiscreteTimeApproximation
 
 from analysis.models.block_models import block_model, join_blocks
 from analysis.models.ideal_scenarios import require_rolling
-from analysis.models.linear_models import LinearModel
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import LinearModel, minimal_model
 from diagrams.running.simulation import simulator_config
 from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant

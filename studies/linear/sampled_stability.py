@@ -50,7 +50,6 @@ class ConditionCheck:
     condition: str
     """Necessary and sufficient condition on stiffness K, damping D and period T."""
     pairs: int
-    """Number of random pairs (K, D)."""
     stable: int
     """Number of pairs that are stable by their eigenvalues."""
     mismatches: int
@@ -63,15 +62,8 @@ def check_conditions(
     """Tests the three stability conditions on random gains near their boundaries.
 
     The matrices of the held velocity are those of the blocks without motor lag. The
-    matrices of the held acceleration come from ``control.sample_system``.
-
-    Args:
-        pairs: Number of random pairs (K, D). All schemes use the same pairs.
-        seed: Seed of the random numbers.
-        tick_s: Control period, s.
-
-    Returns:
-        One comparison for each of ``SCHEMES``.
+    matrices of the held acceleration come from ``control.sample_system``. All of
+    ``SCHEMES`` are tested with the same random pairs (K, D).
     """
     rng, T = np.random.default_rng(seed), tick_s
     K = 10.0 ** rng.uniform(-1.0, math.log10(8.0 / T**2), pairs)
@@ -139,16 +131,9 @@ def poles_against_period(
     """Computes the poles along the line to the source for other sample periods.
 
     The loop has no latency: odometry compensates the latency of hearing, and an echo
-    drives the wheels in the same control period.
-
-    Args:
-        scenario: Scenario with attraction, robot and plant.
-        stiffness_n_m: Stiffness to use instead of the attraction's, for example with
-            the spring of an obstacle, N/m.
-        periods_s: (n,) ascending sample periods, s.
-
-    Returns:
-        Up to three poles per period in the z plane, and the longest stable period.
+    drives the wheels in the same control period. ``stiffness_n_m`` replaces the
+    attraction's, for example with the spring of an obstacle added. ``periods_s`` are
+    ascending.
     """
     periods = np.asarray(periods_s, dtype=float)
     stiffness = stiffness_n_m
@@ -174,15 +159,14 @@ class StabilityChart:
     """Growth rate of the slowest mode over two parameters."""
 
     title: str
-    """Title of the chart."""
     x_name: str
-    """Name and unit of the horizontal parameter."""
+    """Name and unit."""
     y_name: str
-    """Name and unit of the vertical parameter."""
+    """Name and unit."""
     x: NDArray[np.float64]
-    """(nx,) values of the horizontal parameter."""
+    """(nx,)"""
     y: NDArray[np.float64]
-    """(ny,) values of the vertical parameter."""
+    """(ny,)"""
     growth_per_s: NDArray[np.float64]
     """(ny, nx) growth rates, 1/s; negative where all modes decay."""
     today: tuple[float, float]
@@ -210,16 +194,8 @@ def gain_chart(
 ) -> StabilityChart:
     """Computes the stability of the sampled loop over two gains of the attraction.
 
-    The gains are stiffness K_r and damping D_r. The loop has motor lag, and no obstacle
-    is near.
-
-    Args:
-        scenario: Scenario with robot and plant. The chart marks its gains.
-        stiffnesses_n_m: (nx,) values of K_r, N/m; by default 0.1 to 400.
-        dampings_n_s_m: (ny,) values of D_r, N s/m; by default 0.05 to 400.
-
-    Returns:
-        Chart with the growth rate of the slowest mode.
+    The gains are stiffness K_r (x) and damping D_r (y). The loop has motor lag, and no
+    obstacle is near. The chart marks the gains of the scenario.
     """
     K, D = (
         scenario.follower.attraction.stiffness_n_m,
@@ -246,19 +222,11 @@ def gain_delay_chart(
     delays_s: ArrayLike | None = None,
     stiffnesses_n_m: ArrayLike = _ALL_SPRINGS_N_M,
 ) -> StabilityChart:
-    """Computes the stability over stiffness and age of the measured position.
+    """Computes the stability over stiffness (y) and age of the measured position (x).
 
-    The stiffness is the sum of all springs that act on this position.
-
-    Args:
-        scenario: Scenario with robot, plant and damping. The chart marks the
-            attraction's stiffness.
-        delays_s: (nx,) ages of the position, s; by default 0 to 1 s. They are rounded
-            to whole control periods.
-        stiffnesses_n_m: (ny,) sums of all springs, N/m; by default 0.2 to 100.
-
-    Returns:
-        Chart with the growth rate of the slowest mode.
+    The stiffness is the sum of all springs that act on this position. The ages, by
+    default 0 to 1 s, are rounded to whole control periods. The chart marks the
+    stiffness of the attraction.
     """
     tick_s = scenario.tick_s
     delays = np.arange(0.0, 1.0, 2 * tick_s) if delays_s is None else delays_s

@@ -35,9 +35,7 @@ class HeadOn:
     """
 
     scenario: Scenario
-    """Scenario with the gains and the mass."""
     law: RadialLaw
-    """Law of the scenario."""
     to_go_m: float
     """Distance L from the face to the follow point, m."""
     equilibria_m: tuple[float, ...]
@@ -48,10 +46,8 @@ class HeadOn:
         """Distance from the obstacle at which the robot stops, m.
 
         The robot stops at the stable equilibrium that is farthest from the obstacle.
-
-        Raises:
-            InputError: There is no stable equilibrium, because the attraction is
-                stronger than the push of the law.
+        Raises InputError if there is none, because the attraction is stronger than the
+        push.
         """
         held = [c for c in self.equilibria_m if self.slope(c) < 0.0]
         if not held:
@@ -70,33 +66,19 @@ class HeadOn:
         return -self.slope(self.equilibrium_m)
 
     def slope(self, c: float) -> float:
-        """Returns the slope of the net force over the distance, N/m.
+        """Returns the slope df/dc - K_r of the net force at rest, N/m.
 
-        The slope is df/dc - K_r, where f is the force of the law and K_r is the
-        stiffness of the attraction. The obstacle is at rest.
-
-        Args:
-            c: Distance of the robot's control point from the face, m.
-
-        Returns:
-            The slope. If the slope is negative at an equilibrium, the equilibrium is
-            stable.
+        ``c`` is the distance of P from the face, m. An equilibrium with a negative
+        slope is stable.
         """
         slope, _ = self.law.gradient(c, 0.0)
         return slope - self.scenario.follower.attraction.stiffness_n_m
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """Returns the net force f(c, s) - K_r (L + c) on the robot.
+        """Returns the net force f(c, s) - K_r (L + c), N, positive away from the face.
 
-        The force of the law is f. The attraction pulls with K_r (L + c) toward the
-        follow point, which is the distance L behind the face.
-
-        Args:
-            c: Distance of the robot's control point from the face, m.
-            s: Relative speed of the obstacle that the law uses, m/s.
-
-        Returns:
-            The force in N, positive away from the face.
+        ``c`` is the distance of P from the face, m. ``s`` is the relative speed of the
+        obstacle that the law uses, m/s.
         """
         pull = self.scenario.follower.attraction.stiffness_n_m * (self.to_go_m + c)
         return self.law.force(c, s) - pull
@@ -105,19 +87,10 @@ class HeadOn:
 def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
     """Makes the model of a straight approach to an obstacle from a scenario.
 
-    Args:
-        scenario: The scenario with the law, the attraction, and the mass.
-        to_go_m: Distance L from the face of the obstacle to the follow point, m. If it
-            is None, the function takes L from the scenario. It uses the obstacle
-            nearest to the line from the start to the source. Without such an obstacle,
-            L is half the distance from the start to the follow point.
-
-    Returns:
-        The model, with the distances at which the robot can rest.
-
-    Raises:
-        InputError: The law does not exist.
-        InputError: The law has no radial force, or L is negative.
+    ``to_go_m`` is the distance L from the face to the follow point. By default, L is
+    that of the obstacle nearest to the line from the start to the source. Without such
+    an obstacle, L is half the distance from the start to the follow point. Raises
+    InputError if L is negative or the law has no radial force.
     """
     if to_go_m is None:
         to_go_m = _to_go(scenario)
@@ -130,15 +103,9 @@ def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
 
 
 def radial_equilibria(law: RadialLaw, pull_n: NDArray[np.float64]) -> tuple[float, ...]:
-    """Returns the distances at which the push of a law is equal to a given pull.
+    """Returns the distances at which push and pull are equal, m, largest first.
 
-    Args:
-        law: The law, as a table of its force over distance.
-        pull_n: (n,) pull toward the obstacle at the distances ``law.distances_m``, N.
-
-    Returns:
-        The distances in m, largest first. If push and pull are never equal, the tuple
-        is empty.
+    ``pull_n`` is the (n,) pull toward the obstacle at ``law.distances_m``.
     """
     balance = law.forces_n - pull_n
     crossings = np.flatnonzero(np.diff(np.sign(balance)))

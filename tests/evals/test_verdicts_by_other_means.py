@@ -21,13 +21,13 @@ from analysis.certificates.certificate_trials import try_certificate
 from analysis.certificates.energy_certificate import certify_energy
 from analysis.linear.burst_cycle import burst_cycle
 from analysis.linear.delay_margin import DELAY_PLACES, delay_margin
-from analysis.linear.loop_uncertainty import (
+from analysis.linear.robustness import (
     contact_poles,
     contact_uncertainty,
     following_poles,
     following_uncertainty,
+    pole_cloud,
 )
-from analysis.linear.robustness import pole_cloud
 from analysis.models import linearisation
 from analysis.models.equilibria import find_equilibria
 from analysis.models.open_loops import closed, cut_model

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.design import jam_runs as module
+from analysis.design import design_study as module
 from diagrams.scenario.scenario import Scenario
 
 #: One that stops 3 m from the source.

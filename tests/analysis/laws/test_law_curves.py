@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.laws.law_curves import law_curves
-from analysis.laws.law_curves_plots import plot_law_curves
+from analysis.laws.law_curves import AT_DISTANCE_M, law_curves, plot_law_curves
 from analysis.reporting.plain_values import plain
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -50,7 +49,7 @@ def test_curves_are_those_of_the_block(law, velocity_term):
     scenario = SCENARIO.with_robot(law=law, collision_vector=echoes)
     curve = curves_by_law(velocity_term)[law]
     for k in (10, 99, 130, 180):
-        expected = block_force(scenario, curve.at_distance_m, curve.speed_m_s[k])
+        expected = block_force(scenario, AT_DISTANCE_M, curve.speed_m_s[k])
         assert curve.force_n[k] == pytest.approx(expected, abs=1e-9)
         expected = block_force(scenario, curve.distance_m[k], 0.0)
         assert curve.push_n[k] == pytest.approx(expected, abs=1e-9)

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from analysis.laws.radial_law import radial_law
 from analysis.linear.contact_mode import contact_model
-from analysis.linear.loop_uncertainty import (
+from analysis.linear.robustness import (
     contact_poles,
     contact_uncertainty,
     following_poles,

@@ -12,7 +12,7 @@ from analysis.linear.contact_mode import contact_model, largest_contact_stiffnes
 from analysis.linear.delay_margin import delay_margin
 from analysis.linear.delayed_run import check_delay_margin
 from analysis.linear.loop_margins import loop_margins
-from analysis.linear.loop_uncertainty import following_poles
+from analysis.linear.robustness import following_poles
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linearisation import compare_routes, continuous_model

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from analysis.models.linear_models import LinearModel, simple_poles
-from analysis.models.model_reduction import minimal_model
+from analysis.models.linear_models import LinearModel, minimal_model, simple_poles
 
 
 def spring(k: float, d: float, period: float | None = None) -> LinearModel:

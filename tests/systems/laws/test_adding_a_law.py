@@ -27,8 +27,7 @@ import phonotaxis
 from analysis.sweeps.comparison_plans import comparison_plans
 from analysis.design.gain_search import search_gains
 from analysis.design.requirements import Requirements, check_law
-from analysis.laws.law_curves import law_curves
-from analysis.laws.law_curves_plots import plot_law_curves
+from analysis.laws.law_curves import law_curves, plot_law_curves
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from analysis.laws.radial_law import radial_law
 from studies.linear.root_locus import root_loci
