@@ -173,14 +173,7 @@ class ModelSheet:
         return tuple(dict.fromkeys(row.path for row in self.latencies))
 
     def latency_s(self, path: str) -> float:
-        """Returns the sum of the mean delays from one measured quantity to the wheels.
-
-        Args:
-            path: One of ``paths``.
-
-        Returns:
-            The sum in s.
-        """
+        """Returns the sum of the mean delays from one of ``paths`` to the wheels, s."""
         return sum(row.mean_s for row in self.latencies if row.path == path)
 
 

@@ -69,17 +69,12 @@ def stability_text(analyses: Sequence[LawAnalysis]) -> str:
 def write_stability(
     analyses: Sequence[LawAnalysis], document: dict[str, Any], directory: Path
 ) -> None:
-    """Writes the files of a stability analysis into a directory.
+    """Writes the files of a stability analysis into an existing directory.
 
     - ``report.html`` is the report.
-    - ``summary.json`` is the JSON document.
+    - ``summary.json`` is the JSON document from ``stability_document``.
     - ``scenario.yaml`` is the scenario.
     - ``models.mat`` and ``models/*.csv`` are the linear models.
-
-    Args:
-        analyses: One analysis per law, all of the same scenario.
-        document: The JSON document from ``stability_document``.
-        directory: An existing directory.
     """
     models = [
         replace(model, name=f"{analysis.law} {model.name}")

@@ -177,15 +177,7 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
     """Analyzes the stability of the gain adaptation of a robot on a route.
 
     The results come from formulas, and from simulations of a point mass with motor lag.
-
-    Args:
-        scenario: Scenario whose law adapts its gains.
-
-    Returns:
-        The stability results.
-
-    Raises:
-        InputError: The law does not adapt its gains.
+    InputError if the law does not adapt its gains.
     """
     own = route_law(scenario)
     if not isinstance(own, AdaptiveTrajectoryParameters):
@@ -226,14 +218,7 @@ def swinging_target(
     """Computes a target that oscillates along x: a (sin 0.6 t + 0.5 sin 1.7 t).
 
     The two frequencies allow the adaptation to distinguish stiffness K from damping D.
-
-    Args:
-        amplitude_m: Amplitude a, m.
-        duration_s: Duration, s.
-        tick_s: Control period, s.
-
-    Returns:
-        (ticks, 4) positions p_d and velocities v_d of the target, m and m/s.
+    The result has the shape (ticks, 4): positions p_d, m, and velocities v_d, m/s.
     """
     time = np.arange(0.0, duration_s, tick_s)
     targets = np.zeros((len(time), 4))
@@ -247,14 +232,7 @@ def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
 
     The adaptation rule has no limits of the gains. Ten rates per decade are tried. The
     interval below the first divergent rate is bisected. Some higher rates may not
-    diverge.
-
-    Args:
-        loop: Loop with the rule, gains, reference, mass, motor lag and control period.
-        amplitude_m: Amplitude of the target, m.
-
-    Returns:
-        The least critical rate. If no allowed rate is critical, the rate is infinite.
+    diverge. If no allowed rate is critical, the rate is infinite.
     """
     targets = swinging_target(amplitude_m, _CRITICAL_S, loop.tick_s)
 
@@ -277,19 +255,11 @@ def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
 
 
 def drift_stiffness(start: float, rate: float, push: float, time_s: float) -> float:
-    """Computes the stiffness K(t) of the gradient rule under a constant push F.
+    """Computes the stiffness K(t), N/m, of the gradient rule under a constant push, N.
 
-    At rest, the robot is off its target by F/K. The sensitivity of its position p is
-    dp/dK = -F/K^2. The gradient rule therefore gives K^3 K' = gamma F^2.
-
-    Args:
-        start: Initial stiffness K_0, N/m.
-        rate: Adaptation rate gamma, (N/m)^2/(m^2 s).
-        push: Push F, N.
-        time_s: Time t, s.
-
-    Returns:
-        K(t), N/m.
+    Under the push F, the robot rests off its target by F/K. The sensitivity of its
+    position p is dp/dK = -F/K^2. The gradient rule therefore gives K^3 K' = gamma F^2.
+    K starts at ``start``. The adaptation rate gamma has the unit (N/m)^2/(m^2 s).
     """
     return float((start**4 + 4.0 * rate * push**2 * time_s) ** 0.25)
 

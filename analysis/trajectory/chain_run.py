@@ -154,19 +154,13 @@ def run_chain(
 
     The simulation uses the law's own functions. The simulation includes contacts with
     both neighbors, the limits of acceleration and speed, and the motor lag, but no
-    safety filter. P is a robot's control point ahead of the axle.
+    safety filter.
 
-    Args:
-        scenario: Scenario with the law, robot, motors, control period and latency of
-            the object sensor.
-        first_m: (ticks,) positions P of the first robot, m. The first step gives the
-            initial speed of all robots.
-        feed_forward: Target velocity over velocity of the robot ahead.
-        spacing_m: Desired distance between the points P of neighbors, m.
-        robots: Number of robots, including the first.
-
-    Returns:
-        (ticks, robots) positions P, m.
+    All positions are those of the control point P ahead of the axle, m: the result has
+    the shape (ticks, robots). The first step of the (ticks,) positions ``first_m``
+    gives the initial speed of all robots. ``feed_forward`` is the target velocity over
+    the velocity of the robot ahead. ``spacing_m`` is the desired distance between
+    neighbors.
     """
     own, robot, tick_s = route_law(scenario), scenario.only.robot, scenario.tick_s
     lag = scenario.only.plant.motor_lag_s
@@ -213,15 +207,8 @@ def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
     """Simulates eight robots on a line, of which the first oscillates.
 
     The oscillation has the frequency of the largest amplification. If nothing is
-    amplified, the oscillation has the natural frequency of a robot.
-
-    Args:
-        scenario: Scenario as for ``run_chain``.
-        name: Name of the chain of robots.
-        peak: Largest amplification of the chain, with its frequency.
-
-    Returns:
-        Amplitudes over the last five of forty periods.
+    amplified, the oscillation has the natural frequency of a robot. The amplitudes are
+    those of the last five of forty periods.
     """
     natural = math.sqrt(route_law(scenario).stiffness_n_m / scenario.only.robot.mass_kg)
     omega = peak.frequency_rad_s if peak.grows else natural
@@ -265,15 +252,8 @@ def brake_chain(
 ) -> BrakedChain:
     """Simulates eight robots in formation, of which the first brakes to rest.
 
-    Args:
-        scenario: Scenario as for ``run_chain``. Its route gives the speed and the
-            braking acceleration.
-        name: Name of the chain.
-        feed_forward: Target velocity over velocity of the robot ahead.
-        spacing_m: Desired distance between the control points P of neighbors, m.
-
-    Returns:
-        Gaps between neighbors after the braking began.
+    The scenario's route gives the speed and the braking acceleration. The other
+    arguments are those of ``run_chain``.
     """
     speed, slope = (
         scenario.router.route.speed_m_s,

@@ -151,12 +151,7 @@ def plot_adaptation(found: AdaptationStability) -> Figure:
 def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
     """Plots the amplification over frequency, over robots and over D.
 
-    Args:
-        chain: Frequency responses.
-        runs: Simulated amplitudes in the same chains.
-
-    Returns:
-        A figure with three panels.
+    Dots show the simulated amplitudes of ``runs`` in the same chains.
     """
     figure = Figure(figsize=(11.4, 3.9), layout="constrained")
     left, middle, right = figure.subplots(1, 3)

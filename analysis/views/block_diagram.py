@@ -96,19 +96,12 @@ class _Layout:
 
 
 def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
-    """Returns a picture of the block diagram as SVG text.
+    """Returns a picture of the block diagram as one SVG element.
 
     The signals go from left to right. Wires to a neighboring column are drawn directly.
     All other wires go along the bus, a set of horizontal lines between the two rows of
     blocks. The name of an output port is gray if no input port reads it. Logs are left
-    out.
-
-    Args:
-        diagram: The diagram to draw.
-        flat: Whether a nested diagram is replaced by the blocks that it contains.
-
-    Returns:
-        The text of one SVG element, with a newline at the end.
+    out. If the picture is flat, it shows the blocks inside of a nested diagram.
     """
     connections = wires(diagram, flat=flat)
     layout = _arrange(blocks(diagram, flat=flat), connections)
@@ -131,16 +124,7 @@ def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
 def write_block_diagram(
     diagram: Diagram, path: str | Path, *, flat: bool = True
 ) -> None:
-    """Writes the block diagram as an SVG file.
-
-    Args:
-        diagram: The diagram to draw.
-        path: Path of the SVG file.
-        flat: Whether a nested diagram is replaced by the blocks that it contains.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Writes the picture of ``block_svg`` as an SVG file."""
     Path(path).write_text(block_svg(diagram, flat=flat), encoding="utf-8")
 
 

@@ -29,17 +29,9 @@ _EDGE_M = 0.03
 def body_markers(
     bodies: Mapping[str, Thing], room: RoomParameters | None, names: Mapping[str, str]
 ) -> list[Message]:
-    """Returns markers of the robots, sources, obstacles and walls.
+    """Returns one ``Marker`` message per robot, source and obstacle, and one for walls.
 
-    Each marker moves with its frame.
-
-    Args:
-        bodies: Robots, sources and obstacles, by name, from ``scene_bodies``.
-        room: Room with the walls, or None.
-        names: Name of the frame of each body, by the name of the body.
-
-    Returns:
-        One ``Marker`` message per body, and one for the walls.
+    Each marker moves with its frame. ``names`` has the name of the frame of each body.
     """
     markers = []
     for name, body in bodies.items():

@@ -45,8 +45,7 @@ _Entry = tuple[str, str, Message]
 def require_mcap() -> None:
     """Checks that the packages for MCAP files are installed.
 
-    Raises:
-        InputError: A package is not installed. The message explains how to install it.
+    If a package is not installed, an InputError explains how to install it.
     """
     missing = [name for name in _PACKAGES if find_spec(name) is None]
     if missing:
@@ -61,15 +60,7 @@ def write_mcap(run: RecordedRun, path: Path) -> None:
     """Writes a run as an MCAP file. docs/exports.md lists the topics of the file.
 
     The times in the file start at 0, as in the run. Two files of the same run have
-    equal bytes.
-
-    Args:
-        run: Scenario and table of the run.
-        path: Path of the MCAP file.
-
-    Raises:
-        InputError: A package is not installed.
-        OSError: The file cannot be written.
+    equal bytes. InputError if a package is not installed.
     """
     require_mcap()
     from mcap_ros2.writer import Writer

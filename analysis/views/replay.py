@@ -120,19 +120,9 @@ def write_replay(
     that the operator's computer receives.
 
     Around the scene, the page has a clock, a legend with switches for its layers, the
-    warnings about the scenario, and curves over time. If the address ends with
-    ``#t=2.5``, the replay begins at 2.5 s. The page needs a browser with WebGL, but no
-    network.
-
-    Args:
-        result: Result of the run.
-        path: The .html file.
-        clearance: (n,) distance from each robot to the nearest body at the ticks
-            (control periods), m, by name of the robot. The page shows these distances
-            as curves. A robot without an entry has no such curve.
-
-    Raises:
-        OSError: The file cannot be written.
+    warnings about the scenario, and the curves of ``page_charts``, which explains the
+    clearance. If the address ends with ``#t=2.5``, the replay begins at 2.5 s. The page
+    needs a browser with WebGL, but no network.
     """
     scene = make_scene(result)
     layers = [*scene.layers, *overlays(scene, frame_times(result))]

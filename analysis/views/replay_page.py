@@ -27,14 +27,8 @@ def replay_page(
 ) -> str:
     """Returns the page of Meshcat (Drake's 3D viewer) with added controls and charts.
 
-    Args:
-        meshcat_page: HTML text from ``Meshcat.StaticHtml``.
-        scene: Scene of the run.
-        layers: Entries of the legend.
-        charts: Curves over time, from ``page_charts``.
-
-    Returns:
-        HTML text of a page that needs no network.
+    ``meshcat_page`` is from ``Meshcat.StaticHtml``. The layers are the entries of the
+    legend. The charts are from ``page_charts``. The page needs no network.
     """
     result = scene.result
     data = {

@@ -32,7 +32,7 @@ def write_run(
 
     - ``scenario.yaml``: the complete scenario, which can be run again
     - ``scenario.schema.json``: the schema of this scenario file
-    - ``summary.json``: the summary
+    - ``summary.json``: the summary from ``run_summary``
     - ``trajectory.parquet``: the table with one row per tick (control period)
     - ``replay.html``: the replay in three dimensions
     - ``trajectory.png``, ``time_series.png`` and ``diagram.svg``: the pictures
@@ -41,12 +41,6 @@ def write_run(
     With several robots, each robot has its own ``time_series_<name>.png`` and
     ``diagram_<name>.svg``. The file ``diagram.svg`` then shows how the robots are
     connected.
-
-    Args:
-        result: Result of the run.
-        summary: Summary of the run, from ``run_summary``.
-        directory: Existing directory.
-        pictures: Whether to write the PNG and SVG files.
     """
     write_scenario(result.full_scenario, directory)
     write_json(summary, directory / "summary.json")

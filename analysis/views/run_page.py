@@ -36,17 +36,10 @@ def run_page(
     summary: Mapping[str, Any],
     directory: Path,
 ) -> str:
-    """Returns an HTML page about a run, with links to the files in its directory.
+    """Returns an HTML page about a run, for the directory of the run.
 
-    Args:
-        result: Result of the run.
-        rows: Rows of the summary, from ``summary_rows``.
-        summary: Summary as a dictionary, from ``run_summary``.
-        directory: Directory of the run, which will contain the page. The page shows
-            only pictures and files that are in this directory.
-
-    Returns:
-        HTML text of the page.
+    The page shows only pictures and files that are in this directory. The rows are from
+    ``summary_rows``, and the summary is from ``run_summary``.
     """
 
     def there(name: str) -> bool:

@@ -24,16 +24,10 @@ class Wire:
 
 
 def blocks(diagram: Diagram, *, flat: bool = True) -> list[Any]:
-    """Returns the systems of a diagram, except logs.
+    """Returns the systems of a diagram, except logs, in the order of the diagram.
 
-    A system whose outputs only go to logs is also left out.
-
-    Args:
-        diagram: The diagram that contains the systems.
-        flat: Whether a nested diagram is replaced by the systems that it contains.
-
-    Returns:
-        The systems, in the order of the diagram.
+    A system whose outputs only go to logs is also left out. If the result is flat, a
+    nested diagram is replaced by the systems that it contains.
     """
     systems = list(_systems(diagram, flat=flat))
     logs = {s.get_name() for s in systems if isinstance(s, VectorLogSink)}
@@ -48,12 +42,7 @@ def blocks(diagram: Diagram, *, flat: bool = True) -> list[Any]:
 def wires(diagram: Diagram, *, flat: bool = True) -> list[Wire]:
     """Returns all wires between the systems that ``blocks`` returns.
 
-    Args:
-        diagram: The diagram that contains the systems.
-        flat: Whether a nested diagram is replaced by the systems that it contains.
-
-    Returns:
-        The wires, sorted by target block, input port, and source block.
+    The wires are sorted by target block, input port, and source block.
     """
     names = [block.get_name() for block in blocks(diagram, flat=flat)]
     found = [wire for wire in _all_wires(diagram, flat=flat) if wire.target in names]
