@@ -28,8 +28,7 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
     for law in laws or [scenario.only.law]:
         if routed and law not in every:
             raise InputError(
-                "law",
-                f"is {law!r}, but the robot has a route; use {', '.join(every)}",
+                "law", f"is {law!r}, but the robot has a route; use {', '.join(every)}"
             )
         if scenario.only.searches is not None:
             if law != scenario.only.law:

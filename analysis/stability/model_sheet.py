@@ -25,20 +25,8 @@ from systems.laws.parameters import ImpedanceParameters
 _PARTS = {
     "follower": ("attraction", "collision_vector", "robot", "plant", "tracker"),
     "router": ("robot", "plant", "route", "objects"),
-    "odor_searcher": (
-        "robot",
-        "plant",
-        "compass",
-        "motor_driver",
-        "search",
-    ),
-    "sound_searcher": (
-        "robot",
-        "plant",
-        "compass",
-        "motor_driver",
-        "sound_search",
-    ),
+    "odor_searcher": ("robot", "plant", "compass", "motor_driver", "search"),
+    "sound_searcher": ("robot", "plant", "compass", "motor_driver", "sound_search"),
 }
 #: Fields of these parts that do not affect the loop.
 _OTHERS = frozenset(

@@ -352,12 +352,7 @@ def _show_adaptation(data: Adaptation) -> list[Content]:
         )
         + ".",
         Table(
-            [
-                Column("time", "s"),
-                "gradient, closed form",
-                "without limits",
-                "as set",
-            ],
+            [Column("time", "s"), "gradient, closed form", "without limits", "as set"],
             [
                 [float(time), *values]
                 for time, *values in zip(
@@ -391,8 +386,7 @@ def _show_adaptation(data: Adaptation) -> list[Content]:
         if found.bounded
         else "Nothing bounds K and D; set `projected` to bound them.",
         Figure(
-            lambda: plot_adaptation(found),
-            "Lyapunov function, and drift under a push.",
+            lambda: plot_adaptation(found), "Lyapunov function, and drift under a push."
         ),
     ]
 
@@ -481,10 +475,7 @@ def _chain(study: Study) -> ChainStudy:
         tuple(shake_chain(scenario, name, peak) for name, peak in kinds),
         tuple(
             brake_chain(
-                scenario,
-                name,
-                feed_forward=peak.feed_forward,
-                spacing_m=peak.spacing_m,
+                scenario, name, feed_forward=peak.feed_forward, spacing_m=peak.spacing_m
             )
             for name, peak in kinds
         ),

@@ -21,11 +21,7 @@ from analysis.linear.burst_cycle import (
     simulate_burst_cycle,
 )
 from analysis.linear.burst_gaps import GapChart, gap_chart
-from analysis.linear.contact_mode import (
-    ContactLimits,
-    contact_limits,
-    contact_model,
-)
+from analysis.linear.contact_mode import ContactLimits, contact_limits, contact_model
 from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
 from analysis.linear.delayed_run import DelayCheck, check_delay_margin
 from analysis.linear.root_locus import RootLocus, root_loci

@@ -246,11 +246,7 @@ def _bearing(result: RunResult) -> Panel:
 def _forces(result: RunResult) -> Panel:
     curves = [
         Curve(
-            name,
-            result.time,
-            np.hypot(*result.vector(name)),
-            COLOURS[name],
-            width=1.2,
+            name, result.time, np.hypot(*result.vector(name)), COLOURS[name], width=1.2
         )
         for name in ("attraction", "repulsion")
     ]

@@ -58,9 +58,7 @@ class MovieFile:
         return bool(self._ffmpeg)
 
     def write(
-        self,
-        frames: Iterable[NDArray[np.uint8]],
-        sound: Path | None = None,
+        self, frames: Iterable[NDArray[np.uint8]], sound: Path | None = None
     ) -> None:
         """Encodes frames of equal size, and writes the file.
 

@@ -115,10 +115,7 @@ def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
         if any(f"{prefix}{metric.name}" in metrics for prefix in prefixes)
     ]
     rows = [
-        [
-            metric.label,
-            *(metrics.get(f"{prefix}{metric.name}") for prefix in prefixes),
-        ]
+        [metric.label, *(metrics.get(f"{prefix}{metric.name}") for prefix in prefixes)]
         for metric in found
     ]
     text = "docs/metrics.md defines each metric."
