@@ -2,21 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.reporting.html_page import (
+    definitions,
+    file_links,
+    heading,
+    note,
+    paragraph,
+    picture,
+    section,
+    table,
+)
 from analysis.reporting.plain_values import write_json
+from analysis.reporting.render import page
+from analysis.runs.metric_table import METRICS
 from analysis.runs.proximity import Proximity
 from analysis.runs.run_report import summary_rows
 from analysis.views.block_diagram import write_block_diagram
+from analysis.views.framing import run_title
 from analysis.views.picture import plot_trajectory
 from analysis.views.replay import write_replay
-from analysis.views.run_page import run_page
 from analysis.views.time_series import plot_time_series
 from diagrams import RunResult, build_sound_follower, write_scenario
+
+#: Other files in the directory of the page, and their contents.
+_FILES = {
+    "replay.html": "the run in three dimensions, with curves over time",
+    "trajectory.parquet": "one row per tick, SI units",
+    "scenario.yaml": "all inputs of the run; `phonotaxis simulate` runs it again",
+    "summary.json": "the numbers of this page, for programs",
+}
 
 
 def write_run(
@@ -51,7 +72,7 @@ def write_run(
     write_replay(result, directory / "replay.html", clearance)
     rows = summary_rows(result, summary)
     (directory / "report.html").write_text(
-        run_page(result, rows, summary, directory), "utf-8"
+        _page(result, rows, summary, directory), "utf-8"
     )
 
 
@@ -71,3 +92,95 @@ def _write_pictures(
     if result.several:
         for name, parts in follower.robots.items():
             write_block_diagram(parts.diagram, directory / f"diagram_{name}.svg")
+
+
+def _page(
+    result: RunResult,
+    rows: Mapping[str, str],
+    summary: Mapping[str, Any],
+    directory: Path,
+) -> str:
+    """Returns an HTML page about a run, for the directory of the run.
+
+    The page shows only pictures and files that are in this directory. The rows are from
+    ``summary_rows``, and the summary is from ``run_summary``.
+    """
+
+    def there(name: str) -> bool:
+        return (directory / name).is_file()
+
+    parts = {"Summary": _summary(result, rows, has_replay=there("replay.html"))}
+    if there("trajectory.png"):
+        caption = "The run from above, in W. Times are in seconds."
+        parts["From above"] = [picture("trajectory.png", caption)]
+    whose = {f"_{name}": f": {name}" for name in result.several} or {"": ""}
+    for title, file, text, owners in (
+        ("Over time", "time_series{}.png", "Sensors and commands over time", whose),
+        ("Blocks", "diagram{}.svg", "Blocks and their connections", {"": "", **whose}),
+    ):
+        shown = [
+            picture(file.format(ending), f"{text}{who}.")
+            for ending, who in owners.items()
+            if there(file.format(ending))
+        ]
+        if shown:
+            parts[title] = shown
+    parts["Figures"] = _figures(result, summary)
+    files = [(name, text) for name, text in _FILES.items() if there(name)]
+    parts["Files"] = [file_links(files)]
+    contents = [(_anchor(title), title) for title in parts]
+    sections = [section(_anchor(title), title, inner) for title, inner in parts.items()]
+    return page(run_title(result), contents, sections)
+
+
+def _anchor(title: str) -> str:
+    return title.lower().replace(" ", "-")
+
+
+def _summary(
+    result: RunResult, rows: Mapping[str, str], *, has_replay: bool
+) -> list[str]:
+    """Returns the warnings and the summary, with a list of rows per robot."""
+    begin = 0
+    parts = [note(f"Warning: `{x.field}`: {x.message}") for x in result.warnings]
+    names = list(rows)
+    starts = [names.index(name) for name in result.several]
+    for end in [*starts, len(names)]:
+        own = names[begin:end]
+        if begin in starts:
+            parts.append(heading(3, own[0]))
+        shown = [
+            (
+                "Ended" if name in result.several else name.split(".")[-1].capitalize(),
+                rows[name],
+            )
+            for name in own
+        ]
+        parts.append(definitions(shown))
+        begin = end
+    if has_replay:
+        watch = [("replay.html", "the whole run as an animation")]
+        if result.collision is not None:
+            moment = max(result.collision.time - 1.0, 0.0)
+            watch.append(
+                (f"replay.html#t={moment:.2f}", "one second before the collision")
+            )
+        parts.append(file_links(watch))
+    return parts
+
+
+def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
+    """Returns a table with one row per metric and one column per robot."""
+    metrics: Mapping[str, Any] = summary["metrics"]
+    prefixes = [f"{name}." for name in result.several] or [""]
+    found = [
+        metric
+        for metric in METRICS.values()
+        if any(f"{prefix}{metric.name}" in metrics for prefix in prefixes)
+    ]
+    rows = [
+        [metric.label, *(metrics.get(f"{prefix}{metric.name}") for prefix in prefixes)]
+        for metric in found
+    ]
+    text = "docs/metrics.md defines each metric."
+    return [paragraph(text), table(["", *(result.several or [""])], rows)]
