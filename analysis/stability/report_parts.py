@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from analysis.reporting.section import Bullets
-from analysis.stability.gain_parts import RECOMMENDED_GAINS
 from analysis.stability.law_analysis import Part
 from analysis.stability.linear_parts import LINEAR_MODELS, OPERATING_POINTS, STEP
-from analysis.stability.margin_parts import MARGINS
+from analysis.stability.margin_parts import HEADING_LOOP, MARGINS, RECOMMENDED_GAINS
 from analysis.stability.nonlinear_parts import (
     CERTIFIED_STARTS,
     CONTACT_OSCILLATION,
@@ -37,7 +36,6 @@ from analysis.stability.sampling_parts import (
     ROOT_LOCI,
     SAMPLING,
 )
-from analysis.stability.search_parts import HEADING_LOOP
 from diagrams import Scenario
 
 #: Parts for a robot that follows a sound. The first part is about operating points,

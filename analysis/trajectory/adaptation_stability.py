@@ -51,10 +51,7 @@ _DRAWN = 600
 
 @dataclass(frozen=True)
 class LyapunovRun:
-    """Lyapunov function V and gains over a run without contacts.
-
-    The gains start at half their desired values.
-    """
+    """Lyapunov function V in a run without contacts from half the desired gains."""
 
     time_s: NDArray[np.float64]
     """(n,) time, s."""
@@ -79,11 +76,7 @@ class LyapunovRun:
 
 @dataclass(frozen=True)
 class Drift:
-    """Drift of the stiffness K under a constant push that the reference model ignores.
-
-    K is computed twice: without limits of the gains, and with those of the scenario
-    ("limited").
-    """
+    """Drift of K under a constant push that the reference model does not include."""
 
     push_n: float
     """Push F, N."""
@@ -103,21 +96,14 @@ class Drift:
 
 @dataclass(frozen=True)
 class Jam:
-    """Stiffness K while a wall blocks the robot, and after the wall is removed.
-
-    The target moves on while the robot is blocked.
-    """
+    """Stiffness K while a wall blocks the robot, and after the wall is removed."""
 
     jam_s: float
     """Duration of the jam, s."""
     after_s: float
     """Simulated time after the jam, s."""
     end_n_m: tuple[float, float]
-    """Stiffness K at the end of the jam, N/m.
-
-    The first value is without limits of the gains. The second value is with the
-    scenario's limits.
-    """
+    """K at the end of the jam without limits, and with those of the scenario, N/m."""
     left_n_m: tuple[float, float]
     """Stiffness K at the end of the run, in the same order; infinite if K diverged."""
 
@@ -156,12 +142,7 @@ class AdaptationStability:
     drift: Drift
     jam: Jam
     critical: CriticalRate
-    """Critical adaptation rate for a target with the amplitude K_e S/K.
-
-    If the target leads by K_e S/K, it pulls the robot through a contact. K_e is the
-    stiffness of contacts, S is the distance at which contacts begin, and K is the
-    stiffness to the target. If K_e is 0, the amplitude is 1 m.
-    """
+    """Critical rate for a target with the amplitude of ``pull_through_m``."""
     products: tuple[CriticalRate, ...]
     """Critical rates for the other amplitudes."""
     bounded: bool

@@ -45,10 +45,7 @@ _WATCHED_S, _DRIVEN_S = 25.0, 40.0
 
 
 class ChainNumbers(NamedTuple):
-    """Parameters of a simulated line of robots (chain), for the compiled code.
-
-    P is a robot's control point ahead of the axle.
-    """
+    """Parameters of a simulated line of robots (chain), for the compiled code."""
 
     gains: tuple[float, float, float, float]
     """K, D, K_e and D_e: stiffness and damping to the target, and those of contacts."""
@@ -65,11 +62,7 @@ class ChainNumbers(NamedTuple):
     top_speed: float
     """Largest speed of P, m/s."""
     motors: tuple[float, float]
-    """Effect of the motor lag over a control period.
-
-    The first value is the share of the old speed in the new speed. The second value is
-    the coasting distance per old speed, s.
-    """
+    """Share of the old speed after a control period, and coasting per old speed, s."""
     late_ticks: int
     """Latency of the observed neighbors, in control periods."""
     tick_s: float
@@ -87,11 +80,7 @@ def _object(
 
 @njit(cache=True)
 def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cover
-    """Positions of the control points P of all robots at each control period.
-
-    The robots start in formation. Their initial speed is that of the first robot's
-    first step.
-    """
+    """Positions P at each control period; the robots start in formation."""
     ticks, robots, tick_s = len(first), len(gaps) + 1, numbers.tick_s
     places = np.empty((ticks, robots))
     begin = (first[1] - first[0]) / tick_s
@@ -231,10 +220,7 @@ def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
 
 @dataclass(frozen=True)
 class BrakedChain:
-    """Gaps in a chain whose first robot brakes from the target's speed to rest.
-
-    P is a robot's control point ahead of the axle.
-    """
+    """Gaps in a chain whose first robot brakes from the target's speed to rest."""
 
     name: str
     time_s: NDArray[np.float64]

@@ -91,10 +91,7 @@ def _frozen(scenario: Scenario, point: RoutePoint) -> FrozenPoint:
 
 @dataclass(frozen=True)
 class GainBounds:
-    """Bounds of stiffness K and damping D of the sampled loop.
-
-    Several fields have one value per delay of the position measurement.
-    """
+    """Bounds of stiffness K and damping D, some for each delay of the position."""
 
     mass: SampledMass
     """Mass, motor lag and control period."""
@@ -109,16 +106,9 @@ class GainBounds:
     today: dict[str, tuple[float, float]]
     """(K, D) of the scenario, for the target alone and with a contact."""
     stable_today_n_m: tuple[float, ...]
-    """Stiffness at which the loop with the scenario's damping becomes unstable, N/m.
-
-    The tuple has one value per delay of the position.
-    """
+    """Stiffness at which the loop with the scenario's damping becomes unstable, N/m."""
     damped_today_n_m: tuple[float, ...]
-    """Stiffness up to which the loop with the scenario's damping is well damped, N/m.
-
-    Well damped means a damping ratio of 0.7 or more. The tuple has one value per delay
-    of the position.
-    """
+    """Stiffness up to which that loop has a damping ratio of at least 0.7, N/m."""
     closed_form_n_m: tuple[float, ...]
     """``stable_today_n_m`` as computed by ``stiffness_bound``, N/m."""
     most_damping_n_s_m: float
@@ -126,11 +116,7 @@ class GainBounds:
     closed_damping_n_s_m: float
     """Largest stable sum of dampers by the formula 2 M/T, N s/m."""
     contacts: float
-    """Largest number of simultaneous contacts for which the loop is stable.
-
-    Each contact has its full damping. If contacts have no damping, the number is
-    infinite.
-    """
+    """Largest stable number of contacts with full damping; infinite without damping."""
     box: tuple[tuple[float, float], tuple[float, float]] | None
     """Ranges of K and of D to which the adaptation is limited; None without limits."""
 

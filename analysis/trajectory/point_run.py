@@ -40,20 +40,14 @@ class PointLoop(NamedTuple):
 
     law: AdaptiveTrajectoryParameters
     poles: tuple[float, float] | None = None
-    """Natural frequency w_n, rad/s, and damping ratio xi of the reference model.
-
-    If None, the gains of the law determine them.
-    """
+    """w_n, rad/s, and xi of the reference model; None: those of the law's gains."""
     robot: RobotParameters = RobotParameters()
     motor_lag_s: float = 0.0
     tick_s: float = TICK_S
 
 
 class PointRun(NamedTuple):
-    """States at each control period, before its updates.
-
-    P is the robot's control point ahead of the axle.
-    """
+    """States at each control period, before its updates. P is the control point."""
 
     motion: NDArray[np.float64]
     """(ticks, 4) position p and velocity v of P's virtual mass, x and y, m and m/s."""

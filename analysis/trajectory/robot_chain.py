@@ -95,29 +95,15 @@ class RobotChain:
     peaks: dict[str, ChainPeak]
     """Largest amplification of each chain, by name of the chain."""
     least_damping_n_s_m: float
-    """Least damping D that does not amplify motions of two robots apart, N s/m.
-
-    The chain has no feed-forward and the stiffness ``stiffness_n_m``. If no tried D
-    suffices, the value is infinite.
-    """
+    """Least D at which a pair apart without feed-forward does not amplify, N s/m."""
     least_damping_in_contact_n_s_m: float
-    """Least damping D that does not amplify motions of eight robots in contact, N s/m.
-
-    The chain has no feed-forward and the stiffness ``stiffness_n_m``. If no tried D
-    suffices, the value is infinite.
-    """
+    """The same for eight robots in contact, N s/m; infinite if no tried D suffices."""
     most_feed_forward: float
-    """Largest ratio of velocity feed-forward that does not amplify motions.
-
-    If motions are amplified even without feed-forward, the value is negative.
-    """
+    """Largest feed-forward without amplification; negative if none is small enough."""
     dampings: NDArray[np.float64]
     """(n,) tried values of D, N s/m."""
     peaks_by_damping: NDArray[np.float64]
-    """(n, 2) largest amplification with and without feed-forward at this K.
-
-    If a single robot is unstable, the value is infinite.
-    """
+    """(n, 2) largest amplification with and without feed-forward; inf if unstable."""
 
     @property
     def time_headway_s(self) -> float:

@@ -48,10 +48,7 @@ MARGIN, HEADER, ROW, TRACK, GAP, CHARACTER = 24, 42, 20, 9, 36, 6.7
 
 @dataclass(frozen=True)
 class Wire:
-    """A wire from an output port of one block to an input port of another block.
-
-    All fields are names of blocks and ports.
-    """
+    """The names of two connected ports, and of their blocks."""
 
     source: str
     output: str
@@ -180,9 +177,8 @@ def _arrange(systems: Sequence[Any], connections: Sequence[Wire]) -> _Layout:
 
 
 def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
-    """Assigns each box to a column of the picture.
+    """Assigns each box to a column, after all boxes whose outputs it reads.
 
-    The first column is on the left. A box comes after all boxes whose outputs it reads.
     Boxes then move to the right, up to the boxes that read their outputs. Wires that
     close a loop, or that go back to an earlier stage, do not count.
     """

@@ -60,15 +60,7 @@ _MARKS: dict[type, dict[str, Any]] = {
 
 
 class RunFrames:
-    """Draws a run from above at any time of the run.
-
-    The picture shows:
-
-    - robots with their microphones, sensor cones and paths
-    - sources, with rings while they sound
-    - the source position that each robot estimates
-    - obstacles, walls, and touched bodies
-    """
+    """Draws a run from above at any time of the run, as in ``plot_trajectory``."""
 
     def __init__(self, result: RunResult) -> None:
         self._result, scene = result, make_scene(result)

@@ -167,10 +167,9 @@ def _robot_frames(
     tick: int,
     time: float,
 ) -> Iterator[Message]:
-    """Yields the transforms of the frames of one robot.
+    """Yields the transforms of the robot frame B, of P, and of each range sensor.
 
-    The frames are the robot frame B, a frame at the control point P, and a frame for
-    each range sensor. The x axis of a sensor's frame is the axis of its cone.
+    The x axis of a sensor's frame is the axis of its cone.
     """
     base, ahead = f"{name}/base_link", robot.robot.control_point_m
     at = [float(own[key][tick]) for key in _POSES["pose"]]
@@ -237,10 +236,7 @@ def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Mes
 def _body_markers(
     bodies: Mapping[str, Thing], room: RoomParameters | None, names: Mapping[str, str]
 ) -> list[Message]:
-    """Returns one ``Marker`` message per robot, source and obstacle, and one for walls.
-
-    Each marker moves with its frame. ``names`` has the name of the frame of each body.
-    """
+    """Returns one ``Marker`` message per body in its frame, and one for the walls."""
     markers = []
     for name, body in bodies.items():
         frame = names[name]
@@ -333,10 +329,7 @@ def _stamped_pose(time: float, at: Sequence[float]) -> Message:
 
 
 def _transform(time: float, parent: str, child: str, at: Sequence[float]) -> Message:
-    """Returns a ``TransformStamped`` message.
-
-    ``at`` is the pose (x, y, theta) of the child frame in the parent frame, m and rad.
-    """
+    """Returns a ``TransformStamped`` message with the pose of a child in its parent."""
     x, y, theta = at
     placed = {"translation": _vector(x, y), "rotation": _turn(theta)}
     return _stamped(time, parent, child_frame_id=child, transform=placed)

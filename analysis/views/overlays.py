@@ -187,10 +187,7 @@ def _arrow(
 
 
 def _guards(scene: Scene) -> Iterator[Layer]:
-    """Yields the edge of the disc that each safety guard keeps free.
-
-    If the robot braked now, its axle would stop at the center of the disc.
-    """
+    """Yields the edge of the disc that each guard keeps free where the robot stops."""
     things = []
     for name, own in scene.result.robots.items():
         motion = guarded_motion(own)
@@ -215,10 +212,7 @@ def _guards(scene: Scene) -> Iterator[Layer]:
 
 
 def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
-    """Yields a ring around each body that a control law takes as moving.
-
-    The radius of the ring shows the uncertainty of the position.
-    """
+    """Yields a ring per tracked body; its radius is the uncertainty of the position."""
     things, colour, plans = [], COLOURS["tracked"], False
     for name, own in scene.result.robots.items():
         tracked = tracked_bodies(own, times)
@@ -255,11 +249,7 @@ def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
 
 
 def _lamps(scene: Scene) -> Iterator[Layer]:
-    """Yields a lamp above each searching robot, and a flash for each radio frame.
-
-    The flash is for radio frames that the sink receives. The sink is the computer of
-    the operator.
-    """
+    """Yields a lamp above each searcher, and flashes for radio frames at the sink."""
     things = []
     for name, own in scene.result.robots.items():
         if own.scenario.only.searches is None:

@@ -56,18 +56,12 @@ CONE_INSTANTS = 4
 
 
 def plot_trajectory(result: RunResult) -> Figure:
-    """Draws the run from above, in the world frame W.
+    """Draws the run from above at a few times, in the world frame W.
 
-    At a few times, the picture shows:
-
-    - the rectangle of the robot with its microphone bar
-    - the source and the moving obstacles
-    - the cones of the range sensors, up to the range readings
-
-    Labels show the times. With ideal obstacle sensing, there are no cones. For a robot
-    with a safety guard, the floor that the robot knew at the end replaces the cones.
-    Crosses show the source positions that the robot estimated. Early estimates are
-    faint, and late estimates are strong.
+    With ideal obstacle sensing, there are no cones. For a robot with a safety guard,
+    the floor that the robot knew at the end replaces the cones. Crosses show the source
+    positions that the robot estimated. Early estimates are faint, and late estimates
+    are strong.
     """
     figure, axes = map_axes(result)
     draw_grid(axes)
@@ -88,10 +82,10 @@ def plot_trajectory(result: RunResult) -> Figure:
 
 
 def map_axes(result: RunResult) -> tuple[Figure, Axes]:
-    """Makes axes with equal scales that show all bodies, with space for a legend below.
+    """Makes axes in W, m, with equal scales for all bodies, and space for a legend.
 
     The aspect ratio of the axes is limited. If necessary, the axes show more of the
-    floor. The unit of the axes is m, in the world frame W.
+    floor.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
     width = WIDTH_IN - LEFT_IN - RIGHT_IN

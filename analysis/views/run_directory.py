@@ -47,17 +47,7 @@ def write_run(
     *,
     pictures: bool = True,
 ) -> None:
-    """Writes all files of a run into an existing directory.
-
-    The files are:
-
-    - ``scenario.yaml``: the complete scenario, which can be run again
-    - ``scenario.schema.json``: the schema of this scenario file
-    - ``summary.json``: the summary from ``run_summary``
-    - ``trajectory.parquet``: the table with one row per tick (control period)
-    - ``replay.html``: the replay in three dimensions
-    - ``trajectory.png``, ``time_series.png`` and ``diagram.svg``: the pictures
-    - ``report.html``: a page with the pictures, and with links to other files
+    """Writes all files of a run into an existing directory; docs/runs.md lists them.
 
     With several robots, each robot has its own ``time_series_<name>.png`` and
     ``diagram_<name>.svg``. The file ``diagram.svg`` then shows how the robots are
@@ -100,11 +90,7 @@ def _page(
     summary: Mapping[str, Any],
     directory: Path,
 ) -> str:
-    """Returns an HTML page about a run, for the directory of the run.
-
-    The page shows only pictures and files that are in this directory. The rows are from
-    ``summary_rows``, and the summary is from ``run_summary``.
-    """
+    """Returns the page of a run; it shows only files that are in the directory."""
 
     def there(name: str) -> bool:
         return (directory / name).is_file()
