@@ -15,8 +15,8 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
     The name ``all`` means all force laws except ``none``. For a robot on a route,
     ``all`` means all laws for routes. For a robot that searches, ``all`` means the law
     of the scenario. If there are no names, the law of the scenario is chosen. A law
-    that is named twice has one copy. InputError if a law does not exist, or if it
-    cannot be analyzed for this robot.
+    that is named twice has one copy. The function raises an InputError if a law does
+    not exist, or if it cannot be analyzed for this robot.
     """
     routed = scenario.only.kind == "router"
     every = list(ROUTE_LAWS if routed else FORCE_LAWS)
@@ -55,8 +55,8 @@ def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
     """Returns a scenario with only one robot, and a text that lists the other robots.
 
     The scenario also contains the source that the robot follows. Without a name, the
-    first robot is chosen. The text is empty if there are no other robots. InputError if
-    the scenario has no robot with this name.
+    first robot is chosen. The text is empty if there are no other robots. The function
+    raises an InputError if the scenario has no robot with this name.
     """
     names = list(scenario.robots)
     if name is not None and name not in names:

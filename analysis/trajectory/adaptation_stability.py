@@ -158,7 +158,7 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
     """Analyzes the stability of the gain adaptation of a robot on a route.
 
     The results come from formulas, and from simulations of a point mass with motor lag.
-    InputError if the law does not adapt its gains.
+    The function raises an InputError if the law does not adapt its gains.
     """
     own = route_law(scenario)
     if not isinstance(own, AdaptiveTrajectoryParameters):

@@ -66,7 +66,8 @@ class FrozenPoint:
 def frozen_gains(scenario: Scenario) -> tuple[FrozenPoint, ...]:
     """Computes poles and margins at each operating point of ``route_points``.
 
-    InputError if the law is not for a route, or if the wheels can slip.
+    The function raises an InputError if the law is not for a route, or if the wheels
+    can slip.
     """
     return tuple(_frozen(scenario, point) for point in route_points(scenario))
 
@@ -125,7 +126,8 @@ def gain_bounds(scenario: Scenario) -> GainBounds:
     """Computes bounds of stiffness K and damping D by bisection.
 
     Stability follows from the eigenvalues of the blocks' state matrix over one control
-    period. InputError if the law is not for a route, or if the wheels can slip.
+    period. The function raises an InputError if the law is not for a route, or if the
+    wheels can slip.
     """
     own = route_law(scenario)
     of = SampledMass(

@@ -117,7 +117,8 @@ def robot_chain(scenario: Scenario) -> RobotChain:
     All robots are like the scenario's robot. Each robot's target is a fixed distance
     behind the robot ahead, and has the velocity of the robot ahead. The object sensor
     measures the position of the robot ahead. The velocity is computed from the last two
-    positions. InputError if the law is not for a route, or if the wheels can slip.
+    positions. The function raises an InputError if the law is not for a route, or if
+    the wheels can slip.
     """
     own = route_law(scenario)
     k, d = own.stiffness_n_m, own.damping_n_s_m

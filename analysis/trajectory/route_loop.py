@@ -52,7 +52,8 @@ class RoutePoint:
 def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
     """Returns the parameters of the law of the scenario's only robot.
 
-    InputError if the robot has no route, or if its law is not for a route.
+    The function raises an InputError if the robot has no route, or if its law is not
+    for a route.
     """
     if scenario.only.kind != "router" or scenario.only.law not in ROUTE_LAWS:
         raise InputError(
@@ -103,8 +104,8 @@ def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
     those of the simulation. Each block is linearized by AutoDiff. The blocks are
     connected by the names of their ports. States that are not controllable or not
     observable are removed. The model assumes that the safety filter is inactive, that
-    gains do not adapt, and that no limit is reached. InputError if the law is not for a
-    route, or if the wheels can slip.
+    gains do not adapt, and that no limit is reached. The function raises an InputError
+    if the law is not for a route, or if the wheels can slip.
     """
     return minimal_model(whole_route_model(scenario, point))
 
@@ -208,31 +209,25 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
         read_after=True,
     )
     before = [-speed * tick_s, 0.0, 0.0, *(-tick_s * wheels)]
-    models = (
-        (plant, driven),
-        (
-            odometry,
-            block_model(
-                odometry, np.array(before), [np.zeros(2), wheels], period_s=tick_s
-            ),
-        ),
-        (
-            law,
-            block_model(law, np.empty(0), [target, objects, pose, v], period_s=tick_s),
-        ),
-        (
-            command,
-            block_model(
-                command,
-                np.array([*v, *wheels]),
-                [np.zeros(2), pose],
-                period_s=tick_s,
-                held={"wheel_speeds"},
-            ),
-        ),
+    moved = block_model(
+        odometry, np.array(before), [np.zeros(2), wheels], period_s=tick_s
     )
-    named = tuple(_named(block, model) for block, model in models)
-    return (*named, _seen_wall(scenario, point))
+    inputs = [target, objects, pose, v]
+    pulled = block_model(law, np.empty(0), inputs, period_s=tick_s)
+    commanded = block_model(
+        command,
+        np.array([*v, *wheels]),
+        [np.zeros(2), pose],
+        period_s=tick_s,
+        held={"wheel_speeds"},
+    )
+    return (
+        _named(plant, driven),
+        _named(odometry, moved),
+        _named(law, pulled),
+        _named(command, commanded),
+        _seen_wall(scenario, point),
+    )
 
 
 def _named(block: Block, model: LinearModel) -> LinearModel:

@@ -100,8 +100,8 @@ def panels(result: RunResult, clearance: ArrayLike | None = None) -> list[Panel]
     """Returns all panels of one robot's picture over time.
 
     The (n,) clearance is the distance to the nearest body at each tick (control
-    period), m (``analysis.runs.proximity``). Without it, there is no such panel.
-    InputError if it does not have one value per tick.
+    period), m (``analysis.runs.proximity``). Without it, there is no such panel. The
+    function raises an InputError if it does not have one value per tick.
     """
     robot, columns = result.scenario.only, result.columns
     wanted: list[Callable[[RunResult], Panel]]

@@ -71,7 +71,7 @@ def write_mcap(run: RecordedRun, path: Path) -> None:
     """Writes a run as an MCAP file. docs/exports.md lists the topics of the file.
 
     The times in the file start at 0, as in the run. Two files of the same run have
-    equal bytes. InputError if a package is not installed.
+    equal bytes. The function raises an InputError if a package is not installed.
     """
     require_mcap()
     from mcap_ros2.writer import Writer

@@ -64,8 +64,8 @@ class MovieFile:
 
         A frame has (rows, columns, 3) red, green and blue values. The sound file has
         one channel per microphone, the leftmost microphone first. The two outer
-        microphones become the left and the right channel. RunError if the encoder
-        fails, or if the file cannot be written.
+        microphones become the left and the right channel. The function raises a
+        RunError if the encoder fails, or if the file cannot be written.
         """
         handle, partial = tempfile.mkstemp(
             prefix=".movie.", suffix=self.path.suffix, dir=self.path.parent

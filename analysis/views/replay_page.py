@@ -127,10 +127,8 @@ def _panels(
 def _entry(layer: Layer) -> str:
     parts = "".join(f'<i style="background:{colour}"></i>' for colour in layer.colours)
     swatch = f'<span class="swatch">{parts}</span>'
-    label, small = (
-        html.escape(layer.label),
-        f"<small>{html.escape(layer.meaning)}</small>",
-    )
+    label = html.escape(layer.label)
+    small = f"<small>{html.escape(layer.meaning)}</small>"
     if not layer.switched:
         return f"<li>{swatch}{label}{small if layer.meaning else ''}</li>"
     paths = html.escape(json.dumps(_hidden(layer)))
